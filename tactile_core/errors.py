@@ -1,0 +1,27 @@
+"""The one error a user meets: what is wrong, where, what was expected, what to do."""
+
+from __future__ import annotations
+
+import os
+
+
+class TactileError(Exception):
+    """Bad input or a job that cannot be done; the command line prints it in one line and exits with code 2.
+
+    where : the file, and row or field in it, such as ``"touch.csv, row 17, ele3"``
+    found : what is there
+    expected : what should be there
+    advice : what the user can do, an imperative sentence
+    """
+
+    def __init__(self, where: str | os.PathLike, found: str, expected: str = "", advice: str = "") -> None:
+        self.where, self.found, self.expected, self.advice = os.fspath(where), found, expected, advice
+        super().__init__(self._sentence())
+
+    def _sentence(self) -> str:
+        text = f"{self.where}: {self.found}"
+        if self.expected:
+            text += f"; expected {self.expected}"
+        if self.advice:
+            text += f". {self.advice}"
+        return text
