@@ -1,0 +1,61 @@
+"""A structured sensor surface: nodes on a grid of two parameters, and its triangles."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class Lattice:
+    """A surface whose nodes lie on a (rows, columns) grid.
+
+    rest : (n_nodes, 3) float64, m, the undeformed surface in the shared frame of ``sensors``
+    faces : (n_faces, 3) int32, triangles, normals outward
+    shape : (rows, columns), node index = row * columns + column; a surface that closes at poles
+        carries them after the grid (tip pole first, base pole last)
+    window : the (rows, columns) slices inside which the grid is exactly separable
+        (x depends on the row alone and z on the column alone, both evenly spaced); None where there is none
+    """
+
+    rest: np.ndarray
+    faces: np.ndarray
+    shape: tuple[int, int]
+    window: tuple[slice, slice] | None = None
+
+    def __post_init__(self) -> None:
+        self.rest.flags.writeable = False
+        self.faces.flags.writeable = False
+
+    @property
+    def sha256(self) -> str:
+        """Name of this surface in files: hash of the rest nodes rounded to 1 nm, so that two builds agree."""
+        rounded = np.round(self.rest * 1e9).astype("<i8")
+        return hashlib.sha256(rounded.tobytes()).hexdigest()
+
+    def grid(self, values: np.ndarray) -> np.ndarray:
+        """Values at nodes (..., n_nodes, k) as a grid (..., rows, columns, k); poles left out."""
+        rows, columns = self.shape
+        values = np.asarray(values)
+        return values[..., : rows * columns, :].reshape(*values.shape[:-2], rows, columns, values.shape[-1])
+
+
+def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
+    """Two triangles a cell of a grid whose rows and columns run so that (row x column) points outward.
+
+    closed : the last column joins the first. Returns (n, 3) int32.
+    """
+    row = np.arange(rows - 1)[:, None]
+    column = np.arange(columns if closed else columns - 1)[None, :]
+    right = (column + 1) % columns
+    a, b = row * columns + column, (row + 1) * columns + column
+    c, d = (row + 1) * columns + right, row * columns + right
+    quads = np.stack([a, b, c, d], -1).reshape(-1, 4)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
+
+
+def cap_faces(pole: int, ring: np.ndarray) -> np.ndarray:
+    """A fan of triangles that closes a ring of nodes at a pole; (n, 3) int32."""
+    return np.stack([np.full(len(ring), pole), ring, np.roll(ring, -1)], -1).astype(np.int32)
