@@ -1,0 +1,128 @@
+"""Scenes: TOML files that say what presses where. Units stand in the field names; unknown fields are refused."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from .errors import TactileError
+from .indenters import Cylinder, Indenter, Sphere
+
+FORMAT = "tactile-scene-1"
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+
+
+class SphereSpec(msgspec.Struct, tag="sphere", tag_field="kind", forbid_unknown_fields=True, frozen=True):
+    """A ball."""
+
+    name: str
+    radius_mm: Positive
+
+    def build(self) -> Indenter:
+        """The indenter, in metres."""
+        return Sphere(self.radius_mm * 1e-3)
+
+
+class CylinderSpec(msgspec.Struct, tag="cylinder", tag_field="kind", forbid_unknown_fields=True, frozen=True):
+    """An upright cylinder that touches with its flat, rounded end."""
+
+    name: str
+    radius_mm: Positive
+    edge_mm: Positive = 0.5
+
+    def build(self) -> Indenter:
+        """The indenter, in metres."""
+        return Cylinder(self.radius_mm * 1e-3, self.edge_mm * 1e-3)
+
+
+class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """How paired contacts are drawn: places evenly over the gel, tilts evenly over a cone, force growing by a ratio."""
+
+    force_min_n: Positive = 0.02
+    force_ratio: Annotated[float, Meta(gt=1)] = 1.4
+    tilt_max_deg: Annotated[float, Meta(ge=0, le=45)] = 20.0
+    rim_margin_mm: NotNegative = 1.0
+    depth_max_mm: Positive = 1.2
+
+
+class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A moment of a recorded motion: where the indenter is on the DIGIT's (unrolled) plane, and how hard it presses."""
+
+    time_s: NotNegative
+    x_mm: float
+    z_mm: float
+    force_n: NotNegative
+
+
+class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A simulated recording: the motion, linear between its points, and the defects of real electrodes."""
+
+    indenter: str
+    points: Annotated[list[PointSpec], Meta(min_length=2)]
+    noise_counts: NotNegative = 1.0
+    drift_counts: NotNegative = 3.0
+    tilt_deg: Annotated[float, Meta(ge=0, le=45)] = 0.0
+
+
+class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One scene file."""
+
+    format: str
+    name: str
+    description: str
+    indenters: Annotated[list[SphereSpec | CylinderSpec], Meta(min_length=1)]
+    pairs: PairSpec | None = None
+    recording: RecordingSpec | None = None
+
+
+def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
+    """The scene in a ``scene.toml`` (or in the folder that holds one), and its text.
+
+    Raises TactileError naming file and field for anything unreadable, unknown or out of range.
+    """
+    file = pathlib.Path(path)
+    file = file / "scene.toml" if file.is_dir() else file
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise TactileError(file, f"cannot be read ({error})", "a scene.toml or a folder that holds one") from error
+    try:
+        scene = msgspec.toml.decode(text, type=Scene)
+    except msgspec.DecodeError as error:
+        raise TactileError(file, str(error), "the fields of scenes/press_sphere/scene.toml") from error
+    _check(file, scene)
+    return scene, text
+
+
+def _check(file: pathlib.Path, scene: Scene) -> None:
+    if scene.format != FORMAT:
+        raise TactileError(f"{file}, format", repr(scene.format), repr(FORMAT))
+    numbers = list(_numbers(msgspec.to_builtins(scene)))
+    if not np.isfinite(numbers).all():
+        raise TactileError(file, "a number is nan or infinite", "finite numbers")
+    names = [spec.name for spec in scene.indenters]
+    if len(set(names)) < len(names):
+        raise TactileError(f"{file}, indenters", f"names {names}", "different names")
+    if scene.recording is None:
+        return
+    if scene.recording.indenter not in names:
+        raise TactileError(f"{file}, recording.indenter", repr(scene.recording.indenter), f"one of {names}")
+    times = [point.time_s for point in scene.recording.points]
+    if times != sorted(set(times)):
+        raise TactileError(f"{file}, recording.points", f"time_s {times}", "growing times")
+
+
+def _numbers(value):  # noqa: ANN001, ANN202 (any nesting of dict, list and numbers)
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from _numbers(item)
+    elif isinstance(value, float):
+        yield value
