@@ -1,0 +1,96 @@
+"""Structured solids of 27-node hexahedra: the BioTac's skin and the DIGIT's gel."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from .. import biotac_shape, digit_shape
+from ..lattice import Lattice
+
+SKIN_LAYERS = 5  # nodes through the skin: two quadratic elements
+# Through the gel, 0 = bonded back, 1 = surface: three quadratic elements, thinner toward the contact.
+GEL_LAYERS = np.array([0.0, 0.25, 0.5, 0.65, 0.8, 0.9, 1.0])
+
+
+@dataclasses.dataclass(frozen=True)
+class HexMesh:
+    """A solid of quadratic hexahedra.
+
+    nodes : (n, 3) float64, m
+    cells : (n_cells, 27) int, node a + 3 b + 9 c of a cell at (xi, eta, zeta) = (a, b, c) - 1
+    clamped : (n,) bool, nodes that do not move
+    surface : (n_surface,) int, the mesh node of each node of the sensor's surface lattice
+    inner : (n_inner,) int, likewise for the inner skin (empty for the gel)
+    """
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    clamped: np.ndarray
+    surface: np.ndarray
+    inner: np.ndarray
+
+
+def hex_cells(ids: np.ndarray) -> np.ndarray:
+    """Cells (n, 27) of 27-node hexahedra on a grid of node numbers (odd, odd, odd).
+
+    Repeated numbers collapse an edge or a face, as at the skin's poles.
+    """
+    if any(size % 2 == 0 for size in ids.shape):
+        raise ValueError(f"a grid of quadratic cells has odd sizes, got {ids.shape}")
+    a, b, c = (slice(0, size - 2, 2) for size in ids.shape)
+    corner = [ids[_shift(a, i), _shift(b, j), _shift(c, k)] for k in range(3) for j in range(3) for i in range(3)]
+    return np.stack(corner, -1).reshape(-1, 27)
+
+
+def _shift(part: slice, by: int) -> slice:
+    return slice(part.start + by, part.stop + by, part.step)
+
+
+@functools.cache
+def gel_mesh() -> HexMesh:
+    """The DIGIT's gel, bonded at its flat back; about 15,800 nodes."""
+    surface = digit_shape.gel_surface()
+    top = surface.grid(surface.rest)
+    back = top.copy()
+    back[..., 1] = digit_shape.BACK_Y
+    nodes = back[..., None, :] + GEL_LAYERS[:, None] * (top - back)[..., None, :]
+    ids = np.arange(nodes[..., 0].size).reshape(nodes.shape[:-1])
+    clamped = np.zeros(ids.size, bool)
+    clamped[ids[..., 0]] = True
+    return HexMesh(nodes.reshape(-1, 3), hex_cells(ids), clamped, ids[..., -1].ravel(), np.empty(0, int))
+
+
+@functools.cache
+def skin_mesh() -> HexMesh:
+    """The BioTac's skin, clamped where its inner side lies on or in the rigid core; about 18,200 nodes."""
+    outer, inner = biotac_shape.skin_grid("outer"), biotac_shape.skin_grid("inner")
+    through = np.linspace(0, 1, SKIN_LAYERS)
+    grid = inner[..., None, :] + through[:, None] * (outer - inner)[..., None, :]
+    stations, columns = outer.shape[:2]
+    ring = np.arange((stations - 2) * columns * SKIN_LAYERS).reshape(stations - 2, columns, SKIN_LAYERS)
+    tip, base = ring.size + np.arange(SKIN_LAYERS), ring.size + SKIN_LAYERS + np.arange(SKIN_LAYERS)
+    poles = [np.broadcast_to(pole, (1, columns, SKIN_LAYERS)) for pole in (tip, base)]
+    ids = np.concatenate([poles[0], ring, poles[1]])
+    nodes = np.concatenate([grid[1:-1].reshape(-1, 3), grid[0, 0], grid[-1, 0]])
+    closed = np.concatenate([ids, ids[:, :1]], axis=1)
+
+    def surface_ids(layer: int) -> np.ndarray:
+        return np.concatenate([ring[..., layer].ravel(), tip[[layer]], base[[layer]]])
+
+    clamped = np.zeros(len(nodes), bool)
+    clamped[surface_ids(0)] = _on_core(biotac_shape.skin_surface("inner"))
+    return HexMesh(nodes, hex_cells(closed), clamped, surface_ids(-1), surface_ids(0))
+
+
+_ATTACHED = 0.02e-3  # m, nodes this close to the core are glued to it: 532 nodes of the public mesh
+_BASE_CAP_X = 4.9e-3  # m, the inner base cap rests on the core (public mesh: 0.024 mm inside it)
+
+
+def _on_core(inner: Lattice) -> np.ndarray:
+    x, y, z = inner.rest.T
+    radius = np.hypot(y - biotac_shape.AXIS_Y, z)
+    core = biotac_shape.core_radius(x, np.arctan2(z, biotac_shape.AXIS_Y - y))
+    return (np.nan_to_num(core, nan=-1.0) >= radius - _ATTACHED) | (x > _BASE_CAP_X)

@@ -1,0 +1,148 @@
+"""Contact against textbook layers, and the laws every contact keeps."""
+
+import numpy as np
+import pytest
+from slab import slab_compliance
+
+from tactile_core import surface
+from tactile_core.indenters import Cylinder, Sphere, pose_on
+from tactile_core.mechanics import contact as contact_room
+from tactile_core.mechanics.compliance import biotac_compliance, digit_compliance
+from tactile_core.mechanics.contact import ContactProblem, surface_displacement, watched_gaps
+from tactile_core.mechanics.press import MAX_DEPTH, Placement, Press, biotac_pose, digit_pose
+from tactile_core.sensors import Material
+
+THICKNESS, RADIUS = 3e-3, 3.5e-3
+DOWN = np.array([0.0, -1.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def layer():
+    """A bonded layer of 3 mm, E = 1 MPa, nu = .49, with nodes every 0.24 mm under the indenter."""
+    fine = np.linspace(-2.4e-3, 2.4e-3, 21)
+    far = np.linspace(2.4e-3, 12e-3, 9)[1:]
+    x = np.r_[-far[::-1], fine, far]
+    y = -np.array([0, 0.25, 0.5, 0.7, 0.8, 0.9, 1]) * THICKNESS
+    return slab_compliance(x, x, y, Material(1e6, 0.49), reach=2.3e-3)
+
+
+def press_layer(layer, depth):
+    ball = Sphere(RADIUS)
+    problem = ContactProblem(layer, ball, pose_on(ball, np.array([0, -THICKNESS, 0]), DOWN), depth)
+    return problem.at_depth(depth)
+
+
+def dimitriadis(depth: float, youngs: float = 1e6, nu: float = 0.49) -> float:
+    """Force on a ball on a bonded layer. Dimitriadis et al., Biophys. J. 82, 2002, equation 13."""
+    chi = np.sqrt(RADIUS * depth) / THICKNESS
+    a = -(1.2876 - 1.4678 * nu + 1.3442 * nu**2) / (1 - nu)
+    b = (0.6387 - 1.0277 * nu + 1.5164 * nu**2) / (1 - nu)
+    series = (
+        1 - 2 * a / np.pi * chi + 4 * a**2 / np.pi**2 * chi**2
+        - 8 / np.pi**3 * (a**3 + 4 * np.pi**2 / 15 * b) * chi**3
+        + 16 * a / np.pi**4 * (a**3 + 3 * np.pi**2 / 5 * b) * chi**4
+    )  # fmt: skip
+    return 4 / 3 * youngs / (1 - nu**2) * np.sqrt(RADIUS) * depth**1.5 * series
+
+
+@pytest.mark.parametrize("depth", [0.05e-3, 0.1e-3, 0.2e-3])
+def test_force_on_a_bonded_layer(layer, depth):
+    # 4 %: with 13 to 49 nodes in contact the edge of the patch is known to half a node spacing; at twice as many nodes
+    # the three depths are within 1.5 % (1.006, 0.998, 0.985)
+    assert press_layer(layer, depth).axial_force == pytest.approx(dimitriadis(depth), rel=0.04)
+
+
+def test_force_of_the_converged_finite_strain_reference(layer):
+    # Golden number of shared/design/mechanics.md; the linear model is 1.5 % low at this depth (7 % of the thickness).
+    assert press_layer(layer, 0.2e-3).axial_force == pytest.approx(0.4176, rel=0.025)
+
+
+def test_linear_model_is_softer_than_finite_strain_when_deep(layer):
+    ratio = press_layer(layer, 0.6e-3).axial_force / 2.9513
+    assert 0.80 < ratio < 0.90  # the honest size of what is left out at 20 % of the thickness: -15 %
+
+
+def sensors_and_poses(indenter, place):
+    return [(biotac_compliance(), biotac_pose(indenter, place)), (digit_compliance(), digit_pose(indenter, place))]
+
+
+PLACES = [Placement(-8e-3, 0.0), Placement(-14e-3, 4e-3, 0.3, 1.0), Placement(-3e-3, -6e-3, 0.15, 4.0)]
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("indenter", [Sphere(3.5e-3), Sphere(7e-3), Cylinder(3e-3, 0.5e-3)], ids=str)
+def test_no_penetration_no_tension_balance(indenter, place):
+    for compliance, pose in sensors_and_poses(indenter, place):
+        contact = ContactProblem(compliance, indenter, pose, 0.5e-3).at_depth(0.5e-3)
+        assert contact.converged
+        moved = compliance.surface.rest + surface_displacement(compliance, contact)
+        distance, normal = pose.moved(contact.depth).distance(indenter, moved[compliance.touchable])
+        assert distance.min() > -1e-6  # m, the penetration MECHANICS allows
+        pressing = np.einsum("ki,ki->k", contact.nodal_force, normal[contact.nodes])
+        assert (pressing > 0).all()
+        sideways = contact.nodal_force - pressing[:, None] * normal[contact.nodes]
+        # frictionless: a force lies along the normal to the solver's own tolerance, 1e-3 rad a component
+        assert np.abs(sideways).max() < 2e-3 * pressing.max()
+        np.testing.assert_allclose(contact.force, contact.nodal_force.sum(0), rtol=1e-12)
+
+
+def test_force_control_meets_the_force_and_agrees_with_depth_control():
+    ball, place = Sphere(3.5e-3), PLACES[0]
+    for compliance, pose in sensors_and_poses(ball, place):
+        by_force = Press(compliance, ball, pose).at_force(0.3)
+        by_depth = ContactProblem(compliance, ball, pose, MAX_DEPTH).at_depth(by_force.depth)
+        assert by_force.axial_force == pytest.approx(0.3, rel=1e-9)
+        # gaps are closed to 0.05 um of about 500 um
+        assert by_depth.axial_force == pytest.approx(0.3, rel=1e-3)
+
+
+def test_a_force_beyond_the_range_gives_no_contact():
+    ball = Sphere(3.5e-3)
+    assert Press(biotac_compliance(), ball, biotac_pose(ball, PLACES[0])).at_force(50.0) is None
+
+
+def test_mirrored_place_gives_mirrored_displacement():
+    ball = Sphere(7e-3)
+    for (compliance, left), (_, right) in zip(
+        sensors_and_poses(ball, Placement(-9e-3, 3e-3)), sensors_and_poses(ball, Placement(-9e-3, -3e-3)), strict=True
+    ):
+        a, b = (
+            surface_displacement(compliance, ContactProblem(compliance, ball, pose, 4e-4).at_depth(4e-4))
+            for pose in (left, right)
+        )
+        rest = compliance.surface.rest
+        keys = {tuple(key): i for i, key in enumerate(np.round(rest * 1e8).astype(int).tolist())}
+        image = [keys[x, y, -z] for x, y, z in np.round(rest * 1e8).astype(int).tolist()]
+        np.testing.assert_allclose(a, b[image] * [1, 1, -1], atol=2e-7)  # m: gaps are closed to 0.05 um on each side
+
+
+def test_fluid_keeps_its_volume():
+    """Pressing lowers the film under the ball and lifts it at the sides: the fluid does not vanish."""
+    ball = Sphere(3.5e-3)
+    skin = biotac_compliance()
+    contact = ContactProblem(skin, ball, biotac_pose(ball, PLACES[0]), 8e-4).at_depth(8e-4)
+    change = watched_gaps(skin, contact) - skin.watch_gap
+    assert change[17] < -0.2e-3  # E18, under the ball
+    assert change[19:].max() > 0.02e-3
+    outer = surface_displacement(skin, contact)
+    lattice = skin.surface
+    areas = surface.node_areas(lattice.rest, lattice.faces)[:, None] * surface.node_normals(lattice.rest, lattice.faces)
+    swelling, dented = (outer * areas).sum(), np.abs(outer * areas).sum()
+    # skin and fluid are nearly incompressible (nu = .48): what goes in comes out elsewhere, but for a few per cent
+    assert abs(swelling) < 0.05 * dented
+
+
+def test_cycling_active_set_is_broken(monkeypatch):
+    """Even when every set were to come back, one node at a time settles it."""
+    seen_all = type("SeenAll", (set,), {"__contains__": lambda self, key: True})
+    monkeypatch.setattr(contact_room, "set", seen_all, raising=False)
+    monkeypatch.setattr(contact_room, "MAX_ITERATIONS", 400)
+    ball = Sphere(3.5e-3)
+    gel = digit_compliance()
+    pose = digit_pose(ball, PLACES[0])
+    slow = ContactProblem(gel, ball, pose, 3e-4).at_depth(3e-4)
+    monkeypatch.undo()
+    fast = ContactProblem(gel, ball, pose, 3e-4).at_depth(3e-4)
+    assert slow.converged and slow.iterations > fast.iterations
+    # force grows as depth^1.5, and 0.05 um is 2e-4 of this depth
+    np.testing.assert_allclose(slow.axial_force, fast.axial_force, rtol=3e-4)

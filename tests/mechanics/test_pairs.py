@@ -1,0 +1,99 @@
+"""Paired contacts: same bytes for any number of workers, resumable, honest errors."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tactile_core import sensors
+from tactile_core.errors import TactileError
+from tactile_core.mechanics import pairs
+from tactile_core.mechanics.pairs import make_pairs
+
+SCENE = "scenes/press_sphere"
+
+
+@pytest.fixture(scope="module")
+def scene(request):
+    return request.config.rootpath / SCENE
+
+
+@pytest.fixture(scope="module")
+def made(scene, tmp_path_factory):
+    out = tmp_path_factory.mktemp("pairs") / "pairs.h5"
+    make_pairs(scene, 40, 7, out, workers=1)
+    return out
+
+
+def test_file_holds_what_it_says(made):
+    import h5py
+
+    with h5py.File(made) as file:
+        assert file.attrs["format"] == pairs.FORMAT
+        assert file.attrs["biotac_nodes_sha256"] == sensors.biotac_surface().sha256
+        assert json.loads(file.attrs["indenters"]) == ["sphere_7mm", "sphere_14mm"]
+        assert set(file) == set(pairs.DATASETS)
+        assert all(len(file[name]) == 40 and file[name].attrs["unit"] for name in file)
+        biotac, digit = file["force"][()], file["force_digit"][()]
+        depth, press = file["depth_biotac"][()], file["press"][()]
+        moved = file["displacement_digit"][()] * file["displacement_digit"].attrs["scale"]
+        patch = file["contact_patch_digit"][()]
+    same = press[1:] == press[:-1]
+    assert same.any() and (np.diff(depth)[same] > 0).all()  # a press is a path of growing depth
+    # the same axial force on both; the lateral parts differ with the shape of the surface
+    np.testing.assert_allclose(np.linalg.norm(biotac, axis=1), np.linalg.norm(digit, axis=1), rtol=0.05)
+    assert patch.any(axis=1).all()
+    for contact in range(40):
+        deepest = np.argmax(np.linalg.norm(moved[contact], axis=1))
+        touched = sensors.digit_surface().rest[patch[contact]]
+        apart = np.linalg.norm(touched - sensors.digit_surface().rest[deepest], axis=1).min()
+        assert apart < 1e-3  # the gel moves most where it is touched, to about two nodes
+
+
+def test_two_workers_and_a_resumed_run_make_the_same_bytes(made, scene, tmp_path):
+    resumed = tmp_path / "resumed.h5"
+
+    def stop(done, count):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make_pairs(scene, 40, 7, resumed, progress=stop)
+    assert not resumed.exists() and resumed.with_name("resumed.h5.parts").exists()
+    make_pairs(scene, 40, 7, resumed, workers=2)
+    assert resumed.read_bytes() == made.read_bytes()
+    assert not resumed.with_name("resumed.h5.parts").exists()
+
+
+def test_another_seed_makes_other_contacts(made, scene, tmp_path):
+    import h5py
+
+    other = tmp_path / "other.h5"
+    make_pairs(scene, 5, 8, other)
+    with h5py.File(made) as a, h5py.File(other) as b:
+        assert not np.array_equal(a["signal"][:5], b["signal"][:5])
+
+
+def test_an_existing_file_is_kept(made, scene):
+    before = made.read_bytes()
+    with pytest.raises(TactileError, match="exists already"):
+        make_pairs(scene, 5, 7, made)
+    assert made.read_bytes() == before
+
+
+def test_parts_of_another_seed_are_refused(scene, tmp_path):
+    out = tmp_path / "pairs.h5"
+
+    def stop(done, count):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make_pairs(scene, 40, 7, out, progress=stop)
+    with pytest.raises(TactileError, match="another scene, seed"):
+        make_pairs(scene, 40, 8, out)
+
+
+def test_scene_without_pairs_and_bad_count(request, tmp_path):
+    with pytest.raises(TactileError, match="pairs"):
+        make_pairs(request.config.rootpath / "scenes/press_roll_slide", 5, 0, tmp_path / "x.h5")
+    with pytest.raises(TactileError, match="at least 1"):
+        make_pairs(request.config.rootpath / SCENE, 0, 0, tmp_path / "x.h5")

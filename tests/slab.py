@@ -1,0 +1,27 @@
+"""A flat elastic layer bonded below, as a sensor: the textbook cases of contact mechanics live on it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_core.lattice import Lattice, grid_faces
+from tactile_core.mechanics.compliance import Compliance, build
+from tactile_core.mechanics.hex_mesh import HexMesh, hex_cells
+from tactile_core.sensors import Material
+
+
+def slab_mesh(x: np.ndarray, z: np.ndarray, y: np.ndarray) -> tuple[HexMesh, Lattice]:
+    """A block with node planes x, z (m) and y (m, from the bonded back down to the surface at the lowest y)."""
+    grid = np.stack(np.meshgrid(x, z, y, indexing="ij"), -1)[..., [0, 2, 1]]
+    ids = np.arange(grid[..., 0].size).reshape(grid.shape[:-1])
+    clamped = np.zeros(ids.size, bool)
+    clamped[ids[..., 0]] = True
+    lattice = Lattice(grid[:, :, -1].reshape(-1, 3), grid_faces(len(x), len(z), closed=False), (len(x), len(z)))
+    return HexMesh(grid.reshape(-1, 3), hex_cells(ids), clamped, ids[..., -1].ravel(), np.empty(0, int)), lattice
+
+
+def slab_compliance(x: np.ndarray, z: np.ndarray, y: np.ndarray, material: Material, reach: float) -> Compliance:
+    """Its compliance, touchable within ``reach`` m of the middle."""
+    mesh, lattice = slab_mesh(x, z, y)
+    touchable = np.flatnonzero(np.hypot(lattice.rest[:, 0], lattice.rest[:, 2]) < reach)
+    return Compliance("slab", lattice, touchable, *build(mesh, material, touchable, lattice))
