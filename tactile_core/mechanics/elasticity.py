@@ -21,7 +21,7 @@ def _quadratic(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return value, slope
 
 
-def _reference_gradients() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def reference_gradients() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gauss points (27, 3), weights (27,) and shape gradients (27, 27, 3) in the reference cube."""
     points = np.stack(np.meshgrid(_POINTS, _POINTS, _POINTS, indexing="ij"), -1).reshape(-1, 3)
     weights = np.einsum("a,b,c->abc", *[_POINT_WEIGHTS] * 3).ravel()
@@ -41,7 +41,7 @@ def cell_stiffness(corners: np.ndarray, material: Material) -> np.ndarray:
     """
     shear = material.youngs / (2 * (1 + material.poisson))
     bulk = material.youngs / (3 * (1 - 2 * material.poisson))
-    points, weights, reference = _reference_gradients()
+    points, weights, reference = reference_gradients()
     linear = np.column_stack([np.ones(len(points)), points])
     n = len(corners)
     stiffness = np.zeros((n, 27, 3, 27, 3))

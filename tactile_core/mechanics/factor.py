@@ -6,19 +6,28 @@ from collections.abc import Callable
 
 import numpy as np
 
+
+class NotPositiveDefiniteError(ValueError):
+    """The matrix has no Cholesky factor: the solid is unstable at this state, or the step was too large."""
+
+
 _BATCH = 128  # right-hand sides cholespy takes at once
 
 
 def factor(matrix) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy sparse, imported lazily)
-    """A function that solves ``matrix @ x = b`` for b (n, k), float64. ``matrix``: symmetric positive definite CSC."""
+    """A function that solves ``matrix @ x = b`` for b (n, k), float64. ``matrix``: symmetric positive definite CSC.
+
+    Raises NotPositiveDefiniteError where cholespy finds that it is not; SuperLU does not look.
+    """
     try:
         import cholespy
     except ImportError:
         return _superlu(matrix)
-    solver = cholespy.CholeskySolverD(
-        matrix.shape[0], matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data,
-        cholespy.MatrixType.CSC,
-    )  # fmt: skip
+    pattern = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
+    try:
+        solver = cholespy.CholeskySolverD(matrix.shape[0], *pattern, matrix.data, cholespy.MatrixType.CSC)
+    except ValueError as error:
+        raise NotPositiveDefiniteError(str(error)) from error
 
     def solve(b: np.ndarray) -> np.ndarray:
         x = np.empty_like(b)
