@@ -1,0 +1,73 @@
+"""Cubic splines through evenly spaced nodes, as matrices: linear, twice differentiable, exact at the nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+class EvenSpline:
+    """The cubic spline with not-a-knot ends (de Boor, A Practical Guide to Splines, chapter IV) on an even grid.
+
+    start, step : position of the first node and distance between nodes, any unit; count : nodes, 5 or more.
+    Values at nodes v (count, ...) have B-spline coefficients ``to_coefficients @ v`` (count + 2, ...).
+    Beyond the ends a position counts as the end: the first and last values are held.
+    """
+
+    def __init__(self, start: float, step: float, count: int) -> None:
+        if count < 5:
+            raise ValueError(f"a not-a-knot spline needs 5 nodes or more, not {count}")
+        self.start, self.step, self.count = start, step, count
+        self.to_coefficients = _interpolation_matrix(count)
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Positions (count,) of the nodes."""
+        return self.start + self.step * np.arange(self.count)
+
+    def refined(self, factor: int) -> EvenSpline:
+        """The spline on a grid with factor intervals for each of this one, same ends."""
+        return EvenSpline(self.start, self.step / factor, (self.count - 1) * factor + 1)
+
+    def cells(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """First of the four coefficients that matter at each position, and the place 0..1 in its interval."""
+        place = np.clip((position - self.start) / self.step, 0, self.count - 1)
+        cell = np.minimum(place.astype(np.intp), self.count - 2)
+        return cell, place - cell
+
+    def matrix(self, position: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """Matrix (n, count) that takes values at nodes to the spline, or its first derivative, at positions (n,)."""
+        cell, place = self.cells(position)
+        basis = np.zeros((len(cell), self.count + 2))
+        weights = bspline_slopes(place) / self.step if derivative else bspline_weights(place)
+        np.put_along_axis(basis, cell[:, None] + np.arange(4), weights.T, axis=1)
+        matrix = basis @ self.to_coefficients
+        if not derivative:  # reproduce nodes exactly, not just to rounding
+            at_node = np.abs(place - np.rint(place)) < 1e-9
+            matrix[at_node] = np.eye(self.count)[(cell + np.rint(place).astype(np.intp))[at_node]]
+        return matrix
+
+
+def bspline_weights(t: np.ndarray) -> np.ndarray:
+    """The four uniform cubic B-splines at places t (n,) of their interval, 0..1; (4, n), they sum to 1."""
+    s = 1 - t
+    weights = np.empty((4, len(t)), t.dtype)
+    weights[0] = s * s * s / 6
+    weights[1] = 2 / 3 - t * t * (1 - t / 2)
+    weights[2] = 2 / 3 - s * s * (1 - s / 2)
+    weights[3] = t * t * t / 6
+    return weights
+
+
+def bspline_slopes(t: np.ndarray) -> np.ndarray:
+    """Derivatives of ``bspline_weights`` by t; (4, n)."""
+    s = 1 - t
+    return np.stack([-s * s, 3 * t * t - 4 * t, 4 * s - 3 * s * s, t * t]) / 2
+
+
+def _interpolation_matrix(count: int) -> np.ndarray:
+    system = np.zeros((count + 2, count + 2))
+    for k in range(count):
+        system[k + 1, k : k + 3] = 1 / 6, 4 / 6, 1 / 6
+    # Not-a-knot: the third derivative does not jump at the second node from either end.
+    system[0, :5] = system[-1, -5:] = 1, -4, 6, -4, 1
+    return np.linalg.inv(system)[:, 1:-1]

@@ -1,0 +1,66 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tactile_core.camera import DIGIT_CAMERA, DIGIT_LEDS, Led
+from tactile_core.errors import TactileError
+
+
+def test_pixels_and_gel_places_are_inverse() -> None:
+    rng = np.random.default_rng(0)
+    row, column = rng.uniform(-10, 330, 50), rng.uniform(-10, 250, 50)
+    np.testing.assert_allclose(DIGIT_CAMERA.to_pixel(*DIGIT_CAMERA.to_gel(row, column)), (row, column), atol=1e-9)
+
+
+def test_pixel_centres_agree_with_the_conversion() -> None:
+    rows, columns = np.arange(320), np.arange(240)
+    np.testing.assert_allclose(DIGIT_CAMERA.gel_x, DIGIT_CAMERA.to_gel(rows, 0)[0], atol=1e-12)
+    np.testing.assert_allclose(DIGIT_CAMERA.gel_z, DIGIT_CAMERA.to_gel(0, columns)[1], atol=1e-12)
+    assert DIGIT_CAMERA.shape == (320, 240)
+
+
+def test_scales_are_told_apart() -> None:
+    camera = dataclasses.replace(DIGIT_CAMERA, px_per_mm_x=10.0, px_per_mm_y=20.0)
+    x, z = camera.to_gel(np.array([0, 20]), np.array([0, 10]))
+    assert abs(x[1] - x[0]) == pytest.approx(1e-3)
+    assert abs(z[1] - z[0]) == pytest.approx(1e-3)
+
+
+def test_picture_is_not_mirrored() -> None:
+    # A camera looks along -y: right x down points away from it, as x x y does for any picture seen from above.
+    right, down = np.array([0, 0, DIGIT_CAMERA.right_z]), np.array([DIGIT_CAMERA.down_x, 0, 0])
+    np.testing.assert_array_equal(np.cross(right, down), [0, -1, 0])
+
+
+def test_picture_shows_about_13_x_17_mm() -> None:
+    assert np.ptp(DIGIT_CAMERA.gel_z) == pytest.approx(13e-3, abs=0.5e-3)
+    assert np.ptp(DIGIT_CAMERA.gel_x) == pytest.approx(17e-3, abs=0.5e-3)
+
+
+def test_lights_stand_where_the_fit_to_real_pictures_puts_them() -> None:
+    position = np.array([led.position for led in DIGIT_LEDS])
+    azimuth = np.degrees(np.arctan2(-position[:, 1], position[:, 0])) % 360
+    elevation = np.degrees(np.arctan2(position[:, 2], np.hypot(*position[:, :2].T)))
+    np.testing.assert_allclose(azimuth, [45, 147, 276], atol=1)  # the source states whole degrees
+    assert ((elevation > 20.5) & (elevation < 26.5)).all()
+    assert [led.channel for led in DIGIT_LEDS] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("width", 0), ("height", 3.5), ("px_per_mm_x", -18.8), ("px_per_mm_y", float("nan")), ("right_z", 2),
+     ("down_x", 0), ("centre_x", float("inf"))],
+)  # fmt: skip
+def test_camera_refuses(field: str, value: float) -> None:
+    with pytest.raises(TactileError, match=field[:6]):
+        dataclasses.replace(DIGIT_CAMERA, **{field: value})
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("colour", "white"), ("position", (0, 0, -1e-3)), ("position", (0, 1e-3)), ("radius", 0.0)]
+)
+def test_led_refuses(field: str, value: object) -> None:
+    good = {"colour": "red", "position": (1e-3, 0, 1e-3), "radius": 1e-3}
+    with pytest.raises(TactileError, match=field):
+        Led(**good | {field: value})
