@@ -108,7 +108,7 @@ def test_golden_force_at_a_fifth_of_the_thickness_and_work_equals_energy(layer):
     assert (touch.pressing > 0).all()
     assert np.abs(touch.force[[0, 2]]).max() < 1e-6 * touch.force[1]
     # without friction the indenter's work is the stored energy; the trapezoid rule on four steps of F ~ d^2 is 4 % high
-    work = np.trapezoid(forces, depths) if hasattr(np, "trapezoid") else np.trapz(forces, depths)
+    work = (np.convolve(forces, [0.5, 0.5], "valid") * np.diff(depths)).sum()
     assert layer.solid.energy(touch.state) == pytest.approx(work, rel=0.06)
 
 
