@@ -1,0 +1,12 @@
+"""Recordings of a BioTac: read any known file layout, find what is wrong with it, and bring its signals to one form.
+
+``read(path)`` gives a :class:`Recording`, the file as it is; ``prepare(recording, options)`` gives :class:`Signals`,
+the change against rest that the networks see. A new file layout is one new file in ``formats/``; see there.
+"""
+
+from .readers import layouts, read
+from .recording import Recording, Truth
+from .signals import PrepareOptions, Signals, prepare
+from .simulated import write_simulated
+
+__all__ = ["PrepareOptions", "Recording", "Signals", "Truth", "layouts", "prepare", "read", "write_simulated"]

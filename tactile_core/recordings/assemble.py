@@ -1,0 +1,215 @@
+"""From columns to a Recording: checks that all layouts share (bad cells, time stamps, sizes)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import TactileError
+from ..flags import Flag
+from .recording import ELECTRODES, NOMINAL_RATE, Recording, Truth
+
+MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)
+MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
+MAX_READING = 1e5  # counts; nothing a 12-bit sensor gives, in any unit seen, comes near (assumed)
+GAP_STEPS = 1.9  # a missing frame is 2 median steps; jitter of whole recordings reaches 1.8 (data README: 18 ms)
+MAX_STAMP = 1e19  # the year 2286 in nanoseconds
+STAMP_UNITS = ((1e17, 1e-9, "nanoseconds"), (1e14, 1e-6, "microseconds"), (1e11, 1e-3, "milliseconds"))  # of unix time
+MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory
+SHOWN = 8  # problems spelled out one by one; more are counted
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One bad place in a file: frame index, line in the file, column; essential: an electrode or time is lost."""
+
+    frame: int
+    row: int
+    field: str
+    found: str
+    essential: bool = True
+
+
+def check_electrodes(path: str, count: int, source: str) -> None:
+    """Raise for any other sensor than the 19-electrode BioTac. source says where the count was seen."""
+    if count == ELECTRODES:
+        return
+    if count == 24:
+        raise TactileError(
+            f"{path}, {source}",
+            "24 electrodes: a BioTac SP, not supported yet",
+            "the 19 electrodes of a BioTac",
+            "Use a recording of a BioTac with 19 electrodes",
+        )
+    raise TactileError(
+        f"{path}, {source}",
+        f"{count} electrodes",
+        "the 19 electrodes of a BioTac",
+        "Check which sensor made this recording",
+    )
+
+
+def assemble(
+    path: str,
+    layout: str,
+    *,
+    electrodes: np.ndarray,
+    stamps: np.ndarray | None,
+    rows: np.ndarray | None = None,
+    problems: Sequence[Problem] = (),
+    row_word: str = "frame",
+    truth: Truth | None = None,
+    simulated: bool = False,
+    about: dict[str, Any] | None = None,
+    names: Sequence[str] = (),
+    warnings: Sequence[str] = (),
+    **channels: np.ndarray | None,
+) -> Recording:
+    """Check the columns and make a Recording of them.
+
+    electrodes : (T, 19) float with NaN at bad cells; stamps : (T,) float as in the file, or None: 100 Hz is assumed
+    names : the 19 electrode columns' names in the file; channels : pdc, tac, tdc, pac, position, force
+    Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad.
+    """
+    frames = len(electrodes)
+    _check_size(path, electrodes)
+    rows = np.arange(frames) if rows is None else rows
+    names = names or [f"E{j + 1}" for j in range(ELECTRODES)]
+    bad = ~(np.abs(electrodes) <= MAX_READING)  # NaN compares false
+    problems = [*problems, *_unreadable(electrodes, bad, names, rows, problems)]
+    electrodes = np.where(bad, np.nan, electrodes)
+    notes = list(warnings)
+    if stamps is None:
+        notes.append(f"{os.path.basename(path)}: no time stamps; {NOMINAL_RATE:g} Hz assumed")
+        stamps = np.arange(frames) / NOMINAL_RATE
+    _check_share(path, bad.any(axis=1), problems, row_word)
+    flags = np.where(bad.any(axis=1), Flag.REPAIRED, 0).astype(np.uint16)
+    for problem in problems:
+        flags[problem.frame] |= np.uint16(Flag.REPAIRED)
+    notes += tell_problems(problems, row_word)
+    seconds, start, more = _seconds(stamps)
+    jumps, jump_notes = _time_jumps(seconds, rows, row_word)
+    flags[jumps] |= np.uint16(Flag.TIME_JUMP)
+    clean = {key: np.where(np.isfinite(value), value, np.nan) for key, value in channels.items() if value is not None}
+    return Recording(
+        name=Path(path).stem,
+        path=path,
+        layout=layout,
+        time=seconds,
+        start_time=start,
+        electrodes=electrodes,
+        rows=rows,
+        flags=flags,
+        warnings=tuple(notes + more + jump_notes),
+        simulated=simulated,
+        truth=truth,
+        about=about or {},
+        **clean,
+    )
+
+
+def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
+    """Sentences naming row and field of the first few problems and the number of the others."""
+    told = [
+        f"{row_word} {p.row}, {p.field}: {p.found}; "
+        + ("interpolated from the frames around it" if p.essential else "left empty")
+        for p in problems[:SHOWN]
+    ]
+    if len(problems) > SHOWN:
+        rest = problems[SHOWN:]
+        told.append(f"{len(rest)} more bad cells, in {row_word}s {rest[0].row} to {max(p.row for p in rest)}")
+    return told
+
+
+def _check_size(path: str, electrodes: np.ndarray) -> None:
+    if electrodes.ndim != 2:
+        raise TactileError(f"{path}, electrodes", f"an array of shape {electrodes.shape}", "(frames, 19)")
+    if len(electrodes) == 0:
+        raise TactileError(
+            path, "no data rows", "at least one frame", "Check that the recording was written to its end"
+        )
+    if len(electrodes) > MAX_FRAMES:
+        raise TactileError(path, f"{len(electrodes):,} frames", f"at most {MAX_FRAMES:,}", "Split the recording")
+    check_electrodes(path, electrodes.shape[1], "electrodes")
+
+
+def _unreadable(
+    electrodes: np.ndarray, bad: np.ndarray, names: Sequence[str], rows: np.ndarray, known: Sequence[Problem]
+) -> list[Problem]:
+    """Electrode cells that are not a possible reading and that no reader has reported; bad : (T, 19) bool."""
+    told = {(p.frame, "" if p.field == "row" else p.field) for p in known}
+    found = []
+    for frame, j in np.argwhere(bad)[:MAX_PROBLEMS]:
+        if (frame, names[j]) not in told and (frame, "") not in told:
+            found.append(Problem(int(frame), int(rows[frame]), names[j], f"{electrodes[frame, j]:g} is no reading"))
+    return found
+
+
+def _check_share(path: str, bad: np.ndarray, problems: Sequence[Problem], row_word: str) -> None:
+    """bad : (T,) bool, frames with an unreadable electrode."""
+    bad = bad.copy()
+    bad[[p.frame for p in problems if p.essential]] = True
+    frames, count = len(bad), int(bad.sum())
+    if count > max(1, MAX_BAD_SHARE * frames) or count == frames:
+        first = next(p for p in problems if p.essential)
+        raise TactileError(
+            f"{path}, {row_word} {first.row}, {first.field}",
+            f"{first.found}; {count} of {frames} rows are bad",
+            f"at most {MAX_BAD_SHARE:.0%} of the rows",
+            "Check the export of this file",
+        )
+
+
+def _seconds(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
+    """Time from the first frame (s), unix start time (s, 0.0 if unknown), warnings."""
+    stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)
+    stamps = _fill_stamps(stamps)
+    warnings = []
+    for limit, unit, word in STAMP_UNITS:
+        if np.median(np.abs(stamps)) > limit:
+            stamps = stamps * unit
+            warnings.append(f"time stamps taken as {word} of unix time")
+            break
+    start = float(stamps[0]) if stamps[0] > 1e8 else 0.0  # below: seconds since something else than 1970
+    return stamps - stamps[0], start, warnings
+
+
+def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
+    """Missing stamps by interpolation; at the ends by the median step."""
+    good = np.flatnonzero(np.isfinite(stamps))
+    if len(good) == len(stamps):
+        return stamps
+    if len(good) == 0:
+        return np.arange(len(stamps)) / NOMINAL_RATE
+    index = np.arange(len(stamps))
+    filled = np.interp(index, good, stamps[good])
+    step = float(np.median(np.diff(stamps[good]) / np.diff(good))) if len(good) > 1 else 1.0 / NOMINAL_RATE
+    filled[: good[0]] = stamps[good[0]] + (index[: good[0]] - good[0]) * step
+    filled[good[-1] + 1 :] = stamps[good[-1]] + (index[good[-1] + 1 :] - good[-1]) * step
+    return filled
+
+
+def _time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, list[str]]:
+    """Frames before which the stamp went back, stood still or left a gap, and sentences about them."""
+    steps = np.diff(seconds)
+    forward = steps[steps > 0]
+    usual = float(np.median(forward)) if len(forward) else 1.0 / NOMINAL_RATE
+    backward, gap = steps <= 0, steps > GAP_STEPS * usual
+    told = []
+    for what, where in (("do not go forward", backward), ("leave a gap", gap)):
+        frames = np.flatnonzero(where) + 1
+        if len(frames):
+            first = frames[0]
+            worst = frames[np.argmax(np.abs(steps[frames - 1]))]
+            told.append(
+                f"time stamps {what} at {len(frames)} place{'s' * (len(frames) > 1)}, first before {row_word}"
+                f" {rows[first]} ({1e3 * steps[first - 1]:.1f} ms), largest before {row_word} {rows[worst]}"
+                f" ({1e3 * steps[worst - 1]:.1f} ms);"
+                " frames stay in file order"
+            )
+    return np.flatnonzero(backward | gap) + 1, told

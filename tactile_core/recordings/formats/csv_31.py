@@ -1,0 +1,72 @@
+"""31 columns: time, position (3), force (3), pac0, pac1, pdc, tac, tdc, electrodes0..18.
+
+The three components are taken as written ``position_x``, ``position.x``, ``position0``, ``positionx`` or
+``position[0]`` (and so for force); the columns may carry a ROS prefix such as ``field.tactiles0.`` (assumed: no file
+was at hand).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+from ..assemble import assemble, check_electrodes
+from ..recording import ELECTRODES, Recording
+from ..table import Table
+from . import share
+
+CONTAINER = "csv"
+NAME = "CSV with time, position (3), force (3), pac0, pac1, pdc, tac, tdc, electrodes0..18"
+VECTORS = [f"{word}_{axis}" for word in ("position", "force") for axis in "xyz"]
+ELECTRODE_NAMES = [f"electrodes{i}" for i in range(ELECTRODES)]
+COLUMNS = ["time", *VECTORS, "pac0", "pac1", "pdc", "tac", "tdc", *ELECTRODE_NAMES]
+VECTOR = re.compile(r"(?:^|.*[^a-z])(position|force)[^a-z0-9]*([xyz012])[^a-z0-9]*$")
+OTHER = re.compile(r"(?:^|.*[^a-z])(electrodes|pac|pdc|tac|tdc|time)\W*(\d*)\W*$")
+
+
+def canonical(names: Sequence[str]) -> list[str]:
+    """The columns' names as this layout calls them; unknown ones stay."""
+    found = []
+    for name in names:
+        vector, other = VECTOR.match(name), OTHER.match(name)
+        if vector:
+            axis = vector[2] if vector[2] in "xyz" else "xyz"[int(vector[2])]
+            found.append(f"{vector[1]}_{axis}")
+        else:
+            found.append(other[1] + other[2] if other else name)
+    return found
+
+
+def score(keys: Collection[str]) -> float:
+    return share(canonical(list(keys)), ["time", *ELECTRODE_NAMES])
+
+
+def read(table: Table) -> Recording:
+    names = canonical(table.header)
+    called = dict(zip(table.header, names, strict=False))
+    table = replace(
+        table,
+        header=tuple(names),
+        problems=tuple(replace(p, field=called.get(p.field, p.field)) for p in table.problems),
+    )
+    held = sum(name.startswith("electrodes") for name in names)
+    if held > ELECTRODES:
+        check_electrodes(table.path, held, "line 1")
+    table.columns(COLUMNS)  # names the first column that is missing
+    return assemble(
+        table.path,
+        NAME,
+        electrodes=table.columns(ELECTRODE_NAMES),
+        stamps=table.column("time"),
+        rows=table.lines,
+        problems=table.essential(["time", *ELECTRODE_NAMES]),
+        row_word="line",
+        names=ELECTRODE_NAMES,
+        pdc=table.column("pdc"),
+        tac=table.column("tac"),
+        tdc=table.column("tdc"),
+        pac=table.columns(["pac0", "pac1"]),
+        position=table.columns(VECTORS[:3]),
+        force=table.columns(VECTORS[3:]),
+    )

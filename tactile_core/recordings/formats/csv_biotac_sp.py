@@ -1,0 +1,23 @@
+"""ff_e1..24 or ff_biotac_1..24 (also mf, th) of a BioTac SP: recognised, and refused for now."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+from ..assemble import check_electrodes
+from ..recording import Recording
+from ..table import Table
+
+CONTAINER = "csv"
+NAME = "CSV with ff_e1..24 of a BioTac SP (recognised, not supported yet)"
+COLUMN = re.compile(r"(ff|mf|rf|lf|th)_(e|biotac_)\d+$")
+
+
+def score(keys: Collection[str]) -> float:
+    return float(sum(bool(COLUMN.match(key)) for key in keys) >= 20)
+
+
+def read(table: Table) -> Recording:
+    check_electrodes(table.path, 24, "line 1")
+    raise AssertionError("24 electrodes are refused")

@@ -1,0 +1,40 @@
+"""timestamp,tdc,tac,pdc,pac1..22,ele1..19, a separator at the end of each row (the layout of the slide set)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from ..assemble import assemble, check_electrodes
+from ..recording import ELECTRODES, Recording
+from ..table import Table
+from . import share
+
+CONTAINER = "csv"
+NAME = "CSV with timestamp, tdc, tac, pdc, pac1..22, ele1..19"
+PAC = [f"pac{i}" for i in range(1, 23)]
+ELECTRODE_NAMES = [f"ele{i}" for i in range(1, ELECTRODES + 1)]
+
+
+def score(keys: Collection[str]) -> float:
+    return share(keys, ["timestamp", *ELECTRODE_NAMES])
+
+
+def read(table: Table) -> Recording:
+    held = sum(name.startswith("ele") and name[3:].isdigit() for name in table.header)
+    if held > ELECTRODES:
+        check_electrodes(table.path, held, "line 1")
+    needed = ["timestamp", *ELECTRODE_NAMES]
+    return assemble(
+        table.path,
+        NAME,
+        electrodes=table.columns(ELECTRODE_NAMES),
+        stamps=table.column("timestamp"),
+        rows=table.lines,
+        problems=table.essential(needed),
+        row_word="line",
+        names=ELECTRODE_NAMES,
+        pdc=table.column("pdc"),
+        tac=table.column("tac"),
+        tdc=table.column("tdc"),
+        pac=table.columns(PAC),
+    )

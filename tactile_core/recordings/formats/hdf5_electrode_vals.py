@@ -1,0 +1,50 @@
+"""electrode_vals/data (T, 19) and, where present, contact_loc/data, force_vec/data (T, 3), indenter_type/data (T, ...).
+
+Such files hold no time stamps; 100 Hz is assumed and said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from ...errors import TactileError
+from ..assemble import assemble, check_electrodes
+from ..recording import ELECTRODES, Recording
+from ..store import Store
+
+CONTAINER = "hdf5"
+NAME = "HDF5 with electrode_vals/data, contact_loc/data, force_vec/data, indenter_type/data"
+
+
+def score(keys: Collection[str]) -> float:
+    return float("electrode_vals/data" in keys)
+
+
+def read(store: Store) -> Recording:
+    shape, _ = store.shapes["electrode_vals/data"]
+    if len(shape) == 2 and shape[1] != ELECTRODES:
+        check_electrodes(store.path, shape[1], "electrode_vals/data")
+    electrodes = store.array("electrode_vals/data", (None, ELECTRODES))
+    frames = len(electrodes)
+    return assemble(
+        store.path,
+        NAME,
+        electrodes=electrodes,
+        stamps=None,
+        about=_indenters(store, frames),
+        position=store.optional("contact_loc/data", (frames, 3)),
+        force=store.optional("force_vec/data", (frames, 3)),
+    )
+
+
+def _indenters(store: Store, frames: int) -> dict[str, list[float]]:
+    """The different indenter numbers of the file, where it names them."""
+    name = "indenter_type/data"
+    if name not in store.shapes:
+        return {}
+    shape, _ = store.shapes[name]
+    if not shape or shape[0] != frames:
+        raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"{frames} frames as in electrode_vals/data")
+    return {"indenter_types": np.unique(store.array(name, (frames, *shape[1:]))).tolist()}

@@ -1,0 +1,29 @@
+"""electrodes (T, 19) and, if present, time, pdc, tac, tdc (T,), pac (T, P), position, force (T, 3); no pickle."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from ..assemble import assemble, check_electrodes
+from ..recording import ELECTRODES, Recording
+from ..store import Store
+
+CONTAINER = "npz"
+NAME = "NPZ with electrodes (T, 19), optional time, pdc, tac, tdc, pac, position, force"
+
+
+def score(keys: Collection[str]) -> float:
+    return float("electrodes" in keys)
+
+
+def read(store: Store) -> Recording:
+    shape, _ = store.shapes["electrodes"]
+    if len(shape) == 2 and shape[1] != ELECTRODES:
+        check_electrodes(store.path, shape[1], "electrodes")
+    electrodes = store.array("electrodes", (None, ELECTRODES))
+    frames = len(electrodes)
+    columns = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
+    columns |= {name: store.optional(name, (frames, 3)) for name in ("position", "force")}
+    if "pac" in store.shapes:
+        columns["pac"] = store.array("pac", (frames, *store.shapes["pac"][0][1:2]))
+    return assemble(store.path, NAME, electrodes=electrodes, stamps=store.optional("time", (frames,)), **columns)

@@ -1,0 +1,115 @@
+"""What a recording holds, as text for a person."""
+
+from __future__ import annotations
+
+import os
+from datetime import UTC, datetime
+
+import numpy as np
+
+from ..flags import Flag, names
+from .readers import read
+from .recording import ELECTRODES, Recording
+from .signals import PrepareOptions, Signals, prepare
+
+
+def describe(path: str | os.PathLike[str], options: PrepareOptions | None = None) -> str:
+    """Sensor, channels, rate, duration, tare state, gaps and suspicious samples with their lines, as a short table.
+
+    Raises TactileError where the file is no recording.
+    """
+    recording = read(path)
+    signals = prepare(recording, options)
+    lines = [os.fspath(path)]
+    lines += [f"  {label:<11}{text}" for label, text in _rows(recording, signals)]
+    lines.append("")
+    lines += _electrode_table(signals)
+    if signals.warnings:
+        lines += ["", "warnings"] + [f"  - {warning}" for warning in signals.warnings]
+    return "\n".join(lines)
+
+
+def _rows(recording: Recording, signals: Signals) -> list[tuple[str, str]]:
+    report = signals.report
+    origin = "simulated: " + str(recording.about.get("note", "")) if recording.simulated else "not marked as simulated"
+    return [
+        ("layout", recording.layout),
+        ("sensor", f"BioTac, {ELECTRODES} electrodes; {origin}"),
+        ("channels", _channels(recording)),
+        ("frames", f"{len(recording)} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
+        ("rate", f"{recording.rate:.2f} Hz (median)" if len(recording) > 1 else "one frame only"),
+        ("duration", f"{recording.duration:.2f} s{_start(recording)}"),
+        ("time", _time(recording)),
+        ("kind", f"{signals.kind}: {report['kind_evidence']}"),
+        ("tare", f"{report['quiet_evidence']}{_parts(recording, signals)}"),
+        ("drift", _drift(signals)),
+        (
+            "suspicious",
+            f"{report['samples_glitch']} glitch samples, {report['samples_interpolated']} unreadable samples"
+            f"{_places(recording, signals)}",
+        ),
+        ("flags", _flags(signals.flags)),
+    ]
+
+
+def _channels(recording: Recording) -> str:
+    held = [name for name in ("pdc", "tac", "tdc", "position", "force") if getattr(recording, name) is not None]
+    if recording.pac is not None:
+        held.insert(0, f"pac ({recording.pac.shape[1]} a frame)")
+    if recording.truth is not None:
+        held.append(
+            f"truth ({recording.truth.displacement_biotac.shape[1]} BioTac and "
+            f"{recording.truth.displacement_digit.shape[1]} DIGIT nodes)"
+        )
+    return ", ".join(["electrodes", *held])
+
+
+def _start(recording: Recording) -> str:
+    if not 0 < recording.start_time < 1e11:  # 1e11 s: the year 5138, beyond it no calendar
+        return ""
+    return f", from {datetime.fromtimestamp(recording.start_time, UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def _time(recording: Recording) -> str:
+    if len(recording) < 2:
+        return "-"
+    steps = 1e3 * np.diff(recording.time)
+    jumps = int(np.sum(recording.flags & Flag.TIME_JUMP > 0))
+    where = recording.rows[np.flatnonzero(recording.flags & Flag.TIME_JUMP)[:5]].tolist()
+    told = (
+        f"; {jumps} jumps, before {recording.row_word} {', '.join(map(str, where))}{' …' * (jumps > 5)}"
+        if jumps
+        else "; no gaps"
+    )
+    return f"steps {steps.min():.1f} to {steps.max():.1f} ms{told}"
+
+
+def _parts(recording: Recording, signals: Signals) -> str:
+    if not signals.report["quiet_parts"]:
+        return ""
+    spans = [f"{recording.rows[a]}-{recording.rows[b - 1]}" for a, b in signals.report["quiet_parts"]]
+    return f", {recording.row_word}s {', '.join(spans[:6])}{' …' * (len(spans) > 6)}"
+
+
+def _drift(signals: Signals) -> str:
+    if not signals.report["drift_removed"]:
+        return "not removed: " + ("its sign is lost" if signals.kind == "rectified" else "it needs two quiet parts")
+    worst = int(np.argmax(np.abs(signals.drift)))
+    return f"removed, up to {abs(signals.drift[worst]):.3f} counts/s (E{worst + 1})"
+
+
+def _places(recording: Recording, signals: Signals) -> str:
+    rows = signals.report["rows_repaired"]
+    return f", in {recording.row_word} {', '.join(map(str, rows[:12]))}{' …' * (len(rows) > 12)}" if rows else ""
+
+
+def _flags(flags: np.ndarray) -> str:
+    counted = [f"{name} {int(np.sum(flags & bit > 0))}" for name, bit in names().items() if np.any(flags & bit)]
+    return ", ".join(counted) + f" of {len(flags)} frames" if counted else "none"
+
+
+def _electrode_table(signals: Signals) -> list[str]:
+    """Rest, least and largest change of each electrode, in counts."""
+    head = "  electrode " + "".join(f"{j + 1:>6}" for j in range(ELECTRODES))
+    rows = [("rest", signals.rest), ("least", signals.change.min(axis=0)), ("largest", signals.change.max(axis=0))]
+    return [head] + [f"  {label:<10}" + "".join(f"{value:>6.0f}" for value in values) for label, values in rows]

@@ -1,0 +1,33 @@
+"""What was done to the counts before they were written: nothing (raw), tared, tared and scaled, or rectified."""
+
+from __future__ import annotations
+
+import numpy as np
+
+KINDS = ("raw", "tared", "scaled", "rectified")
+RAW_LEVEL = 500.0  # counts; rest is near 3,300 (slide set) or 2,600-2,700 (Ruppel), changes stay below (assumed)
+SCALED_LIMIT = (
+    20.0  # larger values than this are counts; scaled ones are volts, shares or standard deviations (assumed)
+)
+NEGATIVE_SHARE = 0.005  # of all samples: more than the odd glitch
+WHOLE_SHARE = 0.99
+
+
+def detect(electrodes: np.ndarray) -> tuple[str, str]:
+    """Kind and the evidence for it in words. electrodes : (T, 19) float, finite, as in the file."""
+    levels = np.median(electrodes, axis=0)
+    low, high = np.percentile(electrodes, [0.5, 99.5])
+    whole = float(np.mean(np.abs(electrodes - np.rint(electrodes)) < 1e-9))
+    negative = float(np.mean(electrodes < 0))
+    numbers = "whole numbers" if whole > WHOLE_SHARE else f"{1 - whole:.0%} fractions"
+    span = f"{numbers} from {low:.4g} to {high:.4g}"
+    if np.sum(levels > RAW_LEVEL) > len(levels) // 2:
+        return (
+            "raw",
+            f"{span}; medians of the electrodes {levels.min():.0f} to {levels.max():.0f} counts, far above any change",
+        )
+    if whole <= WHOLE_SHARE and max(abs(low), abs(high)) <= SCALED_LIMIT:
+        return "scaled", f"{span}, too small for counts"
+    if negative > NEGATIVE_SHARE:
+        return "tared", f"{span}; {negative:.0%} of the samples are negative"
+    return "rectified", f"{span}: changes without a sign (tared ones have both, raw counts lie in the thousands)"

@@ -1,0 +1,85 @@
+"""The one type every reader returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+ELECTRODES = 19  # of a single BioTac; the BioTac SP has 24
+NOMINAL_RATE = 100.0  # Hz: 44-word frames of a BioTac (SynTouch)
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a simulated recording knows about itself; real ones have none.
+
+    displacement_biotac : (T, N, 3) float32, m, of the outer skin's nodes
+    displacement_digit : (T, M, 3) float32, m, of the gel surface's nodes
+    force : (T, 3) float, N, exerted by the object on the sensor
+    contact_center : (T, 2) float, m, (x, z) on the DIGIT after unrolling; NaN without contact
+    """
+
+    displacement_biotac: np.ndarray
+    displacement_digit: np.ndarray
+    force: np.ndarray
+    contact_center: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording as its file holds it: one frame a data row, in file order, nothing resampled or dropped.
+
+    name : file name without its extension
+    layout : which layout the file has, in words
+    time : (T,) float, s from the first frame; may go back where the file's stamps do
+    start_time : unix time of the first frame, s; 0.0 if unknown
+    electrodes : (T, 19) float, counts (or the file's own unit), E1..E19; NaN where the file is unreadable
+    rows : (T,) int, line of each frame in a text file (the header is line 1); index of the frame in others
+    flags : (T,) uint16, bits of :class:`tactile_core.flags.Flag`
+    pdc, tac, tdc : (T,) float or None, counts
+    pac : (T, P) float or None, counts; P = 22 at 2,200 Hz, or what the file holds
+    position, force : (T, 3) float or None, in the file's own frame and unit
+    warnings : sentences for the user
+    about : what else the file says of itself (simulated: sensor, scene, seed, made_by, note)
+    """
+
+    name: str
+    path: str
+    layout: str
+    time: np.ndarray
+    start_time: float
+    electrodes: np.ndarray
+    rows: np.ndarray
+    flags: np.ndarray
+    pdc: np.ndarray | None = None
+    tac: np.ndarray | None = None
+    tdc: np.ndarray | None = None
+    pac: np.ndarray | None = None
+    position: np.ndarray | None = None
+    force: np.ndarray | None = None
+    warnings: tuple[str, ...] = ()
+    simulated: bool = False
+    truth: Truth | None = None
+    about: dict[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.electrodes)
+
+    @property
+    def rate(self) -> float:
+        """Frames a second: one over the median step between stamps; the nominal 100 Hz for a single frame."""
+        steps = np.diff(self.time)
+        steps = steps[steps > 0]
+        return float(1.0 / np.median(steps)) if len(steps) else NOMINAL_RATE
+
+    @property
+    def duration(self) -> float:
+        """s from the first frame to the last one."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def row_word(self) -> str:
+        """How a frame's row is called in messages."""
+        return "line" if self.layout.startswith("CSV") else "frame"

@@ -1,0 +1,135 @@
+"""Fill unreadable samples and remove glitches, without touching fast contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+LIMIT = 30.0  # counts from the level around it; a glitch (data README: over 30 counts from the 11-sample median)
+SHORT = 5  # samples; the longest glitch that a median of 11 samples can see
+STUCK = 50  # samples; longest stay of a single electrode at a wrong level that is still repaired (assumed, 0.5 s)
+END = 3  # samples; longest glitch at the very start or end of a recording (assumed)
+END_LIMIT = 100.0  # counts, for glitches at the ends, where only one side can be compared (assumed)
+FLATNESS = 1 / 3  # of the jump: how far a glitch's samples and the levels around it may differ (assumed)
+LEVEL = 10.0  # counts that the level may have moved during any glitch, whatever its size (assumed)
+STEEPER = 3.0  # times the jump must exceed the calmer neighbouring step: a steep press is steep on both sides (assumed)
+ALONE = 3  # electrodes that jump together in a stuck run; a real contact moves most of the 19 (assumed)
+ROUNDS = 12  # glitches within glitches are peeled off one by one; a backstop
+MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothing is repaired (assumed)
+
+
+def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
+    """Linear interpolation over the bad samples of each column; the nearest good one at the ends.
+
+    values : (T, C) float; bad : (T, C) bool. A column without any good sample becomes 0.
+    """
+    values = values.copy()
+    index = np.arange(len(values))
+    for j in np.flatnonzero(bad.any(axis=0)):
+        good = ~bad[:, j]
+        values[~good, j] = np.interp(index[~good], index[good], values[good, j]) if good.any() else 0.0
+    return values
+
+
+def find_glitches(values: np.ndarray) -> np.ndarray:
+    """(T, C) bool: samples that left the signal's level for a moment and came back.
+
+    values : (T, C) float, counts, finite.
+
+    A run of samples is a glitch when all of these hold:
+    it begins with a jump of more than 30 counts in one sample and ends with one in the opposite direction; the level
+    after it is the one before it, and its own samples lie on one level, both within a third of the jump; the jumps
+    are three times as steep as the calmer of the two steps just outside; it is not itself the return, between two
+    glitches, to the level of the second around it. It lasts at most 5 samples, or at most 50
+    where no more than 3 electrodes jump with it (a bit stuck in one channel; seen in mat5_50 of the slide set).
+    A press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of
+    20-50 ms is not flat; a contact that comes and goes within one single sample (10 ms) cannot be told from a glitch.
+    At the start and end of a recording only one jump can be seen; there it must exceed 100 counts, within 3 samples.
+    """
+    found = np.zeros(values.shape, bool)
+    for _ in range(ROUNDS):
+        new = (_short_runs(values) | _end_runs(values)) & ~found
+        if not new.any():
+            new = _stuck_runs(values) & ~found
+        if not new.any():
+            break
+        found |= new
+        values = fill(values, found)
+    return found
+
+
+def is_time_series(glitches: np.ndarray) -> bool:
+    """False where so many frames look like glitches that neighbouring rows cannot belong together."""
+    return float(glitches.any(axis=1).mean()) <= MAX_SHARE
+
+
+def _short_runs(values: np.ndarray) -> np.ndarray:
+    """Glitches of 1 to 5 samples, in all columns at once."""
+    frames = len(values)
+    found = np.zeros(values.shape, bool)
+    steps = np.diff(values, axis=0)  # steps[i] leads from sample i to i + 1
+    large = np.abs(steps) > LIMIT
+    if not large.any():
+        return found
+    calm = np.abs(np.pad(steps, ((1, 1), (0, 0)), mode="edge"))  # calm[i] = |step| into sample i
+    for length in range(1, min(SHORT, frames - 2) + 1):
+        starts = frames - 1 - length  # run = samples i+1 .. i+length for i < starts
+        into, out = steps[:starts], steps[length : length + starts]
+        candidate = large[:starts] & large[length : length + starts] & (into * out < 0)
+        for i, j in np.argwhere(candidate):
+            if found[i : i + length + 2, j].any():
+                continue  # its neighbour is a glitch: judge it in the next round, against the repaired level
+            before, after = float(calm[i, j]), float(calm[min(i + length + 2, frames), j])
+            found[i + 1 : i + 1 + length, j] = _is_run(values[:, j], i, i + length + 1, min(before, after))
+    return found
+
+
+def _is_run(column: np.ndarray, first: int, last: int, neighbour_step: float) -> bool:
+    """Whether the samples between first (level before) and last (level after) are a glitch."""
+    samples = column[first : last + 1]
+    jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
+    run = samples[1:-1]
+    returns = abs(samples[-1] - samples[0]) <= max(LEVEL, FLATNESS * jump)
+    flat = np.ptp(run) <= FLATNESS * jump
+    steep = jump > STEEPER * neighbour_step
+    apart = np.abs(run - 0.5 * (samples[0] + samples[-1])).min() > LIMIT
+    if not (returns and flat and steep and apart):
+        return False
+    usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])  # a gap between two glitches is no glitch
+    return bool(abs(run.mean() - usual) > max(LEVEL, FLATNESS * jump))
+
+
+def _end_runs(values: np.ndarray) -> np.ndarray:
+    """Glitches of 1 to 3 samples at the first and the last sample."""
+    found = np.zeros(values.shape, bool)
+    if len(values) < 2 * END + 2:
+        return found
+    for view, marks in ((values, found), (values[::-1], found[::-1])):
+        for j in range(values.shape[1]):
+            head = view[: 2 * END + 2, j]
+            for length in range(1, END + 1):
+                jump = abs(head[length] - head[length - 1])
+                rest = head[length:]
+                if jump > END_LIMIT and np.ptp(head[:length]) <= FLATNESS * jump and np.ptp(rest) <= FLATNESS * jump:
+                    marks[:length, j] = True
+    return found
+
+
+def _stuck_runs(values: np.ndarray) -> np.ndarray:
+    """Runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level."""
+    found = np.zeros(values.shape, bool)
+    steps = np.diff(values, axis=0)
+    large = np.abs(steps) > LIMIT
+    alone = large.sum(axis=1) <= ALONE
+    for j in np.flatnonzero(large.any(axis=0)):
+        edges = np.flatnonzero(large[:, j] & alone)
+        for first, start in enumerate(edges):
+            for end in edges[first + 1 :]:
+                if end - start > STUCK:
+                    break
+                around = [abs(steps[k, j]) for k in (start - 1, end + 1) if 0 <= k < len(steps)]
+                if steps[start, j] * steps[end, j] < 0 and _is_run(
+                    values[:, j], start, end + 1, min(around, default=0.0)
+                ):
+                    found[start + 1 : end + 1, j] = True
+                    break
+    return found

@@ -1,0 +1,278 @@
+"""From a Recording to the signals that the networks see: repaired, tared, drift removed, everything reported."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import TactileError
+from ..flags import Flag
+from .kinds import KINDS, detect
+from .quiet import Quiet, baseline, calmest, find_quiet, level, window_frames
+from .recording import Recording
+from .repair import fill, find_glitches, is_time_series
+
+FULL_SCALE = 4095.0  # counts of the 12-bit converter
+SCALED_PEAK = (
+    150.0  # counts that the 95th percentile of a scaled recording's largest changes is stretched to (networks.md)
+)
+DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
+SHOWN = 8  # bad places spelled out one by one in the warnings
+
+
+@dataclass(frozen=True)
+class PrepareOptions:
+    """What to override; None is automatic.
+
+    kind : "raw", "tared", "scaled" or "rectified"
+    tare : frames to take rest from, a slice or "A:B"; "none" takes the file's own zero; None finds quiet parts
+    drift : remove drift between quiet parts
+    repair : remove glitches (unreadable samples are always interpolated)
+    counts_per_unit : factor from a scaled recording's unit to counts
+    """
+
+    kind: str | None = None
+    tare: slice | str | None = None
+    drift: bool = True
+    repair: bool = True
+    counts_per_unit: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Signals ready for the networks.
+
+    change : (T, 19) float, counts, plain reading minus rest, drift removed. Rectified: |change| minus its quiet level
+    rest : (19,) float, counts, what the electrodes read without contact at the first frame
+    drift : (19,) float, counts/s, mean slope of the rest level over the recording
+    electrodes : (T, 19) float, counts: the readings after repair, before the tare
+    kind : "raw", "tared", "scaled" or "rectified"
+    quiet : (T,) bool, frames without contact that rest was taken from
+    flags : (T,) uint16, the recording's and those found here
+    warnings : the recording's and those found here
+    report : what was found and done, fit for JSON
+    """
+
+    change: np.ndarray
+    rest: np.ndarray
+    drift: np.ndarray
+    electrodes: np.ndarray
+    kind: str
+    quiet: np.ndarray
+    flags: np.ndarray
+    warnings: tuple[str, ...]
+    report: dict[str, Any]
+
+
+def prepare(recording: Recording, options: PrepareOptions | None = None) -> Signals:
+    """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet."""
+    options = options or PrepareOptions()
+    flags, warnings = recording.flags.copy(), list(recording.warnings)
+    readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
+    kind, evidence = _kind(recording, readings, options)
+    unit = _counts_per_unit(recording, readings, kind, options, warnings)
+    readings = readings * unit
+    glitches = _glitches(recording, readings, options, warnings)
+    flags[glitches.any(axis=1)] |= np.uint16(Flag.REPAIRED)
+    readings = fill(readings, glitches | ~np.isfinite(recording.electrodes))
+    if kind == "rectified":
+        flags |= np.uint16(Flag.RECTIFIED)
+        warnings.append("the recording holds absolute changes (rectified): their sign is lost, expect low confidence")
+    quiet = _quiet(recording, readings, kind, options)
+    rest = _rest(recording, readings, kind, quiet, options, warnings)
+    if not quiet.parts:
+        flags |= np.uint16(Flag.NO_QUIET_PART)
+    flags |= _saturated(recording, readings, kind, warnings) | _dead(recording, readings, warnings)
+    slope = (rest[-1] - rest[0]) / recording.duration if recording.duration > 0 else np.zeros(rest.shape[1])
+    report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope)
+    return Signals(
+        change=readings - rest,
+        rest=rest[0].copy(),
+        drift=slope,
+        electrodes=readings,
+        kind=kind,
+        quiet=quiet.mask,
+        flags=flags,
+        warnings=tuple(warnings),
+        report=report,
+    )
+
+
+def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -> tuple[str, str]:
+    if options.kind is None:
+        return detect(readings)
+    if options.kind not in KINDS:
+        raise TactileError("option kind", repr(options.kind), ", ".join(KINDS))
+    return options.kind, f"told by the user (the samples look {detect(readings)[0]})"
+
+
+def _counts_per_unit(
+    recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions, warnings: list[str]
+) -> float:
+    """Factor to counts: 1, the user's, or for scaled recordings one that gives the usual size of a press (assumed)."""
+    factor = options.counts_per_unit
+    if factor is not None:
+        if not 0 < factor < 1e9:
+            raise TactileError("option counts_per_unit", f"{factor:g}", "counts a unit, above 0")
+        return float(factor)
+    if kind != "scaled":
+        return 1.0
+    largest = np.abs(readings - np.median(readings, axis=0)).max(axis=1)
+    peak = float(np.percentile(largest, 95))
+    factor = SCALED_PEAK / peak if peak > 1e-12 else 1.0
+    warnings.append(
+        f"the unit of this scaled recording is not known: stretched by {factor:.4g} to a press's usual {SCALED_PEAK:g}"
+        " counts, so depths and forces are only relative; give counts_per_unit to fix it"
+    )
+    return factor
+
+
+def _glitches(recording: Recording, readings: np.ndarray, options: PrepareOptions, warnings: list[str]) -> np.ndarray:
+    """(T, 19) bool, samples to repair, told in the warnings."""
+    none = np.zeros(readings.shape, bool)
+    if not options.repair:
+        return none
+    found = find_glitches(readings)
+    if not is_time_series(found):
+        warnings.append(
+            f"{found.any(axis=1).mean():.0%} of the frames look like glitches: neighbouring rows seem not to belong"
+            " together, nothing was repaired"
+        )
+        return none
+    frames = np.flatnonzero(found.any(axis=1))
+    for frame in frames[:SHOWN]:
+        cells = [f"E{j + 1} {recording.electrodes[frame, j]:g}" for j in np.flatnonzero(found[frame])]
+        warnings.append(f"{recording.row_word} {recording.rows[frame]}: glitch in {', '.join(cells)}; interpolated")
+    if len(frames) > SHOWN:
+        warnings.append(
+            f"{len(frames) - SHOWN} more frames with glitches, the last in {recording.row_word}"
+            f" {recording.rows[frames[-1]]}"
+        )
+    return found
+
+
+def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions) -> Quiet:
+    if options.tare is None:
+        return find_quiet(readings, recording.pdc, recording.rate, kind)
+    if options.tare == "none":
+        if kind == "raw":
+            raise TactileError(
+                "option tare",
+                "'none' for a raw recording, which has no zero of its own",
+                "frames A:B",
+                "Name frames without contact, or leave the option out",
+            )
+        return Quiet(np.zeros(len(readings), bool), (), "the file's own zero, as told by the user")
+    frames = _frames(options.tare, len(readings))
+    mask = np.zeros(len(readings), bool)
+    mask[frames] = True
+    return Quiet(mask, ((frames.start, frames.stop),), "told by the user")
+
+
+def _frames(tare: slice | str, count: int) -> slice:
+    """The tare frames as a plain slice. Raises TactileError where they are not inside the recording."""
+    asked = tare
+    if isinstance(tare, str):
+        ends = tare.split(":")
+        try:
+            tare = slice(*(int(end) if end.strip() else None for end in ends))
+        except (ValueError, TypeError):
+            ends = []
+        if len(ends) != 2:
+            raise TactileError("option tare", repr(asked), "frames A:B, such as 0:50, or 'none'")
+    first = 0 if tare.start is None else tare.start + (count if tare.start < 0 else 0)
+    last = count if tare.stop is None else tare.stop + (count if tare.stop < 0 else 0)
+    if tare.step not in (None, 1) or not 0 <= first < last <= count:
+        raise TactileError(
+            "option tare",
+            f"frames {asked if isinstance(asked, str) else f'{tare.start}:{tare.stop}'}",
+            f"A:B inside the {count} frames of the recording, without a step",
+            "Name frames without contact",
+        )
+    return slice(first, last)
+
+
+def _rest(
+    recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
+) -> np.ndarray:
+    """(T, 19) counts that are subtracted."""
+    if quiet.parts:
+        return baseline(
+            readings, quiet, options.drift and kind != "rectified"
+        )  # drift of a rectified signal has no sign
+    if options.tare == "none":
+        warnings.append("no tare, as told: the file's own zero is taken for rest")
+        return np.zeros(readings.shape)
+    if kind == "raw":
+        guess = calmest(readings, recording.pdc, recording.rate)
+        warnings.append(
+            f"no quiet part ({quiet.evidence}): rest is guessed from the calmest {guess.stop - guess.start} frames, "
+            f"{guess.start}:{guess.stop}"
+        )
+        return np.broadcast_to(level(readings[guess]), readings.shape).copy()
+    warnings.append(f"no quiet part ({quiet.evidence}): the file's own zero is taken for rest")
+    return np.zeros(readings.shape)
+
+
+def _saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
+    """(T,) flags of raw readings at an end of the 12-bit range; other kinds do not show it."""
+    if kind != "raw":
+        return np.zeros(len(readings), np.uint16)
+    ends = (readings <= 0) | (readings >= FULL_SCALE)
+    frames = np.flatnonzero(ends.any(axis=1))
+    if len(frames):
+        warnings.append(
+            f"{_electrodes(ends.any(axis=0))} at an end of the 12-bit range in {len(frames)} frames, first in "
+            f"{recording.row_word} {recording.rows[frames[0]]}"
+        )
+    return np.where(ends.any(axis=1), Flag.SATURATED, 0).astype(np.uint16)
+
+
+def _dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
+    """(T,) flags, all set when an electrode never changes in a recording of at least 1 s."""
+    still = (readings == readings[0]).all(axis=0) & (len(readings) >= DEAD_FRAMES)
+    if still.any():
+        warnings.append(f"{_electrodes(still)} never changes: dead channel")
+    return np.full(len(readings), Flag.DEAD_CHANNEL if still.any() else 0, np.uint16)
+
+
+def _electrodes(mask: np.ndarray) -> str:
+    return ", ".join(f"E{j + 1}" for j in np.flatnonzero(mask))
+
+
+def _report(
+    recording: Recording,
+    kind: str,
+    evidence: str,
+    options: PrepareOptions,
+    unit: float,
+    glitches: np.ndarray,
+    quiet: Quiet,
+    slope: np.ndarray,
+) -> dict[str, Any]:
+    unreadable = ~np.isfinite(recording.electrodes)
+    return {
+        "layout": recording.layout,
+        "frames": len(recording),
+        "rate_hz": round(recording.rate, 3),
+        "duration_s": round(recording.duration, 3),
+        "kind": kind,
+        "kind_evidence": evidence,
+        "counts_per_unit": unit,
+        "tare": "none" if options.tare == "none" else "told" if options.tare is not None else "automatic",
+        "tare_window_frames": window_frames(recording.rate),
+        "quiet_parts": [list(part) for part in quiet.parts],
+        "quiet_evidence": quiet.evidence,
+        "drift_removed": bool(options.drift and len(quiet.parts) > 1 and kind != "rectified"),
+        "drift_counts_per_s": [round(float(value), 4) for value in slope],
+        "samples_interpolated": int(unreadable.sum()),
+        "samples_glitch": int(glitches.sum()),
+        "rows_repaired": _rows(recording.rows[(glitches | unreadable).any(axis=1)]),
+    }
+
+
+def _rows(rows: np.ndarray) -> Sequence[int]:
+    return [int(row) for row in rows]

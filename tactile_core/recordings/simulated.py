@@ -1,0 +1,173 @@
+"""The project's own simulated recording: one HDF5 file that says that it is simulated and carries its truth.
+
+Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sensor``, ``scene`` (TOML text), ``seed``,
+``made_by``, ``note``, ``start_time`` (unix s, 0 if unknown). Datasets, T first: ``time`` (T,) float64 s; ``electrodes``
+(T, 19), ``pdc``, ``tac``, ``tdc`` (T,) int16 raw 12-bit counts; ``truth/displacement_biotac`` (T, N, 3) and
+``truth/displacement_digit`` (T, M, 3) int16 with attribute ``scale`` (m a unit); ``truth/force`` (T, 3) float32 N;
+``truth/contact_center`` (T, 2) float32 m. The same arrays give the same bytes.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import TactileError
+from .assemble import assemble
+from .recording import ELECTRODES, Recording, Truth
+from .store import Store
+
+FORMAT = "tactile-recording-1"
+SCALE = 1e-7  # m a unit of the truth's int16: steps of 0.1 um, reach +-3.27 mm
+COUNTS = (0, 4095)  # 12-bit readings
+BLOCK = 16  # frames a chunk of the truth: a chunk stays below 300 kB at 2,700 nodes
+
+
+def write_simulated(
+    path: str | os.PathLike[str],
+    *,
+    time: np.ndarray,
+    electrodes: np.ndarray,
+    pdc: np.ndarray,
+    tac: np.ndarray,
+    tdc: np.ndarray,
+    truth: Truth,
+    scene: str,
+    seed: int,
+    made_by: str,
+    note: str,
+    sensor: str = "BioTac",
+    start_time: float = 0.0,
+) -> Path:
+    """Write the file whole or not at all, and return its path. Shapes and units: see the module.
+
+    Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-3.27 mm.
+    """
+    import h5py
+
+    path = Path(path)
+    frames = len(time)
+    _check_shape(path, "time", time, (frames,))
+    counts = {"electrodes": _counts(path, "electrodes", electrodes, (frames, ELECTRODES))}
+    counts |= {
+        name: _counts(path, name, value, (frames,)) for name, value in (("pdc", pdc), ("tac", tac), ("tdc", tdc))
+    }
+    _check_shape(path, "truth/force", truth.force, (frames, 3))
+    _check_shape(path, "truth/contact_center", truth.contact_center, (frames, 2))
+    steps = {
+        name: _steps(path, name, getattr(truth, name), frames) for name in ("displacement_biotac", "displacement_digit")
+    }
+    attributes = {
+        "format": FORMAT,
+        "simulated": True,
+        "sensor": sensor,
+        "scene": scene,
+        "seed": int(seed),
+        "made_by": made_by,
+        "note": note,
+        "start_time": float(start_time),
+    }
+
+    def fill(file: h5py.File) -> None:
+        for key, value in attributes.items():
+            file.attrs[key] = value
+        packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "track_times": False}
+        file.create_dataset("time", data=np.asarray(time, np.float64), **packed)
+        for name, value in counts.items():
+            file.create_dataset(name, data=value, **packed)
+        for name, value in steps.items():
+            data = file.create_dataset(
+                f"truth/{name}", data=value, chunks=(min(BLOCK, frames), *value.shape[1:]), **packed
+            )
+            data.attrs["scale"] = SCALE
+        file.create_dataset("truth/force", data=np.asarray(truth.force, np.float32), **packed)
+        file.create_dataset("truth/contact_center", data=np.asarray(truth.contact_center, np.float32), **packed)
+
+    _write_whole(path, fill)
+    return path
+
+
+def read_simulated(store: Store, layout: str) -> Recording:
+    """The Recording of an opened file of this format, with its truth as float32 in m."""
+    electrodes = store.array("electrodes", (None, ELECTRODES))
+    frames = len(electrodes)
+    about = {key: store.attributes.get(key, "") for key in ("sensor", "scene", "seed", "made_by", "note")}
+    truth = Truth(
+        _displacement(store, "truth/displacement_biotac", frames),
+        _displacement(store, "truth/displacement_digit", frames),
+        store.array("truth/force", (frames, 3)),
+        store.array("truth/contact_center", (frames, 2)),
+    )
+    start = store.attributes.get("start_time", 0.0)
+    start = float(start) if isinstance(start, int | float) and np.isfinite(start) else 0.0
+    columns = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
+    return assemble(
+        store.path,
+        layout,
+        electrodes=electrodes,
+        stamps=store.array("time", (frames,)) + start,
+        truth=truth,
+        simulated=True,
+        about=about,
+        **columns,
+    )
+
+
+def _displacement(store: Store, name: str, frames: int) -> np.ndarray:
+    nodes = store.shapes[name][0][1:2] if name in store.shapes else (None,)
+    steps = store.array(name, (frames, *nodes, 3), np.float32)
+    scale = store.attributes_of(name).get("scale")
+    if not isinstance(scale, float) or not 0 < scale < 1:
+        raise TactileError(f"{store.path}, {name}", f"attribute scale = {scale!r}", "metres a unit, such as 1e-7")
+    return steps * np.float32(scale)
+
+
+def _check_shape(path: Path, name: str, value: np.ndarray, shape: tuple[int, ...]) -> None:
+    if np.shape(value) != shape:
+        raise TactileError(f"{path}, {name}", f"shape {np.shape(value)}", str(shape))
+
+
+def _counts(path: Path, name: str, value: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    _check_shape(path, name, value, shape)
+    rounded = np.rint(np.asarray(value, float))
+    if not np.all((rounded >= COUNTS[0]) & (rounded <= COUNTS[1])):  # false for NaN too
+        raise TactileError(
+            f"{path}, {name}", "values outside 12 bits", f"counts {COUNTS[0]}..{COUNTS[1]}", "Clip as the sensor does"
+        )
+    return rounded.astype(np.int16)
+
+
+def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
+    if np.ndim(value) != 3 or np.shape(value)[0] != frames or np.shape(value)[2] != 3:
+        raise TactileError(f"{path}, truth/{name}", f"shape {np.shape(value)}", f"({frames}, nodes, 3)")
+    steps = np.rint(np.asarray(value, np.float64) / SCALE)
+    if not np.all(np.abs(steps) <= np.iinfo(np.int16).max):
+        raise TactileError(f"{path}, truth/{name}", "displacements beyond +-3.27 mm or not finite", "at most 3.27 mm")
+    return steps.astype(np.int16)
+
+
+def _write_whole(path: Path, fill: Any) -> None:
+    """Let fill write into a temporary file of the same folder, then put it in the place of path."""
+    import h5py
+
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+        os.close(handle)
+    except OSError as error:
+        raise TactileError(path, error.strerror or str(error), "a folder that can be written to") from error
+    try:
+        with h5py.File(temporary, "w") as file:
+            fill(file)
+        with open(temporary, "rb+") as file:
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o644)  # mkstemp makes files that others cannot read
+        os.replace(temporary, path)
+    except BaseException as error:
+        Path(temporary).unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise TactileError(path, error.strerror or str(error), "room to write the recording") from error
+        raise

@@ -1,0 +1,194 @@
+"""A text table with one header line, parsed so that every bad cell is known by line and column."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import TactileError
+from .assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
+
+MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
+SHOWN = 40  # characters of a cell or header that a message repeats
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, the header is line 1."""
+
+    path: str
+    header: tuple[str, ...]
+    values: np.ndarray
+    lines: np.ndarray
+    problems: tuple[Problem, ...]
+
+    def columns(self, names: list[str]) -> np.ndarray:
+        """(T, len(names)) float. Raises TactileError for a column that is not there, naming it."""
+        missing = [name for name in names if name not in self.header]
+        if missing:
+            more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+            raise TactileError(
+                f"{self.path}, line 1",
+                f"column {missing[0]!r}{more} is missing",
+                f"{names[0]} .. {names[-1]}" if len(names) > 1 else names[0],
+                "Export the recording again with all columns",
+            )
+        return self.values[:, [self.header.index(name) for name in names]]
+
+    def column(self, name: str) -> np.ndarray:
+        """(T,) float."""
+        return self.columns([name])[:, 0]
+
+    def essential(self, names: list[str]) -> list[Problem]:
+        """The table's problems, with those outside these columns marked as not essential."""
+        keep = {*names, "row"}
+        return [p if p.field in keep else Problem(p.frame, p.row, p.field, p.found, False) for p in self.problems]
+
+
+def read_header(path: str) -> tuple[str, ...]:
+    """Lower-case column names of the first line that is not empty."""
+    return _header(path, _lines(path))[0]
+
+
+def read_table(path: str) -> Table:
+    """Parse the file. Raises TactileError: not text, empty, no header, no data rows, columns named twice."""
+    lines = _lines(path)
+    header, first, separator = _header(path, lines)
+    if not lines[-1]:
+        ended, lines = True, lines[:-1]
+    else:
+        ended = False
+    kept = [(number, line) for number, line in enumerate(lines[first:], start=first + 1) if line.strip(" \t")]
+    if not kept:
+        raise TactileError(
+            path, "a header without data rows", "at least one frame", "Check that the recording was written to its end"
+        )
+    if len(kept) > MAX_FRAMES:
+        raise TactileError(path, f"{len(kept):,} data rows", f"at most {MAX_FRAMES:,}", "Split the recording")
+    values = np.empty((len(kept), len(header)))
+    problems: list[Problem] = []
+    for frame, (number, line) in enumerate(kept):
+        values[frame] = _row(line, header, separator, frame, number, problems)
+        if len(problems) > MAX_PROBLEMS:
+            raise TactileError(
+                f"{path}, line {problems[0].row}, {problems[0].field}",
+                f"{problems[0].found}; more than {MAX_PROBLEMS:,} bad cells up to line {number}",
+                "numbers",
+                "Check the export of this file",
+            )
+    if not ended:
+        _doubt_last_cell(kept, header, separator, values, problems)
+    return Table(path, header, values, np.array([number for number, _ in kept]), tuple(problems))
+
+
+def _lines(path: str) -> list[str]:
+    with open(path, "rb") as file:
+        data = file.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise TactileError(
+            path, f"more than {MAX_BYTES // 2**20} MB of text", "a recording of some hours", "Split the recording"
+        )
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise TactileError(path, "UTF-16 text", "UTF-8 text", "Save the file as UTF-8 (in a spreadsheet: CSV UTF-8)")
+    if b"\0" in data:
+        raise TactileError(f"{path}, byte {data.index(0)}", "binary data", "a CSV, HDF5 or NPZ recording")
+    try:
+        text = data.decode("utf-8-sig").replace('"', "")
+    except UnicodeDecodeError as error:
+        raise TactileError(
+            f"{path}, byte {error.start}", "not UTF-8 text", "a CSV, HDF5 or NPZ recording", "Save a text file as UTF-8"
+        ) from None
+    if not text.strip():
+        raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def _header(path: str, lines: list[str]) -> tuple[tuple[str, ...], int, str]:
+    """Column names, number of lines up to and with the header, separator."""
+    first = next(i for i, line in enumerate(lines) if line.strip())
+    line = lines[first]
+    separator = max(",;\t", key=line.count)
+    cells = [cell.strip().lower() for cell in line.split(separator)]
+    while len(cells) > 1 and not cells[-1]:
+        cells.pop()
+    if all(_number(cell) is not None for cell in cells):
+        raise TactileError(
+            f"{path}, line {first + 1}",
+            "numbers where the column names should be",
+            "a header line",
+            "Add the header line, so that no column is guessed",
+        )
+    for i, cell in enumerate(cells):
+        if cell and cell in cells[:i]:
+            raise TactileError(f"{path}, line {first + 1}", f"column {shown(cell)} is there twice", "each column once")
+    return tuple(cells), first + 1, separator
+
+
+def shown(text: str) -> str:
+    """The text as a message repeats it: quoted, and cut when long."""
+    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "…")
+
+
+def _number(cell: str) -> float | None:
+    """The cell as a finite number; None for text, NaN, infinity and Python's 1_000."""
+    if "_" in cell:
+        return None
+    try:
+        value = float(cell)
+    except ValueError:
+        return None
+    return value if np.isfinite(value) else None
+
+
+def _row(
+    line: str, header: tuple[str, ...], separator: str, frame: int, number: int, problems: list[Problem]
+) -> list[float]:
+    """The row's values; what is wrong with it is added to problems."""
+    cells = line.split(separator)
+    if len(cells) > len(header) and not "".join(cells[len(header) :]).strip():
+        cells = cells[: len(header)]  # a separator at the end of each row, as the slide set has
+    if len(cells) == len(header) and "_" not in line:
+        try:
+            values = [float(cell) for cell in cells]
+        except ValueError:
+            values = []
+        if values and all(-1e300 < value < 1e300 for value in values):  # false for NaN and infinity
+            return values
+    return _bad_row(cells, header, frame, number, problems)
+
+
+def _bad_row(
+    cells: list[str], header: tuple[str, ...], frame: int, number: int, problems: list[Problem]
+) -> list[float]:
+    width = len(header)
+    if len(cells) > width:
+        problems.append(Problem(frame, number, "row", f"{len(cells)} cells where the header has {width}"))
+        return [np.nan] * width
+    cut = len(cells) < width
+    if cut:  # the last cell that is there may be cut in its middle
+        problems.append(Problem(frame, number, "row", f"ends after {len(cells)} of {width} cells (truncated)"))
+        cells = cells[:-1]
+    values = []
+    for name, cell in zip(header, cells, strict=False):
+        value = _number(cell.strip())
+        if value is None or not -1e300 < value < 1e300:
+            problems.append(
+                Problem(
+                    frame, number, name, f"{shown(cell.strip())} is not a number" if cell.strip() else "an empty cell"
+                )
+            )
+            value = np.nan
+        values.append(value)
+    return values + [np.nan] * (width - len(values))
+
+
+def _doubt_last_cell(
+    kept: list[tuple[int, str]], header: tuple[str, ...], separator: str, values: np.ndarray, problems: list[Problem]
+) -> None:
+    """A last line without the separator that closes every other row is cut off in its last number."""
+    number, line = kept[-1]
+    closed = len(kept) > 1 and kept[-2][1].rstrip(" ").endswith(separator)
+    if closed and line.count(separator) == len(header) - 1:
+        values[-1, -1] = np.nan
+        problems.append(Problem(len(kept) - 1, number, header[-1], "the file ends in this cell (truncated)"))

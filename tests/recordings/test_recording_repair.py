@@ -1,0 +1,87 @@
+"""Glitches are found, fast contacts are left alone."""
+
+import numpy as np
+import pytest
+
+from tactile_core.recordings.repair import fill, find_glitches, is_time_series
+
+
+def marked(values):
+    return np.argwhere(find_glitches(values)).tolist()
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("size", [-3000, -60, 60, 800])
+def test_short_glitches_on_rest_and_in_a_press_are_found(length, size, press):
+    values = press.electrodes.copy()
+    for start, j in ((40, 3), (350, 12)):
+        values[start : start + length, j] += size
+    expected = [[i, 3] for i in range(40, 40 + length)] + [[i, 12] for i in range(350, 350 + length)]
+    assert marked(values) == expected
+
+
+def test_a_dropout_of_many_electrodes_at_once_is_found(press):
+    values = press.electrodes.copy()
+    values[300, 6:14] = 0
+    assert marked(values) == [[300, j] for j in range(6, 14)]
+
+
+@pytest.mark.parametrize("rise", [0.02, 0.03, 0.1, 0.5])
+def test_fast_presses_are_left_alone(rise, make):
+    assert marked(make(rise=rise).electrodes) == []
+
+
+@pytest.mark.parametrize("width", [3, 4, 5, 8, 20])
+def test_round_taps_are_left_alone(width, press):
+    """A half-sine of 30 ms and more, up to 300 counts, in all electrodes."""
+    values = press.electrodes[:150].copy()
+    tap = np.sin(np.pi * np.arange(1, width + 1) / (width + 1))
+    values[60 : 60 + width] += np.rint(tap[:, None] * np.linspace(-300, 300, 19))
+    assert marked(values) == []
+
+
+def test_a_triangular_contact_of_full_slope_is_left_alone():
+    values = np.zeros((60, 19))
+    values[20:40] += 50 * (10 - np.abs(np.arange(20) - 10))[:, None]
+    assert marked(values) == []
+
+
+def test_a_step_that_stays_is_left_alone():
+    values = np.zeros((200, 19))
+    values[100:] = 200
+    assert marked(values) == []
+
+
+def test_a_stuck_electrode_is_found_but_a_held_contact_is_not(press):
+    stuck = press.electrodes[:150].copy()
+    stuck[50:70, 4] += 190
+    assert marked(stuck) == [[i, 4] for i in range(50, 70)]
+    held = press.electrodes[:150].copy()
+    held[50:70] += 190
+    assert marked(held) == []
+
+
+def test_a_burst_of_glitches_spares_the_good_samples_between(press):
+    values = press.electrodes[:150].copy()
+    bad = [60, 62, 63, 66, 68, 69, 70]
+    values[bad, 8] += 300
+    assert marked(values) == [[i, 8] for i in bad]
+
+
+@pytest.mark.parametrize("frame", [0, -1])
+def test_glitches_at_the_ends_are_found(frame, press):
+    values = press.electrodes.copy()
+    values[frame, 5] = 0
+    assert marked(values) == [[frame % len(values), 5]]
+
+
+def test_unrelated_rows_are_no_time_series():
+    random = np.random.default_rng(0)
+    assert not is_time_series(find_glitches(random.choice([0.0, 100.0], (400, 19), p=[0.7, 0.3])))
+
+
+def test_fill_takes_the_line_between_and_the_nearest_at_the_ends():
+    values = np.array([[9.0], [1.0], [9.0], [3.0], [9.0]])
+    bad = np.array([[True], [False], [True], [False], [True]])
+    assert fill(values, bad)[:, 0].tolist() == [1, 1, 2, 3, 3]
+    assert fill(values, np.ones((5, 1), bool))[:, 0].tolist() == [0] * 5

@@ -1,0 +1,194 @@
+"""Kind, tare, drift: found, reported, overridable."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tactile_core import recordings
+from tactile_core.errors import TactileError
+from tactile_core.flags import Flag
+from tactile_core.recordings import PrepareOptions
+from tactile_core.recordings.assemble import assemble
+from tactile_core.recordings.kinds import KINDS
+
+NOISE = 0.6  # counts; 1.2 over 175 quiet and 225 held frames deviate by 0.13; 4.5 deviations for the largest of 19
+
+
+def make_recording(press, electrodes=None, pdc=True, part=slice(None)):
+    electrodes = press.electrodes if electrodes is None else electrodes
+    return assemble(
+        "press.npz", "NPZ", electrodes=electrodes[part], stamps=press.time[part], pdc=press.pdc[part] if pdc else None
+    )
+
+
+def as_kind(press, kind):
+    tared = press.electrodes - np.rint(press.rest)
+    return {"raw": press.electrodes, "tared": tared, "scaled": tared / 300, "rectified": np.abs(tared)}[kind]
+
+
+def error_of(signals, press, part=slice(None)):
+    """Largest difference between the mean change of the quiet and of the held frames and the truth, counts."""
+    change, truth = signals.change, press.change[part]
+    return np.abs((change - truth)[truth.any(axis=1)].mean(axis=0)).max()
+
+
+@pytest.mark.parametrize("pdc", [True, False])
+@pytest.mark.parametrize("kind", ["raw", "tared"])
+def test_true_changes_come_back_with_tare_and_drift(kind, pdc, press):
+    signals = recordings.prepare(make_recording(press, as_kind(press, kind), pdc))
+    assert signals.kind == kind and not signals.flags.any()
+    assert error_of(signals, press) < NOISE
+    assert not (signals.quiet & press.contact).sum() > 3  # frames of a window may see the first 0.03 s of the rise
+    np.testing.assert_allclose(
+        signals.drift, press.drift, atol=0.1
+    )  # counts/s: 0.3 counts of level over 5 s between the parts
+    json.dumps(signals.report)
+
+
+@pytest.mark.parametrize("part", [slice(0, 400), slice(300, 700)], ids=["rest at the start", "rest at the end"])
+@pytest.mark.parametrize("pdc", [True, False])
+def test_a_quiet_part_is_found_wherever_it_lies(part, pdc, make):
+    press = make(slope=0)
+    signals = recordings.prepare(make_recording(press, pdc=pdc, part=part))
+    assert signals.quiet.any() and error_of(signals, press, part) < NOISE
+
+
+def test_a_quiet_part_in_the_middle_is_found(make):
+    press = make(slope=0)
+    order = np.r_[250:525, 525:700, 175:450]  # press, release and rest, press again
+    press = type(press)(**{k: v[order] if np.ndim(v) and len(v) == 700 else v for k, v in vars(press).items()})
+    press.time = np.arange(len(order)) / 100
+    signals = recordings.prepare(make_recording(press))
+    assert np.flatnonzero(signals.quiet).min() > 230 and error_of(signals, press) < NOISE
+
+
+def test_a_held_press_is_not_rest_where_pdc_tells(make):
+    press = make(slope=0)
+    press.electrodes = np.rint(
+        press.rest + (press.contact * 100)[:, None] + np.random.default_rng(2).normal(0, 1.2, (700, 19))
+    )
+    signals = recordings.prepare(make_recording(press, part=slice(200, 700)))
+    assert not (signals.quiet & press.contact[200:]).any() and signals.quiet.any()
+
+
+def test_contact_is_never_taken_for_drift(make):
+    press = make(slope=0)
+    creep = press.contact * np.linspace(0, 60, 700)
+    signals = recordings.prepare(make_recording(press, np.rint(press.electrodes + creep[:, None])))
+    assert np.abs(signals.drift).max() < 0.1  # counts/s, see above
+    assert np.abs(signals.change[350] - press.change[350] - creep[350]).max() < 6  # noise of one frame, 4 deviations
+
+
+def test_drift_can_be_left_in(press):
+    signals = recordings.prepare(make_recording(press), PrepareOptions(drift=False))
+    assert not signals.drift.any() and not signals.report["drift_removed"]
+
+
+def test_rectified_recordings_are_flagged_and_tared_at_their_end(make):
+    press = make(slope=0)
+    recording = make_recording(press, as_kind(press, "rectified"), part=slice(300, 700))
+    recording.pdc[:] -= 1500
+    signals = recordings.prepare(recording)
+    assert signals.kind == "rectified" and (signals.flags == Flag.RECTIFIED).all()
+    assert signals.quiet[300:].all() and not signals.quiet[:200].any()
+    assert any("rectified" in warning for warning in signals.warnings)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_kinds_are_told_with_evidence_and_can_be_overridden(kind, press):
+    recording = make_recording(press, as_kind(press, kind))
+    signals = recordings.prepare(recording)
+    assert signals.kind == kind and signals.report["kind_evidence"]
+    other = "tared" if kind != "tared" else "rectified"
+    overridden = recordings.prepare(recording, PrepareOptions(kind=other))
+    assert overridden.kind == other and f"look {kind}" in overridden.report["kind_evidence"]
+
+
+def test_scaled_recordings_say_that_their_unit_is_unknown(press):
+    recording = make_recording(press, as_kind(press, "scaled"))
+    signals = recordings.prepare(recording)
+    assert any("counts_per_unit" in warning for warning in signals.warnings)
+    told = recordings.prepare(recording, PrepareOptions(counts_per_unit=300))
+    assert error_of(told, press) < NOISE and not told.warnings
+
+
+def test_tare_frames_can_be_told(press):
+    recording = make_recording(press)
+    for tare in ("0:100", slice(0, 100), ":100", "-700:100"):
+        signals = recordings.prepare(recording, PrepareOptions(tare=tare))
+        assert np.flatnonzero(signals.quiet).tolist() == list(range(100))
+        np.testing.assert_allclose(signals.rest, press.electrodes[:100].mean(axis=0), atol=NOISE)
+
+
+@pytest.mark.parametrize("tare", ["600:900", "50:50", "90:10", "a:b", "5", "0:10:2", slice(0, 701), "-900:10"])
+def test_tare_frames_outside_are_an_error(tare, press):
+    with pytest.raises(TactileError, match="option tare"):
+        recordings.prepare(make_recording(press), PrepareOptions(tare=tare))
+
+
+def test_no_tare(press):
+    tared = as_kind(press, "tared")
+    signals = recordings.prepare(make_recording(press, tared), PrepareOptions(tare="none"))
+    np.testing.assert_array_equal(signals.change, tared)
+    assert (signals.flags & Flag.NO_QUIET_PART).all()
+    with pytest.raises(TactileError, match="raw recording"):
+        recordings.prepare(make_recording(press), PrepareOptions(tare="none"))
+
+
+@pytest.mark.parametrize(
+    "option", [PrepareOptions(kind="Raw"), PrepareOptions(counts_per_unit=0), PrepareOptions(counts_per_unit=-1)]
+)
+def test_options_that_make_no_sense_are_an_error(option, press):
+    with pytest.raises(TactileError, match="option"):
+        recordings.prepare(make_recording(press), option)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 5, 29])
+def test_shorter_than_the_tare_window_converts_with_a_flag(frames, press):
+    signals = recordings.prepare(make_recording(press, part=slice(0, frames)))
+    assert (signals.flags & Flag.NO_QUIET_PART).all() and np.isfinite(signals.change).all()
+    assert any("fewer than the 30 of the tare window" in warning for warning in signals.warnings)
+
+
+def test_without_a_quiet_part_frames_are_flagged(make):
+    press = make(rise=2.0)
+    recording = make_recording(press, as_kind(press, "tared"), part=slice(220, 500))
+    signals = recordings.prepare(recording)
+    assert (signals.flags & Flag.NO_QUIET_PART).all() and not signals.quiet.any()
+    assert any("no quiet part" in warning for warning in signals.warnings)
+
+
+def test_saturated_frames_are_flagged(press):
+    press.electrodes[300:360, 2] = 4095
+    press.electrodes[300:360, 3] = 0
+    signals = recordings.prepare(make_recording(press), PrepareOptions(repair=False))
+    assert np.flatnonzero(signals.flags & Flag.SATURATED).tolist() == list(range(300, 360))
+    assert any("E3, E4 at an end of the 12-bit range in 60 frames" in warning for warning in signals.warnings)
+
+
+def test_a_dead_channel_is_flagged_only_where_time_enough_passed(press):
+    press.electrodes[:, 6] = 3300
+    signals = recordings.prepare(make_recording(press))
+    assert (signals.flags == Flag.DEAD_CHANNEL).all() and signals.warnings == ("E7 never changes: dead channel",)
+    assert not (recordings.prepare(make_recording(press, part=slice(0, 99))).flags & Flag.DEAD_CHANNEL).any()
+
+
+def test_repair_is_reported_with_its_line_and_can_be_turned_off(press, slide_lines, write):
+    cells = slide_lines[5].split(",")
+    cells[26 + 6 : 26 + 14] = ["0"] * 8
+    slide_lines[5] = ",".join(cells)
+    recording = recordings.read(write(slide_lines))
+    signals = recordings.prepare(recording)
+    assert np.flatnonzero(signals.flags & Flag.REPAIRED).tolist() == [4] and signals.report["samples_glitch"] == 8
+    assert signals.warnings[0].startswith("line 6: glitch in E7 0, E8 0") and np.abs(signals.change[4]).max() < 6
+    kept = recordings.prepare(recording, PrepareOptions(repair=False))
+    assert not (kept.flags & Flag.REPAIRED).any() and kept.change[4, 6] < -2900
+
+
+def test_input_is_not_changed(press):
+    recording = make_recording(press)
+    before, flags = recording.electrodes.copy(), recording.flags.copy()
+    recordings.prepare(recording)
+    np.testing.assert_array_equal(recording.electrodes, before)
+    np.testing.assert_array_equal(recording.flags, flags)
