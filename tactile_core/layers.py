@@ -1,0 +1,66 @@
+"""The building blocks of the networks in numpy, float32: each with the tensor names and the arithmetic of torch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+Tensors = dict[str, np.ndarray]
+NORM_EPSILON = 1e-5  # torch.nn.LayerNorm's default
+
+
+def linear(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
+    """x (T, inputs) -> (T, outputs); weight (outputs, inputs) as torch keeps it."""
+    return x @ tensors[f"{name}.weight"].T + tensors[f"{name}.bias"]
+
+
+def layer_norm(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
+    """Ba et al. 2016 over the last axis, biased variance as torch."""
+    centred = x - x.mean(-1, keepdims=True)
+    spread = np.sqrt(np.square(centred).mean(-1, keepdims=True) + np.float32(NORM_EPSILON))
+    return centred / spread * tensors[f"{name}.weight"] + tensors[f"{name}.bias"]
+
+
+def silu(x: np.ndarray) -> np.ndarray:
+    """x * sigmoid(x), written with tanh because exp overflows for large negative x."""
+    return x * (np.float32(0.5) * (np.float32(1.0) + np.tanh(np.float32(0.5) * x)))
+
+
+def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray:
+    """Linear layers with ReLU between them."""
+    for layer in range(layers):
+        x = linear(np.maximum(x, 0) if layer else x, tensors, f"{name}.{layer}")
+    return x
+
+
+def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndarray:
+    """Residual MLP with a linear skip from input to output (networks.md)."""
+    hidden = linear(x, tensors, f"{name}.first")
+    for block in range(blocks):
+        inner = layer_norm(hidden, tensors, f"{name}.blocks.{block}.norm")
+        inner = silu(linear(inner, tensors, f"{name}.blocks.{block}.up"))
+        hidden = hidden + linear(inner, tensors, f"{name}.blocks.{block}.down")
+    out = linear(layer_norm(hidden, tensors, f"{name}.norm"), tensors, f"{name}.last")
+    return out + x @ tensors[f"{name}.skip.weight"].T
+
+
+def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
+    """Tensor shapes of `plain` with these layer sizes."""
+    shapes: dict[str, tuple[int, ...]] = {}
+    for layer, (inputs, outputs) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
+        shapes |= {f"{name}.{layer}.weight": (outputs, inputs), f"{name}.{layer}.bias": (outputs,)}
+    return shapes
+
+
+def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: int) -> dict[str, tuple[int, ...]]:
+    """Tensor shapes of `residual`."""
+    shapes: dict[str, tuple[int, ...]] = {
+        f"{name}.first.weight": (width, inputs),
+        f"{name}.last.weight": (outputs, width),
+        f"{name}.last.bias": (outputs,),
+        f"{name}.skip.weight": (outputs, inputs),
+    }
+    vectors = [f"{name}.first.bias", f"{name}.norm.weight", f"{name}.norm.bias"]
+    for block in (f"{name}.blocks.{index}" for index in range(blocks)):
+        shapes |= {f"{block}.up.weight": (width, width), f"{block}.down.weight": (width, width)}
+        vectors += [f"{block}.{part}" for part in ("norm.weight", "norm.bias", "up.bias", "down.bias")]
+    return shapes | {vector: (width,) for vector in vectors}

@@ -1,0 +1,88 @@
+"""A training's state on disk, without pickle: one NPZ of arrays, with a JSON text among them."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from torch import nn
+
+from ..errors import TactileError
+from ..weights import write_bytes
+
+ADVICE = "Remove the file to start again, or train into another folder"
+
+
+@dataclass
+class State:
+    """Where a training stands.
+
+    identity : what must be the same for the training to go on: data, seed, options, versions
+    stage, epoch : the next to run           log : rows (stage, epoch, train, validation)
+    arrays : weights and optimiser
+    """
+
+    identity: dict
+    stage: int = 0
+    epoch: int = 0
+    log: list[list] = field(default_factory=list)
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: torch.optim.Optimizer | None) -> None:
+    """Write the state, with the model and the optimiser as they are now."""
+    arrays = {f"model/{name}": tensor.numpy() for name, tensor in model.state_dict().items()}
+    if optimiser is not None:
+        for index, values in optimiser.state_dict()["state"].items():
+            arrays |= {f"optimiser/{index}/{name}": tensor.numpy() for name, tensor in values.items()}
+    text = {"identity": state.identity, "stage": state.stage, "epoch": state.epoch, "log": state.log}
+    arrays["state"] = np.frombuffer(json.dumps(text).encode(), np.uint8)
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    write_bytes(path, buffer.getvalue())
+
+
+def read(path: str | os.PathLike, identity: dict) -> State:
+    """The state in the file, or the state of a start if there is none.
+
+    raises: TactileError if the file is damaged, or belongs to another training
+    """
+    if not os.path.exists(path):
+        return State(identity)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        text = json.loads(arrays.pop("state").tobytes())
+        state = State(text["identity"], text["stage"], text["epoch"], text["log"], arrays)
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise TactileError(path, f"cannot be read ({error})", "a checkpoint", ADVICE) from error
+    for name, expected in identity.items():
+        if state.identity.get(name) != expected:
+            raise TactileError(path, f"{name} {state.identity.get(name)}", f"{name} {expected}", ADVICE)
+    return state
+
+
+def restore(state: State, model: nn.Module, path: str | os.PathLike) -> None:
+    """Put the saved weights into the model; raises TactileError if they do not fit."""
+    saved = {name: array for name, array in state.arrays.items() if name.startswith("model/")}
+    weights = {name.removeprefix("model/"): torch.from_numpy(array.copy()) for name, array in saved.items()}
+    try:
+        model.load_state_dict(weights)
+    except RuntimeError as error:
+        raise TactileError(path, "weights of other networks", "a checkpoint of this version", ADVICE) from error
+
+
+def restore_optimiser(state: State, optimiser: torch.optim.Optimizer) -> None:
+    """Put the saved moments into the optimiser; nothing to do at the start of a stage."""
+    values: dict[int, dict[str, torch.Tensor]] = {}
+    for name, array in state.arrays.items():
+        kind, *rest = name.split("/")
+        if kind == "optimiser":
+            values.setdefault(int(rest[0]), {})[rest[1]] = torch.from_numpy(array.copy())
+    if values:
+        optimiser.load_state_dict({"state": values, "param_groups": optimiser.state_dict()["param_groups"]})

@@ -1,0 +1,158 @@
+"""The pairs file (HDF5, written by `mechanics/pairs.py`) as training reads it, and its split by presses."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import TactileError
+
+FORMAT = "tactile-pairs-1"
+ELECTRODES = 19
+ADVICE = "Make the file again with `tactile pairs`"
+ATTRIBUTES = ("biotac_nodes_sha256", "digit_nodes_sha256", "indenters", "scene", "seed", "version")
+MIN_PRESSES = 5  # at least three to train on, one to validate, one to test
+# dataset -> trailing shape and kind of numbers (i whole, f real); None: as many nodes as the surface has
+DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
+    "displacement_biotac": ((None, 3), "i"),
+    "displacement_digit": ((None, 3), "i"),
+    "signal": ((ELECTRODES,), "f"),
+    "force": ((3,), "f"),
+    "contact_center": ((2,), "f"),
+    "depth_digit": ((), "f"),
+    "press": ((), "i"),
+    "indenter": ((), "i"),
+}
+SCALED = ("displacement_biotac", "displacement_digit")
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Paired contacts, C of them. Displacements stay in the file's whole numbers; times their scale they are metres.
+
+    displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
+    scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change against rest
+    force : (C, 3) float32 N                         contact_center : (C, 2) float32 m, (x, z) on the DIGIT
+    depth_digit : (C,) float32 m                     press : (C,) int32
+    indenter : (C,) int16                            attributes : of the file, as text
+    sha256 : of the content, whatever the HDF5 layout
+    """
+
+    displacement_biotac: np.ndarray
+    displacement_digit: np.ndarray
+    scale_biotac: float
+    scale_digit: float
+    signal: np.ndarray
+    force: np.ndarray
+    contact_center: np.ndarray
+    depth_digit: np.ndarray
+    press: np.ndarray
+    indenter: np.ndarray
+    attributes: dict[str, str]
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Split:
+    """Row numbers of the contacts to train on, to choose by, and to report on; no press is in two of them."""
+
+    train: np.ndarray
+    validation: np.ndarray
+    test: np.ndarray
+
+
+def read_pairs(path: str | os.PathLike) -> Pairs:
+    """Read and check a pairs file.
+
+    raises: TactileError if it is missing, truncated, of another format, or if shapes or numbers are wrong
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            found = str(file.attrs.get("format", ""))
+            if found != FORMAT:
+                raise TactileError(path, f"format {found!r}", f"format {FORMAT!r}", ADVICE)
+            missing = [name for name in ATTRIBUTES if name not in file.attrs]
+            if missing:
+                raise TactileError(path, f"no attribute {missing[0]}", ", ".join(ATTRIBUTES), ADVICE)
+            attributes = {name: str(file.attrs[name]) for name in ATTRIBUTES}
+            arrays = {name: _dataset(file, name, path) for name in DATASETS}
+            scales = {name: _scale(file[name], f"{os.fspath(path)}, {name}") for name in SCALED}
+    except (OSError, KeyError) as error:  # h5py: a truncated file is an OSError, damage inside it may be either
+        found = "cannot be read as HDF5, it is damaged or cut off" if os.path.exists(path) else "no such file"
+        raise TactileError(path, found, "a whole HDF5 file of pairs", ADVICE) from error
+    _check_values(arrays, path)
+    digest = _content_hash(arrays, scales, attributes)
+    return Pairs(
+        scale_biotac=scales["displacement_biotac"],
+        scale_digit=scales["displacement_digit"],
+        attributes=attributes,
+        sha256=digest,
+        **arrays,
+    )
+
+
+def _dataset(file: object, name: str, path: str | os.PathLike) -> np.ndarray:
+    """One dataset, its kind and trailing shape checked."""
+    place = f"{os.fspath(path)}, {name}"
+    if name not in file:
+        raise TactileError(place, "no such dataset", f"the datasets {', '.join(DATASETS)}", ADVICE)
+    data, (shape, kind) = file[name], DATASETS[name]
+    expected = "(C, " + ", ".join("n" if size is None else str(size) for size in shape) + ")"
+    fits = len(data.shape) == len(shape) + 1 and all(
+        size in (None, found) and found > 0 for size, found in zip(shape, data.shape[1:], strict=True)
+    )
+    if not fits:
+        raise TactileError(place, f"shape {data.shape}", expected, ADVICE)
+    if data.dtype.kind != kind or (shape == (None, 3) and data.dtype != np.int16):
+        raise TactileError(place, f"dtype {data.dtype}", "int16" if kind == "i" else "float32", ADVICE)
+    values = data[:]
+    return values if kind == "i" else values.astype(np.float32)
+
+
+def _scale(data: object, place: str) -> float:
+    """Metres per unit of a displacement dataset."""
+    scale = np.asarray(data.attrs.get("scale", np.nan), np.float64)
+    if scale.shape != () or not 0.0 < scale < 1.0:
+        raise TactileError(place, f"scale {scale}", "metres per unit, a number above 0", ADVICE)
+    return float(scale)
+
+
+def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> None:
+    """As many rows everywhere, and only finite numbers."""
+    count = len(arrays["press"])
+    for name, array in arrays.items():
+        if len(array) != count:
+            raise TactileError(f"{os.fspath(path)}, {name}", f"{len(array)} contacts", f"{count} as in press", ADVICE)
+        if array.dtype.kind == "f" and name != "contact_center" and not np.isfinite(array).all():
+            bad = int(np.flatnonzero(~np.isfinite(array.reshape(count, -1)).all(-1))[0])
+            raise TactileError(f"{os.fspath(path)}, {name}, contact {bad}", "NaN or infinite", "finite numbers", ADVICE)
+
+
+def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attributes: dict[str, str]) -> str:
+    """SHA-256 over names, types, shapes, values and attributes."""
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
+        digest.update(np.ascontiguousarray(array).data)
+    digest.update(repr((sorted(scales.items()), sorted(attributes.items()))).encode())
+    return digest.hexdigest()
+
+
+def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
+    """Split contacts 80/10/10 by press, so that no neighbour of a training contact is tested.
+
+    raises: TactileError if there are fewer than five presses
+    """
+    presses = np.unique(press)
+    if len(presses) < MIN_PRESSES:
+        advice = "Make more contacts with `tactile pairs --count`"
+        raise TactileError(f"{os.fspath(where)}, press", f"{len(presses)} presses", f"at least {MIN_PRESSES}", advice)
+    order = np.random.default_rng([seed, len(presses)]).permutation(presses)
+    share = max(1, round(0.1 * len(presses)))
+    groups = order[2 * share :], order[:share], order[share : 2 * share]
+    return Split(*(np.flatnonzero(np.isin(press, group)) for group in groups))

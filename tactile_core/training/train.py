@@ -1,0 +1,206 @@
+"""Training from a pairs file to a weights folder, from top to bottom: data, model, stages, export, report.
+
+The same pairs, seed, options and machine give the same bytes, interrupted or not: every epoch draws its order, its
+noise and its posterior samples from generators seeded with (seed, stage, epoch), on one thread.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ..errors import TactileError
+from . import checkpoint
+from .data import Contacts
+from .export import export, versions
+from .options import Options
+from .pairs import Pairs, read_pairs, split_presses
+from .report import draw_losses, write_log
+from .stages import STAGES, Model, Stage
+
+log = logging.getLogger(__name__)
+Progress = Callable[[float, str], None]
+WARM_UP = 0.02  # share of the steps over which the learning rate rises (assumed)
+VALIDATION_SEED = 2**31  # stands in the place of the epoch; no training has as many
+
+
+def train(
+    pairs_path: str | os.PathLike,
+    out_folder: str | os.PathLike,
+    seed: int = 0,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    rest_digit: np.ndarray | None = None,
+    overwrite: bool = False,
+) -> dict:
+    """Train the five networks and the force estimate; returns the card.
+
+    Writes out_folder/weights/<net>.safetensors and card.json (what `networks.load` reads), log.csv, loss.png; while it
+    runs, checkpoint.npz, from which the next call with the same arguments goes on.
+    progress : called with the share done (0..1) and a line of text
+    rest_digit : (M, 3) m, rest nodes of the DIGIT in the pairs; None: those of `sensors.digit_surface()`
+    raises: TactileError if the pairs, the folder or a checkpoint in it cannot be used
+    """
+    options, out = options or Options(), Path(out_folder)
+    pairs = read_pairs(pairs_path)
+    split = split_presses(pairs.press, seed, pairs_path)
+    rest = digit_rest(pairs, pairs_path) if rest_digit is None else np.asarray(rest_digit, np.float64)
+    prepare_folder(out, overwrite)
+    with deterministic():
+        generator = torch.Generator().manual_seed(seed)
+        contacts = Contacts(pairs, split, options, generator)
+        model = Model(options, contacts.biotac.modes.shape[1], contacts.digit.modes.shape[1], generator)
+        history = run_stages(model, contacts, seed, out / "checkpoint.npz", progress or quiet)
+        card = export(model, contacts, rest, seed, out / "weights")
+    write_log(out / "log.csv", history)
+    draw_losses(out / "loss.png", history)
+    (out / "checkpoint.npz").unlink()
+    return card
+
+
+def quiet(share: float, text: str) -> None:
+    """Progress that nobody watches goes to the log."""
+    log.info("%3.0f %% %s", 100 * share, text)
+
+
+def digit_rest(pairs: Pairs, path: str | os.PathLike) -> np.ndarray:
+    """(M, 3) m, our DIGIT surface; raises TactileError if the pairs were made on another one."""
+    from ..sensors import digit_surface
+
+    surface = digit_surface()
+    found = pairs.attributes["digit_nodes_sha256"]
+    if found != surface.sha256 or len(surface.rest) != pairs.displacement_digit.shape[1]:
+        advice = "Make the pairs again with this version"
+        raise TactileError(f"{os.fspath(path)}, digit_nodes_sha256", found, surface.sha256, advice)
+    return np.asarray(surface.rest)
+
+
+def prepare_folder(out: Path, overwrite: bool) -> None:
+    """Make the folder; raises TactileError if it cannot be made or already holds weights."""
+    if (out / "weights" / "card.json").exists() and not overwrite:
+        raise TactileError(out, "already holds weights", "a new folder", "Choose another folder, or overwrite")
+    try:
+        (out / "weights").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        advice = "Choose another folder"
+        raise TactileError(out, f"cannot be made ({error.strerror})", "a writable folder", advice) from error
+
+
+@contextmanager
+def deterministic() -> Iterator[None]:
+    """One thread and deterministic algorithms inside, the caller's settings after."""
+    threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    torch.set_num_threads(1)
+    torch.use_deterministic_algorithms(True)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+        torch.use_deterministic_algorithms(strict)
+
+
+def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress: Progress) -> list[list]:
+    """Run the stages that are left; returns the log rows (stage, epoch, train, validation)."""
+    identity = {
+        "pairs": contacts.pairs.sha256,
+        "seed": seed,
+        "options": contacts.options.settings(),
+        "versions": versions(),
+    }
+    state = checkpoint.read(path, identity)
+    if state.arrays:
+        checkpoint.restore(state, model, path)
+        log.info("going on at stage %d, epoch %d from %s", state.stage, state.epoch, path)
+    while state.stage < len(STAGES):
+        run_stage(STAGES[state.stage], model, contacts, seed, state, path, progress)
+        state.stage, state.epoch, state.arrays = state.stage + 1, 0, {}
+        checkpoint.save(path, state, model, None)
+    return state.log
+
+
+def run_stage(
+    stage: Stage, model: Model, contacts: Contacts, seed: int, state: checkpoint.State, path: Path, progress: Progress
+) -> None:
+    """Train the networks of one stage for its epochs."""
+    options = contacts.options
+    parameters = [parameter for net in stage.nets for parameter in getattr(model, net).parameters()]
+    optimiser = torch.optim.AdamW(parameters, lr=options.rate, weight_decay=options.weight_decay)
+    checkpoint.restore_optimiser(state, optimiser)
+    epochs, saved = options.epochs(stage.name), time.monotonic()
+    while state.epoch < epochs:
+        steps = epoch_losses(stage, model, contacts, seed, state.stage, state.epoch)
+        training = train_epoch(steps, optimiser, state.epoch, epochs, stage.rate * options.rate)
+        validation = validate(stage, model, contacts, seed, state.stage)
+        state.log.append([stage.name, state.epoch, training, validation])
+        state.epoch += 1
+        text = f"{stage.name} {state.epoch}/{epochs}: loss {training:.4f}, validation {validation:.4f}"
+        progress(share_done(options, state), text)
+        if time.monotonic() - saved >= options.checkpoint_seconds and state.epoch < epochs:
+            checkpoint.save(path, state, model, optimiser)
+            saved = time.monotonic()
+
+
+def share_done(options: Options, state: checkpoint.State) -> float:
+    """Epochs done over all epochs."""
+    lengths = [options.epochs(stage.name) for stage in STAGES]
+    return (sum(lengths[: state.stage]) + state.epoch) / sum(lengths)
+
+
+def epoch_losses(
+    stage: Stage, model: Model, contacts: Contacts, seed: int, index: int, epoch: int
+) -> list[Callable[[], torch.Tensor]]:
+    """One function a step: called in order, each gives the loss of its batch."""
+    options = contacts.options
+    rng = np.random.default_rng([seed, index, epoch])
+    generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
+    rows = rng.permutation(contacts.with_silence(contacts.split.train))
+    change = contacts.read(rows, rng)
+
+    def loss(step: int) -> torch.Tensor:
+        part = slice(step * options.batch, (step + 1) * options.batch)
+        batch = contacts.batch(rows[part], change[part], epoch + step)
+        return stage.loss(model, contacts, batch, options, generator)
+
+    return [lambda step=step: loss(step) for step in range(math.ceil(len(rows) / options.batch))]
+
+
+def train_epoch(
+    losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
+) -> float:
+    """One pass over the data; returns the mean loss. The rate rises over the first steps, then falls as a cosine."""
+    total = 0.0
+    for step, loss in enumerate(losses):
+        share = (epoch * len(losses) + step + 1) / (epochs * len(losses))
+        for group in optimiser.param_groups:
+            group["lr"] = rate * min(1.0, share / WARM_UP) * 0.5 * (1.0 + math.cos(math.pi * share))
+        optimiser.zero_grad()
+        value = loss()
+        value.backward()
+        torch.nn.utils.clip_grad_norm_(optimiser.param_groups[0]["params"], 1.0)
+        optimiser.step()
+        total += float(value.detach())
+    if not math.isfinite(total):
+        raise TactileError("training", "the loss is not finite", "a falling loss", "Check the pairs, or lower the rate")
+    return total / len(losses)
+
+
+def validate(stage: Stage, model: Model, contacts: Contacts, seed: int, index: int) -> float:
+    """The stage's loss on the validation presses, with the same noise in every epoch."""
+    rng = np.random.default_rng([seed, index, VALIDATION_SEED])
+    generator = torch.Generator().manual_seed(seed)
+    rows = contacts.with_silence(contacts.split.validation)
+    change, size = contacts.read(rows, rng), 256
+    total = 0.0
+    with torch.no_grad():
+        for part, start in enumerate(range(0, len(rows), size)):
+            batch = contacts.batch(rows[start : start + size], change[start : start + size], part)
+            total += float(stage.loss(model, contacts, batch, contacts.options, generator)) * len(batch.rows)
+    return total / len(rows)

@@ -1,0 +1,86 @@
+"""Each metric against a case that can be worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_core import metrics
+
+REST = np.array([[x * 1e-3, -8e-3, z * 1e-3] for x in range(5) for z in range(4)])
+
+
+def dent(depth: float, node: int) -> np.ndarray:
+    """(1, 20, 3) m, one node pushed in."""
+    displacement = np.zeros((1, len(REST), 3), np.float32)
+    displacement[0, node, 1] = depth
+    return displacement
+
+
+def test_perfect_answer_has_no_error():
+    true = dent(1e-3, 7)
+    for value in metrics.mesh_figures(true, true).values():
+        assert value == [0.0]
+
+
+def test_rms_counts_moving_nodes_only():
+    true, found = dent(100e-6, 3), dent(60e-6, 3)
+    true[0, 4, 0] = 20e-6  # moves, and the answer misses it
+    found[0, 5, 2] = 500e-6  # rests in truth: not in the contact, but the largest error
+    expected = np.sqrt((40e-6**2 + 20e-6**2) / 2)
+    assert metrics.rms_in_contact(found, true) == pytest.approx([expected], rel=1e-6)  # float32 input
+    assert metrics.max_error(found, true) == pytest.approx([500e-6], rel=1e-6)
+
+
+def test_core_is_above_a_share_of_the_peak():
+    true = dent(100e-6, 3)
+    true[0, [4, 5], 1] = 31e-6, 29e-6
+    found = true.copy()
+    found[0, [3, 4, 5], 1] += np.float32([-10e-6, 20e-6, 90e-6])
+    assert metrics.core_height_error(found, true) == pytest.approx([np.sqrt((10e-6**2 + 20e-6**2) / 2)], rel=1e-5)
+    assert metrics.peak_depth_error(found, true) == pytest.approx([0.19], rel=1e-5)  # the new peak is node 5, 119 um
+
+
+def test_no_contact_is_no_figure():
+    still = np.zeros((1, len(REST), 3), np.float32)
+    assert np.isnan(metrics.rms_in_contact(still, still)).all()
+    assert np.isnan(metrics.core_height_error(still, still)).all()
+    assert np.isnan(metrics.peak_depth_error(still, still)).all()
+    assert np.isnan(metrics.dent_center(still, REST)).all()
+    assert metrics.mean(np.array([np.nan])) is None
+    assert metrics.median(np.array([])) is None
+
+
+def test_depth_on_a_curved_pad_is_the_length():
+    true = np.zeros((1, len(REST), 3), np.float32)
+    true[0, 2] = 0.0, 30e-6, 40e-6
+    assert metrics.peak_depth_error(0.5 * true, true, metrics.lengths) == pytest.approx([0.5])
+
+
+def test_center_of_a_dent():
+    displacement = dent(1e-3, 0) + dent(1e-3, 1) + dent(0.2e-3, 19)  # the last is below 30 % of the peak
+    assert metrics.dent_center(displacement, REST)[0] == pytest.approx([0.0, 0.5e-3])
+
+
+def test_center_row_counts_a_missed_contact_as_the_null_answer():
+    true = np.array([[0.0, 0.0], [0.0, 4e-3], [3e-3, 0.0]])
+    found = np.array([[np.nan, np.nan], [0.0, 4e-3], [3e-3, 1e-3]])
+    row = metrics.center_row("center", found, true, np.array([0.0, 2e-3]))
+    assert row == {"name": "center", "value": 1.0, "null": 2.0, "unit": "mm"}
+
+
+def test_rows_carry_the_null_answer():
+    rows = metrics.mesh_rows("net", [(dent(60e-6, 3), dent(100e-6, 3)), (dent(0.0, 3), dent(200e-6, 3))])
+    assert [row["name"] for row in rows] == ["net_rms", "net_max", "net_core_height", "net_peak_depth"]
+    assert rows[0]["value"] == pytest.approx(120.0)
+    assert rows[0]["null"] == pytest.approx(150.0)
+    assert rows[3] == {"name": "net_peak_depth", "value": 70.0, "null": 100.0, "unit": "percent"}
+
+
+def test_force_rows():
+    true = np.array([[0.0, 3.0, 4.0], [0.0, 0.05, 0.0]])
+    rms, share = metrics.force_rows("force", np.array([[0.0, 3.0, 3.0], [0.0, 0.05, 0.0]]), true)
+    assert rms["value"] == pytest.approx(np.sqrt(0.5), rel=1e-3)
+    assert rms["null"] == pytest.approx(np.sqrt(25.0025 / 2), rel=1e-3)
+    assert share["value"] == pytest.approx(20.0)
+    assert share["null"] == 100.0
