@@ -40,11 +40,16 @@ STYLE = {"font.size": 9, "axes.linewidth": 0.6, "agg.path.chunksize": 10_000}
 def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
     """Indices (k,) of the frames to show: the strongest of each of `count` equal parts of the recording, in order.
 
+    A frame closer than half a part to the one before is passed over, where the part has others.
     strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none
     """
     strength = np.where(np.isfinite(strength), strength, -np.inf)
-    parts = np.array_split(np.arange(len(strength)), min(count, len(strength)))
-    return np.array([part[np.argmax(strength[part])] for part in parts], int)
+    chosen: list[int] = []
+    for part in np.array_split(np.arange(len(strength)), min(count, len(strength))):
+        apart = part[part >= chosen[-1] + len(part) / 2] if chosen else part
+        candidates = apart if len(apart) else part
+        chosen.append(int(candidates[np.argmax(strength[candidates])]))
+    return np.array(chosen, int)
 
 
 def contact_sheet(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pathlib
 from collections.abc import Callable
 
 import numpy as np
@@ -43,6 +44,8 @@ def simulate_recording(
         raise TactileError(
             f"{scene_path}, recording", "missing", "a [recording] table", "See scenes/press_roll_slide/scene.toml"
         )
+    if pathlib.Path(out).exists():
+        raise TactileError(out, "exists already", "a new file", "Remove it or choose another name")
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     time, place, force = _motion(spec)
     frames: list[Pair | None] = []

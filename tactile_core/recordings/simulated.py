@@ -22,7 +22,7 @@ from .recording import ELECTRODES, Recording, Truth
 from .store import Store
 
 FORMAT = "tactile-recording-1"
-SCALE = 1e-7  # m a unit of the truth's int16: steps of 0.1 um, reach +-3.27 mm
+SCALE = 5e-7  # m a unit of the truth's int16: steps of 0.5 um (0.14 um rms, below any error measured), reach +-16 mm
 COUNTS = (0, 4095)  # 12-bit readings
 BLOCK = 16  # frames a chunk of the truth: a chunk stays below 300 kB at 2,700 nodes
 
@@ -45,7 +45,7 @@ def write_simulated(
 ) -> Path:
     """Write the file whole or not at all, and return its path. Shapes and units: see the module.
 
-    Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-3.27 mm.
+    Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm.
     """
     import h5py
 
@@ -146,7 +146,7 @@ def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
         raise TactileError(f"{path}, truth/{name}", f"shape {np.shape(value)}", f"({frames}, nodes, 3)")
     steps = np.rint(np.asarray(value, np.float64) / SCALE)
     if not np.all(np.abs(steps) <= np.iinfo(np.int16).max):
-        raise TactileError(f"{path}, truth/{name}", "displacements beyond +-3.27 mm or not finite", "at most 3.27 mm")
+        raise TactileError(f"{path}, truth/{name}", "displacements beyond +-16 mm or not finite", "at most 16 mm")
     return steps.astype(np.int16)
 
 

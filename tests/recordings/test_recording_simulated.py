@@ -20,7 +20,7 @@ def test_read_back_with_its_truth(press, simulated, tmp_path):
     for name in ("displacement_biotac", "displacement_digit"):
         written, back = getattr(arrays["truth"], name), getattr(recording.truth, name)
         assert back.dtype == np.float32
-        np.testing.assert_allclose(back, written, rtol=0, atol=5.1e-8)  # half of the 1e-7 m a unit, and float32
+        np.testing.assert_allclose(back, written, rtol=0, atol=2.51e-7)  # half of the 5e-7 m a unit, and float32
     np.testing.assert_allclose(recording.truth.contact_center, arrays["truth"].contact_center, rtol=1e-7)  # float32
     signals = recordings.prepare(recording)
     assert signals.kind == "raw" and not signals.flags.any() and signals.warnings == ()
@@ -34,7 +34,7 @@ def test_same_input_same_bytes(press, simulated, tmp_path):
 def test_file_says_what_it_is(press, simulated, tmp_path):
     with h5py.File(recordings.write_simulated(tmp_path / "a.h5", **simulated(press))) as file:
         assert file.attrs["format"] == "tactile-recording-1" and file.attrs["simulated"]
-        assert file["electrodes"].dtype == np.int16 and file["truth/displacement_biotac"].attrs["scale"] == 1e-7
+        assert file["electrodes"].dtype == np.int16 and file["truth/displacement_biotac"].attrs["scale"] == 5e-7
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_arrays_that_a_sensor_cannot_give_are_refused(change, message, press, si
 
 def test_truth_beyond_its_range_is_refused(press, simulated, tmp_path):
     arrays = simulated(press)
-    arrays["truth"] = replace(arrays["truth"], displacement_digit=np.full((700, 9, 3), 4e-3))
+    arrays["truth"] = replace(arrays["truth"], displacement_digit=np.full((700, 9, 3), 2e-2))
     with pytest.raises(TactileError, match="beyond"):
         recordings.write_simulated(tmp_path / "a.h5", **arrays)
 
