@@ -1,0 +1,126 @@
+"""The three steps as one pure function: signals to BioTac deformation to DIGIT deformation, force and confidence."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+
+import numpy as np
+
+from . import digit_shape, metrics, networks, sensors, surface
+from .errors import TactileError
+from .flags import Flag
+from .networks import Networks
+from .recordings import Signals
+
+# Frames that differ from training in kind, not in degree, are worth little until networks know them (TRANSLATION).
+UNTRAINED_CONFIDENCE = 0.2  # assumed
+FAR = 2.0  # times validation's outermost quantile: there confidence is gone, the frame out of range (assumed)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Translation:
+    """What a recording becomes; T frames first, float32, SI units.
+
+    latent_signal (T, 8), latent_biotac, latent_digit : means of the networks' latents
+    displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
+    force : (T, 3) N, exerted by the object on the BioTac, sensor frame
+    contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
+    confidence : (T,), 1 as in training, 0 far from it
+    flags : (T,) uint16, bits of ``flags.Flag``: those of the signals and OUT_OF_RANGE, BEYOND_DIGIT
+    """
+
+    latent_signal: np.ndarray
+    latent_biotac: np.ndarray
+    latent_digit: np.ndarray
+    displacement_biotac: np.ndarray
+    displacement_digit: np.ndarray
+    force: np.ndarray
+    contact_center: np.ndarray
+    confidence: np.ndarray
+    flags: np.ndarray
+
+
+class Translator:
+    """Verified networks, ready to translate. card : what they are; sha256 : of the card, which names all weights."""
+
+    def __init__(self, nets: Networks) -> None:
+        self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
+        distance = self.card["distance"]
+        self._limits = {name: distance[name] for name in ("mahalanobis", "residual", "largest")}
+        self._unrolled = surface.unrolled_nodes()
+
+    def __call__(self, signals: Signals) -> Translation:
+        """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours."""
+        nets = self.nets
+        change = np.asarray(signals.change, np.float32)
+        latent_signal = nets.encode_signal(change)
+        latent_biotac = nets.s2m(latent_signal)
+        latent_digit = nets.m2m(latent_biotac)
+        biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
+        confidence, out_of_range = self._trust(change, signals.flags)
+        flags = signals.flags.copy()
+        flags[out_of_range] |= np.uint16(Flag.OUT_OF_RANGE)
+        flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
+        return Translation(
+            latent_signal, latent_biotac, latent_digit, biotac, digit,
+            force=nets.force(latent_biotac),
+            contact_center=self._contact_center(digit),
+            confidence=confidence, flags=flags,
+        )  # fmt: skip
+
+    def _contact_center(self, displacement: np.ndarray) -> np.ndarray:
+        """(T, 2) m, NaN where the gel moves no more than noise alone makes it."""
+        center = metrics.dent_center(displacement, sensors.digit_surface().rest).astype(np.float32)
+        center[metrics.lengths(displacement).max(axis=1) < self._silent("digit_m")] = np.nan
+        return center
+
+    def _silent(self, quantity: str) -> float:
+        """The most that 99 of 100 frames of noise without contact make of a quantity of the card."""
+        return float(np.interp(0.99, self.card["silence"]["levels"], self.card["silence"][quantity]))
+
+    def _trust(self, change: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Confidence (T,) and whether a frame is out of range (T,).
+
+        Each distance to the training signals counts against its quantiles in validation: full confidence up to the
+        95 % quantile, none at ``FAR`` times the outermost. Not a calibrated probability.
+        """
+        distance = self.nets.signal_distance(change)
+        levels = self.card["distance"]["levels"]
+        confidence = np.ones(len(change), np.float32)
+        for name, limits in self._limits.items():
+            usual, far = np.interp(0.95, levels, limits), FAR * limits[-1]
+            confidence = np.minimum(confidence, np.clip((far - getattr(distance, name)) / (far - usual), 0, 1))
+        out_of_range = confidence <= 0
+        untrained = flags & np.uint16(Flag.RECTIFIED | Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
+        confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
+        return confidence.astype(np.float32), out_of_range
+
+    def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
+        """Whether the BioTac is touched (T,) where the gel has no counterpart: the dent's centre rolls off the gel."""
+        moved = metrics.lengths(displacement)
+        peak = moved.max(axis=1, keepdims=True)
+        core = (moved > metrics.CORE * peak) & (peak > self._silent("biotac_m"))
+        weight = np.where(core & np.isfinite(self._unrolled[:, 0]), moved, 0)
+        total = weight.sum(axis=1)
+        center = weight @ np.nan_to_num(self._unrolled) / np.where(total > 0, total, 1)[:, None]
+        outside = digit_shape.outline_distance(center[:, 0], center[:, 1]) <= 0
+        return core.any(axis=1) & (outside | (total == 0))
+
+
+def load_translator(folder: str | os.PathLike | None = None) -> Translator:
+    """The networks of a weights folder, the shipped ones by default.
+
+    Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces.
+    """
+    nets = networks.load(folder)
+    for key, here in (
+        ("biotac_nodes_sha256", sensors.biotac_surface().sha256),
+        ("digit_nodes_sha256", sensors.digit_surface().sha256),
+    ):
+        if nets.card.get(key) != here:
+            raise TactileError(
+                f"{folder or networks.WEIGHTS_FOLDER}, card.json, {key}", f"{str(nets.card.get(key))[:12]}...",
+                f"{here[:12]}..., the surface of this version", "Use weights trained with this version of the sensors",
+            )  # fmt: skip
+    return Translator(nets)
