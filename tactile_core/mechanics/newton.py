@@ -1,7 +1,8 @@
 """Frictionless contact of a rigid indenter with a finite-strain solid: Newton's method with an exact active set.
 
-A touching node may slide on the indenter but not leave along its normal: its degrees of freedom are turned into the
-indenter's frame and the normal one is prescribed, so the matrix stays symmetric positive definite.
+A touching node may slide on the obstacle but not leave along its normal: its degrees of freedom are turned into the
+obstacle's frame and the normal one is prescribed, so the matrix stays symmetric positive definite. The BioTac's fluid
+adds one unknown, its pressure, by a bordered solve.
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ import numpy as np
 
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
+from .cavity import Cavity
 from .factor import NotPositiveDefiniteError, factor
 from .finite_strain import FiniteStrainSolid, State
 
 GAP_TOLERANCE = 1e-9  # m
-FORCE_TOLERANCE = 1e-8  # of the largest nodal force
+BALANCE_TOLERANCE = 1e-8  # of the largest nodal force, and of the fluid's volume
 MAX_ITERATIONS = 25
 SMALLEST_STEP = 1 / 64  # of a load step; halved below that, the path has ended
 _CURVATURE_STEP = 1e-7  # m, central differences of the exact normals
@@ -26,8 +28,9 @@ _CURVATURE_STEP = 1e-7  # m, central differences of the exact normals
 class Touch:
     """A solved contact. depth : m; state : of the solid; pressing : (k,) N, normal force of the touching ``nodes``.
 
-    nodes : (k,) mesh nodes; normals : (k, 3) of the indenter there; force : (3,) N on the sensor
-    iterations : Newton iterations of the last load step; steps : load steps, halved ones counted
+    nodes : (k,) mesh nodes; normals : (k, 3) of the obstacle there; by_indenter : (k,) bool, else the core presses
+    fluid : Pa, rise of the fluid's pressure; iterations : Newton iterations of the last load step
+    steps : load steps, halved ones counted
     """
 
     depth: float
@@ -35,30 +38,56 @@ class Touch:
     nodes: np.ndarray
     pressing: np.ndarray
     normals: np.ndarray
+    by_indenter: np.ndarray
+    fluid: float = 0.0
     iterations: int = 0
     steps: int = 0
 
     @property
     def force(self) -> np.ndarray:
         """Total force (3,) N of the indenter on the sensor."""
-        return self.pressing @ self.normals
+        return self.pressing[self.by_indenter] @ self.normals[self.by_indenter]
 
 
 class _NotConvergedError(Exception):
     """A load step is too large."""
 
 
-class FiniteStrainContact:
-    """An indenter at a pose in front of a solid; follows a path of growing depth."""
+@dataclasses.dataclass(frozen=True)
+class Wall:
+    """A rigid body that does not move, such as the BioTac's core, in the sensor's frame, and the nodes it may meet."""
 
-    def __init__(self, solid: FiniteStrainSolid, touchable: np.ndarray, indenter: Indenter, pose: Pose) -> None:
-        """touchable : (m,) mesh nodes that the indenter may touch."""
-        self.solid, self.touchable, self.indenter, self.pose = solid, touchable, indenter, pose
+    nodes: np.ndarray
+    body: Indenter
+
+
+class FiniteStrainContact:
+    """An indenter at a pose in front of a solid; follows a path of growing depth.
+
+    touchable : (m,) mesh nodes that the indenter may touch; wall : what other nodes may touch inside
+    cavity : incompressible fluid in the solid; ``pre_inflation`` m3 is added to its volume at rest
+    """
+
+    def __init__(
+        self,
+        solid: FiniteStrainSolid,
+        touchable: np.ndarray,
+        indenter: Indenter,
+        pose: Pose,
+        cavity: Cavity | None = None,
+        pre_inflation: float = 0.0,
+        wall: Wall | None = None,
+    ) -> None:
+        self.solid, self.indenter, self.pose, self.cavity, self.wall = solid, indenter, pose, cavity, wall
         self.free = np.flatnonzero(np.repeat(~solid.mesh.clamped, 3))
+        self.outer = len(touchable)
+        self.touchable = touchable if wall is None else np.concatenate([touchable, wall.nodes])
+        self.volume = pre_inflation + (cavity.volume(solid.mesh.nodes) if cavity else 0.0)
 
     def start(self) -> Touch:
-        """First touch: nothing is deformed."""
-        return Touch(0.0, self.solid.rest(), np.empty(0, int), np.empty(0), np.empty((0, 3)))
+        """Nothing is deformed; a pre-inflated skin finds its shape in the first step."""
+        empty = np.empty(0, int)
+        return Touch(0.0, self.solid.rest(), empty, np.empty(0), np.empty((0, 3)), empty.astype(bool))
 
     def press(self, depth: float, start: Touch | None = None, step: float = 0.1e-3) -> Touch:
         """The contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
@@ -75,21 +104,19 @@ class FiniteStrainContact:
             except (_NotConvergedError, FloatingPointError, NotPositiveDefiniteError):
                 size /= 2
                 if size < step * SMALLEST_STEP:
-                    raise TactileError(
-                        "reference solver", f"no equilibrium beyond {touch.depth * 1e3:.3f} mm", "a smaller depth"
-                    ) from None
+                    found = f"no equilibrium beyond {touch.depth * 1e3:.3f} mm"
+                    raise TactileError("reference solver", found, "a smaller depth") from None
             steps += 1
         return dataclasses.replace(touch, steps=steps)
 
     def _solve(self, depth: float, start: Touch) -> Touch:
         """One load step, from a solved contact."""
-        pose = self.pose.moved(depth)
-        state = start.state.copy()
+        pose, state, fluid = self.pose.moved(depth), start.state.copy(), start.fluid
         pressing = np.zeros(len(self.solid.mesh.nodes))
         pressing[start.nodes] = start.pressing
-        active = self._guess(pose, state, start)
+        active = np.isin(self.touchable, start.nodes) | (self._gaps(pose, state)[0] < 0)
         for iteration in range(1, MAX_ITERATIONS + 1):
-            step, normal_force, imbalance = self._newton(pose, state, active, pressing)
+            step, normal_force, fluid, imbalance = self._newton(pose, state, active, pressing, fluid)
             state.displacement += step
             distance, normal = self._gaps(pose, state)
             pressing = np.zeros_like(pressing)
@@ -98,68 +125,84 @@ class FiniteStrainContact:
             release[active] = normal_force < 0
             enter = ~active & (distance < -GAP_TOLERANCE)
             settled = not release.any() and not enter.any() and np.abs(distance[active]).max(initial=0) < GAP_TOLERANCE
-            if settled and imbalance < FORCE_TOLERANCE * max(np.abs(normal_force).max(initial=0), 1e-9):
-                nodes = self.touchable[active]
-                return Touch(depth, state, nodes, pressing[nodes], normal[active], iteration)
+            if settled and imbalance < BALANCE_TOLERANCE:
+                nodes, by_indenter = self.touchable[active], np.flatnonzero(active) < self.outer
+                return Touch(depth, state, nodes, pressing[nodes], normal[active], by_indenter, fluid, iteration)
             active = (active & ~release) | enter
         raise _NotConvergedError
 
-    def _guess(self, pose: Pose, state: State, start: Touch) -> np.ndarray:
-        active = np.isin(self.touchable, start.nodes)
-        return active | (self._gaps(pose, state)[0] < 0)
-
     def _gaps(self, pose: Pose, state: State) -> tuple[np.ndarray, np.ndarray]:
-        nodes = self.solid.mesh.nodes[self.touchable] + state.displacement[self.touchable]
-        return pose.distance(self.indenter, nodes)
+        return self._distance(pose, self.solid.mesh.nodes[self.touchable] + state.displacement[self.touchable])
 
-    def _newton(self, pose, state, active, pressing) -> tuple[np.ndarray, np.ndarray, float]:  # noqa: ANN001
-        """Displacement step (n, 3), normal forces (k,) after it, and the force imbalance before it, N."""
+    def _distance(self, pose: Pose, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance and normals of the obstacle that each touchable node meets, at points in the same order."""
+        outer = pose.distance(self.indenter, points[: self.outer])
+        if self.wall is None:
+            return outer
+        inner = self.wall.body.distance(points[self.outer :])
+        return np.concatenate([outer[0], inner[0]]), np.concatenate([outer[1], inner[1]])
+
+    def _newton(self, pose, state, active, pressing, fluid):  # noqa: ANN001, ANN202
+        """Displacement step (n, 3), normal forces (k,) and fluid pressure after it, relative imbalance before it."""
         lines = self.solid.linearise(state)
+        largest = np.abs(lines.internal_force(condensed=False)).max()
         distance, normal = self._gaps(pose, state)
         nodes = self.touchable[active]
         turn, prescribed = self._turn(nodes, normal[active])
-        matrix = lines.matrix() - self._curvature(pose, state, nodes, pressing)
+        matrix, residual = lines.matrix() - self._curvature(pose, state, active, pressing), lines.internal_force()
+        swell, excess = np.zeros(len(residual)), 0.0
+        if self.cavity:
+            moved = self.solid.mesh.nodes + state.displacement
+            swell, excess = self.cavity.gradient(moved), self.cavity.volume(moved) - self.volume
+            residual = residual - fluid * swell
+            matrix = matrix - fluid * self.cavity.hessian(moved)
         matrix = (turn.T @ matrix @ turn).tocsc()
-        residual = turn.T @ lines.internal_force()
+        residual, swell = turn.T @ residual, turn.T @ swell
         step = np.zeros(len(residual))
         step[prescribed] = -distance[active]
         solved = np.setdiff1d(self.free, prescribed)
         load = -residual[solved] - (matrix @ step)[solved]
-        step[solved] = factor(matrix[solved][:, solved].tocsc())(load[:, None])[:, 0]
-        reaction = residual[prescribed] + (matrix @ step)[prescribed]
+        answer = factor(matrix[solved][:, solved].tocsc())(np.column_stack([load, swell[solved]]))
+        rise = 0.0
+        if self.cavity:
+            known = excess + swell[prescribed] @ step[prescribed] + swell[solved] @ answer[:, 0]
+            rise = -known / float(swell[solved] @ answer[:, 1])
+        step[solved] = answer[:, 0] + rise * answer[:, 1]
+        reaction = residual[prescribed] + (matrix @ step)[prescribed] - rise * swell[prescribed]
         step = (turn @ step).reshape(-1, 3)
         state.pressure += lines.pressure_step(step)
-        return step, reaction, float(np.abs(residual[solved]).max())
+        imbalance = np.abs(residual[solved]).max() / max(largest, 1e-12), abs(excess) / max(self.volume, 1e-12)
+        return step, reaction, fluid + rise, float(max(imbalance))
 
     def _turn(self, nodes: np.ndarray, normals: np.ndarray):  # noqa: ANN202 (scipy sparse)
         """Orthogonal matrix that turns touching nodes into (normal, tangents), and their normal degrees of freedom."""
-        import scipy.sparse
-
         helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
         first = np.cross(normals, helper)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
         frames = np.stack([normals, first, np.cross(normals, first)], -1)
-        size = 3 * len(self.solid.mesh.nodes)
-        turned = np.zeros(size // 3, bool)
-        turned[nodes] = True
-        rows = (3 * nodes[:, None, None] + np.arange(3)[:, None]) + np.zeros(3, int)
-        columns = (3 * nodes[:, None, None] + np.arange(3)) + np.zeros((3, 1), int)
-        same = np.flatnonzero(np.repeat(~turned, 3))
-        entries = np.r_[frames.ravel(), np.ones(len(same))]
-        places = np.r_[rows.ravel(), same], np.r_[columns.ravel(), same]
-        return scipy.sparse.coo_matrix((entries, places), shape=(size, size)).tocsr(), 3 * nodes
+        size = len(self.solid.mesh.nodes)
+        still = np.setdiff1d(np.arange(size), nodes)
+        same = np.broadcast_to(np.eye(3), (len(still), 3, 3))
+        return _blocks(np.r_[nodes, still], np.concatenate([frames, same]), size), 3 * nodes
 
-    def _curvature(self, pose, state, nodes, pressing):  # noqa: ANN001, ANN202 (scipy sparse)
+    def _curvature(self, pose, state, active, pressing):  # noqa: ANN001, ANN202 (scipy sparse)
         """Change of the contact forces with the normal's turn: pressing times the Hessian of the distance."""
-        import scipy.sparse
-
-        at = self.solid.mesh.nodes[nodes] + state.displacement[nodes]
-        blocks = np.empty((len(nodes), 3, 3))
+        at = self.solid.mesh.nodes[self.touchable] + state.displacement[self.touchable]
+        blocks = np.empty((len(at), 3, 3))
         for k, axis in enumerate(np.eye(3) * _CURVATURE_STEP):
-            ahead, behind = pose.distance(self.indenter, at + axis)[1], pose.distance(self.indenter, at - axis)[1]
+            ahead, behind = self._distance(pose, at + axis)[1], self._distance(pose, at - axis)[1]
             blocks[:, :, k] = (ahead - behind) / (2 * _CURVATURE_STEP)
+        nodes = self.touchable[active]
+        blocks = blocks[active]
         blocks = (blocks + blocks.swapaxes(1, 2)) / 2 * pressing[nodes][:, None, None]
-        rows = (3 * nodes[:, None, None] + np.arange(3)[:, None]) + np.zeros(3, int)
-        columns = (3 * nodes[:, None, None] + np.arange(3)) + np.zeros((3, 1), int)
-        size = 3 * len(self.solid.mesh.nodes)
-        return scipy.sparse.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsc()
+        return _blocks(nodes, blocks, len(self.solid.mesh.nodes))
+
+
+def _blocks(nodes: np.ndarray, blocks: np.ndarray, size: int):  # noqa: ANN202 (scipy sparse)
+    """Sparse (3 size, 3 size) with a 3 x 3 block on the diagonal at each of ``nodes``."""
+    import scipy.sparse
+
+    shape = blocks.shape
+    rows = np.broadcast_to(3 * nodes[:, None, None] + np.arange(3)[:, None], shape).ravel()
+    columns = np.broadcast_to(3 * nodes[:, None, None] + np.arange(3), shape).ravel()
+    return scipy.sparse.coo_matrix((blocks.ravel(), (rows, columns)), shape=(3 * size, 3 * size)).tocsc()

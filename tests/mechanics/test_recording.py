@@ -40,7 +40,7 @@ def test_recording_carries_its_truth(scene, tmp_path):
     assert recording.simulated and len(recording) == 61
     assert recording.about["scene"] == SHORT and "Simulated" in recording.about["note"]
     truth = recording.truth
-    np.testing.assert_allclose(np.linalg.norm(truth.force[50]), 0.3, rtol=0.02)  # axial force; the rest leans with the pad
+    np.testing.assert_allclose(np.linalg.norm(truth.force[50]), 0.3, rtol=0.02)  # axial; the rest leans
     np.testing.assert_allclose(truth.contact_center[50], [-8e-3, 2e-3], atol=0.2e-3)  # half a node spacing
     assert np.isnan(truth.contact_center[:41]).all() and not truth.displacement_biotac[:41].any()
     signals = recordings.prepare(recording)
