@@ -38,18 +38,19 @@ STYLE = {"font.size": 9, "axes.linewidth": 0.6, "agg.path.chunksize": 10_000}
 
 
 def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
-    """Indices (k,) of the frames to show: the strongest of each of `count` equal parts of the recording, in order.
+    """Indices (k,) of the frames to show, in order: the strongest ones that lie apart from each other.
 
-    A frame closer than half a part to the one before is passed over, where the part has others.
+    Taken one by one, each at least half of a `count`-th of the recording away from those before.
     strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none
     """
-    strength = np.where(np.isfinite(strength), strength, -np.inf)
-    chosen: list[int] = []
-    for part in np.array_split(np.arange(len(strength)), min(count, len(strength))):
-        apart = part[part >= chosen[-1] + len(part) / 2] if chosen else part
-        candidates = apart if len(apart) else part
-        chosen.append(int(candidates[np.argmax(strength[candidates])]))
-    return np.array(chosen, int)
+    left = np.where(np.isfinite(strength), strength, -1.0)
+    count = min(count, len(left))
+    frames, chosen = np.arange(len(left)), []
+    for _ in range(count):
+        best = int(np.argmax(left))
+        chosen.append(best)
+        left[np.abs(frames - best) < len(left) / (2 * count)] = -np.inf
+    return np.sort(chosen)
 
 
 def contact_sheet(

@@ -17,7 +17,7 @@ def translator():
 
 @pytest.fixture(scope="module")
 def shipped(request):
-    return recordings.read(request.config.rootpath / "scenes/press_roll_slide/recording.h5")
+    return recordings.read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
 
 
 @pytest.fixture(scope="module")
