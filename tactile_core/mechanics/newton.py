@@ -1,7 +1,7 @@
 """Frictionless contact of a rigid indenter with a finite-strain solid: Newton's method with an exact active set.
 
-A touching node may slide on the obstacle but not leave along its normal: its degrees of freedom are turned into the
-obstacle's frame and the normal one is prescribed, so the matrix stays symmetric positive definite. The BioTac's fluid
+A touching node may slide on the indenter but not leave along its normal: its degrees of freedom are turned into the
+indenter's frame and the normal one is prescribed, so the matrix stays symmetric positive definite. The BioTac's fluid
 adds one unknown, its pressure, by a bordered solve.
 """
 
@@ -28,7 +28,7 @@ _CURVATURE_STEP = 1e-7  # m, central differences of the exact normals
 class Touch:
     """A solved contact. depth : m; state : of the solid; pressing : (k,) N, normal force of the touching ``nodes``.
 
-    nodes : (k,) mesh nodes; normals : (k, 3) of the obstacle there; by_indenter : (k,) bool, else the core presses
+    nodes : (k,) mesh nodes; normals : (k, 3) of the indenter there
     fluid : Pa, rise of the fluid's pressure; iterations : Newton iterations of the last load step
     steps : load steps, halved ones counted
     """
@@ -38,7 +38,6 @@ class Touch:
     nodes: np.ndarray
     pressing: np.ndarray
     normals: np.ndarray
-    by_indenter: np.ndarray
     fluid: float = 0.0
     iterations: int = 0
     steps: int = 0
@@ -46,25 +45,17 @@ class Touch:
     @property
     def force(self) -> np.ndarray:
         """Total force (3,) N of the indenter on the sensor."""
-        return self.pressing[self.by_indenter] @ self.normals[self.by_indenter]
+        return self.pressing @ self.normals
 
 
 class _NotConvergedError(Exception):
     """A load step is too large."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Wall:
-    """A rigid body that does not move, such as the BioTac's core, in the sensor's frame, and the nodes it may meet."""
-
-    nodes: np.ndarray
-    body: Indenter
-
-
 class FiniteStrainContact:
     """An indenter at a pose in front of a solid; follows a path of growing depth.
 
-    touchable : (m,) mesh nodes that the indenter may touch; wall : what other nodes may touch inside
+    touchable : (m,) mesh nodes that the indenter may touch
     cavity : incompressible fluid in the solid; ``pre_inflation`` m3 is added to its volume at rest
     """
 
@@ -76,18 +67,14 @@ class FiniteStrainContact:
         pose: Pose,
         cavity: Cavity | None = None,
         pre_inflation: float = 0.0,
-        wall: Wall | None = None,
     ) -> None:
-        self.solid, self.indenter, self.pose, self.cavity, self.wall = solid, indenter, pose, cavity, wall
+        self.solid, self.touchable, self.indenter, self.pose, self.cavity = solid, touchable, indenter, pose, cavity
         self.free = np.flatnonzero(np.repeat(~solid.mesh.clamped, 3))
-        self.outer = len(touchable)
-        self.touchable = touchable if wall is None else np.concatenate([touchable, wall.nodes])
         self.volume = pre_inflation + (cavity.volume(solid.mesh.nodes) if cavity else 0.0)
 
     def start(self) -> Touch:
         """Nothing is deformed; a pre-inflated skin finds its shape in the first step."""
-        empty = np.empty(0, int)
-        return Touch(0.0, self.solid.rest(), empty, np.empty(0), np.empty((0, 3)), empty.astype(bool))
+        return Touch(0.0, self.solid.rest(), np.empty(0, int), np.empty(0), np.empty((0, 3)))
 
     def press(self, depth: float, start: Touch | None = None, step: float = 0.1e-3) -> Touch:
         """The contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
@@ -126,21 +113,14 @@ class FiniteStrainContact:
             enter = ~active & (distance < -GAP_TOLERANCE)
             settled = not release.any() and not enter.any() and np.abs(distance[active]).max(initial=0) < GAP_TOLERANCE
             if settled and imbalance < BALANCE_TOLERANCE:
-                nodes, by_indenter = self.touchable[active], np.flatnonzero(active) < self.outer
-                return Touch(depth, state, nodes, pressing[nodes], normal[active], by_indenter, fluid, iteration)
+                nodes = self.touchable[active]
+                return Touch(depth, state, nodes, pressing[nodes], normal[active], fluid, iteration)
             active = (active & ~release) | enter
         raise _NotConvergedError
 
     def _gaps(self, pose: Pose, state: State) -> tuple[np.ndarray, np.ndarray]:
-        return self._distance(pose, self.solid.mesh.nodes[self.touchable] + state.displacement[self.touchable])
-
-    def _distance(self, pose: Pose, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distance and normals of the obstacle that each touchable node meets, at points in the same order."""
-        outer = pose.distance(self.indenter, points[: self.outer])
-        if self.wall is None:
-            return outer
-        inner = self.wall.body.distance(points[self.outer :])
-        return np.concatenate([outer[0], inner[0]]), np.concatenate([outer[1], inner[1]])
+        nodes = self.solid.mesh.nodes[self.touchable] + state.displacement[self.touchable]
+        return pose.distance(self.indenter, nodes)
 
     def _newton(self, pose, state, active, pressing, fluid):  # noqa: ANN001, ANN202
         """Displacement step (n, 3), normal forces (k,) and fluid pressure after it, relative imbalance before it."""
@@ -187,13 +167,12 @@ class FiniteStrainContact:
 
     def _curvature(self, pose, state, active, pressing):  # noqa: ANN001, ANN202 (scipy sparse)
         """Change of the contact forces with the normal's turn: pressing times the Hessian of the distance."""
-        at = self.solid.mesh.nodes[self.touchable] + state.displacement[self.touchable]
+        nodes = self.touchable[active]
+        at = self.solid.mesh.nodes[nodes] + state.displacement[nodes]
         blocks = np.empty((len(at), 3, 3))
         for k, axis in enumerate(np.eye(3) * _CURVATURE_STEP):
-            ahead, behind = self._distance(pose, at + axis)[1], self._distance(pose, at - axis)[1]
+            ahead, behind = (pose.distance(self.indenter, at + s * axis)[1] for s in (1, -1))
             blocks[:, :, k] = (ahead - behind) / (2 * _CURVATURE_STEP)
-        nodes = self.touchable[active]
-        blocks = blocks[active]
         blocks = (blocks + blocks.swapaxes(1, 2)) / 2 * pressing[nodes][:, None, None]
         return _blocks(nodes, blocks, len(self.solid.mesh.nodes))
 
