@@ -1,0 +1,269 @@
+"""Set up and run the project on a fresh machine, with the standard library alone (Linux, macOS, Windows).
+
+    python3 scripts/dev.py demo                     convert the recording that ships; results in out/demo/
+    python3 scripts/dev.py test                     check the style, then run the tests
+    python3 scripts/dev.py test --train             the same with torch, so that the training tests run too
+    python3 scripts/dev.py test tests/test_cli.py -x    what is not known here goes to pytest
+
+Both make `.venv` in the checkout and install the project there (editable, versions from constraints.txt).
+Afterwards `.venv/bin/tactile` and `.venv/bin/python` work (Windows: `.venv\\Scripts\\`). A second call is instant.
+The file keeps to the syntax of Python 3.7, so that an old Python reads it far enough to say what it lacks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+OLDEST, NEWEST = (3, 11), (3, 13)
+DEMO_RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+STAMP = "tactile-dev.json"
+LOG = "tactile-install.log"
+# Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
+SIZES_MB = {"": "50", "dev": "60", "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)"}
+NETWORK_SIGNS = ("NewConnectionError", "NameResolutionError", "ConnectTimeoutError", "ReadTimeoutError", "ProxyError",
+                 "Max retries exceeded", "Failed to establish", "Temporary failure", "SSLError",
+                 "(from versions: none)")
+
+
+class SetupError(Exception):
+    """The machine lacks something; the message says what to do."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; returns the exit status: that of the tool it ran, 2 when set-up failed, 130 on Ctrl-C."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a path may hold what the terminal cannot show
+    layout = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=layout)
+    commands = parser.add_subparsers(dest="command", required=True)
+    demo = commands.add_parser("demo", help="convert the recording that ships", allow_abbrev=False)
+    # No abbreviations: `-t` and the like belong to pytest.
+    test = commands.add_parser("test", help="run ruff and pytest; other arguments go to pytest", allow_abbrev=False)
+    test.add_argument("--train", action="store_true", help="also install torch and run the training tests")
+    test.add_argument("--numpy", metavar="VERSION", help="install this numpy instead of the pinned one")
+    for command in (demo, test):
+        command.add_argument("--venv", type=Path, default=ROOT / ".venv", help="where to install (default: .venv)")
+    options, rest = parser.parse_known_args(arguments)
+    if rest and options.command != "test":
+        parser.error("unknown arguments: " + " ".join(rest))
+    try:
+        check_python(sys.version_info[:2])
+        return run_demo(options.venv) if options.command == "demo" else run_tests(options, rest)
+    except SetupError as error:
+        print(f"dev.py: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("dev.py: interrupted; the next call goes on from here", file=sys.stderr)
+        return 130
+
+
+def check_python(version: tuple[int, int]) -> None:
+    """Raises SetupError for a Python that the pinned packages have no wheels for."""
+    if not OLDEST <= version <= NEWEST:
+        raise SetupError(
+            "this is Python {}.{}; the project needs {}.{} to {}.{}. Run it with one of these, such as "
+            "`python3.11 scripts/dev.py ...`".format(*version, *OLDEST, *NEWEST)
+        )
+
+
+def run_demo(folder: Path) -> int:
+    """Convert the shipped recording into out/demo and name the files."""
+    python = install(folder, extras=())
+    out = ROOT / "out" / "demo"
+    command = ["-m", "tactile_core", "convert", str(DEMO_RECORDING), "--out", str(out), "--overwrite"]
+    say(f"tactile convert {relative(DEMO_RECORDING)} --out {relative(out)} --overwrite")
+    status = subprocess.call([str(python), *command], cwd=str(ROOT), env=environment())
+    if status == 0:
+        result = out / DEMO_RECORDING.stem
+        print(f"\nThe demo's files, in {relative(result)}:")
+        for path in sorted(result.iterdir()):
+            pictures = f" ({len(list(path.iterdir()))} pictures)" if path.is_dir() else ""
+            print(f"  {path.name}{pictures}")
+        print("Open {} first.".format(relative(result / "contact_sheet.png")))
+    return status
+
+
+def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
+    """Ruff, then pytest, whatever ruff says; the status of the first that fails."""
+    extras = ("dev", "train") if options.train else ("dev",)
+    python = install(options.venv, extras, options.numpy)
+    failed = []
+    for command in (["ruff", "check", "."], ["pytest", *pytest_arguments]):
+        say(" ".join(command))
+        status = subprocess.call([str(python), "-m", *command], cwd=str(ROOT), env=environment())
+        failed += [status] if status else []
+    return failed[0] if failed else 0
+
+
+def install(folder: Path, extras: tuple[str, ...], numpy: str | None = None) -> Path:
+    """Make the virtual environment hold the project with these extras; returns its Python.
+
+    A stamp remembers what is installed, so that this costs nothing when nothing has changed. What an earlier call
+    installed beyond the extras asked for stays.
+    """
+    folder = Path(os.path.abspath(str(folder)))
+    python = make_venv(folder)
+    have = read_stamp(folder)
+    wanted = {"root": str(ROOT), "python": python_version(), "numpy": numpy, "sources": sources_hash()}
+    current = all(have.get(key) == value for key, value in wanted.items())
+    there = set(have.get("extras", [])) if current else set()
+    missing = [extra for extra in ("", *extras) if extra not in there]
+    if not missing:
+        return python
+    what = "tactile-core" + ("[{}]".format(",".join(extras)) if extras else "")
+    sizes = " + ".join(SIZES_MB[extra] for extra in missing)
+    say(f"installing {what} into {relative(folder)}; downloads up to about {sizes} MB")
+    if "train" in missing:
+        say("for torch's small CPU build on Linux: PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu")
+    write_stamp(folder, dict(wanted, extras=[], state="installing"))
+    failure = pip_install(python, folder, extras, numpy)
+    write_stamp(folder, dict(wanted, extras=[] if failure else sorted(there | {"", *extras}), state="ready"))
+    if failure:
+        raise SetupError(failure)
+    return python
+
+
+def make_venv(folder: Path) -> Path:
+    """Make the environment, or make it anew when it is half made, moved, or of another Python; returns its Python."""
+    python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    if folder.is_file() or (folder.is_dir() and folder != ROOT / ".venv" and is_foreign(folder)):
+        raise SetupError(f"{folder} holds something else. Name a new or an empty folder")
+    if folder.is_dir() and any(folder.iterdir()):
+        why = why_unusable(python, read_stamp(folder))
+        if why is None:
+            return python
+        say(f"making {relative(folder)} anew: {why}")
+    else:
+        say(f"making {relative(folder)} with Python {python_version()}")
+    try:
+        venv.create(str(folder), clear=True, with_pip=True, symlinks=os.name != "nt")
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise SetupError(
+            "cannot make a virtual environment in {} ({}). Check that the folder can be written; on Debian and "
+            "Ubuntu: apt install python{}.{}-venv".format(folder, error, *sys.version_info[:2])
+        ) from None
+    return python
+
+
+def is_foreign(folder: Path) -> bool:
+    """Whether a folder holds files but no virtual environment, so that making one there would destroy them."""
+    return any(folder.iterdir()) and not (folder / "pyvenv.cfg").exists()
+
+
+def why_unusable(python: Path, have: dict) -> str | None:
+    """The reason why an existing environment cannot be used, or None."""
+    if have and have.get("root") != str(ROOT):
+        return "it was made for {}".format(have.get("root"))
+    if have.get("state") == "installing":
+        return "its installation was interrupted"
+    code = "import pip, sys; print('%d.%d.%d' % sys.version_info[:3])"
+    try:
+        done = subprocess.run([str(python), "-c", code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    except OSError:
+        return "it is half made"
+    found = done.stdout.decode(errors="replace").strip()
+    if done.returncode:
+        return "it is half made"
+    return None if found == python_version() else f"it holds Python {found}, this is {python_version()}"
+
+
+def pip_install(python: Path, folder: Path, extras: tuple[str, ...], numpy: str | None) -> str | None:
+    """Run pip, showing its downloads and keeping all it says in a log. Returns why it failed, or None."""
+    constraints = ROOT / "constraints.txt"
+    if numpy:
+        text = re.sub(r"(?m)^numpy==.*$", f"numpy=={numpy}", constraints.read_text(encoding="utf-8"))
+        constraints = folder / "constraints.txt"
+        constraints.write_text(text, encoding="utf-8")
+    # pip reads `.[extra]` relative to its working folder, whatever characters the path of that folder holds.
+    target = ".[{}]".format(",".join(extras)) if extras else "."
+    command = [str(python), "-m", "pip", "install", "--no-input", "--constraint", str(constraints)]
+    log = folder / LOG
+    with subprocess.Popen(
+        [*command, "--editable", target], cwd=str(ROOT), env=environment(),
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+    ) as process, open(str(log), "w", encoding="utf-8") as record:
+        for raw in process.stdout:
+            line = raw.decode(errors="replace")
+            record.write(line)
+            if line.lstrip().startswith("Downloading"):
+                print("  " + line.strip(), flush=True)
+    return why_pip_failed(log.read_text(encoding="utf-8"), log) if process.returncode else None
+
+
+def why_pip_failed(text: str, log: Path) -> str:
+    """One sentence from what pip said."""
+    if any(sign in text for sign in NETWORK_SIGNS):
+        return (
+            "the package index cannot be reached, or lacks a package. Check the network, or set PIP_INDEX_URL or "
+            f"HTTPS_PROXY, and run this again; pip's words are in {log}"
+        )
+    if "No space left on device" in text:
+        return f"the disk is full. Make room and run this again; pip's words are in {log}"
+    errors = [line.strip() for line in text.splitlines() if line.lstrip().lower().startswith("error")]
+    last = errors[-1] if errors else "it gave no reason"
+    return f"pip could not install the packages: {last}. Its words are in {log}"
+
+
+def environment() -> dict[str, str]:
+    """The caller's environment without what would lead Python or pip away from the virtual environment."""
+    kept = {key: value for key, value in os.environ.items() if key not in ("PYTHONHOME", "PYTHONPATH", "PIP_USER")}
+    kept["PIP_DISABLE_PIP_VERSION_CHECK"] = "1"
+    kept.setdefault("PIP_RETRIES", "2")  # pip's five keep a user without a network waiting for a minute
+    if not kept.get("HOME") and os.name != "nt":
+        # An empty HOME makes caches land in the working folder.
+        kept.pop("HOME", None)
+    return kept
+
+
+def read_stamp(folder: Path) -> dict:
+    """What is installed in an environment, {} when nothing is known of it."""
+    try:
+        found = json.loads((folder / STAMP).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def write_stamp(folder: Path, content: dict) -> None:
+    """Replace the stamp as one piece."""
+    fresh = folder / (STAMP + ".new")
+    fresh.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    os.replace(str(fresh), str(folder / STAMP))
+
+
+def sources_hash() -> str:
+    """Changes when the list of packages does."""
+    digest = hashlib.sha256()
+    for name in ("pyproject.toml", "constraints.txt"):
+        digest.update((ROOT / name).read_bytes())
+    return digest.hexdigest()
+
+
+def python_version() -> str:
+    return ".".join(str(number) for number in sys.version_info[:3])
+
+
+def relative(path: Path) -> str:
+    """A path as short as the working folder of the reader allows."""
+    try:
+        return str(path.relative_to(ROOT))
+    except ValueError:
+        return str(path)
+
+
+def say(text: str) -> None:
+    print("[dev] " + text, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

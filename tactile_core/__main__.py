@@ -1,0 +1,8 @@
+"""``python -m tactile_core`` is the command ``tactile``."""
+
+import sys
+
+from .cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

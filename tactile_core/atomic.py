@@ -1,0 +1,155 @@
+"""Files and folders that appear whole or not at all, whatever interrupts the writing."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from .errors import TactileError
+
+
+@contextlib.contextmanager
+def new_file(path: str | os.PathLike) -> Iterator[Path]:
+    """Yield a temporary path in the same folder; leaving the block flushes it to disk and moves it to `path`.
+
+    An error inside the block removes the temporary file and leaves what stood at `path` untouched. A killed process
+    leaves `.<name>.tactile-partial`, which the next writer of the same file replaces.
+    """
+    path = Path(path)
+    partial = _beside(path, "partial")
+    try:
+        yield partial
+        _sync(partial)
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+    _sync_folder(path.parent)
+
+
+def write_bytes(path: str | os.PathLike, content: bytes) -> None:
+    """Write a whole file or nothing."""
+    with new_file(path) as partial:
+        partial.write_bytes(content)
+
+
+def write_json(path: str | os.PathLike, content: Any) -> None:
+    """Write readable JSON with sorted keys, so that equal content is equal bytes; raises ValueError for NaN."""
+    text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    # A file name that is no UTF-8 holds lone surrogates, which become JSON's own escapes.
+    write_bytes(path, (text + "\n").encode(errors="backslashreplace"))
+
+
+@contextlib.contextmanager
+def new_folder(path: str | os.PathLike, *, overwrite: bool = False) -> Iterator[Path]:
+    """Yield an empty folder beside `path`; leaving the block moves it to `path` as one piece.
+
+    An error or Ctrl-C inside the block removes it and leaves what stood at `path` untouched. What a killed process
+    left behind is cleared by the next one (or by `sweep`): a lock on `.<name>.tactile-lock`, which the system drops
+    when its holder dies, tells a dead writer from a living one. Raises TactileError when the folder exists and
+    `overwrite` is not given, and when another process is writing it.
+    """
+    path = Path(path)
+    partial, old = _beside(path, "partial"), _beside(path, "old")
+    with _locked(path):
+        _recover(path)
+        if path.exists() and not overwrite:
+            raise TactileError(path, "already exists", "a new folder", "Name another one, or add --overwrite")
+        partial.mkdir()
+        try:
+            yield partial
+            for file in sorted(partial.rglob("*")):
+                if file.is_file():
+                    _sync(file)
+            if path.exists():
+                os.replace(path, old)
+            os.replace(partial, path)
+            _sync_folder(path.parent)
+        finally:
+            _recover(path)
+
+
+def sweep(folder: str | os.PathLike) -> None:
+    """Clear what killed writers of folders left in `folder`; living ones, and files of others, are let alone."""
+    for lock in Path(folder).glob(".*.tactile-lock"):
+        path = lock.with_name(lock.name.removeprefix(".").removesuffix(".tactile-lock"))
+        with contextlib.suppress(TactileError), _locked(path):
+            _recover(path)
+
+
+def _beside(path: Path, role: str) -> Path:
+    """A hidden name in the same folder, that no other program uses."""
+    return path.with_name(f".{path.name}.tactile-{role}")
+
+
+def _recover(path: Path) -> None:
+    """Undo an exchange that was cut between its two moves, then clear what is left of it."""
+    partial, old = _beside(path, "partial"), _beside(path, "old")
+    if old.exists() and not path.exists():
+        os.replace(old, path)
+    for leftover in (partial, old):
+        if leftover.is_symlink():
+            leftover.unlink()
+        elif leftover.exists():
+            shutil.rmtree(leftover)
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Hold the lock of one folder's writer; raises TactileError when another process holds it."""
+    lock = _beside(path, "lock")
+    while True:
+        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            _lock(descriptor)
+        except OSError:
+            os.close(descriptor)
+            advice = "Wait for it, or name another folder"
+            raise TactileError(path, "another process is writing it", "one writer at a time", advice) from None
+        # The last holder may have removed the file between our opening and locking it: then the lock guards nothing.
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), os.stat(lock)):
+                break
+        os.close(descriptor)
+    try:
+        yield
+    finally:
+        if os.name == "nt":  # Windows removes only what is closed
+            os.close(descriptor)
+            with contextlib.suppress(OSError):
+                lock.unlink()
+        else:
+            lock.unlink(missing_ok=True)
+            os.close(descriptor)
+
+
+def _lock(descriptor: int) -> None:
+    """Take an exclusive lock without waiting; raises OSError when it is taken."""
+    if os.name == "nt":
+        import msvcrt
+
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _sync(path: Path) -> None:
+    with open(path, "rb+") as file:
+        os.fsync(file.fileno())
+
+
+def _sync_folder(path: Path) -> None:
+    """Flush the folder's own entries, where the system can (Windows cannot open folders)."""
+    if os.name != "nt":
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

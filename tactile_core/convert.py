@@ -1,0 +1,137 @@
+"""The main job: a recording becomes DIGIT pictures, deformations and a note, in a folder of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import atomic, results
+from .errors import TactileError
+from .frame_pass import FramePass, Tools
+from .stopwatch import Stopwatch
+
+if TYPE_CHECKING:
+    from .recordings import PrepareOptions, Recording
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What to make of a recording.
+
+    frames : part of it, the same for every recording; keep : words of results.KEEPABLE
+    prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
+    """
+
+    frames: slice = dataclasses.field(default_factory=lambda: slice(None))
+    keep: tuple[str, ...] = results.DEFAULT_KEEP
+    prepare: PrepareOptions | None = None
+    overwrite: bool = False
+
+
+def load_tools(weights: str | os.PathLike | None = None) -> Tools:
+    """The shipped weights, or those in a folder, and the DIGIT's camera and lights.
+
+    Raises TactileError for weights that are missing, changed or of another shape.
+    """
+    from . import height_map, shading, translate
+
+    translator = translate.load_translator(weights)
+    return Tools(translator, translator.card, translator.sha256, height_map.digit_mapper(), shading.Shader())
+
+
+def parse_frames(text: str) -> slice:
+    """``"A:B:STEP"`` as in Python, with STEP above 0; raises TactileError for anything else."""
+    if not re.fullmatch(r"(-?\d{1,9})?:(-?\d{1,9})?(:\d{0,9})?", text):
+        raise TactileError("--frames", repr(text), "A:B or A:B:STEP, such as 100:200 or ::10", "Give it that way")
+    first, last, step = ([int(part) if part else None for part in text.split(":")] + [None])[:3]
+    if step == 0:
+        raise TactileError("--frames", repr(text), "a STEP above 0", "Give it that way")
+    return slice(first, last, step)
+
+
+def select(frames: slice, count: int) -> np.ndarray:
+    """Indices (n,) of the selected ones of `count` frames; raises TactileError when none is left."""
+    chosen = np.arange(count)[frames]
+    if not len(chosen):
+        found = f"{frames_text(frames)} takes none of the {count} frames"
+        raise TactileError("--frames", found, f"indices from 0 to {count - 1}", "Widen it")
+    return chosen
+
+
+def frames_text(frames: slice) -> str:
+    """The form that `parse_frames` reads; "all" for a selection without limits."""
+    first, last, step = [("" if part is None else str(part)) for part in (frames.start, frames.stop, frames.step)]
+    return ":".join([first, last, step] if step else [first, last]) if first or last or step else "all"
+
+
+@dataclasses.dataclass(frozen=True)
+class Done:
+    """A finished conversion. folder : the result; warnings : what the user should know of it."""
+
+    folder: Path
+    warnings: tuple[str, ...]
+
+
+def convert(
+    recording_path: str | os.PathLike,
+    folder: str | os.PathLike,
+    options: Options,
+    tools: Tools,
+    progress: Callable[[int, int], None] | None = None,
+) -> Done:
+    """Convert one recording into `folder`, which appears whole or not at all.
+
+    progress : called with (frames done, frames in all)
+    Raises TactileError for a recording that cannot be read, a selection without frames, a disk that cannot be written.
+    """
+    from . import recordings
+
+    clock = Stopwatch()
+    with clock.stage("read"):
+        recording = recordings.read(recording_path)
+    frames = select(options.frames, len(recording))
+    with clock.stage("prepare"):
+        signals = recordings.prepare(recording, options.prepare)
+    try:
+        with atomic.new_folder(folder, overwrite=options.overwrite) as partial:
+            made = FramePass(recording, signals, frames, options.keep, tools, clock)
+            made.write(partial, progress or _silent)
+            with clock.stage("sheet"):
+                made.draw_sheet(partial / results.SHEET)
+            atomic.write_json(partial / results.NOTE, note(recording, made, options, tools))
+            timings = {"ms_a_frame": clock.per_frame(len(frames)), "frames": len(frames), "machine": results.machine()}
+            atomic.write_json(partial / results.TIMINGS, timings)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
+    return Done(Path(folder), made.warnings())
+
+
+def _silent(done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
+
+def note(recording: Recording, made: FramePass, options: Options, tools: Tools) -> dict:
+    """Where a result came from, fit for JSON: only what the same input makes again, so no paths and no time of day."""
+    prepare = None if options.prepare is None else dataclasses.asdict(options.prepare)
+    return {
+        "format": results.FORMAT,
+        "recording": {
+            "file": os.path.basename(recording.path), "sha256": results.sha256(recording.path),
+            "layout": recording.layout, "frames": len(recording), "simulated": recording.simulated,
+            "about": recording.about,
+        },
+        "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare},
+        "frames_converted": len(made.frames),
+        "prepared": made.signals.report,
+        "warnings": list(made.warnings()),
+        "flagged_frames": made.flagged,
+        "weights": {"sha256": tools.sha256, "card": tools.card},
+        "versions": results.versions(),
+    }  # fmt: skip

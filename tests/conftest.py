@@ -1,0 +1,46 @@
+"""What tests of all rooms share: the outside data and small recordings."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PAC, ELECTRODES = [f"pac{i}" for i in range(1, 23)], [f"ele{i}" for i in range(1, 20)]
+SLIDE_HEADER = ["timestamp", "tdc", "tac", "pdc", *PAC, *ELECTRODES]
+
+
+@pytest.fixture(scope="session")
+def outside_data() -> Callable[[str], Path]:
+    """``outside_data("biotac_recordings")``: that folder of real data, or a skip that says why."""
+
+    def folder(name: str) -> Path:
+        base = Path(os.environ.get("TACTILE_TEST_DATA") or ROOT.parent / "shared" / "data")
+        if not (base / name).exists():
+            pytest.skip(f"outside data: {base / name} is absent; set TACTILE_TEST_DATA to the folder that holds {name}")
+        return base / name
+
+    return folder
+
+
+@pytest.fixture
+def slide_csv(tmp_path: Path) -> Callable[..., Path]:
+    """``slide_csv("touch", frames=150)`` writes a raw recording: 0.6 s of quiet, then a press, at 100 Hz."""
+
+    def write(name: str = "touch", frames: int = 150, folder: Path = tmp_path) -> Path:
+        random = np.random.default_rng(7)
+        press = np.clip(np.arange(frames) - 60, 0, 60)[:, None] * np.linspace(1, 3, 19)
+        electrodes = np.rint(3000 + press + random.normal(0, 1, (frames, 19)))
+        rows = np.zeros((frames, len(SLIDE_HEADER)))
+        rows[:, 0] = 1.6e9 + np.arange(frames) / 100
+        rows[:, 1:4], rows[:, 4:26], rows[:, 26:] = 2000, 2000, electrodes
+        rows[:, 3] += press[:, 0]
+        path = folder / f"{name}.csv"
+        np.savetxt(path, rows, fmt=["%.6f"] + ["%d"] * 44, delimiter=",", header=",".join(SLIDE_HEADER), comments="")
+        return path
+
+    return write

@@ -1,0 +1,63 @@
+"""A conversion without networks: one dent whose depth follows the electrodes; pictures in two grey levels.
+
+Run as a script it is the command ``tactile`` with these tools, slowed down by FAKE_DELAY seconds a chunk of frames,
+so that tests can interrupt it: ``python tests/fake_tools.py convert touch.csv --out results``.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+
+import numpy as np
+
+from tactile_core import sensors
+from tactile_core.flags import Flag
+from tactile_core.frame_pass import Tools
+from tactile_core.recordings import Signals
+from tactile_core.translate import Translation
+
+SHAPE = (320, 240)
+
+
+def translate(signals: Signals) -> Translation:
+    """Depth of a dent in the middle: 1 um a count of the mean change; frames beyond 100 counts are out of range."""
+    depth = np.abs(signals.change).mean(axis=1).astype(np.float32)
+    time.sleep(float(os.environ.get("FAKE_DELAY", "0")))
+    codes = [np.repeat(depth[:, None], size, axis=1) for size in (8, 32, 64)]
+    skin, gel = _dent(sensors.biotac_surface().rest, depth), _dent(sensors.digit_surface().rest, depth)
+    force = np.outer(depth, [0, 0.01, 0]).astype(np.float32)
+    center = np.where(depth[:, None] > 5, np.float32([-8e-3, 0]), np.float32(np.nan))
+    flags = np.where(depth > 100, Flag.OUT_OF_RANGE, 0).astype(np.uint16)
+    return Translation(*codes, skin, gel, force, center, np.exp(-depth / 100), flags)
+
+
+def _dent(rest: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    shape = np.exp(-((rest[:, 0] + 8e-3) ** 2 + rest[:, 2] ** 2) / 2.5e-3**2)
+    moved = np.zeros((len(depth), len(rest), 3), np.float32)
+    moved[..., 1] = 1e-6 * depth[:, None] * shape
+    return moved
+
+
+def height_map(displacement: np.ndarray) -> np.ndarray:
+    """The deepest node's height everywhere."""
+    return np.broadcast_to(displacement[..., 1].max(axis=1)[:, None, None], (len(displacement), *SHAPE))
+
+
+def shade(height: np.ndarray) -> np.ndarray:
+    """Grey level = height in um; the left half stays black."""
+    picture = np.zeros((*SHAPE, 3), np.uint8)
+    picture[:, SHAPE[1] // 2 :] = np.clip(1e6 * height[0, 0], 0, 255)
+    return picture
+
+
+def tools() -> Tools:
+    return Tools(translate, {"name": "fake"}, "0" * 64, height_map, shade)
+
+
+if __name__ == "__main__":
+    from tactile_core import cli, convert
+
+    convert.load_tools = lambda weights=None: tools()
+    sys.exit(cli.main())

@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fake_tools
+import h5py
+import numpy as np
+import pytest
+from PIL import Image
+
+from tactile_core import convert, results
+from tactile_core.errors import TactileError
+from tactile_core.flags import Flag
+from tactile_core.frame_pass import CHUNK
+from tactile_core.frames_file import ALWAYS, KEPT
+
+FRAMES = 150  # of slide_csv: more than two chunks
+
+
+@pytest.fixture(scope="module")
+def tools():
+    return fake_tools.tools()
+
+
+@pytest.fixture
+def run(tmp_path, tools):
+    """Convert one recording with options and return its result folder."""
+
+    def one(path, out="out", **options):
+        options = convert.Options(**options)
+        (folder,) = results.result_folders([path], tmp_path / out, options.overwrite)
+        return convert.convert(path, folder, options, tools).folder
+
+    return one
+
+
+def test_a_result_is_complete_and_one_frame_a_row(run, slide_csv):
+    path = slide_csv(frames=FRAMES)
+    folder = run(path)
+    assert sorted(child.name for child in folder.iterdir()) == sorted(
+        ["contact_sheet.png", "frames.h5", "images", "note.json", "timings.json"]
+    )
+    assert [image.name for image in sorted((folder / "images").iterdir())] == [f"{i:05d}.png" for i in range(FRAMES)]
+    read = np.loadtxt(path, delimiter=",", skiprows=1)
+    with h5py.File(folder / "frames.h5") as file:
+        assert set(file) == {*ALWAYS, *KEPT["latent"], *KEPT["displacement"]}
+        assert {len(dataset) for dataset in file.values()} == {FRAMES}
+        np.testing.assert_allclose(file["time"], read[:, 0] - read[0, 0], atol=1e-6)  # the file's microseconds
+        assert file["time"].attrs["start_time"] == pytest.approx(1.6e9)
+        assert (file["electrodes"][:] == read[:, 26:]).all()
+        depth = file["displacement_digit"][..., 1].max(axis=1)
+        assert {file[name].dtype for name in ("force", "confidence", "displacement_biotac")} == {np.dtype("float32")}
+    for frame in (0, FRAMES // 2, FRAMES - 1):
+        picture = np.asarray(Image.open(folder / "images" / f"{frame:05d}.png"))
+        assert picture.shape == (320, 240, 3)
+        assert (picture == fake_tools.shade(np.full(fake_tools.SHAPE, depth[frame]))).all()
+
+
+def test_chunks_leave_no_seam(run, slide_csv, tools):
+    folder = run(slide_csv(frames=FRAMES))
+    single = run(slide_csv("again", frames=FRAMES), keep=("displacement",))
+    with h5py.File(folder / "frames.h5") as file, h5py.File(single / "frames.h5") as other:
+        assert (file["displacement_biotac"][:] == other["displacement_biotac"][:]).all()
+        depth = file["latent_signal"][:, 0]
+    rises = np.diff(depth[60:120])
+    assert CHUNK in range(60, 120) and np.abs(rises).max() < 4  # counts: the press adds 2 a frame, noise below 2
+
+
+def test_keep_and_frames_choose_what_is_written(run, slide_csv):
+    path = slide_csv(frames=FRAMES)
+    full = run(path, out="full")
+    part = run(path, out="part", keep=("height",), frames=slice(20, 120, 25))
+    chosen = np.arange(20, 120, 25)
+    assert not (part / "images").exists()
+    with h5py.File(part / "frames.h5") as file, h5py.File(full / "frames.h5") as whole:
+        assert set(file) == {*ALWAYS, "height_map"}
+        assert file["height_map"].shape == (len(chosen), 320, 240)
+        assert (file["frame"][:] == chosen).all()
+        for name in ("time", "electrodes", "force", "flags"):
+            assert (file[name][:] == whole[name][:][chosen]).all()  # the tare saw the whole recording
+    images = run(path, out="images", keep=("image",), frames=slice(-3, None))
+    assert [image.name for image in sorted((images / "images").iterdir())] == ["00147.png", "00148.png", "00149.png"]
+
+
+def test_the_same_input_gives_the_same_bytes(run, slide_csv):
+    path = slide_csv(frames=80)
+    first, second = run(path, out="a"), run(path, out="b")
+    files = sorted(p.relative_to(first) for p in first.rglob("*") if p.is_file() and p.name != "timings.json")
+    assert len(files) == 80 + 3
+    for file in files:
+        assert (first / file).read_bytes() == (second / file).read_bytes(), file
+
+
+def test_the_note_tells_what_is_reproducible_and_no_path(run, slide_csv, tmp_path):
+    folder = run(slide_csv(frames=80), frames=slice(0, 70))
+    text = (folder / "note.json").read_text(encoding="utf-8")
+    note = json.loads(text)
+    assert str(tmp_path) not in text
+    assert note["recording"]["file"] == "touch.csv" and len(note["recording"]["sha256"]) == 64
+    assert note["options"]["frames"] == "0:70" and note["frames_converted"] == 70
+    assert note["weights"] == {"sha256": "0" * 64, "card": {"name": "fake"}}
+    assert {"numpy", "h5py", "python", "tactile_core"} <= set(note["versions"])
+    timings = json.loads((folder / "timings.json").read_text(encoding="utf-8"))
+    stages = {"read", "prepare", "translate", "height_map", "shade", "png", "hdf5", "sheet", "all"}
+    assert set(timings["ms_a_frame"]) == stages
+
+
+def test_flags_of_recording_and_translation_meet_and_are_told(run, slide_csv):
+    path = slide_csv(frames=FRAMES)
+    lines = path.read_text().splitlines()
+    cells = lines[31].split(",")
+    cells[30] = "nan"
+    lines[31] = ",".join(cells)
+    path.write_text("\n".join(lines) + "\n")
+    folder = run(path, keep=())
+    note = json.loads((folder / "note.json").read_text(encoding="utf-8"))
+    with h5py.File(folder / "frames.h5") as file:
+        bits = file["flags"][:]
+        assert np.isfinite(file["electrodes"][:]).all()
+    assert bits[30] & Flag.REPAIRED and not bits[40] & Flag.REPAIRED
+    beyond = int(np.count_nonzero(bits & Flag.OUT_OF_RANGE))
+    assert beyond == note["flagged_frames"]["out_of_range"] > 0
+    assert any("line 32, ele5" in warning for warning in note["warnings"])
+    assert any(f"{beyond} of {FRAMES} frames" in warning for warning in note["warnings"])
+
+
+def test_overwrite_replaces_the_whole_result(run, slide_csv):
+    path = slide_csv(frames=80)
+    run(path)
+    with pytest.raises(TactileError, match="already holds a result"):
+        run(path)
+    folder = run(path, overwrite=True, keep=(), frames=slice(0, 5))
+    assert not (folder / "images").exists()
+    with h5py.File(folder / "frames.h5") as file:
+        assert len(file["time"]) == 5
+
+
+def test_a_recording_of_one_frame_converts(run, slide_csv):
+    folder = run(slide_csv(frames=1))
+    assert [image.name for image in (folder / "images").iterdir()] == ["00000.png"]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [(":", slice(None)), ("3:", slice(3, None)), ("::7", slice(None, None, 7)), ("-9:-1:2", slice(-9, -1, 2))],
+)
+def test_frames_are_read_as_python_reads_them(text, expected):
+    assert convert.parse_frames(text) == expected
+    assert convert.parse_frames(convert.frames_text(expected).replace("all", ":")) == expected
+
+
+@pytest.mark.parametrize("text", ["", "5", "1:2:3:4", "a:b", "::0", "::-1", "1.5:", "1 :2", "9999999999:"])
+def test_other_selections_are_refused(text):
+    with pytest.raises(TactileError, match="--frames"):
+        convert.parse_frames(text)
+
+
+def test_a_selection_without_frames_is_refused():
+    with pytest.raises(TactileError, match=r"--frames: 200:300 takes none of the 150 frames; expected indices from 0"):
+        convert.select(slice(200, 300), 150)
+
+
+def test_a_disk_that_fills_up_ends_in_one_message_and_no_folder(slide_csv, tmp_path, tools, monkeypatch):
+    def full(*arguments, **more):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tactile_core.frame_pass._write_png", full)
+    out = tmp_path / "out"
+    (folder,) = results.result_folders([tmp_path / "touch.csv"], out, False)
+    with pytest.raises(TactileError, match="No space left on device"):
+        convert.convert(slide_csv(frames=80), folder, convert.Options(), tools)
+    assert list(out.iterdir()) == []
+
+
+def interrupt(how: int, path: Path, out: Path) -> subprocess.Popen:
+    """Start a slow conversion, interrupt it when half of its pictures are there, and wait for its end."""
+    root = Path(__file__).parent.parent
+    environment = {**os.environ, "FAKE_DELAY": "0.5", "PYTHONPATH": str(root)}
+    command = [sys.executable, str(root / "tests" / "fake_tools.py"), "convert", str(path), "--out", str(out)]
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+    partial = out / f".{path.stem}.tactile-partial" / "images"
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and process.poll() is None:
+        if partial.exists() and len(list(partial.iterdir())) > CHUNK // 2:
+            break
+        time.sleep(0.01)
+    assert process.poll() is None, "the conversion ended before it could be interrupted"
+    process.send_signal(how)
+    process.communicate(timeout=60)
+    return process
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT and SIGKILL for one process")
+def test_an_interrupted_run_leaves_nothing_and_a_killed_one_is_cleared_by_the_next(slide_csv, tmp_path, run):
+    path, out = slide_csv(frames=500), tmp_path / "out"
+    assert interrupt(signal.SIGINT, path, out).returncode == 130
+    assert list(out.iterdir()) == []
+    assert interrupt(signal.SIGKILL, path, out).returncode == -signal.SIGKILL
+    assert not (out / "touch").exists()
+    assert len(list(out.iterdir())) == 2  # its half result and its lock, both hidden
+    run(slide_csv("other", frames=5))
+    assert [child.name for child in out.iterdir()] == ["other"]
