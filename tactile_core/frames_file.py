@@ -27,8 +27,8 @@ ALWAYS = {
 KEPT = {
     "latent": {
         "latent_signal": ("1", "(T, 8) code of the electrodes (SVB)"),
-        "latent_biotac": ("1", "(T, 128) code of the BioTac's deformation (MVB)"),
-        "latent_digit": ("1", "(T, 128) code of the DIGIT's deformation (MVD)"),
+        "latent_biotac": ("1", "(T, L) code of the BioTac's deformation (MVB)"),
+        "latent_digit": ("1", "(T, L) code of the DIGIT's deformation (MVD)"),
     },
     "displacement": {
         "displacement_biotac": ("m", "(T, N, 3) of the nodes of sensors.biotac_surface()"),
@@ -75,8 +75,6 @@ class FramesFile:
 
     def _create(self, name: str, array: np.ndarray) -> h5py.Dataset:
         kind = "float32" if array.dtype.kind == "f" else array.dtype
-        if name == "time":
-            kind = "float64"  # float32 steps of 0.5 ms after an hour would blur the rate
         packing = PACKED.get(name, {})
         chunks = (1, *array.shape[1:]) if packing else None
         shape = (self._count, *array.shape[1:])

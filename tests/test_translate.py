@@ -98,7 +98,7 @@ def test_confidence_is_high_where_trained_and_low_elsewhere(translator, shipped,
     assert np.median(odd.confidence[touched(shipped)]) == 0
     assert (odd.flags[touched(shipped)] & Flag.OUT_OF_RANGE).mean() > 0.9
     rectified = dataclasses.replace(signals, flags=signals.flags | np.uint16(Flag.RECTIFIED))
-    assert translator(rectified).confidence.max() <= translate.UNTRAINED_CONFIDENCE
+    assert translator(rectified).confidence.max() <= np.float32(translate.UNTRAINED_CONFIDENCE)
 
 
 def test_a_contact_beyond_the_gel_is_flagged(translator):

@@ -1,0 +1,141 @@
+"""One door to contact mechanics: a sensor, an indenter at a place, a depth or a force, and a tier."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import Literal
+
+import numpy as np
+
+from .. import biotac_shape, sensors
+from ..errors import TactileError
+from ..indenters import Indenter, Pose
+from .cavity import Cavity
+from .compliance import Compliance, biotac_compliance, digit_compliance
+from .contact import ContactProblem, fluid_pressure, surface_displacement
+from .finite_strain import FiniteStrainSolid
+from .hex_mesh import HexMesh, gel_mesh, skin_mesh
+from .newton import FiniteStrainContact, Touch
+from .press import MAX_DEPTH, Placement, Press, biotac_pose, digit_pose
+
+Sensor = Literal["biotac", "digit"]
+Tier = Literal["fast", "reference"]
+
+LOAD_STEP = {"biotac": 0.3e-3, "digit": 0.2e-3}  # m; Newton's method takes 5 or 6 iterations a step of this size
+_REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth may come to touch it
+_FORCE_TOLERANCE = 1e-4  # relative, of the reference tier's search for a force
+_SEARCH_STEPS = 12
+
+
+@dataclasses.dataclass(frozen=True)
+class Solution:
+    """A solved contact, SI units, whatever the tier.
+
+    tier : which solver made it; converged : whether it may be used; iterations : of its last step
+    displacement : (n, 3) m of the sensor's surface nodes; contact_patch : (n,) bool, nodes that carry force
+    force : (3,) N, exerted by the indenter on the sensor; depth : m from first touch
+    pressure : Pa, rise of the BioTac's fluid pressure, 0 for the DIGIT
+    """
+
+    tier: Tier
+    converged: bool
+    iterations: int
+    displacement: np.ndarray
+    contact_patch: np.ndarray
+    force: np.ndarray
+    depth: float
+    pressure: float
+
+
+def solve(
+    sensor: Sensor,
+    indenter: Indenter,
+    place: Placement,
+    *,
+    depth: float | None = None,
+    force: float | None = None,
+    tier: Tier = "fast",
+) -> Solution:
+    """Press ``indenter`` into ``sensor`` at ``place`` to a depth, m, or a force along the motion, N.
+
+    ``fast`` is linear (milliseconds, right for small depths), ``reference`` finite strain on the same mesh (minutes).
+    Raises TactileError for an impossible request, or for one beyond what the tier may be asked.
+    """
+    _check(depth, force)
+    pose = (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
+    if tier == "fast":
+        return _fast(sensor, indenter, pose, depth, force)
+    return _reference(sensor, indenter, pose, depth, force)
+
+
+def _check(depth: float | None, force: float | None) -> None:
+    if (depth is None) == (force is None):
+        raise TactileError("solve", f"depth {depth!r} and force {force!r}", "one of the two")
+    name, value, unit = ("depth", depth, "m") if force is None else ("force", force, "N")
+    if not (np.isfinite(value) and value >= 0):
+        raise TactileError(f"solve, {name}", f"{value!r} {unit}", "zero or more, and finite")
+    if depth is not None and depth > MAX_DEPTH:
+        raise TactileError("solve, depth", f"{depth * 1e3:g} mm", f"at most {MAX_DEPTH * 1e3:g} mm",
+                           "Deeper contacts are not modelled yet")  # fmt: skip
+
+
+def _fast(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float | None, force: float | None) -> Solution:
+    compliance: Compliance = biotac_compliance() if sensor == "biotac" else digit_compliance()
+    if depth is not None or force == 0:
+        contact = ContactProblem(compliance, indenter, pose, MAX_DEPTH).at_depth(depth or 0.0)
+    else:
+        contact = Press(compliance, indenter, pose).at_force(force)
+        if contact is None:
+            raise TactileError("solve, force", f"{force:g} N", "a force within the linear model's depth", "Lower it")
+    patch = np.zeros(len(compliance.surface.rest), bool)
+    patch[compliance.touchable[contact.nodes]] = True
+    return Solution(
+        "fast", contact.converged, contact.iterations, surface_displacement(compliance, contact), patch,
+        contact.force, contact.depth, fluid_pressure(compliance, contact),
+    )  # fmt: skip
+
+
+@functools.cache
+def _solid(sensor: Sensor) -> tuple[FiniteStrainSolid, Cavity | None]:
+    if sensor == "digit":
+        return FiniteStrainSolid(gel_mesh(), sensors.DIGIT_GEL), None
+    mesh = skin_mesh()
+    into_skin = mesh.inner[biotac_shape.skin_surface("inner").faces][:, ::-1]
+    return FiniteStrainSolid(mesh, sensors.BIOTAC_SKIN), Cavity(into_skin, len(mesh.nodes))
+
+
+def _reference(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float | None, force: float | None) -> Solution:
+    solid, cavity = _solid(sensor)
+    mesh = solid.mesh
+    distance, _ = pose.moved(MAX_DEPTH).distance(indenter, mesh.nodes[mesh.surface])
+    problem = FiniteStrainContact(solid, mesh.surface[distance < _REACH], indenter, pose, cavity)
+    touch = problem.press(depth, step=LOAD_STEP[sensor]) if force is None else _at_force(problem, sensor, force)
+    return _solution(mesh, touch)
+
+
+def _at_force(problem: FiniteStrainContact, sensor: Sensor, force: float) -> Touch:
+    """The contact at a force along the motion, by regula falsi on F^(2/3), which is nearly straight in the depth."""
+    touch, below = problem.start(), (0.0, 0.0)
+    direction = problem.pose.direction
+    goal = force ** (2 / 3)
+    depth = LOAD_STEP[sensor] / 2
+    for _ in range(_SEARCH_STEPS):
+        if depth > MAX_DEPTH:
+            raise TactileError("solve, force", f"{force:g} N", f"a force within {MAX_DEPTH * 1e3:g} mm", "Lower it")
+        touch = problem.press(depth, touch if touch.depth < depth else None, LOAD_STEP[sensor])
+        found = max(float(touch.force @ direction), 0.0)
+        if abs(found - force) <= _FORCE_TOLERANCE * force:
+            return touch
+        root = found ** (2 / 3)
+        slope = (root - below[1]) / (depth - below[0])
+        if root < goal:
+            below = (depth, root)
+        depth = depth + float(np.clip((goal - root) / slope, -depth / 2, LOAD_STEP[sensor]))
+    raise TactileError("solve, force", f"{found:g} N after {_SEARCH_STEPS} steps", f"{force:g} N", "Give a depth")
+
+
+def _solution(mesh: HexMesh, touch: Touch) -> Solution:
+    patch = np.isin(mesh.surface, touch.nodes)
+    displacement = touch.state.displacement[mesh.surface]
+    return Solution("reference", True, touch.iterations, displacement, patch, touch.force, touch.depth, touch.fluid)
