@@ -56,6 +56,7 @@ class FiniteStrainContact:
     """An indenter at a pose in front of a solid; follows a path of growing depth.
 
     touchable : (m,) mesh nodes that the indenter may touch
+    fixed : (3 n,) bool, degrees of freedom that do not move; None: those of the clamped nodes
     cavity : incompressible fluid in the solid; ``pre_inflation`` m3 is added to its volume at rest
     """
 
@@ -67,9 +68,10 @@ class FiniteStrainContact:
         pose: Pose,
         cavity: Cavity | None = None,
         pre_inflation: float = 0.0,
+        fixed: np.ndarray | None = None,
     ) -> None:
         self.solid, self.touchable, self.indenter, self.pose, self.cavity = solid, touchable, indenter, pose, cavity
-        self.free = np.flatnonzero(np.repeat(~solid.mesh.clamped, 3))
+        self.fixed = (np.repeat(solid.mesh.clamped, 3) if fixed is None else fixed).reshape(-1, 3)
         self.volume = pre_inflation + (cavity.volume(solid.mesh.nodes) if cavity else 0.0)
 
     def start(self) -> Touch:
@@ -128,7 +130,7 @@ class FiniteStrainContact:
         largest = np.abs(lines.internal_force(condensed=False)).max()
         distance, normal = self._gaps(pose, state)
         nodes = self.touchable[active]
-        turn, prescribed = self._turn(nodes, normal[active])
+        turn, free, prescribed = self._turn(nodes, normal[active])
         matrix, residual = lines.matrix() - self._curvature(pose, state, active, pressing), lines.internal_force()
         swell, excess = np.zeros(len(residual)), 0.0
         if self.cavity:
@@ -140,7 +142,7 @@ class FiniteStrainContact:
         residual, swell = turn.T @ residual, turn.T @ swell
         step = np.zeros(len(residual))
         step[prescribed] = -distance[active]
-        solved = np.setdiff1d(self.free, prescribed)
+        solved = np.setdiff1d(free, prescribed)
         load = -residual[solved] - (matrix @ step)[solved]
         answer = factor(matrix[solved][:, solved].tocsc())(np.column_stack([load, swell[solved]]))
         rise = 0.0
@@ -155,7 +157,10 @@ class FiniteStrainContact:
         return step, reaction, fluid + rise, float(max(imbalance))
 
     def _turn(self, nodes: np.ndarray, normals: np.ndarray):  # noqa: ANN202 (scipy sparse)
-        """Orthogonal matrix that turns touching nodes into (normal, tangents), and their normal degrees of freedom."""
+        """Orthogonal matrix that turns touching nodes into (normal, tangents), free and normal degrees of freedom.
+
+        One tangent lies across the axis that the normal has least of: on a plane of symmetry that is its own.
+        """
         helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
         first = np.cross(normals, helper)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -163,7 +168,10 @@ class FiniteStrainContact:
         size = len(self.solid.mesh.nodes)
         still = np.setdiff1d(np.arange(size), nodes)
         same = np.broadcast_to(np.eye(3), (len(still), 3, 3))
-        return _blocks(np.r_[nodes, still], np.concatenate([frames, same]), size), 3 * nodes
+        fixed = self.fixed.copy()
+        fixed[nodes] = np.einsum("nij,ni->nj", frames**2, self.fixed[nodes]) > 0.5
+        turn = _blocks(np.r_[nodes, still], np.concatenate([frames, same]), size)
+        return turn, np.flatnonzero(~fixed.ravel()), 3 * nodes
 
     def _curvature(self, pose, state, active, pressing):  # noqa: ANN001, ANN202 (scipy sparse)
         """Change of the contact forces with the normal's turn: pressing times the Hessian of the distance."""
