@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +13,11 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PAC, ELECTRODES = [f"pac{i}" for i in range(1, 23)], [f"ele{i}" for i in range(1, 20)]
 SLIDE_HEADER = ["timestamp", "tdc", "tac", "pdc", *PAC, *ELECTRODES]
+
+# A run started in the background of a shell inherits "ignore Ctrl-C" and so would every program that a test starts and
+# interrupts. A handler of our own is not inherited: children begin with the system's default.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from .. import __version__, digit_shape, sensors
+from .. import __version__, atomic, digit_shape, sensors
 from ..errors import TactileError
 from ..scene import PairSpec, Scene, load_scene
 from .compliance import biotac_compliance, digit_compliance
@@ -232,8 +232,7 @@ def _merge(files, count, out, text, seed, names) -> None:  # noqa: ANN001
     """One HDF5 file from the blocks in order, cut to ``count`` contacts; written beside and renamed."""
     import h5py
 
-    partial = out.with_name(out.name + ".partial")
-    with h5py.File(partial, "w") as file:
+    with atomic.new_file(out) as partial, h5py.File(partial, "w") as file:
         file.attrs.update({
             "format": FORMAT, "scene": text, "seed": seed, "version": __version__, "indenters": json.dumps(names),
             "biotac_nodes_sha256": sensors.biotac_surface().sha256,
@@ -246,9 +245,6 @@ def _merge(files, count, out, text, seed, names) -> None:  # noqa: ANN001
                 for name in DATASETS if take else ():
                     _append(file, name, block[name][:take], count, done)
                 done += take
-    with open(partial, "rb+") as file:
-        os.fsync(file.fileno())
-    os.replace(partial, out)
 
 
 def _append(file, name: str, values: np.ndarray, count: int, start: int) -> None:  # noqa: ANN001

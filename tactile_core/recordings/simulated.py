@@ -10,12 +10,12 @@ Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sen
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .. import atomic
 from ..errors import TactileError
 from .assemble import assemble
 from .recording import ELECTRODES, Recording, Truth
@@ -151,23 +151,12 @@ def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
 
 
 def _write_whole(path: Path, fill: Any) -> None:
-    """Let fill write into a temporary file of the same folder, then put it in the place of path."""
+    """Let fill write a file that appears whole or not at all."""
     import h5py
 
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-        os.close(handle)
-    except OSError as error:
-        raise TactileError(path, error.strerror or str(error), "a folder that can be written to") from error
-    try:
-        with h5py.File(temporary, "w") as file:
+        with atomic.new_file(path) as partial, h5py.File(partial, "w") as file:
             fill(file)
-        with open(temporary, "rb+") as file:
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o644)  # mkstemp makes files that others cannot read
-        os.replace(temporary, path)
-    except BaseException as error:
-        Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise TactileError(path, error.strerror or str(error), "room to write the recording") from error
-        raise
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise TactileError(path, f"cannot be written ({reason})", "room in a folder that can be written to") from error
