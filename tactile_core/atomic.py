@@ -153,3 +153,23 @@ def _sync_folder(path: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+
+def claim(path: str | os.PathLike) -> None:
+    """Before a long job: refuse a `path` that exists or cannot be written, and make its folder.
+
+    Raises TactileError for an empty name, an existing file, or a folder that cannot be made or written.
+    """
+    if not os.fspath(path):
+        raise TactileError("--out", "an empty name", "a file to write")
+    path = Path(path)
+    if path.exists():
+        raise TactileError(path, "exists already", "a new file", "Remove it or choose another name")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe = _beside(path, "probe")
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise TactileError(path, found, "a place in a writable folder", "Choose another --out") from error

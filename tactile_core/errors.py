@@ -18,6 +18,10 @@ class TactileError(Exception):
         self.where, self.found, self.expected, self.advice = os.fspath(where), found, expected, advice
         super().__init__(self._sentence())
 
+    def __reduce__(self) -> tuple[type, tuple[str, str, str, str]]:
+        """Worker processes hand errors over; by default only the sentence would arrive."""
+        return type(self), (self.where, self.found, self.expected, self.advice)
+
     def _sentence(self) -> str:
         text = f"{self.where}: {self.found}"
         if self.expected:

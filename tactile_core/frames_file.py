@@ -19,7 +19,7 @@ ALWAYS = {
     "frame": ("1", "index of the frame in the recording, from 0; names its picture"),
     "time": ("s", "from the recording's first frame; attribute start_time: unix time of that frame, 0 if unknown"),
     "electrodes": ("count", "(T, 19) E1..E19 as read, bad samples repaired; attribute rest: reading without contact"),
-    "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame"),
+    "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame; 0 without contact"),
     "contact_center": ("m", "(T, 2) = (x, z) on the DIGIT after unrolling; NaN without contact"),
     "confidence": ("1", "0 (a guess) to 1"),
     "flags": ("bits", "what is remarkable about a frame; attribute names: JSON, name -> bit"),

@@ -111,7 +111,7 @@ def pose_on(
     """An indenter that just touches ``point`` (3,) m of a surface with unit normal ``outward`` (3,).
 
     tilt : rad, between its axis (the way it moves) and that normal
-    tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 toward +z
+    tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z
     """
     along = np.array([1.0, 0.0, 0.0]) - outward[0] * outward
     along /= np.linalg.norm(along)

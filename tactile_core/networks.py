@@ -30,6 +30,9 @@ COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see
 COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
 NETS = ("SVB", "MVB", "S2MPN", "MVD", "M2MPN", "force")
 WEIGHTS_FOLDER = Path(__file__).parent / "weights"
+# The card names the hash of every file of weights; this names the card that ships.
+SHIPPED_CARD_SHA256 = "4cc538ce5a68d27856391cc086ad1fb36b4c65f8ca4760b83a876dd44d3b4851"
+MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small enough to refuse a damaged number
 
 
 @dataclass(frozen=True)
@@ -212,8 +215,11 @@ def load(folder: str | os.PathLike | None = None) -> Networks:
 
     raises: TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)
     """
-    folder = Path(WEIGHTS_FOLDER if folder is None else folder)
+    shipped = folder is None
+    folder = Path(WEIGHTS_FOLDER if shipped else folder)
     card, digest = read_card(folder)
+    if shipped and digest != SHIPPED_CARD_SHA256:
+        raise TactileError(folder / CARD_NAME, f"sha256 {digest}", SHIPPED_CARD_SHA256, ADVICE)
     tensors = {}
     for net in NETS:
         entry = _card_entry(card, net, folder / CARD_NAME)
@@ -229,7 +235,7 @@ def _card_entry(card: dict, net: str, path: Path) -> dict:
     sizes = entry.get("sizes") if isinstance(entry, dict) else None
     names = SIZE_NAMES[net]
     whole = isinstance(sizes, dict) and sorted(sizes) == sorted(names)
-    whole = whole and all(type(size) is int and size >= 0 for size in sizes.values())
+    whole = whole and all(type(size) is int and 0 <= size <= MAX_SIZE for size in sizes.values())
     if not whole or not isinstance(entry.get("sha256"), str):
         expected = f"sha256 and the sizes {', '.join(names)} as whole numbers"
         raise TactileError(f"{path}, nets.{net}", "an incomplete entry", expected, ADVICE)

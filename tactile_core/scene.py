@@ -45,16 +45,16 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """How paired contacts are drawn: places evenly over the gel, tilts evenly over a cone, force growing by a ratio."""
 
     force_min_n: Positive = 0.02
-    force_ratio: Annotated[float, Meta(gt=1)] = 1.4
+    force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5
     tilt_max_deg: Annotated[float, Meta(ge=0, le=45)] = 20.0
-    rim_margin_mm: NotNegative = 1.0
-    depth_max_mm: Positive = 1.2
+    rim_margin_mm: Annotated[float, Meta(ge=0, le=8)] = 1.0
+    depth_max_mm: Annotated[float, Meta(gt=0, le=1.2)] = 1.2  # the linear model's range, mechanics.press.MAX_DEPTH
 
 
 class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A moment of a recorded motion: where the indenter is on the DIGIT's (unrolled) plane, and how hard it presses."""
 
-    time_s: NotNegative
+    time_s: Annotated[float, Meta(ge=0, le=600)]
     x_mm: float
     z_mm: float
     force_n: NotNegative

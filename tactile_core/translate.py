@@ -12,6 +12,7 @@ from .errors import TactileError
 from .flags import Flag
 from .networks import Networks
 from .recordings import Signals
+from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little until networks know them (TRANSLATION).
 UNTRAINED_CONFIDENCE = 0.2  # assumed
@@ -24,7 +25,7 @@ class Translation:
 
     latent_signal (T, 8), latent_biotac, latent_digit : means of the networks' latents
     displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
-    force : (T, 3) N, exerted by the object on the BioTac, sensor frame
+    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
     confidence : (T,), 1 as in training, 0 far from it
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals and OUT_OF_RANGE, BEYOND_DIGIT
@@ -58,14 +59,15 @@ class Translator:
         latent_biotac = nets.s2m(latent_signal)
         latent_digit = nets.m2m(latent_biotac)
         biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
+        center = self._contact_center(digit)
         confidence, out_of_range = self._trust(change, signals.flags)
         flags = signals.flags.copy()
         flags[out_of_range] |= np.uint16(Flag.OUT_OF_RANGE)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
         return Translation(
             latent_signal, latent_biotac, latent_digit, biotac, digit,
-            force=nets.force(latent_biotac),
-            contact_center=self._contact_center(digit),
+            force=np.where(np.isnan(center[:, :1]), np.float32(0), nets.force(latent_biotac)),
+            contact_center=center,
             confidence=confidence, flags=flags,
         )  # fmt: skip
 
@@ -108,19 +110,41 @@ class Translator:
         return core.any(axis=1) & (outside | (total == 0))
 
 
+QUANTILES = {"distance": ("mahalanobis", "residual", "largest"), "silence": ("biotac_m", "digit_m", "force_N")}
+
+
+def _check_quantiles(card: dict, where: str) -> None:
+    """What confidence and silence are measured by: growing finite numbers, as many as there are levels."""
+    for table, names in QUANTILES.items():
+        entry = card.get(table)
+        levels = entry.get("levels") if isinstance(entry, dict) else None
+        for name in ("levels", *names):
+            values = entry.get(name) if isinstance(entry, dict) else None
+            if not (_grows(values) and len(values) == len(levels)):
+                expected = "as many growing, finite numbers as levels"
+                raise TactileError(f"{where}, {table}.{name}", f"{values!r:.80}", expected, ADVICE)
+
+
+def _grows(values: object) -> bool:
+    numbers = isinstance(values, list) and len(values) > 0 and all(type(v) in (int, float) for v in values)
+    return numbers and bool(np.isfinite(values).all()) and values == sorted(values) and values[0] >= 0
+
+
 def load_translator(folder: str | os.PathLike | None = None) -> Translator:
     """The networks of a weights folder, the shipped ones by default.
 
     Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces.
     """
     nets = networks.load(folder)
+    card_file = f"{folder or networks.WEIGHTS_FOLDER}, card.json"
+    _check_quantiles(nets.card, card_file)
     for key, here in (
         ("biotac_nodes_sha256", sensors.biotac_surface().sha256),
         ("digit_nodes_sha256", sensors.digit_surface().sha256),
     ):
         if nets.card.get(key) != here:
             raise TactileError(
-                f"{folder or networks.WEIGHTS_FOLDER}, card.json, {key}", f"{str(nets.card.get(key))[:12]}...",
+                f"{card_file}, {key}", f"{str(nets.card.get(key))[:12]}...",
                 f"{here[:12]}..., the surface of this version", "Use weights trained with this version of the sensors",
             )  # fmt: skip
     return Translator(nets)

@@ -1,11 +1,13 @@
 """The shipped networks, end to end, against the truth that the shipped recording carries."""
 
 import dataclasses
+import json
+import shutil
 
 import numpy as np
 import pytest
 
-from tactile_core import metrics, recordings, sensors, translate
+from tactile_core import metrics, networks, recordings, sensors, translate
 from tactile_core.errors import TactileError
 from tactile_core.flags import Flag
 
@@ -113,4 +115,34 @@ def test_a_contact_beyond_the_gel_is_flagged(translator):
 def test_weights_for_another_surface_are_refused(monkeypatch):
     monkeypatch.setattr(sensors, "digit_surface", sensors.biotac_surface)
     with pytest.raises(TactileError, match="digit_nodes_sha256"):
+        translate.load_translator()
+
+
+def test_a_changed_card_is_refused(tmp_path):
+    folder = tmp_path / "weights"
+    shutil.copytree(networks.WEIGHTS_FOLDER, folder)
+    card = json.loads((folder / "card.json").read_text(encoding="utf-8"))
+
+    def load(**changes):
+        (folder / "card.json").write_text(json.dumps(card | changes), encoding="utf-8")
+        return translate.load_translator(folder)
+
+    assert load().card == card
+    distance = card["distance"]
+    for changes, said in [
+        ({"distance": None}, "distance.levels"),
+        ({"silence": {}}, "silence.levels"),
+        ({"distance": distance | {"levels": []}}, "distance.levels"),
+        ({"distance": distance | {"largest": "many"}}, "distance.largest"),
+        ({"distance": distance | {"residual": distance["residual"][:2]}}, "distance.residual"),
+        ({"distance": distance | {"residual": [float("nan")] * 5}}, "distance.residual"),
+        ({"nets": card["nets"] | {"M2MPN": card["nets"]["M2MPN"] | {"sizes": {"blocks": 10**9}}}}, "M2MPN"),
+    ]:
+        with pytest.raises(TactileError, match=said):
+            load(**changes)
+
+
+def test_the_shipped_card_is_pinned(monkeypatch):
+    monkeypatch.setattr(networks, "SHIPPED_CARD_SHA256", "0" * 64)
+    with pytest.raises(TactileError, match="sha256"):
         translate.load_translator()

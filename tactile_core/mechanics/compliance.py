@@ -16,7 +16,8 @@ import pathlib
 
 import numpy as np
 
-from .. import biotac_shape, digit_shape, sensors, surface
+from .. import atomic, biotac_shape, digit_shape, sensors, surface
+from ..errors import TactileError
 from ..lattice import Lattice
 from ..sensors import Material
 from .elasticity import assemble
@@ -56,14 +57,14 @@ class Compliance:
 @functools.cache
 def biotac_compliance() -> Compliance:
     """The BioTac's skin over incompressible fluid; built in about a minute, then read from the cache."""
-    return _cached("biotac", sensors.biotac_surface(), _touchable_skin(), skin_mesh, sensors.BIOTAC_SKIN)
+    return _cached("biotac", sensors.biotac_surface(), _touchable_skin(), skin_mesh(), sensors.BIOTAC_SKIN)
 
 
 @functools.cache
 def digit_compliance() -> Compliance:
     """The DIGIT's gel; built in about a minute, then read from the cache."""
     lattice = sensors.digit_surface()
-    return _cached("digit", lattice, np.arange(len(lattice.rest)), gel_mesh, sensors.DIGIT_GEL)
+    return _cached("digit", lattice, np.arange(len(lattice.rest)), gel_mesh(), sensors.DIGIT_GEL)
 
 
 def _touchable_skin() -> np.ndarray:
@@ -82,26 +83,49 @@ def cache_folder() -> pathlib.Path:
     return (pathlib.Path(base) if base else pathlib.Path.home() / ".cache") / "tactile"
 
 
-def _cached(name: str, lattice: Lattice, touchable: np.ndarray, make_mesh, material: Material) -> Compliance:  # noqa: ANN001
-    recipe = json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material), touchable.tolist()])
-    folder = cache_folder() / f"compliance-{name}-{hashlib.sha256(recipe.encode()).hexdigest()[:16]}"
-    arrays = ("move", "watch", "watch_gap", "pressure")
-    if not (folder / "done").exists():
+def _cached(name: str, lattice: Lattice, touchable: np.ndarray, mesh: HexMesh, material: Material) -> Compliance:
+    digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
+    watch, watch_gap = _watched(mesh)
+    for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, np.round(watch * 1e9), watch_gap):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    folder = cache_folder() / f"compliance-{name}-{digest.hexdigest()[:16]}"
+    try:
+        loaded = _load(folder)
+    except (OSError, ValueError):  # not built yet, or cut short
         log.info("building the compliance of the %s in %s (about a minute, once)", name, folder)
-        built = build(make_mesh(), material, touchable, lattice)
-        _store(folder, dict(zip(arrays, built, strict=True)))
-    loaded = [np.load(folder / f"{array}.npy", mmap_mode="r", allow_pickle=False) for array in arrays]
+        _claim(folder)
+        _store(folder, dict(zip(_ARRAYS, build(mesh, material, touchable, lattice), strict=True)))
+        loaded = _load(folder)
     return Compliance(name, lattice, touchable, *loaded)
 
 
+_ARRAYS = ("move", "watch", "watch_gap", "pressure")
+
+
+def _load(folder: pathlib.Path) -> list[np.ndarray]:
+    return [np.load(folder / f"{array}.npy", mmap_mode="r", allow_pickle=False) for array in _ARRAYS]
+
+
+def _claim(folder: pathlib.Path) -> None:
+    """Find out before the long build whether its result can be kept."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "probe").touch()
+        (folder / "probe").unlink()
+    except OSError as error:
+        found = f"cannot be written ({error.strerror})"
+        raise TactileError(folder, found, "a folder for 450 MB", "Name one in TACTILE_CACHE") from error
+
+
 def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write arrays, then the mark that they are whole; two processes that build at once write the same bytes."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, values in arrays.items():
-        partial = folder / f"{name}.{os.getpid()}.partial.npy"
-        np.save(partial, values)
-        os.replace(partial, folder / f"{name}.npy")
-    (folder / "done").touch()
+    """Write arrays whole or not at all; two processes that build at once write the same bytes."""
+    try:
+        for name, values in arrays.items():
+            with atomic.new_file(folder / f"{name}.npy") as partial, open(partial, "wb") as file:
+                np.save(file, values)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror})"
+        raise TactileError(folder, found, "room for 450 MB", "Make room, or name a folder in TACTILE_CACHE") from error
 
 
 def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lattice) -> tuple[np.ndarray, ...]:

@@ -72,6 +72,8 @@ class ContactProblem:
         for iteration in range(1, MAX_ITERATIONS + 1):
             distance, normal = self.pose.moved(depth).distance(self.indenter, self.rest + displacement)
             if not active.any():
+                force, displacement = np.zeros_like(force), np.zeros_like(displacement)
+                distance, normal = self.pose.moved(depth).distance(self.indenter, self.rest)
                 active = distance < 0
                 if not active.any():
                     return self._result(depth, force, converged=axial_force is None, iterations=iteration)

@@ -7,10 +7,12 @@ an interrupted run goes on from the blocks of presses that are already on disk.
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import logging
 import os
 import pathlib
+import zipfile
 from collections.abc import Callable, Iterable
 
 import numpy as np
@@ -19,8 +21,8 @@ from .. import __version__, atomic, digit_shape, sensors
 from ..errors import TactileError
 from ..scene import PairSpec, Scene, load_scene
 from .compliance import biotac_compliance, digit_compliance
-from .contact import Contact, fluid_pressure, surface_displacement, watched_gaps
-from .electrodes import signal_of_gaps
+from .contact import Contact, fluid_pressure, surface_displacement
+from .electrodes import electrode_gaps, signal_of_gaps
 from .press import Placement, Press, biotac_pose, digit_pose, on_gel
 
 log = logging.getLogger(__name__)
@@ -57,8 +59,9 @@ def make_pairs(
         raise TactileError(f"{scene_path}, pairs", "missing", "a [pairs] table", "See scenes/press_sphere/scene.toml")
     if count < 1:
         raise TactileError("--count", str(count), "at least 1")
-    if out.exists():
-        raise TactileError(out, "exists already", "a new file", "Remove it or choose another name")
+    for spec in scene.indenters:
+        spec.build()  # an impossible one is refused before anything is written
+    atomic.claim(out)
     digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
     folder = _parts_folder(out, text, seed)
     files = _run_blocks(str(scene_path), seed, folder, count, workers, progress)
@@ -141,15 +144,26 @@ class _Pool:
 def _make_block(job: _Job) -> tuple[str, int]:
     """One block of presses as a file of its own; an existing whole file is taken as it is."""
     file = pathlib.Path(job.folder) / f"block_{job.block:06d}.npz"
-    if not file.exists():
-        scene, _ = load_scene(job.scene_file)
-        rows = [row for i in range(BLOCK) for row in _press_rows(scene, job.seed, job.block * BLOCK + i)]
-        columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
-        partial = file.with_name(f"{file.stem}.{os.getpid()}.partial.npz")
-        np.savez(partial, count=len(rows), **columns)
-        os.replace(partial, file)
-    with np.load(file, allow_pickle=False) as block:
-        return str(file), int(block["count"])
+    try:
+        with np.load(file, allow_pickle=False) as block:
+            return str(file), int(block["count"])
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+        pass  # not made yet, or cut short: made now
+    scene, _ = load_scene(job.scene_file)
+    rows = [row for i in range(BLOCK) for row in _press_rows(scene, job.seed, job.block * BLOCK + i)]
+    columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
+    content = io.BytesIO()
+    np.savez(content, count=len(rows), **columns)
+    try:
+        atomic.write_bytes(file, content.getvalue())
+    except OSError as error:
+        raise _no_room(file, error) from error
+    return str(file), len(rows)
+
+
+def _no_room(path: pathlib.Path, error: OSError | RuntimeError) -> TactileError:
+    reason = getattr(error, "strerror", None) or str(error).split("\n")[0]
+    return TactileError(path, f"cannot be written ({reason})", "room for it", "Make room, then give the command again")
 
 
 def _press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray]]:
@@ -185,7 +199,7 @@ def _draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
 def pair_row(biotac: Contact, digit: Contact) -> dict[str, np.ndarray]:
     """What one paired contact stores; arrays as in the file, see ``DATASETS``."""
     skin, gel = biotac_compliance(), digit_compliance()
-    gaps = watched_gaps(skin, biotac)[:19]
+    gaps = electrode_gaps(skin, biotac)
     return {
         "displacement_biotac": quantise(surface_displacement(skin, biotac)),
         "displacement_digit": quantise(surface_displacement(gel, digit)),
@@ -230,6 +244,13 @@ DATASETS = {
 
 def _merge(files, count, out, text, seed, names) -> None:  # noqa: ANN001
     """One HDF5 file from the blocks in order, cut to ``count`` contacts; written beside and renamed."""
+    try:
+        _write_merged(files, count, out, text, seed, names)
+    except (OSError, RuntimeError) as error:  # h5py reports a full disk as either
+        raise _no_room(out, error) from error
+
+
+def _write_merged(files, count, out, text, seed, names) -> None:  # noqa: ANN001
     import h5py
 
     with atomic.new_file(out) as partial, h5py.File(partial, "w") as file:

@@ -67,6 +67,13 @@ class Press:
         self.last = contact
         return contact
 
+    def at_depth(self, depth: float) -> Contact | None:
+        """The contact at a depth, m, or None when it lies beyond what the linear model may be asked."""
+        contact = self.problem.at_depth(depth)
+        if depth > self.max_depth or not contact.converged or self._touches_core(contact):
+            return None
+        return contact
+
     def _first_touch(self) -> Contact | None:
         """The first contact that carries force; a coarse lattice may be missed by the shallowest depths."""
         depth = FIRST_DEPTH

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import os
-import pathlib
 from collections.abc import Callable
 
 import numpy as np
 
-from .. import __version__, sensors
+from .. import __version__, atomic, sensors
 from ..errors import TactileError
 from ..recordings import Truth, write_simulated
 from ..scene import RecordingSpec, load_scene
 from .compliance import biotac_compliance, digit_compliance
-from .contact import Contact, fluid_pressure, surface_displacement, watched_gaps
-from .electrodes import raw_counts, signal_of_gaps
+from .contact import Contact, fluid_pressure, surface_displacement
+from .electrodes import electrode_gaps, raw_counts, signal_of_gaps
 from .pairs import contact_center
-from .press import Placement, Press, biotac_pose, digit_pose
+from .press import Placement, Press, biotac_pose, digit_pose, on_gel
 
 PRESSURE_PER_COUNT = 100e3 / 4096  # Pa: the fluid's 0 to 100 kPa over 12 bits (sensors.md)
 PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (sensors.md)
@@ -44,8 +43,8 @@ def simulate_recording(
         raise TactileError(
             f"{scene_path}, recording", "missing", "a [recording] table", "See scenes/press_roll_slide/scene.toml"
         )
-    if pathlib.Path(out).exists():
-        raise TactileError(out, "exists already", "a new file", "Remove it or choose another name")
+    atomic.claim(out)
+    _check_places(scene_path, spec)
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     time, place, force = _motion(spec)
     frames: list[Pair | None] = []
@@ -64,6 +63,15 @@ def simulate_recording(
         scene=text, seed=seed, made_by=f"tactile {__version__}, mechanics.recording",
         note=f"Simulated, not measured: {scene.description}",
     )  # fmt: skip
+
+
+def _check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
+    for number, point in enumerate(spec.points, 1):
+        if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3):
+            raise TactileError(
+                f"{scene_path}, recording.points, point {number}", f"({point.x_mm:g}, {point.z_mm:g}) mm",
+                "a place on the DIGIT's gel, x -20.06 to 4.94 mm, z within 9.17 mm", "Move it or set its force_n to 0",
+            )  # fmt: skip
 
 
 def _motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -89,7 +97,7 @@ def _solve(scene_path, indenter, place: Placement, force: float, time: float) ->
 
 def _signals(frames: list[Pair | None]) -> np.ndarray:
     skin = biotac_compliance()
-    return np.stack([np.zeros(19) if f is None else signal_of_gaps(watched_gaps(skin, f[0])[:19]) for f in frames])
+    return np.stack([np.zeros(19) if f is None else signal_of_gaps(electrode_gaps(skin, f[0])) for f in frames])
 
 
 def _pressure_counts(frames: list[Pair | None]) -> np.ndarray:

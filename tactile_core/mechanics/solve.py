@@ -12,12 +12,12 @@ from .. import biotac_shape, sensors
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
 from .cavity import Cavity
-from .compliance import Compliance, biotac_compliance, digit_compliance
-from .contact import ContactProblem, fluid_pressure, surface_displacement
+from .compliance import biotac_compliance, digit_compliance
+from .contact import fluid_pressure, surface_displacement
 from .finite_strain import FiniteStrainSolid
 from .hex_mesh import HexMesh, gel_mesh, skin_mesh
 from .newton import FiniteStrainContact, Touch
-from .press import MAX_DEPTH, Placement, Press, biotac_pose, digit_pose
+from .press import MAX_DEPTH, Placement, Press, biotac_pose, digit_pose, on_gel
 
 Sensor = Literal["biotac", "digit"]
 Tier = Literal["fast", "reference"]
@@ -63,6 +63,11 @@ def solve(
     Raises TactileError for an impossible request, or for one beyond what the tier may be asked.
     """
     _check(depth, force)
+    if not on_gel(place.x, place.z):
+        found = f"({place.x * 1e3:g}, {place.z * 1e3:g}) mm"
+        raise TactileError("solve, place", found, "a place on the DIGIT's gel (x, z), see digit_shape.outline_distance")
+    if force == 0:
+        depth, force = 0.0, None
     pose = (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
     if tier == "fast":
         return _fast(sensor, indenter, pose, depth, force)
@@ -81,13 +86,13 @@ def _check(depth: float | None, force: float | None) -> None:
 
 
 def _fast(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float | None, force: float | None) -> Solution:
-    compliance: Compliance = biotac_compliance() if sensor == "biotac" else digit_compliance()
-    if depth is not None or force == 0:
-        contact = ContactProblem(compliance, indenter, pose, MAX_DEPTH).at_depth(depth or 0.0)
-    else:
-        contact = Press(compliance, indenter, pose).at_force(force)
-        if contact is None:
-            raise TactileError("solve, force", f"{force:g} N", "a force within the linear model's depth", "Lower it")
+    compliance = biotac_compliance() if sensor == "biotac" else digit_compliance()
+    press = Press(compliance, indenter, pose)
+    contact = press.at_force(force) if depth is None else press.at_depth(depth)
+    if contact is None:
+        found = f"force {force:g} N" if depth is None else f"depth {depth * 1e3:g} mm"
+        expected = f"at most {MAX_DEPTH * 1e3:g} mm deep, and the skin clear of its core"
+        raise TactileError(f"solve, {sensor}, fast tier", found, expected, "Press less")
     patch = np.zeros(len(compliance.surface.rest), bool)
     patch[compliance.touchable[contact.nodes]] = True
     return Solution(
@@ -128,7 +133,7 @@ def _at_force(problem: FiniteStrainContact, sensor: Sensor, force: float) -> Tou
         if abs(found - force) <= _FORCE_TOLERANCE * force:
             return touch
         root = found ** (2 / 3)
-        slope = (root - below[1]) / (depth - below[0])
+        slope = max((root - below[1]) / (depth - below[0]), 1e-6)  # no node is touched yet: go on by a whole step
         if root < goal:
             below = (depth, root)
         depth = depth + float(np.clip((goal - root) / slope, -depth / 2, LOAD_STEP[sensor]))

@@ -136,3 +136,20 @@ def test_cycling_active_set_is_broken(monkeypatch):
     assert slow.converged and slow.iterations > fast.iterations
     # force grows as depth^1.5, and 0.05 um is 2e-4 of this depth
     np.testing.assert_allclose(slow.axial_force, fast.axial_force, rtol=3e-4)
+
+
+@pytest.mark.parametrize("depth", [0.0, -0.1e-3])
+def test_backing_out_leaves_no_pull(depth):
+    ball = Sphere(3.5e-3)
+    for compliance, pose in sensors_and_poses(ball, PLACES[0]):
+        problem = ContactProblem(compliance, ball, pose, 5e-4)
+        left = problem.at_depth(depth, problem.at_depth(5e-4))
+        assert left.converged and len(left.nodes) == 0 and not left.force.any()
+
+
+def test_presses_end_at_the_core():
+    """At the side of the pad the skin is a millimetre from its core: the linear model must not go through it."""
+    ball = Sphere(3.5e-3)
+    side = Placement(-8e-3, 8e-3)
+    assert Press(biotac_compliance(), ball, biotac_pose(ball, side)).at_depth(1.2e-3) is None
+    assert Press(biotac_compliance(), ball, biotac_pose(ball, side)).at_depth(0.2e-3).converged

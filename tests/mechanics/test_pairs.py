@@ -97,3 +97,27 @@ def test_scene_without_pairs_and_bad_count(request, tmp_path):
         make_pairs(request.config.rootpath / "scenes/press_roll_slide", 5, 0, tmp_path / "x.h5")
     with pytest.raises(TactileError, match="at least 1"):
         make_pairs(request.config.rootpath / SCENE, 0, 0, tmp_path / "x.h5")
+
+
+def test_an_impossible_indenter_is_refused_before_anything_is_written_also_by_workers(scene, tmp_path):
+    text = (scene / "scene.toml").read_text(encoding="utf-8").replace("radius_mm = 3.5", "radius_mm = 1e9")
+    bad = tmp_path / "scene.toml"
+    bad.write_text(text, encoding="utf-8")
+    for workers in (1, 2):
+        with pytest.raises(TactileError, match="radius"):
+            make_pairs(bad, 5, 0, tmp_path / "x.h5", workers=workers)
+    assert list(tmp_path.iterdir()) == [bad]
+
+
+def test_a_block_cut_short_is_made_again(scene, made, tmp_path):
+    out = tmp_path / "pairs.h5"
+
+    def stop(done, count):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make_pairs(scene, 40, 7, out, progress=stop)
+    block = next(out.with_name("pairs.h5.parts").glob("block_*.npz"))
+    block.write_bytes(block.read_bytes()[:1000])
+    make_pairs(scene, 40, 7, out)
+    assert out.read_bytes() == made.read_bytes()

@@ -57,3 +57,10 @@ def test_reference_tier_agrees_at_small_depth(monkeypatch):
     np.testing.assert_allclose(exact.force, fast.force, atol=0.01 * np.abs(fast.force).max())
     error = np.linalg.norm(exact.displacement - fast.displacement, axis=1)
     assert np.sqrt((error**2).mean()) < 2e-6
+
+
+def test_places_off_the_gel_and_presses_into_the_core_are_refused():
+    with pytest.raises(TactileError, match="place on the DIGIT's gel"):
+        solve("biotac", BALL, Placement(-8e-3, 9.4e-3), depth=1e-4)
+    with pytest.raises(TactileError, match="clear of its core"):
+        solve("biotac", Sphere(3.5e-3), Placement(-8e-3, 8e-3), depth=1.2e-3)

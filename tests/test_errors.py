@@ -1,0 +1,17 @@
+"""The error type: one sentence, and the same one after a trip between processes."""
+
+import copy
+
+from tactile_core.errors import TactileError
+
+
+def test_sentence_names_where_found_expected_and_advice():
+    error = TactileError("touch.csv, row 3", "'abc'", "a number", "Correct the cell")
+    assert str(error) == "touch.csv, row 3: 'abc'; expected a number. Correct the cell"
+    assert str(TactileError("touch.csv", "empty")) == "touch.csv: empty"
+
+
+def test_it_survives_being_handed_over():
+    error = TactileError("a", "b", "c", "d")
+    again = copy.copy(error)  # goes through __reduce__, as between worker processes
+    assert str(again) == str(error) and again.advice == "d"
