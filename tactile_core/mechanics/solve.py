@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Iterable, Iterator
 from typing import Literal
 
 import numpy as np
@@ -63,15 +64,39 @@ def solve(
     Raises TactileError for an impossible request, or for one beyond what the tier may be asked.
     """
     _check(depth, force)
+    pose = _pose(sensor, indenter, place)
+    if force == 0:
+        depth, force = 0.0, None
+    if tier == "fast":
+        return _fast(sensor, indenter, pose, depth, force)
+    problem = _problem(sensor, indenter, pose)
+    touch = problem.press(depth, step=LOAD_STEP[sensor]) if force is None else _at_force(problem, sensor, force)
+    return _solution(sensor, problem, touch)
+
+
+def solve_path(
+    sensor: Sensor, indenter: Indenter, place: Placement, depths: Iterable[float], tier: Tier = "fast"
+) -> Iterator[Solution]:
+    """Solutions at growing depths, m, each going on from the one before; those already yielded are kept on an error.
+
+    Raises what ``solve`` raises.
+    """
+    pose = _pose(sensor, indenter, place)
+    problem, touch = (_problem(sensor, indenter, pose), None) if tier == "reference" else (None, None)
+    for depth in depths:
+        _check(depth, None)
+        if problem is None:
+            yield _fast(sensor, indenter, pose, depth, None)
+            continue
+        touch = problem.press(depth, touch, LOAD_STEP[sensor])
+        yield _solution(sensor, problem, touch)
+
+
+def _pose(sensor: Sensor, indenter: Indenter, place: Placement) -> Pose:
     if not on_gel(place.x, place.z):
         found = f"({place.x * 1e3:g}, {place.z * 1e3:g}) mm"
         raise TactileError("solve, place", found, "a place on the DIGIT's gel (x, z), see digit_shape.outline_distance")
-    if force == 0:
-        depth, force = 0.0, None
-    pose = (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
-    if tier == "fast":
-        return _fast(sensor, indenter, pose, depth, force)
-    return _reference(sensor, indenter, pose, depth, force)
+    return (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
 
 
 def _check(depth: float | None, force: float | None) -> None:
@@ -110,13 +135,10 @@ def _solid(sensor: Sensor) -> tuple[FiniteStrainSolid, Cavity | None]:
     return FiniteStrainSolid(mesh, sensors.BIOTAC_SKIN), Cavity(into_skin, len(mesh.nodes))
 
 
-def _reference(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float | None, force: float | None) -> Solution:
+def _problem(sensor: Sensor, indenter: Indenter, pose: Pose) -> FiniteStrainContact:
     solid, cavity = _solid(sensor)
-    mesh = solid.mesh
-    distance, _ = pose.moved(MAX_DEPTH).distance(indenter, mesh.nodes[mesh.surface])
-    problem = FiniteStrainContact(solid, mesh.surface[distance < _REACH], indenter, pose, cavity)
-    touch = problem.press(depth, step=LOAD_STEP[sensor]) if force is None else _at_force(problem, sensor, force)
-    return _solution(mesh, touch)
+    distance, _ = pose.moved(MAX_DEPTH).distance(indenter, solid.mesh.nodes[solid.mesh.surface])
+    return FiniteStrainContact(solid, solid.mesh.surface[distance < _REACH], indenter, pose, cavity)
 
 
 def _at_force(problem: FiniteStrainContact, sensor: Sensor, force: float) -> Touch:
@@ -140,7 +162,21 @@ def _at_force(problem: FiniteStrainContact, sensor: Sensor, force: float) -> Tou
     raise TactileError("solve, force", f"{found:g} N after {_SEARCH_STEPS} steps", f"{force:g} N", "Give a depth")
 
 
-def _solution(mesh: HexMesh, touch: Touch) -> Solution:
+def _solution(sensor: Sensor, problem: FiniteStrainContact, touch: Touch) -> Solution:
+    mesh = problem.solid.mesh
+    if sensor == "biotac" and _core_gap(mesh, touch.state.displacement) < 0:
+        found = f"the skin goes through its core at {touch.depth * 1e3:g} mm"
+        raise TactileError("solve, biotac, reference tier", found, "a skin clear of its core", "Press less")
     patch = np.isin(mesh.surface, touch.nodes)
     displacement = touch.state.displacement[mesh.surface]
     return Solution("reference", True, touch.iterations, displacement, patch, touch.force, touch.depth, touch.fluid)
+
+
+def _core_gap(mesh: HexMesh, displacement: np.ndarray) -> float:
+    """Smallest distance, m, along the radius between core and free inner skin; contact there is not modelled."""
+    free = mesh.inner[~mesh.clamped[mesh.inner]]
+    x, y, z = (mesh.nodes[free] + displacement[free]).T
+    angle = np.arctan2(z, biotac_shape.AXIS_Y - y)
+    pad = np.abs(angle) < biotac_shape.PAD_ANGLE  # beyond it the skin rests beside the core, 0.2 mm away or less
+    gap = np.hypot(y - biotac_shape.AXIS_Y, z) - biotac_shape.core_radius(x, angle)
+    return float(np.nanmin(gap[pad]))

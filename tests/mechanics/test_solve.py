@@ -6,8 +6,9 @@ import pytest
 from tactile_core.errors import TactileError
 from tactile_core.indenters import Sphere
 from tactile_core.mechanics.finite_strain import FiniteStrainSolid
+from tactile_core.mechanics.hex_mesh import skin_mesh
 from tactile_core.mechanics.press import Placement
-from tactile_core.mechanics.solve import solve
+from tactile_core.mechanics.solve import _core_gap, solve, solve_path
 
 BALL, PLACE = Sphere(7e-3), Placement(-8e-3, 1e-3)
 
@@ -37,7 +38,7 @@ def test_nothing_happens_without_depth_or_force():
         ({"depth": float("nan")}, "finite"),
         ({"depth": -1e-4}, "zero or more"),
         ({"depth": 5e-3}, "at most 1.2 mm"),
-        ({"force": 1e4}, "linear model"),
+        ({"force": 1e4}, "at most 1.2 mm deep"),
     ],
 )
 def test_impossible_requests_are_refused_in_words(request_, said):
@@ -64,3 +65,22 @@ def test_places_off_the_gel_and_presses_into_the_core_are_refused():
         solve("biotac", BALL, Placement(-8e-3, 9.4e-3), depth=1e-4)
     with pytest.raises(TactileError, match="clear of its core"):
         solve("biotac", Sphere(3.5e-3), Placement(-8e-3, 8e-3), depth=1.2e-3)
+
+
+def test_a_path_gives_the_same_as_single_solves_and_keeps_what_it_had():
+    depths = [0.1e-3, 0.2e-3, 5e-3]
+    found = []
+    with pytest.raises(TactileError, match="at most"):
+        found.extend(solve_path("digit", BALL, PLACE, depths))
+    assert len(found) == 2
+    path = solve_path("digit", BALL, PLACE, depths)
+    for depth in depths[:2]:
+        np.testing.assert_array_equal(next(path).force, solve("digit", BALL, PLACE, depth=depth).force)
+
+
+def test_the_core_is_watched():
+    mesh = skin_mesh()
+    still = np.zeros_like(mesh.nodes)
+    assert _core_gap(mesh, still) > 0
+    still[:, 1] = 2.6e-3  # deeper than the fluid under the pad, 2.45 mm at most
+    assert _core_gap(mesh, still) < 0
