@@ -60,8 +60,8 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool = False) -> Iterator[
         _recover(path)
         if path.exists() and not overwrite:
             raise TactileError(path, "already exists", "a new folder", "Name another one, or add --overwrite")
-        partial.mkdir()
         try:
+            partial.mkdir()
             yield partial
             for file in sorted(partial.rglob("*")):
                 if file.is_file():

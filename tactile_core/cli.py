@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from . import __version__
 from .errors import TactileError
+from .stop_signals import Stopped, stopping
 
 DESCRIPTION = """\
 Translate touch between robot fingertips: BioTac electrode recordings become the deformation of a BioTac,
@@ -20,7 +22,8 @@ example:
   tactile info touch.csv                   what the recording holds, and what is wrong with it
   tactile convert touch.csv --out results  pictures in results/touch/images, numbers in results/touch/frames.h5
 
-`tactile VERB --help` explains a verb. Exit status: 0 done, 2 bad input, 130 interrupted."""
+`tactile VERB --help` explains a verb. Exit status: 0 done, 2 bad input, 130 interrupted, 143 or 129 stopped by
+SIGTERM or SIGHUP."""
 
 CONVERT = """\
 Read, tare, translate and shade recordings. Each gets the folder DIR/<file name without extension> with
@@ -39,8 +42,9 @@ examples:
   tactile convert touch.csv --out results --frames 200:300:5 --tare 0:50
 
 Size of a 700-frame result, measured: {sizes}."""
-# 4 B a number of 3,650 + 2,255 nodes; pictures measured at 26 to 29 kB, packed height maps at 200 kB.
-SIZES = "displacement 50 MB, latent 0.3 MB, image about 20 MB, height about 140 MB (the default: 70 MB)"
+# 4 B a number of 3,650 + 2,255 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
+# noisy real one), packed height maps at 200 kB.
+SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
 
 INFO_EPILOG = """\
 example:
@@ -64,6 +68,10 @@ example:
 Needs torch: pip install "tactile-core[train]". An interrupted run goes on where it stopped."""
 
 
+# What a stopped verb leaves.
+LEAVES = "no half file is left"
+RESUMES = "the same command goes on where it stopped"
+
 MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
 MAX_EFFORT = 1000.0
 EXTRAS = {"torch": "train", "scipy": "fem"}  # module -> extra that brings it
@@ -76,8 +84,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")  # a path may hold what the terminal cannot show
     options = _parser().parse_args(arguments)
     try:
-        status = options.run(options)
-        sys.stdout.flush()
+        with stopping():
+            _check_out(options)
+            status = options.run(options)
+            sys.stdout.flush()
     except TactileError as error:
         _complain(str(error))
         return 2
@@ -86,9 +96,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         _complain(f'this verb needs {error.name}. Install it: pip install "tactile-core[{EXTRAS[error.name]}]"')
         return 2
-    except KeyboardInterrupt:
-        print("tactile: interrupted; no half file is left", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as stop:
+        return _stopped(stop, options.stopped)
     except BrokenPipeError:
         # The reader of our output has gone, as in `tactile info … | head`; the exit must not flush into it again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -97,8 +106,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _complain(text: str) -> None:
+    _say("error: " + text)
+
+
+def _say(text: str) -> None:
     """One line on stderr, whatever the text holds."""
-    print("tactile: error: " + " ".join(text.split()), file=sys.stderr)
+    print("tactile: " + " ".join(text.split()), file=sys.stderr)
+
+
+def _stopped(stop: KeyboardInterrupt, left: str) -> int:
+    """Say what an interrupted verb leaves; returns the exit status that shells give: 128 + the signal's number."""
+    with suppress(OSError):  # after SIGHUP the terminal is gone
+        _say(f"stopped by {stop}; {left}" if isinstance(stop, Stopped) else f"interrupted; {left}")
+    return 128 + (stop.number if isinstance(stop, Stopped) else signal.SIGINT)
+
+
+def _check_out(options: argparse.Namespace) -> None:
+    """An empty name, as a script's unset variable gives it, would be the current folder."""
+    if getattr(options, "out", None) == "":
+        raise TactileError("--out", "an empty name", "a file or folder to write", "Name one")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -111,7 +137,7 @@ def _parser() -> argparse.ArgumentParser:
         name: str, run: Callable[[argparse.Namespace], int], brief: str, text: str, epilog: str
     ) -> argparse.ArgumentParser:
         sub = verbs.add_parser(name, help=brief, description=text, epilog=epilog, formatter_class=raw)
-        sub.set_defaults(run=run)
+        sub.set_defaults(run=run, stopped=RESUMES if name in ("pairs", "train") else LEAVES)
         return sub
 
     _convert_arguments(verb("convert", _convert, "recordings to DIGIT pictures", CONVERT,
@@ -204,7 +230,7 @@ def _convert(options: argparse.Namespace) -> int:
             failed += 1
             continue
         for warning in done.warnings:
-            print(f"tactile: warning: {folder.name}: {warning}", file=sys.stderr)
+            _say(f"warning: {folder.name}: {warning}")
         print(done.folder)
     if failed and len(folders) > 1:
         _complain(f"{failed} of {len(folders)} recordings were not converted")

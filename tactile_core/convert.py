@@ -108,7 +108,8 @@ def convert(
             timings = {"ms_a_frame": clock.per_frame(len(frames)), "frames": len(frames), "machine": results.machine()}
             atomic.write_json(partial / results.TIMINGS, timings)
     except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
+        file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
+        found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
     return Done(Path(folder), made.warnings())
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +46,10 @@ PACKED = {"height_map": {"compression": "gzip", "compression_opts": 1, "shuffle"
 
 
 class FramesFile:
-    """``frames.h5`` while it is written, some frames at a time. Nothing that was not kept is in it."""
+    """``frames.h5`` while it is written, some frames at a time. Nothing that was not kept is in it.
+
+    All methods raise OSError, naming the file, where the disk cannot be written.
+    """
 
     def __init__(self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any]) -> None:
         """path : new file; count : T; attributes : of the file itself, beside format and version."""
@@ -53,25 +59,42 @@ class FramesFile:
         for word in keep:
             self._about |= KEPT[word]
         self._count = count
-        self._file = h5py.File(path, "w")
+        self._disk = _Disk(path)
+        self._file = h5py.File(self._disk, "w")
         self._file.attrs.update({"format": FORMAT, "tactile_core": __version__, **attributes})
 
     def __enter__(self) -> FramesFile:
         return self
 
-    def __exit__(self, *failure: object) -> None:
-        self._file.close()
+    def __exit__(self, kind: type[BaseException] | None, *more: object) -> None:
+        try:
+            with self._checked() if kind is None else suppress(Exception):  # the error on its way out tells more
+                self._file.close()
+        finally:
+            self._disk.close()
+
+    @contextmanager
+    def _checked(self) -> Iterator[None]:
+        """Raise what the disk refused, also where HDF5 stumbles over it first."""
+        try:
+            yield
+        except Exception:
+            self._disk.check()
+            raise
+        self._disk.check()
 
     def write(self, start: int, arrays: dict[str, np.ndarray]) -> None:
         """Write frames from `start` on; arrays that are not kept are passed over. Floats become float32."""
-        for name, array in arrays.items():
-            if name in self._about:
-                data = self._file[name] if name in self._file else self._create(name, array)
-                data[start : start + len(array)] = array
+        with self._checked():
+            for name, array in arrays.items():
+                if name in self._about:
+                    data = self._file[name] if name in self._file else self._create(name, array)
+                    data[start : start + len(array)] = array
 
     def annotate(self, name: str, **attributes: Any) -> None:
         """Add attributes to a dataset that exists."""
-        self._file[name].attrs.update(attributes)
+        with self._checked():
+            self._file[name].attrs.update(attributes)
 
     def _create(self, name: str, array: np.ndarray) -> h5py.Dataset:
         kind = "float32" if array.dtype.kind == "f" else array.dtype
@@ -84,3 +107,60 @@ class FramesFile:
         if name == "flags":
             data.attrs["names"] = json.dumps(flags.names())
         return data
+
+
+class _Disk(io.RawIOBase):
+    """The file below HDF5, which never learns that the disk is full; `check` tells.
+
+    HDF5 cannot close a file whose writing failed: it keeps the place on the disk and crashes at the process's end
+    (seen with HDF5 1.14 and packed datasets). Here it always closes, into a file that is thrown away then.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file = open(path, "wb+", buffering=0)  # noqa: SIM115 - closed by close()
+        self._failure: OSError | None = None
+
+    def check(self) -> None:
+        """Raise the first OSError that the disk gave, if any."""
+        if self._failure is not None:
+            raise OSError(self._failure.errno, self._failure.strerror, str(self._path)) from self._failure
+
+    def write(self, data: Any) -> int:
+        rest = memoryview(data).cast("B")
+        count = len(rest)
+        try:
+            while len(rest) and self._failure is None:
+                rest = rest[self._file.write(rest) :]  # one call may write a part
+        except OSError as error:
+            self._failure = error
+        return count
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return self._file.truncate(size)
+        except OSError as error:
+            self._failure = self._failure or error
+            return self._file.tell() if size is None else size
+
+    def readinto(self, buffer: Any) -> int:
+        return self._file.readinto(buffer)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()

@@ -40,10 +40,12 @@ def parse_keep(text: str) -> tuple[str, ...]:
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:
     """The result folder of each recording; all that can be refused before any work is refused here.
 
-    Makes `out` where it is missing, and clears what killed runs left in it. Raises TactileError: two recordings of
-    the same name, a result that exists (unless `overwrite`), something that is no result in its place, a folder that
-    cannot be written.
+    Makes `out` where it is missing, and clears what killed runs left in it. Raises TactileError: an empty `out`,
+    two recordings of the same name, a result that exists (unless `overwrite`), something that is no result in its
+    place, a folder that cannot be written.
     """
+    if not os.fspath(out):
+        raise TactileError("--out", "an empty name", "a folder to write", "Name one")
     out = Path(out)
     seen: dict[str, Path] = {}
     for recording in map(Path, recordings):

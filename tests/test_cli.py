@@ -255,6 +255,36 @@ def test_ctrl_c_ends_in_one_line(tactile, slide_csv, tmp_path, monkeypatch):
     assert only_line(err).startswith("tactile: interrupted")
 
 
+@pytest.mark.parametrize(("verb", "left"), [("pairs", "goes on"), ("train", "goes on"), ("simulate", "no half file")])
+def test_what_an_interrupted_verb_leaves_is_told(verb, left, tactile, tmp_path, monkeypatch):
+    def interrupted(options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, f"_{verb}", interrupted)
+    count = ["--count", "4"] if verb == "pairs" else []
+    status, _, err = tactile(verb, "given", "--out", tmp_path / "out", *count)
+    assert status == 130
+    assert left in only_line(err)
+
+
+@pytest.mark.parametrize("verb", ["convert", "simulate", "pairs", "train"])
+def test_an_empty_out_is_refused(verb, tactile, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    count = ["--count", "4"] if verb == "pairs" else []
+    status, _, err = tactile(verb, "given", "--out", "", *count)
+    assert status == 2
+    assert only_line(err).startswith("tactile: error: --out: an empty name")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows allows no line break in a file name")
+def test_each_warning_is_one_line(tactile, slide_csv, tmp_path):
+    status, _, err = tactile("convert", slide_csv("two\nlines"), "--out", tmp_path / "out", "--keep", "")
+    assert status == 0
+    assert err
+    assert all(line.startswith("tactile: warning: two lines: ") for line in err.splitlines())
+
+
 def test_progress_is_silent_without_a_terminal_unless_asked(tactile, slide_csv, tmp_path):
     path = slide_csv(frames=5)
     _, _, quiet = tactile("convert", path, "--out", tmp_path / "a", "--keep", "")

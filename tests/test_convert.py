@@ -196,11 +196,35 @@ def interrupt(how: int, path: Path, out: Path) -> subprocess.Popen:
     return process
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on the size of a process's files")
+@pytest.mark.parametrize("keep", ["displacement", "height"])  # plain and packed in frames.h5
+def test_a_full_disk_costs_one_recording_and_no_half_result_is_left(keep, slide_csv, tmp_path):
+    paths, out = [slide_csv("long", frames=500), slide_csv("short", frames=5)], tmp_path / "out"
+    root = Path(__file__).parent.parent
+    limited = (  # 400 kB: enough for 5 frames and a sheet. Python ignores SIGXFSZ: writing gives OSError
+        "import resource, runpy, sys; sys.argv = sys.argv[1:]; sys.path.insert(0, sys.argv[0].rpartition('/')[0]);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000)); runpy.run_path(sys.argv[0], None, '__main__')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", limited, str(root / "tests" / "fake_tools.py"),
+         "convert", *map(str, paths), "--out", str(out), "--keep", keep],
+        env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    errors = [line for line in done.stderr.splitlines() if not line.startswith("tactile: warning:")]
+    assert errors[0].startswith(f"tactile: error: {out / 'long'}: frames.h5 cannot be written (File too large)")
+    assert errors[1:] == ["tactile: error: 1 of 2 recordings were not converted"]
+    assert [child.name for child in out.iterdir()] == ["short"]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT and SIGKILL for one process")
 def test_an_interrupted_run_leaves_nothing_and_a_killed_one_is_cleared_by_the_next(slide_csv, tmp_path, run):
     path, out = slide_csv(frames=500), tmp_path / "out"
     assert interrupt(signal.SIGINT, path, out).returncode == 130
     assert list(out.iterdir()) == []
+    for how in (signal.SIGTERM, signal.SIGHUP):
+        assert interrupt(how, path, out).returncode == 128 + how
+        assert list(out.iterdir()) == []
     assert interrupt(signal.SIGKILL, path, out).returncode == -signal.SIGKILL
     assert not (out / "touch").exists()
     assert len(list(out.iterdir())) == 2  # its half result and its lock, both hidden

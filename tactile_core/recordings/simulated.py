@@ -9,6 +9,7 @@ Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sen
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 from typing import Any
@@ -151,12 +152,17 @@ def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
 
 
 def _write_whole(path: Path, fill: Any) -> None:
-    """Let fill write a file that appears whole or not at all."""
+    """Let fill write a file that appears whole or not at all.
+
+    It is made in memory: HDF5 keeps a file open whose writing failed on a full disk, and crashes at the process's end.
+    """
     import h5py
 
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        fill(file)
     try:
-        with atomic.new_file(path) as partial, h5py.File(partial, "w") as file:
-            fill(file)
+        atomic.write_bytes(path, memory.getvalue())
     except OSError as error:
         reason = error.strerror or str(error)
         raise TactileError(path, f"cannot be written ({reason})", "room in a folder that can be written to") from error

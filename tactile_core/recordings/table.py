@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from ..errors import TactileError
 from .assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
+MAX_BLANK = 8  # blank lines that a message names
 SHOWN = 40  # characters of a cell or header that a message repeats
 
 
@@ -22,6 +24,7 @@ class Table:
     values: np.ndarray
     lines: np.ndarray
     problems: tuple[Problem, ...]
+    warnings: tuple[str, ...] = ()
 
     def columns(self, names: list[str]) -> np.ndarray:
         """(T, len(names)) float. Raises TactileError for a column that is not there, naming it."""
@@ -79,7 +82,21 @@ def read_table(path: str) -> Table:
             )
     if not ended:
         _doubt_last_cell(kept, header, separator, values, problems)
-    return Table(path, header, values, np.array([number for number, _ in kept]), tuple(problems))
+    rows = np.array([number for number, _ in kept])
+    return Table(path, header, values, rows, tuple(problems), _tell_blank_lines(first, rows))
+
+
+def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
+    """A sentence on lines without text between the header and the last row: a frame may be missing there."""
+    count = int(rows[-1]) - header_line - len(rows)
+    if count == 0:
+        return ()
+    lines = [header_line, *rows.tolist()]
+    blank = (line for before, after in pairwise(lines) for line in range(before + 1, after))
+    where = ", ".join(map(str, islice(blank, MAX_BLANK))) + " …" * (count > MAX_BLANK)
+    if count == 1:
+        return (f"line {where}: blank; no frame is made of it",)
+    return (f"lines {where}: blank ({count} in all); no frames are made of them",)
 
 
 def _lines(path: str) -> list[str]:
@@ -186,9 +203,29 @@ def _bad_row(
 def _doubt_last_cell(
     kept: list[tuple[int, str]], header: tuple[str, ...], separator: str, values: np.ndarray, problems: list[Problem]
 ) -> None:
-    """A last line without the separator that closes every other row is cut off in its last number."""
+    """The last number of a file that does not end in a newline may be cut off.
+
+    It is where every other row is closed by a separator and this one is not. Else it is doubted where the value tells:
+    see `_looks_cut`; complete files that merely lack the last newline are common.
+    """
     number, line = kept[-1]
-    closed = len(kept) > 1 and kept[-2][1].rstrip(" ").endswith(separator)
-    if closed and line.count(separator) == len(header) - 1:
+    if len(kept) < 2 or line.count(separator) != len(header) - 1 or not np.isfinite(values[-1, -1]):
+        return
+    closed = kept[-2][1].rstrip(" ").endswith(separator)
+    if closed or _looks_cut(values[:, -1]):
+        cell = line.split(separator)[-1].strip()
         values[-1, -1] = np.nan
-        problems.append(Problem(len(kept) - 1, number, header[-1], "the file ends in this cell (truncated)"))
+        found = f"the file ends in this cell, {shown(cell)}" + ("" if closed else ", far below the rows before")
+        problems.append(Problem(len(kept) - 1, number, header[-1], f"{found} (truncated)"))
+
+
+def _looks_cut(column: np.ndarray) -> bool:
+    """Whether the last value of a column (T,) looks like the first digits of a longer number.
+
+    A digit less makes a count ten times smaller: it is doubted below half of the last value before it (assumed), if
+    no step in the column is as large, so that a signal that swings around 0 is not. Lost decimals change little.
+    """
+    before = column[:-1][np.isfinite(column[:-1])]
+    if not len(before) or abs(column[-1]) >= 0.5 * abs(before[-1]):
+        return False
+    return bool(abs(column[-1] - before[-1]) > np.abs(np.diff(before)).max(initial=0.0))

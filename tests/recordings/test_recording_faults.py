@@ -31,6 +31,26 @@ def test_a_number_cut_off_in_the_last_cell_is_not_believed(press, slide_lines, w
     assert "ele19" in recording.warnings[0] and "truncated" in recording.warnings[0]
 
 
+@pytest.mark.parametrize(("cut", "doubted"), [(0, False), (1, True), (2, True), (3, True)])
+def test_without_closing_separators_a_number_far_below_those_before_is_doubted(cut, doubted, slide_lines, write):
+    lines = [line.rstrip(",") for line in slide_lines]
+    recording = recordings.read(write([*lines[:-1], lines[-1][: len(lines[-1]) - cut]], end=""))
+    assert np.isnan(recording.electrodes[-1, 18]) == doubted
+    assert repaired(recording) == [len(recording) - 1] * doubted
+    assert len(recording.warnings) == doubted
+    if doubted:
+        assert f"line {len(lines)}, ele19: the file ends in this cell" in recording.warnings[0]
+
+
+def test_a_last_value_near_zero_is_believed_in_a_signal_that_swings_around_it(slide_lines, write):
+    swing = np.rint(40 * np.sin(np.arange(60.0)))
+    swing[-1] = np.rint(0.25 * swing[-2])
+    lines = slide_lines[:1]
+    for i, value in enumerate(swing):
+        lines.append(f"{1.58e9 + i / 100:.2f}," + "2000," * (lines[0].count(",") - 1) + f"{value:g}")
+    assert recordings.read(write(lines, end="")).warnings == ()
+
+
 @pytest.mark.parametrize("cell", ["oops", "nan", "", "inf", "1_0", "9e99"])
 def test_a_bad_cell_is_one_flagged_frame_named_by_line_and_field(cell, press, slide_lines, write):
     cells = slide_lines[40].split(",")
@@ -62,6 +82,15 @@ def test_a_bad_cell_outside_the_electrodes_keeps_them(press, slide_lines, write)
 def test_blank_lines_are_no_frames_and_keep_the_numbering(slide_lines, write):
     recording = recordings.read(write([*slide_lines[:5], "", *slide_lines[5:]]))
     assert recording.rows[:6].tolist() == [2, 3, 4, 5, 7, 8]
+    assert recording.warnings == ("line 6: blank; no frame is made of it",)
+
+
+def test_blank_lines_in_place_of_frames_are_told_and_those_at_the_end_are_not(slide_lines, write):
+    for line in range(20, 30):
+        slide_lines[line] = " "
+    told = recordings.read(write([*slide_lines, "", ""])).warnings
+    assert told[0] == "lines 21, 22, 23, 24, 25, 26, 27, 28 …: blank (10 in all); no frames are made of them"
+    assert not any("blank" in warning for warning in told[1:])
 
 
 def test_too_many_bad_rows_are_an_error(slide_lines, write):

@@ -1,7 +1,10 @@
 """The project's own recordings: read back as written, the same bytes each time, whole or not at all."""
 
 import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -75,6 +78,32 @@ def test_an_interrupted_write_leaves_the_old_file(press, simulated, tmp_path, mo
 def test_a_folder_that_is_not_there(press, simulated, tmp_path):
     with pytest.raises(TactileError, match="a folder that can be written to"):
         recordings.write_simulated(tmp_path / "absent" / "a.h5", **simulated(press))
+
+
+FULL_DISK = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # the file takes more; Python ignores SIGXFSZ
+sys.path.insert(0, sys.argv[1])
+from conftest import make_press, simulated_arrays
+from tactile_core import recordings
+from tactile_core.errors import TactileError
+try:
+    recordings.write_simulated(sys.argv[2], **simulated_arrays(make_press()))
+except TactileError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on the size of a process's files")
+def test_a_full_disk_is_told_and_leaves_nothing(tmp_path):
+    here = Path(__file__).parent
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(here), str(tmp_path / "a.h5")],
+        capture_output=True, text=True, timeout=120, env={**os.environ, "PYTHONPATH": str(here.parent.parent)},
+    )  # fmt: skip
+    assert done.returncode == 0 and done.stderr == ""
+    assert f"{tmp_path / 'a.h5'}: cannot be written (File too large)" in done.stdout
+    assert os.listdir(tmp_path) == []
 
 
 def test_damaged_truth_is_refused(press, simulated, tmp_path):

@@ -62,6 +62,7 @@ def read(table: Table) -> Recording:
         rows=table.lines,
         problems=table.essential(["time", *ELECTRODE_NAMES]),
         row_word="line",
+        warnings=table.warnings,
         names=ELECTRODE_NAMES,
         pdc=table.column("pdc"),
         tac=table.column("tac"),

@@ -32,6 +32,7 @@ def read(table: Table) -> Recording:
         rows=table.lines,
         problems=table.essential(needed),
         row_word="line",
+        warnings=table.warnings,
         names=ELECTRODE_NAMES,
         pdc=table.column("pdc"),
         tac=table.column("tac"),
