@@ -110,9 +110,7 @@ def tiers(sensor: str, depths: list[float]) -> Iterator[Row]:
         off = 100 * (np.linalg.norm(fast.force) / load - 1)
         yield row(f"{where}_force_error", float(off), "percent", None, -100.0, "7 mm ball, one place")
         yield row(f"{where}_time", 1e3 * (ended - middle), "ms", None, None, "with set-up")
-        yield row(
-            f"{sensor}_reference_{depth * 1e3:.1f}mm_time", middle - started, "s", None, None, "from the row above"
-        )
+        yield row(f"{sensor}_reference_{depth * 1e3:.1f}mm_time", middle - started, "s", None, None, "this step")
         started = time.perf_counter()
 
 
