@@ -76,19 +76,22 @@ def _meridian(layer: str, column: int) -> np.ndarray:
     return np.concatenate(pieces)
 
 
+def catmull_rom(t: np.ndarray | float) -> np.ndarray:
+    """Weights (4, ...) of the nodes -1, 0, 1, 2 at places t between 0 and 1: cubic, once differentiable."""
+    return np.stack([
+        -t / 2 + t**2 - t**3 / 2,
+        1 - 2.5 * t**2 + 1.5 * t**3,
+        t / 2 + 2 * t**2 - 1.5 * t**3,
+        (t**3 - t**2) / 2,
+    ])  # fmt: skip
+
+
 def _around(values: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Periodic cubic (Catmull-Rom) interpolation of values (..., 72) on the table's angles, at angles (n,)."""
     position = (at + np.pi) / (2 * np.pi) * 72
     cell = np.floor(position + 1e-9).astype(int)
     t = position - cell
-    weights = np.stack(
-        [
-            -t / 2 + t**2 - t**3 / 2,
-            1 - 2.5 * t**2 + 1.5 * t**3,
-            t / 2 + 2 * t**2 - 1.5 * t**3,
-            (t**3 - t**2) / 2,
-        ]
-    )
+    weights = catmull_rom(t)
     return sum(weights[k] * values[..., (cell + k - 1) % 72] for k in range(4))
 
 

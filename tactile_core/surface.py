@@ -79,17 +79,11 @@ def _cubic(grid: np.ndarray, row: float, column: float) -> np.ndarray:
     i, j = int(np.clip(np.floor(row), 0, len(grid) - 2)), int(np.floor(column))
     rows = np.clip(np.arange(i - 1, i + 3), 0, len(grid) - 1)
     columns = np.arange(j - 1, j + 3) % grid.shape[1]
-    return np.einsum("a,b,abk->k", _weights(row - i), _weights(column - j), grid[np.ix_(rows, columns)])
-
-
-def _weights(t: float) -> np.ndarray:
-    return np.array(
-        [
-            -t / 2 + t**2 - t**3 / 2,
-            1 - 2.5 * t**2 + 1.5 * t**3,
-            t / 2 + 2 * t**2 - 1.5 * t**3,
-            (t**3 - t**2) / 2,
-        ]
+    return np.einsum(
+        "a,b,abk->k",
+        biotac_shape.catmull_rom(row - i),
+        biotac_shape.catmull_rom(column - j),
+        grid[np.ix_(rows, columns)],
     )
 
 

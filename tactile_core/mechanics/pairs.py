@@ -19,6 +19,7 @@ import numpy as np
 
 from .. import __version__, atomic, digit_shape, sensors
 from ..errors import TactileError
+from ..hdf5_disk import Disk
 from ..scene import PairSpec, Scene, load_scene
 from .compliance import biotac_compliance, digit_compliance
 from .contact import Contact, fluid_pressure, surface_displacement
@@ -253,7 +254,7 @@ def _merge(files, count, out, text, seed, names) -> None:  # noqa: ANN001
 def _write_merged(files, count, out, text, seed, names) -> None:  # noqa: ANN001
     import h5py
 
-    with atomic.new_file(out) as partial, h5py.File(partial, "w") as file:
+    with atomic.new_file(out) as partial, Disk(partial) as disk, h5py.File(disk, "w") as file:
         file.attrs.update({
             "format": FORMAT, "scene": text, "seed": seed, "version": __version__, "indenters": json.dumps(names),
             "biotac_nodes_sha256": sensors.biotac_surface().sha256,
@@ -266,6 +267,7 @@ def _write_merged(files, count, out, text, seed, names) -> None:  # noqa: ANN001
                 for name in DATASETS if take else ():
                     _append(file, name, block[name][:take], count, done)
                 done += take
+            disk.check()
 
 
 def _append(file, name: str, values: np.ndarray, count: int, start: int) -> None:  # noqa: ANN001

@@ -1,5 +1,6 @@
 """Paired contacts: same bytes for any number of workers, resumable, honest errors."""
 
+import errno
 import json
 
 import numpy as np
@@ -50,14 +51,20 @@ def test_file_holds_what_it_says(made):
         assert apart < 1e-3  # the gel moves most where it is touched, to about two nodes
 
 
-def test_two_workers_and_a_resumed_run_make_the_same_bytes(made, scene, tmp_path):
-    resumed = tmp_path / "resumed.h5"
+def interrupt(scene, out):
+    """Start to make pairs and stop after the first block."""
 
     def stop(done, count):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        make_pairs(scene, 40, 7, resumed, progress=stop)
+        make_pairs(scene, 40, 7, out, progress=stop)
+
+
+def test_two_workers_and_a_resumed_run_make_the_same_bytes(made, scene, tmp_path):
+    resumed = tmp_path / "resumed.h5"
+
+    interrupt(scene, resumed)
     assert not resumed.exists() and resumed.with_name("resumed.h5.parts").exists()
     make_pairs(scene, 40, 7, resumed, workers=2)
     assert resumed.read_bytes() == made.read_bytes()
@@ -83,11 +90,7 @@ def test_an_existing_file_is_kept(made, scene):
 def test_parts_of_another_seed_are_refused(scene, tmp_path):
     out = tmp_path / "pairs.h5"
 
-    def stop(done, count):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        make_pairs(scene, 40, 7, out, progress=stop)
+    interrupt(scene, out)
     with pytest.raises(TactileError, match="another scene, seed"):
         make_pairs(scene, 40, 8, out)
 
@@ -112,12 +115,20 @@ def test_an_impossible_indenter_is_refused_before_anything_is_written_also_by_wo
 def test_a_block_cut_short_is_made_again(scene, made, tmp_path):
     out = tmp_path / "pairs.h5"
 
-    def stop(done, count):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        make_pairs(scene, 40, 7, out, progress=stop)
+    interrupt(scene, out)
     block = next(out.with_name("pairs.h5.parts").glob("block_*.npz"))
     block.write_bytes(block.read_bytes()[:1000])
     make_pairs(scene, 40, 7, out)
     assert out.read_bytes() == made.read_bytes()
+
+
+def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, monkeypatch):
+    out = tmp_path / "pairs.h5"
+    full = OSError(errno.ENOSPC, "No space left on device")
+    monkeypatch.setattr(pairs.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
+    with pytest.raises(TactileError, match="No space left"):
+        make_pairs(scene, 5, 7, out)
+    assert not out.exists()
+    monkeypatch.undo()
+    make_pairs(scene, 5, 7, out)  # goes on from the blocks that are there
+    assert out.exists()

@@ -74,3 +74,9 @@ def test_an_existing_file_is_kept(scene, tmp_path):
     with pytest.raises(TactileError, match="exists already"):
         simulate_recording(scene, out)
     assert out.read_text() == "mine"
+
+
+def test_a_place_off_the_gel_names_the_point(scene, tmp_path):
+    scene.write_text(SHORT.replace("z_mm = 2.0, force_n = 0.3", "z_mm = 9.5, force_n = 0.3"), encoding="utf-8")
+    with pytest.raises(TactileError, match="point 3"):
+        simulate_recording(scene, tmp_path / "x.h5")

@@ -1,0 +1,64 @@
+"""What an HDF5 file is written through, so that a full disk is told in words and not by a crash."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+
+class Disk(io.RawIOBase):
+    """The file below HDF5, which never learns that the disk is full; `check` tells.
+
+    HDF5 cannot close a file whose writing failed: it keeps the place on the disk and crashes at the process's end
+    (seen with HDF5 1.14 and packed datasets). Here it always closes, into a file that is thrown away then.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file = open(path, "wb+", buffering=0)  # noqa: SIM115 - closed by close()
+        self._failure: OSError | None = None
+
+    def check(self) -> None:
+        """Raise the first OSError that the disk gave, if any."""
+        if self._failure is not None:
+            raise OSError(self._failure.errno, self._failure.strerror, str(self._path)) from self._failure
+
+    def write(self, data: Any) -> int:
+        rest = memoryview(data).cast("B")
+        count = len(rest)
+        try:
+            while len(rest) and self._failure is None:
+                rest = rest[self._file.write(rest) :]  # one call may write a part
+        except OSError as error:
+            self._failure = error
+        return count
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return self._file.truncate(size)
+        except OSError as error:
+            self._failure = self._failure or error
+            return self._file.tell() if size is None else size
+
+    def readinto(self, buffer: Any) -> int:
+        return self._file.readinto(buffer)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
