@@ -11,34 +11,9 @@ import numpy as np
 from msgspec import Meta
 
 from .errors import TactileError
-from .indenters import Cylinder, Indenter, Sphere
+from .scene_indenters import IndenterSpec, NotNegative, Positive, with_files_of
 
 FORMAT = "tactile-scene-1"
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
-
-
-class SphereSpec(msgspec.Struct, tag="sphere", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """A ball."""
-
-    name: str
-    radius_mm: Positive
-
-    def build(self) -> Indenter:
-        """The indenter, in metres."""
-        return Sphere(self.radius_mm * 1e-3)
-
-
-class CylinderSpec(msgspec.Struct, tag="cylinder", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """An upright cylinder that touches with its flat, rounded end."""
-
-    name: str
-    radius_mm: Positive
-    edge_mm: Positive = 0.5
-
-    def build(self) -> Indenter:
-        """The indenter, in metres."""
-        return Cylinder(self.radius_mm * 1e-3, self.edge_mm * 1e-3)
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -48,7 +23,8 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5
     tilt_max_deg: Annotated[float, Meta(ge=0, le=45)] = 20.0
     rim_margin_mm: Annotated[float, Meta(ge=0, le=8)] = 1.0
-    depth_max_mm: Annotated[float, Meta(gt=0, le=1.2)] = 1.2  # the linear model's range, mechanics.press.MAX_DEPTH
+    depth_max_percent: Annotated[float, Meta(gt=0, le=60)] = 60.0  # of the thickness under the first touch
+    friction: Annotated[float, Meta(ge=0, le=5)] = 0.78  # Coulomb's coefficient (sensors.md)
 
 
 class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -76,7 +52,7 @@ class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     format: str
     name: str
     description: str
-    indenters: Annotated[list[SphereSpec | CylinderSpec], Meta(min_length=1)]
+    indenters: Annotated[list[IndenterSpec], Meta(min_length=1)]
     pairs: PairSpec | None = None
     recording: RecordingSpec | None = None
 
@@ -97,7 +73,8 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
     except msgspec.DecodeError as error:
         raise TactileError(file, str(error), "the fields of scenes/press_sphere/scene.toml") from error
     _check(file, scene)
-    return scene, text
+    found = [with_files_of(file.parent, spec) for spec in scene.indenters]
+    return msgspec.structs.replace(scene, indenters=found), text
 
 
 def _check(file: pathlib.Path, scene: Scene) -> None:

@@ -1,0 +1,31 @@
+"""Rigid indenters by signed distance. A new one is one file here, a struct in ``scene.py`` and one test row.
+
+In its own frame an indenter touches the plane z = 0 at the origin from above: its body lies at z >= 0.
+"""
+
+from .box import Box
+from .bumpy_cube import BumpyCube
+from .cylinder import Cylinder
+from .edge import Edge
+from .indenter import Indenter
+from .lying_cylinder import LyingCylinder
+from .mesh import MeshIndenter
+from .pose import Pose, pose_on
+from .ring import Ring
+from .several import Several
+from .sphere import Sphere
+
+__all__ = [
+    "Box",
+    "BumpyCube",
+    "Cylinder",
+    "Edge",
+    "Indenter",
+    "LyingCylinder",
+    "MeshIndenter",
+    "Pose",
+    "Ring",
+    "Several",
+    "Sphere",
+    "pose_on",
+]

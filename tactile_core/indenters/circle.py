@@ -1,0 +1,38 @@
+"""Distance from a circle about the z axis in the plane z = 0, in three dimensions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .indenter import NEAREST
+
+
+def circle_distance(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (n,) m of points (n, 3) m from a circle of ``radius`` m, and its gradient (n, 3)."""
+    _, radial, arm, length = _arms(points, radius)
+    return length, np.column_stack([arm[:, :1] * radial, arm[:, 1]]) / length[:, None]
+
+
+def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
+    """Second derivatives (n, 3, 3) 1/m of ``circle_distance``: 1 / length round the wire, and along it."""
+    around, radial, arm, length = _arms(points, radius)
+    turn = np.column_stack([-arm[:, 1:] * radial, arm[:, 0]])
+    along = np.column_stack([-radial[:, 1], radial[:, 0], np.zeros(len(points))])
+    hoop = arm[:, 0] / length / np.maximum(around, NEAREST)
+    return _square(turn) / length[:, None, None] ** 3 + hoop[:, None, None] * _square(along)
+
+
+def _arms(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Distance (n,) m from the axis, direction from it (n, 2), arm from the circle (n, 2) m, its length (n,) m."""
+    around = np.hypot(points[:, 0], points[:, 1])
+    radial = points[:, :2] / np.maximum(around, NEAREST)[:, None]
+    radial[around < NEAREST] = [1.0, 0.0]
+    arm = np.column_stack([around - radius, points[:, 2]])
+    length = np.hypot(arm[:, 0], arm[:, 1])
+    arm[length < NEAREST] = [0.0, -NEAREST]
+    return around, radial, arm, np.maximum(length, NEAREST)
+
+
+def _square(vectors: np.ndarray) -> np.ndarray:
+    """The outer product (n, 3, 3) of each vector (n, 3) with itself."""
+    return vectors[:, :, None] * vectors[:, None, :]

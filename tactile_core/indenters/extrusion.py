@@ -1,0 +1,67 @@
+"""Signed distance of a flat outline drawn out along an axis and rounded: the body of cylinders and wedges.
+
+Outside, the distance to a straight prism is the hypotenuse of the distances to its outline and to its span; inside,
+the nearer face counts. The edge radius then inflates the prism evenly.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from .indenter import NEAREST
+
+
+@dataclasses.dataclass(frozen=True)
+class Outline:
+    """A two-dimensional signed distance at n places: ``value`` (n,) m, ``slope`` (n, 2), ``bend`` (n, 2, 2) 1/m."""
+
+    value: np.ndarray
+    slope: np.ndarray
+    bend: np.ndarray
+
+
+def disc(across: np.ndarray, radius: float) -> Outline:
+    """The outline of a disc about the origin at places (n, 2) m; radius 0 is a point."""
+    length = np.hypot(across[:, 0], across[:, 1])
+    centre = length < NEAREST
+    length = np.maximum(length, NEAREST)
+    slope = across / length[:, None]
+    slope[centre] = [0.0, -1.0]
+    bend = (np.eye(2) - slope[:, :, None] * slope[:, None, :]) / length[:, None, None]
+    return Outline(length - radius, slope, bend)
+
+
+def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (n,) m and gradient (n, 3): two components across, then one along.
+
+    along : (n,) m, from the middle of the span; half_span : m, of the prism before it is inflated by ``edge`` m
+    """
+    side, end = outline.value, np.abs(along) - half_span
+    across, beyond, corner = _corner(side, end)
+    inner = np.minimum(np.maximum(side, end), 0)
+    outward = np.where(along >= 0, 1.0, -1.0)
+    on_side = np.where(corner > 0, across / np.maximum(corner, NEAREST**2), side > end)
+    on_end = np.where(corner > 0, beyond / np.maximum(corner, NEAREST**2), side <= end)
+    gradient = np.column_stack([on_side[:, None] * outline.slope, on_end * outward])
+    return corner + inner - edge, gradient
+
+
+def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarray:
+    """Second derivatives (n, 3, 3) 1/m of ``distance``, in the same order of components."""
+    side, end = outline.value, np.abs(along) - half_span
+    across, beyond, corner = _corner(side, end)
+    # On a round corner the normal turns in the plane of the outline's normal and the axis.
+    turn = np.column_stack([-beyond[:, None] * outline.slope, np.where(along >= 0, across, -across)])
+    length = np.maximum(corner, NEAREST)[:, None, None]
+    round_corner = ((across > 0) & (beyond > 0))[:, None, None]
+    hessian = np.where(round_corner, turn[:, :, None] * turn[:, None, :] / length**3, 0.0)
+    on_side = np.where(corner > 0, across / np.maximum(corner, NEAREST**2), side > end)
+    hessian[:, :2, :2] += on_side[:, None, None] * outline.bend
+    return hessian
+
+
+def _corner(side: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    across, beyond = np.maximum(side, 0), np.maximum(end, 0)
+    return across, beyond, np.hypot(across, beyond)

@@ -1,0 +1,41 @@
+"""A ball."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from .indenter import NEAREST, Indenter, check_length
+
+
+@dataclasses.dataclass(frozen=True)
+class Sphere(Indenter):
+    """A ball of the given radius, m."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        check_length("sphere", "radius", self.radius)
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See ``Indenter.distance``; exact."""
+        length, normal = self._polar(points)
+        return length - self.radius, normal
+
+    def curvature(self, points: np.ndarray) -> np.ndarray:
+        """See ``Indenter.curvature``."""
+        length, normal = self._polar(points)
+        return (np.eye(3) - normal[:, :, None] * normal[:, None, :]) / length[:, None, None]
+
+    def support(self, direction: np.ndarray) -> np.ndarray:
+        """See ``Indenter.support``."""
+        return np.array([0.0, 0.0, self.radius]) + self.radius * direction
+
+    def _polar(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance (n,) m from the centre, and the direction away from it (n, 3)."""
+        arm = points - [0.0, 0.0, self.radius]
+        length = np.linalg.norm(arm, axis=1)
+        arm[length < NEAREST] = [0.0, 0.0, -NEAREST]
+        length = np.maximum(length, NEAREST)
+        return length, arm / length[:, None]

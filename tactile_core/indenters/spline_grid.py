@@ -1,0 +1,76 @@
+"""A smooth function on a regular grid: a tricubic B-spline, twice continuously differentiable."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+
+from ..cubic_spline import bspline_slopes, bspline_weights
+
+
+@dataclasses.dataclass(frozen=True)
+class SplineGrid:
+    """The spline sum_ijk c_ijk B(x - i) B(y - j) B(z - k), in units of ``spacing`` m from ``origin`` (3,) m.
+
+    coefficients : (nx, ny, nz), 4 or more each way, in the unit of the values
+    It is known in the box that leaves out the outermost nodes. Beyond it the distance to the box is added: continuous
+    and, for a body well inside of it, larger than zero, but its slope jumps at the box.
+    """
+
+    origin: np.ndarray
+    spacing: float
+    coefficients: np.ndarray
+
+    def value_and_gradient(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (n,) and gradients (n, 3) a metre at points (n, 3) m."""
+        known, beyond, away = self._split(points)
+        sums = self._sums(known, 2)
+        return sums[:, 0, 0, 0] + away, self._gradient(sums, beyond, away)
+
+    def gradient_and_hessian(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gradients (n, 3) a metre and second derivatives (n, 3, 3) a square metre at points (n, 3) m."""
+        known, beyond, away = self._split(points)
+        sums = self._sums(known, 3)
+        hessian = np.empty((len(points), 3, 3))
+        for i, j in itertools.product(range(3), range(3)):
+            order = np.bincount([i, j], minlength=3)
+            hessian[:, i, j] = sums[:, order[0], order[1], order[2]] / self.spacing**2
+        outside = beyond != 0
+        hessian *= ~outside[:, :, None] & ~outside[:, None, :]
+        length = np.where(away > 0, away, 1)[:, None, None]
+        hessian += (np.eye(3) * outside[:, None, :] - beyond[:, :, None] * beyond[:, None, :] / length**2) / length
+        return self._gradient(sums, beyond, away), hessian
+
+    def _gradient(self, sums: np.ndarray, beyond: np.ndarray, away: np.ndarray) -> np.ndarray:
+        inner = np.stack([sums[:, 1, 0, 0], sums[:, 0, 1, 0], sums[:, 0, 0, 1]], axis=1) / self.spacing
+        return np.where(beyond == 0, inner, beyond / np.where(away > 0, away, 1)[:, None])
+
+    def _split(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Nearest place (n, 3) in the known box, in spacings; way (n, 3) m and distance (n,) m from there."""
+        place = (points - self.origin) / self.spacing
+        known = np.clip(place, 1, np.array(self.coefficients.shape) - 2)
+        beyond = (place - known) * self.spacing
+        return known, beyond, np.linalg.norm(beyond, axis=1)
+
+    def _sums(self, place: np.ndarray, orders: int) -> np.ndarray:
+        """The spline's derivatives (n, orders, orders, orders) along x, y and z at places (n, 3) in spacings."""
+        shape = np.array(self.coefficients.shape)
+        cell = np.minimum(place.astype(np.intp), shape - 3)
+        along = (place - cell).ravel()
+        weights = np.stack([bspline_weights(along), bspline_slopes(along), _bends(along)][:orders])  # (orders, 4, 3 n)
+        x, y, z = weights.reshape(orders, 4, -1, 3).transpose(3, 2, 1, 0)  # three times (n, 4, orders)
+        steps = np.array([shape[1] * shape[2], shape[2], 1])
+        k = np.arange(-1, 3)
+        around = (k[:, None, None] * steps[0] + k[:, None] * steps[1] + k).ravel()
+        near = self.coefficients.ravel()[(cell @ steps)[:, None] + around].astype(np.float64)
+        n = len(place)
+        sums = near.reshape(n, 16, 4) @ z
+        sums = x.swapaxes(1, 2) @ sums.reshape(n, 4, 4 * orders)
+        return y.swapaxes(1, 2)[:, None] @ sums.reshape(n, orders, 4, orders)
+
+
+def _bends(t: np.ndarray) -> np.ndarray:
+    """Second derivatives of ``bspline_weights`` by t; (4, n)."""
+    return np.stack([1 - t, 3 * t - 2, 1 - 3 * t, t])
