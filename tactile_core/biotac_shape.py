@@ -17,6 +17,7 @@ _POLES = {"outer": (-21.30e-3, 6.65e-3), "inner": (-19.725e-3, 5.08e-3)}
 
 TIP_ROWS, TRUNK_ROWS, BASE_ROWS = 18, 28, 12  # node intervals along a meridian, poles included
 PAD_ANGLE = np.pi / 2
+SKIN_THICKNESS = 1.58e-3  # uniform (sensors.md, public mesh)
 PAD_INTERVALS, BACK_INTERVALS = 40, 24  # round the axis: 4.5 degrees (0.56 mm) on the pad, 7.5 on the back
 
 
@@ -102,12 +103,20 @@ def skin_grid(layer: str) -> np.ndarray:
     Stations run from the tip pole to the base pole (both included, each one point repeated over the columns);
     outer and inner points of one station and column face each other through the skin.
     """
-    meridians = np.stack([_meridian(layer, column) for column in range(72)], -1)  # (stations, 2, 72)
-    x, r = np.moveaxis(_around(meridians, angles()), 1, 0)
+    return skin_points(layer, angles())
+
+
+def skin_points(layer: str, theta: np.ndarray) -> np.ndarray:
+    """The stations of ``skin_grid`` at any angles (columns,) rad: (stations, columns, 3) m."""
+    x, r = np.moveaxis(_around(_meridians(layer), theta), 1, 0)
     x[[0, -1]] = x[[0, -1]].mean(axis=1, keepdims=True)
     r[[0, -1]] = 0
-    theta = angles()
     return np.stack([x, AXIS_Y - r * np.cos(theta), r * np.sin(theta)], -1)
+
+
+@functools.cache
+def _meridians(layer: str) -> np.ndarray:
+    return np.stack([_meridian(layer, column) for column in range(72)], -1)  # (stations, 2, 72)
 
 
 def core_radius(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
@@ -134,8 +143,8 @@ def skin_surface(layer: str = "outer") -> Lattice:
     faces = np.concatenate(
         [
             grid_faces(rows, columns, closed=True),
-            cap_faces(rows * columns, ring)[:, ::-1],
-            cap_faces(rows * columns + 1, (rows - 1) * columns + ring),
+            cap_faces(rows * columns, ring),
+            cap_faces(rows * columns + 1, (rows - 1) * columns + ring)[:, ::-1],
         ]
     )
     outward = faces if layer == "outer" else faces[:, ::-1]

@@ -13,12 +13,14 @@ from .profiles import load_profile
 HALF_WIDTH = 9.17e-3
 X_TIP, X_BASE = -20.06e-3, 4.94e-3
 BACK_Y = -4.2365e-3
+THICKNESS = 4.06e-3  # at the apex
 ARC_X = X_TIP + HALF_WIDTH  # centre of the semicircular end
 CORNER_RADIUS = 1.15e-3  # of the two corners at the square end
 
 # The part of the lattice that is an even grid: a little more than the camera sees (13 x 17 mm, sensors.md).
 WINDOW_X, WINDOW_Z = (-16.2e-3, 1.2e-3), (-6.6e-3, 6.6e-3)
-WINDOW_NODES = (45, 33)  # 0.395 x 0.413 mm between nodes
+WINDOW_NODES = (51, 39)  # 0.348 x 0.347 mm between nodes: at most 0.35 where the camera looks
+SPACING = (WINDOW_X[1] - WINDOW_X[0]) / (WINDOW_NODES[0] - 1)
 RIM_TIP, RIM_BASE, RIM_SIDE = 4, 6, 4  # nodes from the window's edge to the outline
 
 _DOME_DEGREE_X, _DOME_DEGREE_Z = 8, 3  # 36 coefficients leave 5 um rms on the profile table, 7 um near the rim

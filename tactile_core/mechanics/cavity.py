@@ -28,22 +28,16 @@ class Cavity:
         np.add.at(gradient, self.faces.ravel(), parts.reshape(-1, 3))
         return gradient.ravel()
 
-    def hessian(self, nodes: np.ndarray):  # noqa: ANN201 (scipy is imported only where it is needed)
-        """d2V / d(node)2, scipy CSC (3 n_nodes, 3 n_nodes), m; symmetric."""
-        import scipy.sparse
-
+    def hessian(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """d2V / d(node)2: node pairs (k,), (k,) and the sum's 3 x 3 blocks (k, 3, 3), m, of each; pairs come again."""
         corners = nodes[self.faces]
         rows, columns, values = [], [], []
-        axes = np.arange(3)
         for i, j, k, sign in ((0, 1, 2, 1), (1, 2, 0, 1), (2, 0, 1, 1), (1, 0, 2, -1), (2, 1, 0, -1), (0, 2, 1, -1)):
             # d/db of (b x c) / 6 is -[c]x / 6, so the block (a, b) is the matrix of v -> v x c
-            blocks = -sign * _cross_matrix(corners[:, k]) / 6
-            rows.append(np.broadcast_to(3 * self.faces[:, i, None, None] + axes[:, None], blocks.shape).ravel())
-            columns.append(np.broadcast_to(3 * self.faces[:, j, None, None] + axes, blocks.shape).ravel())
-            values.append(blocks.ravel())
-        places = np.concatenate(rows), np.concatenate(columns)
-        size = 3 * self.n_nodes
-        return scipy.sparse.coo_matrix((np.concatenate(values), places), shape=(size, size)).tocsc()
+            rows.append(self.faces[:, i])
+            columns.append(self.faces[:, j])
+            values.append(-sign * _cross_matrix(corners[:, k]) / 6)
+        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
 
 def _cross_matrix(v: np.ndarray) -> np.ndarray:

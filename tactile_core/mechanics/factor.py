@@ -1,7 +1,14 @@
-"""Sparse Cholesky factor of a stiffness matrix: cholespy where it is installed, SciPy's SuperLU otherwise."""
+"""Sparse Cholesky factors of stiffness matrices, by the fastest library that is installed.
+
+Many right-hand sides against one matrix: cholespy, else SciPy's SuperLU. One matrix after another on one pattern:
+MKL's PARDISO (pypardiso), which keeps the analysis and is ten times faster, else the former.
+"""
 
 from __future__ import annotations
 
+import os
+import pathlib
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -47,3 +54,65 @@ def _superlu(matrix) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001
     return scipy.sparse.linalg.splu(
         matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     ).solve
+
+
+class PatternFactor:
+    """Factors of symmetric positive definite matrices that share the places of their entries."""
+
+    def __init__(self) -> None:
+        self._pardiso = _pardiso()
+        self._analysed: np.ndarray | None = None  # the pattern, whose analysis PARDISO keeps
+
+    def __call__(self, upper) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy CSR)
+        """A function that solves ``matrix @ x = b`` for b (n, k); valid until the next call.
+
+        upper : the matrix's upper triangle, sorted, all of the diagonal in it. Raises NotPositiveDefiniteError as
+        ``factor`` does.
+        """
+        if self._pardiso is None:
+            import scipy.sparse
+
+            return factor((upper + scipy.sparse.triu(upper, 1).T).tocsc())
+        same = self._analysed is upper.indices
+        self._run(upper, np.zeros((upper.shape[0], 1)), _FACTORISE if same else _ANALYSE_AND_FACTORISE)
+        self._analysed = upper.indices
+        return lambda b: self._run(upper, np.asfortranarray(b, np.float64), _SOLVE)
+
+    def _run(self, upper, b: np.ndarray, phase: int) -> np.ndarray:  # noqa: ANN001
+        import pypardiso
+
+        self._pardiso.set_phase(phase)
+        try:
+            return self._pardiso._call_pardiso(upper, b)
+        except pypardiso.pardiso_wrapper.PyPardisoError as error:
+            self._analysed = None
+            if error.value == _NOT_POSITIVE:
+                raise NotPositiveDefiniteError("PARDISO met a pivot that is not positive") from error
+            if error.value == _NO_MEMORY:
+                raise MemoryError(f"PARDISO has no memory for {upper.shape[0]} unknowns") from error
+            raise
+
+    def __del__(self) -> None:
+        if self._pardiso is not None and self._analysed is not None and not sys.is_finalizing():
+            self._pardiso.free_memory(everything=True)
+
+
+# Numbers of PARDISO: phases, error codes, matrix type (oneMKL reference).
+_FACTORISE, _ANALYSE_AND_FACTORISE, _SOLVE = 22, 12, 33
+_NOT_POSITIVE, _NO_MEMORY = -4, -2
+_SYMMETRIC_POSITIVE_DEFINITE = 2
+
+
+def _pardiso():  # noqa: ANN202
+    """A PARDISO solver, or None where pypardiso is missing or finds no MKL."""
+    try:
+        import pypardiso
+
+        # Told where MKL lies, pypardiso does not search the whole environment for it: a second each time.
+        for path in sorted(pathlib.Path(sys.prefix, "lib").glob("libmkl_rt.so*")):
+            os.environ.setdefault("PYPARDISO_MKL_RT", str(path))
+        solver = pypardiso.PyPardisoSolver(mtype=_SYMMETRIC_POSITIVE_DEFINITE)
+        solver.iparm[[0, 1, 9]] = 1, 2, 8  # own settings: nested dissection, no refinement (it takes most of a solve)
+    except (ImportError, OSError):
+        return None
+    return solver

@@ -1,18 +1,23 @@
-"""Finite-strain, nearly incompressible solid: neo-Hookean, Q2 displacement with a discontinuous linear pressure a cell.
+"""Finite-strain, nearly incompressible solid: Q2 displacement with a discontinuous linear pressure a cell.
 
-Energy mu/2 (J^-2/3 I1 - 3) + p (J - 1) - p^2 / (2 kappa), p linear in each cell: the pressure is an independent Newton
-iterate, eliminated cell by cell (mechanics.md). Simo, Taylor, Pister, Comput. Methods Appl. Mech. Eng. 51, 1985.
+Energy W(F) + p (J - 1) - p^2 / (2 kappa), p linear in each cell: the pressure is an independent Newton iterate,
+eliminated cell by cell (mechanics.md). Simo, Taylor, Pister, Comput. Methods Appl. Mech. Eng. 51, 1985.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 
 from ..sensors import Material
+from .block_pattern import BlockPattern
 from .elasticity import reference_gradients
 from .hex_mesh import HexMesh
+from .neo_hookean import Law, NeoHookean
+
+_BATCH = 32  # cells whose stiffness is made at once: what they need stays in the processor's cache
 
 
 @dataclasses.dataclass
@@ -28,22 +33,35 @@ class State:
 
 
 class FiniteStrainSolid:
-    """Residual and tangent of a mesh of one material; see the module for the energy."""
+    """Residual and tangent of a mesh of one material; see the module for the energy.
 
-    def __init__(self, mesh: HexMesh, material: Material) -> None:
+    material : linear constants, for a neo-Hookean solid, or a law of its own
+    pattern : of the mesh's cells, where it is known already
+    """
+
+    def __init__(self, mesh: HexMesh, material: Material | Law, pattern: BlockPattern | None = None) -> None:
         self.mesh = mesh
-        self.shear = material.youngs / (2 * (1 + material.poisson))
-        self.bulk = material.youngs / (3 * (1 - 2 * material.poisson))
+        self.law: Law = NeoHookean.of(material) if isinstance(material, Material) else material
+        if pattern is not None:
+            self.pattern = pattern
         points, weights, reference = reference_gradients()
-        jacobian = np.einsum("qak,ead->eqkd", reference, mesh.nodes[mesh.cells], optimize=True)
+        n = len(mesh.cells)
+        corners = np.ascontiguousarray(mesh.nodes[mesh.cells].swapaxes(1, 2))  # (e, d, a)
+        jacobian = (corners @ reference.transpose(1, 0, 2).reshape(27, 81)).reshape(n, 3, 27, 3).swapaxes(1, 2)
         self.weight = weights * np.linalg.det(jacobian)
         if not (self.weight > 0).all():
             raise ValueError("the mesh holds cells that are turned inside out")
-        self.gradient = np.einsum("qak,eqdk->eqad", reference, np.linalg.inv(jacobian), optimize=True)
+        self.gradient = reference @ np.linalg.inv(jacobian)  # (e, q, a, d)
+        self._by_node = np.ascontiguousarray(self.gradient.transpose(0, 2, 1, 3)).reshape(n, 27, 81)
+        self._by_point = np.ascontiguousarray(self.gradient.swapaxes(2, 3))
         self.linear = np.column_stack([np.ones(len(points)), points])
-        self.mass = np.einsum("eq,qp,qr->epr", self.weight, self.linear, self.linear, optimize=True) / self.bulk
-        dofs = (3 * mesh.cells[..., None] + np.arange(3)).reshape(len(mesh.cells), 81)
-        self.dofs, self.rows, self.columns = dofs, np.repeat(dofs, 81, axis=1).ravel(), np.tile(dofs, (1, 81)).ravel()
+        self.mass = np.einsum("eq,qp,qr->epr", self.weight, self.linear, self.linear, optimize=True) / self.law.bulk
+        self.dofs = (3 * mesh.cells[..., None] + np.arange(3)).reshape(n, 81)
+
+    @functools.cached_property
+    def pattern(self) -> BlockPattern:
+        """Where the stiffness matrix has entries."""
+        return BlockPattern(self.mesh.cells, self.mesh.clamped)
 
     def rest(self) -> State:
         """No displacement, no pressure."""
@@ -51,71 +69,61 @@ class FiniteStrainSolid:
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Deformation gradient F (n_cells, 27, 3, 3) and its determinant J (n_cells, 27)."""
-        moved = displacement[self.mesh.cells]
-        f = np.einsum("eai,eqaj->eqij", moved, self.gradient, optimize=True) + np.eye(3)
+        moved = displacement[self.mesh.cells].swapaxes(1, 2)
+        f = (moved @ self._by_node).reshape(-1, 3, 27, 3).swapaxes(1, 2) + np.eye(3)
         return f, np.linalg.det(f)
 
     def energy(self, state: State) -> float:
         """Stored elastic energy, J."""
         f, j = self.deformation(state.displacement)
         p = state.pressure @ self.linear.T
-        i1 = np.einsum("eqij,eqij->eq", f, f)
-        density = self.shear / 2 * (j ** (-2 / 3) * i1 - 3) + p * (j - 1) - p**2 / (2 * self.bulk)
+        density = self.law.energy(f, j) + p * (j - 1) - p**2 / (2 * self.law.bulk)
         return float((density * self.weight).sum())
 
     def linearise(self, state: State) -> Linearised:
         """Residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
         f, j = self.deformation(state.displacement)
-        if not (j > 0).all():
+        if not (j > 0).all():  # NaN, too
             raise FloatingPointError("a cell is turned inside out")
         p = state.pressure @ self.linear.T
-        stress, tangent, cofactor = self._point_law(f, j, p)
-        n = len(self.mesh.cells)
-        residual = np.einsum("eq,eqij,eqaj->eai", self.weight, stress, self.gradient, optimize=True).reshape(n, 81)
-        couple = np.einsum("eq,qp,eqij,eqaj->epai", self.weight, self.linear, cofactor, self.gradient, optimize=True)
-        couple = couple.reshape(n, 4, 81)
-        gap = np.einsum("eq,qp->ep", self.weight * (j - 1), self.linear) - np.einsum(
-            "epr,er->ep", self.mass, state.pressure
-        )
-        stiffness = self._stiffness(tangent)
-        to_pressure = np.linalg.solve(self.mass, couple)  # d(pressure) / d(displacement)
+        n = len(j)
+        residual, couple = np.empty((n, 27, 3)), np.empty((n, 27, 4, 3))
+        stiffness = np.empty((n, 27, 3, 3, 27))
+        for start in range(0, n, _BATCH):
+            part = slice(start, start + _BATCH)
+            self._cells(part, f[part], j[part], p[part], residual, couple, stiffness)
+        gap = (self.weight * (j - 1)) @ self.linear - np.einsum("epr,er->ep", self.mass, state.pressure)
+        couple = couple.swapaxes(1, 2)  # (e, p, a, i)
+        to_pressure = np.linalg.solve(self.mass, couple.reshape(n, 4, 81)).reshape(n, 4, 27, 3)
         pressure_gap = np.linalg.solve(self.mass, gap[..., None])[..., 0]
-        stiffness += couple.swapaxes(1, 2) @ to_pressure
-        condensed = residual + np.einsum("epi,ep->ei", couple, pressure_gap)
-        return Linearised(self, residual, condensed, stiffness, to_pressure, pressure_gap)
+        by_dof = couple.reshape(n, 4, 81).swapaxes(1, 2)
+        stiffness += (by_dof @ to_pressure.swapaxes(2, 3).reshape(n, 4, 81)).reshape(n, 27, 3, 3, 27)
+        residual = residual.reshape(n, 81)
+        condensed = residual + (by_dof @ pressure_gap[..., None])[..., 0]
+        return Linearised(self, residual, condensed, stiffness, to_pressure.reshape(n, 4, 81), pressure_gap)
 
-    def _point_law(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """First Piola-Kirchhoff stress, its derivative (..., 3, 3, 3, 3) and the cofactor J F^-T at all points."""
-        g = np.linalg.inv(f).swapaxes(-1, -2)
-        i1 = np.einsum("eqij,eqij->eq", f, f)
-        scale = self.shear * j ** (-2 / 3)
-        pj = p * j
-        stress = scale[..., None, None] * (f - (i1 / 3)[..., None, None] * g) + pj[..., None, None] * g
-        gg = np.einsum("eqij,eqkl->eqijkl", g, g)
-        crossed = gg.transpose(0, 1, 2, 5, 4, 3)  # G_iL G_kJ
-        fg = np.einsum("eqij,eqkl->eqijkl", f, g)
-        tangent = -(2 / 3) * scale[..., None, None, None, None] * (fg + fg.transpose(0, 1, 4, 5, 2, 3))
-        tangent += (2 / 9 * scale * i1 + pj)[..., None, None, None, None] * gg
-        tangent += (scale * i1 / 3 - pj)[..., None, None, None, None] * crossed
-        for i in range(3):
-            for k in range(3):
-                tangent[:, :, i, k, i, k] += scale
-        return stress, tangent, j[..., None, None] * g
-
-    def _stiffness(self, tangent: np.ndarray) -> np.ndarray:
-        n = len(self.mesh.cells)
-        stiffness = np.zeros((n, 81, 81))
-        for q in range(27):
-            gradient = self.gradient[:, q]  # (e, a, J)
-            half = np.einsum("eijkl,ebl->eijbk", tangent[:, q] * self.weight[:, q, None, None, None, None], gradient)
-            full = gradient @ half.transpose(0, 2, 1, 3, 4).reshape(n, 3, 3 * 81)  # (e, a, i b k)
-            stiffness += full.reshape(n, 81, 81)
-        return stiffness
+    def _cells(self, part, f, j, p, residual, couple, stiffness) -> None:  # noqa: ANN001
+        """Fill in internal forces (e, 27, 3), pressure coupling (e, 27, 4, 3) and stiffness of some cells."""
+        stress, tangent = self.law.stress_tangent(f, j, p)
+        by_node, n = self._by_node[part], len(j)
+        weight = self.weight[part]
+        along = (weight[..., None, None] * stress).swapaxes(2, 3)  # (e, q, J, i)
+        residual[part] = by_node @ along.reshape(n, 81, 3)
+        cofactor = (weight * j)[..., None, None] * np.linalg.inv(f)  # (e, q, J, i)
+        spread = cofactor[:, :, :, None, :] * self.linear[:, None, :, None]
+        couple[part] = (by_node @ spread.reshape(n, 81, 12)).reshape(n, 27, 4, 3)
+        tangent = weight[..., None, None, None, None] * tangent.transpose(0, 1, 3, 2, 4, 5)  # (e, q, J, i, k, L)
+        half = np.ascontiguousarray(tangent).reshape(n, 27, 27, 3) @ self._by_point[part]
+        stiffness[part] = (by_node @ half.reshape(n, 81, 243)).reshape(n, 27, 3, 3, 27)
 
 
 @dataclasses.dataclass
 class Linearised:
-    """A solid's equations at one state, cell by cell, pressure eliminated."""
+    """A solid's equations at one state, cell by cell, pressure eliminated.
+
+    residual, condensed : (n_cells, 81) N, the second with the pressure's own residual carried over
+    stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node)
+    """
 
     solid: FiniteStrainSolid
     residual: np.ndarray
@@ -125,18 +133,18 @@ class Linearised:
     pressure_gap: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """(3 n,) N; ``condensed`` with the pressure's own residual carried over, as the Newton step needs it."""
+        """(3 n,) N; ``condensed`` as the Newton step needs it."""
         values = self.condensed if condensed else self.residual
         size = 3 * len(self.solid.mesh.nodes)
         return np.bincount(self.solid.dofs.ravel(), values.ravel(), minlength=size)
 
+    def blocks(self) -> np.ndarray:
+        """Tangent stiffness (n_blocks, 3, 3) N/m on the solid's pattern."""
+        return self.solid.pattern.gather(self.stiffness)
+
     def matrix(self):  # noqa: ANN201 (scipy is imported only where it is needed)
         """Tangent stiffness, scipy CSC (3 n, 3 n), N/m."""
-        import scipy.sparse
-
-        size = 3 * len(self.solid.mesh.nodes)
-        entries = (self.stiffness.ravel(), (self.solid.rows, self.solid.columns))
-        return scipy.sparse.coo_matrix(entries, shape=(size, size)).tocsc()
+        return self.solid.pattern.sparse(self.blocks()).tocsc()
 
     def pressure_step(self, step: np.ndarray) -> np.ndarray:
         """Change of the pressures (n_cells, 4) Pa that goes with a displacement step (n, 3) m."""

@@ -8,7 +8,6 @@ import functools
 import numpy as np
 
 from .. import biotac_shape, digit_shape
-from ..lattice import Lattice
 
 SKIN_LAYERS = 5  # nodes through the skin: two quadratic elements
 # Through the gel, 0 = bonded back, 1 = surface: three quadratic elements, thinner toward the contact.
@@ -49,30 +48,31 @@ def _shift(part: slice, by: int) -> slice:
     return slice(part.start + by, part.stop + by, part.step)
 
 
-@functools.cache
-def gel_mesh() -> HexMesh:
-    """The DIGIT's gel, bonded at its flat back; about 15,800 nodes."""
-    surface = digit_shape.gel_surface()
-    top = surface.grid(surface.rest)
+def gel_solid(top: np.ndarray, layers: np.ndarray = GEL_LAYERS) -> HexMesh:
+    """The gel below a grid (rows, columns, 3) m of its surface, both odd, bonded at its flat back.
+
+    layers : places of the nodes through the gel, 0 = back, 1 = surface, an odd number
+    """
     back = top.copy()
     back[..., 1] = digit_shape.BACK_Y
-    nodes = back[..., None, :] + GEL_LAYERS[:, None] * (top - back)[..., None, :]
+    nodes = back[..., None, :] + layers[:, None] * (top - back)[..., None, :]
     ids = np.arange(nodes[..., 0].size).reshape(nodes.shape[:-1])
     clamped = np.zeros(ids.size, bool)
     clamped[ids[..., 0]] = True
     return HexMesh(nodes.reshape(-1, 3), hex_cells(ids), clamped, ids[..., -1].ravel(), np.empty(0, int))
 
 
-@functools.cache
-def skin_mesh() -> HexMesh:
-    """The BioTac's skin, clamped where its inner side lies on or in the rigid core; about 18,200 nodes."""
-    outer, inner = biotac_shape.skin_grid("outer"), biotac_shape.skin_grid("inner")
-    through = np.linspace(0, 1, SKIN_LAYERS)
+def skin_solid(outer: np.ndarray, inner: np.ndarray, glued: np.ndarray, layers: int = SKIN_LAYERS) -> HexMesh:
+    """The skin between two grids (stations, columns, 3) m, whose first and last stations are the poles.
+
+    glued : (stations, columns) bool, inner points that do not move; layers : nodes through the skin, odd
+    """
+    through = np.linspace(0, 1, layers)
     grid = inner[..., None, :] + through[:, None] * (outer - inner)[..., None, :]
     stations, columns = outer.shape[:2]
-    ring = np.arange((stations - 2) * columns * SKIN_LAYERS).reshape(stations - 2, columns, SKIN_LAYERS)
-    tip, base = ring.size + np.arange(SKIN_LAYERS), ring.size + SKIN_LAYERS + np.arange(SKIN_LAYERS)
-    poles = [np.broadcast_to(pole, (1, columns, SKIN_LAYERS)) for pole in (tip, base)]
+    ring = np.arange((stations - 2) * columns * layers).reshape(stations - 2, columns, layers)
+    tip, base = ring.size + np.arange(layers), ring.size + layers + np.arange(layers)
+    poles = [np.broadcast_to(pole, (1, columns, layers)) for pole in (tip, base)]
     ids = np.concatenate([poles[0], ring, poles[1]])
     nodes = np.concatenate([grid[1:-1].reshape(-1, 3), grid[0, 0], grid[-1, 0]])
     closed = np.concatenate([ids, ids[:, :1]], axis=1)
@@ -81,16 +81,36 @@ def skin_mesh() -> HexMesh:
         return np.concatenate([ring[..., layer].ravel(), tip[[layer]], base[[layer]]])
 
     clamped = np.zeros(len(nodes), bool)
-    clamped[surface_ids(0)] = _on_core(biotac_shape.skin_surface("inner"))
+    clamped[surface_ids(0)] = np.r_[glued[1:-1].ravel(), glued[0, 0], glued[-1, 0]]
     return HexMesh(nodes, hex_cells(closed), clamped, surface_ids(-1), surface_ids(0))
+
+
+@functools.cache
+def gel_mesh() -> HexMesh:
+    """The DIGIT's gel on the lattice of its surface; about 20,000 nodes."""
+    surface = digit_shape.gel_surface()
+    return gel_solid(surface.grid(surface.rest))
+
+
+@functools.cache
+def skin_mesh() -> HexMesh:
+    """The BioTac's skin on its lattice, clamped where its inner side lies on or in the rigid core; 18,200 nodes."""
+    return skin_solid(biotac_shape.skin_grid("outer"), biotac_shape.skin_grid("inner"), glued_skin())
+
+
+@functools.cache
+def glued_skin() -> np.ndarray:
+    """Which inner points of the skin's grid (stations, columns) lie on or in the core."""
+    inner = biotac_shape.skin_grid("inner")
+    return _on_core(inner.reshape(-1, 3)).reshape(inner.shape[:2])
 
 
 _ATTACHED = 0.02e-3  # m, nodes this close to the core are glued to it: 532 nodes of the public mesh
 _BASE_CAP_X = 4.9e-3  # m, the inner base cap rests on the core (public mesh: 0.024 mm inside it)
 
 
-def _on_core(inner: Lattice) -> np.ndarray:
-    x, y, z = inner.rest.T
+def _on_core(inner: np.ndarray) -> np.ndarray:
+    x, y, z = inner.T
     radius = np.hypot(y - biotac_shape.AXIS_Y, z)
     core = biotac_shape.core_radius(x, np.arctan2(z, biotac_shape.AXIS_Y - y))
     return (np.nan_to_num(core, nan=-1.0) >= radius - _ATTACHED) | (x > _BASE_CAP_X)

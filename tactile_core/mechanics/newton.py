@@ -1,51 +1,85 @@
-"""Frictionless contact of a rigid indenter with a finite-strain solid: Newton's method with an exact active set.
+"""Contact of a rigid indenter with a finite-strain solid: Newton's method with an exact active set.
 
 A touching node may slide on the indenter but not leave along its normal: its degrees of freedom are turned into the
-indenter's frame and the normal one is prescribed, so the matrix stays symmetric positive definite. The BioTac's fluid
-adds one unknown, its pressure, by a bordered solve.
+indenter's frame and the normal one is prescribed, so the matrix stays symmetric positive definite. With friction a
+node that sticks has all three prescribed, and one that slips is pulled by mu times its normal force. The BioTac's
+fluid adds one unknown, its pressure, by a bordered solve; its core is a second obstacle, for the inner skin.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
 from .cavity import Cavity
-from .factor import NotPositiveDefiniteError, factor
+from .factor import NotPositiveDefiniteError, PatternFactor
 from .finite_strain import FiniteStrainSolid, State
+from .obstacle import Obstacle, PlacedIndenter
+from .pose_path import between
+from .touching import Touching
 
-GAP_TOLERANCE = 1e-9  # m
-BALANCE_TOLERANCE = 1e-8  # of the largest nodal force, and of the fluid's volume
-MAX_ITERATIONS = 25
-SMALLEST_STEP = 1 / 64  # of a load step; halved below that, the path has ended
-_CURVATURE_STEP = 1e-7  # m, central differences of the exact normals
+SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
+MAX_ITERATIONS = 40
+SMALLEST_STEP = 1 / 16  # of a load step, or of the way where that is less; halved below that, the path has ended
+_FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the normal forces
 
 
 @dataclasses.dataclass
 class Touch:
-    """A solved contact. depth : m; state : of the solid; pressing : (k,) N, normal force of the touching ``nodes``.
+    """A solved contact. depth : m, from the problem's own pose; state : of the solid; outer, inner : what touches.
 
-    nodes : (k,) mesh nodes; normals : (k, 3) of the indenter there
-    fluid : Pa, rise of the fluid's pressure; iterations : Newton iterations of the last load step
-    steps : load steps, halved ones counted
+    pose : of the indenter; fluid : Pa, rise of the fluid's pressure
+    iterations : Newton iterations of the last load step; steps : load steps, halved ones counted
     """
 
     depth: float
+    pose: Pose
     state: State
-    nodes: np.ndarray
-    pressing: np.ndarray
-    normals: np.ndarray
+    outer: Touching
+    inner: Touching
     fluid: float = 0.0
     iterations: int = 0
     steps: int = 0
 
     @property
+    def nodes(self) -> np.ndarray:
+        """(k,) mesh nodes that the indenter touches."""
+        return self.outer.nodes
+
+    @property
+    def pressing(self) -> np.ndarray:
+        """(k,) N, normal forces of the indenter on ``nodes``."""
+        return self.outer.pressing
+
+    @property
+    def normals(self) -> np.ndarray:
+        """(k, 3), of the indenter at ``nodes``."""
+        return self.outer.normals
+
+    @property
     def force(self) -> np.ndarray:
         """Total force (3,) N of the indenter on the sensor."""
-        return self.pressing @ self.normals
+        return self.outer.forces.sum(axis=0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Tolerance:
+    """When an iteration ends.
+
+    gap : m, of every touching node; balance : of the largest nodal force and of the fluid's volume, before the last
+    step; step : m, a last step so small that, Newton's method being quadratic, the balance after it is good
+    """
+
+    gap: float
+    balance: float
+    step: float = 0.0
+
+
+EXACT = Tolerance(1e-9, 1e-8, 1e-13)
 
 
 class _NotConvergedError(Exception):
@@ -53,11 +87,16 @@ class _NotConvergedError(Exception):
 
 
 class FiniteStrainContact:
-    """An indenter at a pose in front of a solid; follows a path of growing depth.
+    """An indenter at a pose in front of a solid; follows a path of growing depth, or of poses.
 
     touchable : (m,) mesh nodes that the indenter may touch
     fixed : (3 n,) bool, degrees of freedom that do not move; None: those of the clamped nodes
     cavity : incompressible fluid in the solid; ``pre_inflation`` m3 is added to its volume at rest
+    core : a rigid body inside, that ``inner`` (k,) mesh nodes may come to touch
+    friction : Coulomb's coefficient, between indenter and sensor
+    factor : where it is known already, the solver of the solid's pattern; tolerance : when iterations end
+    first_share : a press from rest begins with the nodes that overlap by more than this share of the most: a guess,
+        which the active set corrects
     """
 
     def __init__(
@@ -69,14 +108,30 @@ class FiniteStrainContact:
         cavity: Cavity | None = None,
         pre_inflation: float = 0.0,
         fixed: np.ndarray | None = None,
+        core: Obstacle | None = None,
+        inner: np.ndarray | None = None,
+        friction: float = 0.0,
+        factor: PatternFactor | None = None,
+        tolerance: Tolerance = EXACT,
+        first_share: float = 0.0,
     ) -> None:
         self.solid, self.touchable, self.indenter, self.pose, self.cavity = solid, touchable, indenter, pose, cavity
         self.fixed = (np.repeat(solid.mesh.clamped, 3) if fixed is None else fixed).reshape(-1, 3)
         self.volume = pre_inflation + (cavity.volume(solid.mesh.nodes) if cavity else 0.0)
+        self.core, self.inner = core, np.empty(0, int) if inner is None or core is None else inner
+        self.friction, self.tolerance, self.first_share = friction, tolerance, first_share
+        self._factor = factor or PatternFactor()
+        if cavity:
+            rows, columns, _ = cavity.hessian(solid.mesh.nodes)
+            self._cavity_places = solid.pattern.find(rows, columns)
+        # Of the size of a node's own: weighs a slip against friction, and damps. Only the way to the answer depends on it.
+        spacing = np.median(np.linalg.norm(np.diff(solid.mesh.nodes[solid.mesh.cells[:, :2]], axis=1), axis=-1))
+        self._stiffness = solid.law.bulk * 0.05 * spacing
+        self._damping = 0.0
 
     def start(self) -> Touch:
         """Nothing is deformed; a pre-inflated skin finds its shape in the first step."""
-        return Touch(0.0, self.solid.rest(), np.empty(0, int), np.empty(0), np.empty((0, 3)))
+        return Touch(0.0, self.pose, self.solid.rest(), Touching.none(), Touching.none())
 
     def press(self, depth: float, start: Touch | None = None, step: float = 0.1e-3) -> Touch:
         """The contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
@@ -84,112 +139,194 @@ class FiniteStrainContact:
         A step that fails is halved. Raises TactileError with the depth reached where even 1/64 of a step fails.
         """
         touch = start or self.start()
-        size, steps = step, 0
-        while touch.depth < depth - 1e-12:
-            goal = min(touch.depth + size, depth)
+        if depth <= touch.depth + 1e-12:
+            return dataclasses.replace(touch, steps=0)
+        begin, reach = touch, depth - touch.depth
+
+        def along(part: float) -> Pose:
+            return between(begin.pose, self.pose.moved(depth), part)
+
+        try:
+            touch = self._follow(along, begin, step / reach)
+        except _PathEndsError as end:
+            reached = begin.depth + end.part * reach
+            found = f"no equilibrium beyond {reached * 1e3:.3f} mm"
+            raise TactileError("finite-strain solver", found, "a smaller depth") from None
+        return dataclasses.replace(touch, depth=depth)
+
+    def move(self, pose: Pose, start: Touch, step: float = 0.1e-3) -> Touch:
+        """The contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel.
+
+        Raises TactileError with the part of the way that was reached.
+        """
+        way = float(np.linalg.norm(pose.apex - start.pose.apex))
+        turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
+        try:
+            touch = self._follow(lambda part: between(start.pose, pose, part), start, step / max(way, turned, 1e-12))
+        except _PathEndsError as end:
+            found = f"no equilibrium beyond {end.part:.0%} of the way"
+            raise TactileError("finite-strain solver", found, "a shorter way, or less force") from None
+        return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
+
+    def _follow(self, along: Callable[[float], Pose], start: Touch, step: float) -> Touch:
+        """Load steps from ``along(0)``, where ``start`` is solved, to ``along(1)``; a step that fails is halved."""
+        touch, done, size, steps = start, 0.0, step, 0
+        while done < 1 - 1e-9:
+            goal = min(done + size, 1.0)
             try:
-                touch = self._solve(goal, touch)
-                size = min(step, 2 * size)
-            except (_NotConvergedError, FloatingPointError, NotPositiveDefiniteError):
-                size /= 2
-                if size < step * SMALLEST_STEP:
-                    found = f"no equilibrium beyond {touch.depth * 1e3:.3f} mm"
-                    raise TactileError("reference solver", found, "a smaller depth") from None
+                touch = self._solve(along(goal), touch)
+                done, size = goal, min(step, 2 * size)
+            except (_NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError):
+                size = min(size, goal - done) / 2
+                if size < min(step, 1.0) * SMALLEST_STEP:
+                    raise _PathEndsError(done) from None
             steps += 1
         return dataclasses.replace(touch, steps=steps)
 
-    def _solve(self, depth: float, start: Touch) -> Touch:
+    def _solve(self, pose: Pose, start: Touch) -> Touch:
         """One load step, from a solved contact."""
-        pose, state, fluid = self.pose.moved(depth), start.state.copy(), start.fluid
-        pressing = np.zeros(len(self.solid.mesh.nodes))
-        pressing[start.nodes] = start.pressing
-        active = np.isin(self.touchable, start.nodes) | (self._gaps(pose, state)[0] < 0)
+        state, fluid = start.state.copy(), start.fluid
+        at = self._at(state)
+        outer = start.outer.carried(
+            PlacedIndenter(self.indenter, pose), self.touchable, at, self.friction, self.first_share
+        )
+        inner = start.inner.carried(self.core, self.inner, at)
+        self._damping = 0.0
         for iteration in range(1, MAX_ITERATIONS + 1):
-            step, normal_force, fluid, imbalance = self._newton(pose, state, active, pressing, fluid)
-            state.displacement += step
-            distance, normal = self._gaps(pose, state)
-            pressing = np.zeros_like(pressing)
-            pressing[self.touchable[active]] = normal_force
-            release = active.copy()
-            release[active] = normal_force < 0
-            enter = ~active & (distance < -GAP_TOLERANCE)
-            settled = not release.any() and not enter.any() and np.abs(distance[active]).max(initial=0) < GAP_TOLERANCE
-            if settled and imbalance < BALANCE_TOLERANCE:
-                nodes = self.touchable[active]
-                return Touch(depth, state, nodes, pressing[nodes], normal[active], fluid, iteration)
-            active = (active & ~release) | enter
+            step, rise, imbalance, pressure_step = self._newton(state, outer, inner, fluid)
+            share = self._share(state, step)
+            state.displacement += share * step
+            state.pressure += share * pressure_step
+            fluid += share * rise
+            at = self._at(state)
+            settled = [
+                touching.update(at, self.tolerance.gap, _SLIP_WEIGHT * self._stiffness) for touching in (outer, inner)
+            ]
+            enough = max(self.tolerance.balance, SLIDING_TOLERANCE) if outer.slips else self.tolerance.balance
+            small = np.abs(step).max() < self.tolerance.step and not outer.slips and not self._damping
+            if all(settled) and share == 1 and (small or max(outer.imbalance, imbalance) < enough):
+                return Touch(start.depth, pose, state, outer, inner, fluid, iteration)
+            self._damping = self._damping / 4 if self._damping > _LEAST_DAMPING else 0.0
         raise _NotConvergedError
 
-    def _gaps(self, pose: Pose, state: State) -> tuple[np.ndarray, np.ndarray]:
-        nodes = self.solid.mesh.nodes[self.touchable] + state.displacement[self.touchable]
-        return pose.distance(self.indenter, nodes)
+    def _share(self, state: State, step: np.ndarray) -> float:
+        """How much of a step leaves every Gauss point a good part of its volume; FloatingPointError where none does."""
+        before = self.solid.deformation(state.displacement)[1]
+        for share in _SHARES:
+            if (self.solid.deformation(state.displacement + share * step)[1] > _KEPT_VOLUME * before).all():
+                return share
+        raise FloatingPointError("a cell would be turned inside out")
 
-    def _newton(self, pose, state, active, pressing, fluid):  # noqa: ANN001, ANN202
-        """Displacement step (n, 3), normal forces (k,) and fluid pressure after it, relative imbalance before it."""
+    def _at(self, state: State) -> np.ndarray:
+        return self.solid.mesh.nodes + state.displacement
+
+    def _newton(
+        self, state: State, outer: Touching, inner: Touching, fluid: float
+    ) -> tuple[np.ndarray, float, float, np.ndarray]:
+        """Steps of displacement (n, 3), of the fluid's pressure and of the cells' (n_cells, 4); imbalance before them."""
         lines = self.solid.linearise(state)
         largest = np.abs(lines.internal_force(condensed=False)).max()
-        distance, normal = self._gaps(pose, state)
-        nodes = self.touchable[active]
-        turn, free, prescribed = self._turn(nodes, normal[active])
-        matrix, residual = lines.matrix() - self._curvature(pose, state, active, pressing), lines.internal_force()
-        swell, excess = np.zeros(len(residual)), 0.0
+        pattern, at = self.solid.pattern, self._at(state)
+        blocks, residual = lines.blocks(), lines.internal_force().reshape(-1, 3)
+        swell, excess = np.zeros_like(residual), 0.0
         if self.cavity:
-            moved = self.solid.mesh.nodes + state.displacement
-            swell, excess = self.cavity.gradient(moved), self.cavity.volume(moved) - self.volume
+            swell, excess = self.cavity.gradient(at).reshape(-1, 3), self.cavity.volume(at) - self.volume
             residual = residual - fluid * swell
-            matrix = matrix - fluid * self.cavity.hessian(moved)
-        matrix = (turn.T @ matrix @ turn).tocsc()
-        residual, swell = turn.T @ residual, turn.T @ swell
-        step = np.zeros(len(residual))
-        step[prescribed] = -distance[active]
-        solved = np.setdiff1d(free, prescribed)
-        load = -residual[solved] - (matrix @ step)[solved]
-        answer = factor(matrix[solved][:, solved].tocsc())(np.column_stack([load, swell[solved]]))
-        rise = 0.0
-        if self.cavity:
-            known = excess + swell[prescribed] @ step[prescribed] + swell[solved] @ answer[:, 0]
-            rise = -known / float(swell[solved] @ answer[:, 1])
-        step[solved] = answer[:, 0] + rise * answer[:, 1]
-        reaction = residual[prescribed] + (matrix @ step)[prescribed] - rise * swell[prescribed]
-        step = (turn @ step).reshape(-1, 3)
-        state.pressure += lines.pressure_step(step)
-        imbalance = np.abs(residual[solved]).max() / max(largest, 1e-12), abs(excess) / max(self.volume, 1e-12)
-        return step, reaction, fluid + rise, float(max(imbalance))
+            np.add.at(blocks, self._cavity_places, -fluid * self.cavity.hessian(at)[2])
+        held, step = self.fixed.copy(), np.zeros_like(residual)
+        nodes = np.concatenate([outer.nodes, inner.nodes])
+        frames = np.concatenate([touching.begin(at) for touching in (outer, inner)])
+        blocks[pattern.diagonal[nodes]] -= _held_back(
+            np.concatenate([outer.bending(at), inner.bending(at)]), blocks[pattern.diagonal[nodes]]
+        )
+        held[nodes] = np.einsum("nij,ni->nj", frames**2, self.fixed[nodes]) > 0.5
+        for touching in (outer, inner):
+            held[touching.nodes], step[touching.nodes] = touching.prescribe(held[touching.nodes])
+        pattern.turn(blocks, nodes, frames)
+        matrix = pattern.sparse(blocks)
+        for values in (residual, swell):
+            values[nodes] = np.einsum("nji,nj->ni", frames, values[nodes])
+        solve = self._solver(blocks, held)
+        known = (matrix @ step.ravel()).reshape(-1, 3)
+        under_pressure = solve(swell) if self.cavity else swell
+        step, reaction, rise = self._pull(
+            solve, matrix, residual, step, known, held, swell, excess, under_pressure, outer
+        )
+        for touching in (outer, inner):
+            touching.press(reaction[touching.nodes])
+        loose = ~held
+        pulled = residual.copy()
+        pulled[outer.nodes] -= outer.pull_in_frames()
+        imbalance = np.abs(pulled[loose]).max(initial=0.0) / max(largest, 1e-12)
+        step[nodes] = np.einsum("nij,nj->ni", frames, step[nodes])
+        imbalance = float(max(imbalance, abs(excess) / max(self.volume, 1e-12)))
+        return step, rise, imbalance, lines.pressure_step(step)
 
-    def _turn(self, nodes: np.ndarray, normals: np.ndarray):  # noqa: ANN202 (scipy sparse)
-        """Orthogonal matrix that turns touching nodes into (normal, tangents), free and normal degrees of freedom.
+    def _solver(self, blocks: np.ndarray, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """A function from forces (n, 3) to displacements (n, 3) of what is not held.
 
-        One tangent lies across the axis that the normal has least of: on a plane of symmetry that is its own.
+        Where the solid is unstable (a node about to slide off a ridge) it is damped until it is not: the iteration then
+        follows it down to the next equilibrium. Raises NotPositiveDefiniteError where even much damping is too little.
         """
-        helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-        first = np.cross(normals, helper)
-        first /= np.linalg.norm(first, axis=1, keepdims=True)
-        frames = np.stack([normals, first, np.cross(normals, first)], -1)
-        size = len(self.solid.mesh.nodes)
-        still = np.setdiff1d(np.arange(size), nodes)
-        same = np.broadcast_to(np.eye(3), (len(still), 3, 3))
-        fixed = self.fixed.copy()
-        fixed[nodes] = np.einsum("nij,ni->nj", frames**2, self.fixed[nodes]) > 0.5
-        turn = _blocks(np.r_[nodes, still], np.concatenate([frames, same]), size)
-        return turn, np.flatnonzero(~fixed.ravel()), 3 * nodes
+        free, pattern = self.solid.pattern.free, self.solid.pattern
+        for _ in range(_DAMPINGS):
+            blocks[pattern.diagonal] += self._damping * self._stiffness * np.eye(3)
+            try:
+                fast = self._factor(pattern.upper(blocks, held.ravel()[free]))
+                break
+            except NotPositiveDefiniteError:
+                blocks[pattern.diagonal] -= self._damping * self._stiffness * np.eye(3)
+                self._damping = max(4 * self._damping, _FIRST_DAMPING)
+        else:
+            raise NotPositiveDefiniteError("the solid is unstable, damped or not")
 
-    def _curvature(self, pose, state, active, pressing):  # noqa: ANN001, ANN202 (scipy sparse)
-        """Change of the contact forces with the normal's turn: pressing times the Hessian of the distance."""
-        nodes = self.touchable[active]
-        at = self.solid.mesh.nodes[nodes] + state.displacement[nodes]
-        blocks = np.empty((len(at), 3, 3))
-        for k, axis in enumerate(np.eye(3) * _CURVATURE_STEP):
-            ahead, behind = (pose.distance(self.indenter, at + s * axis)[1] for s in (1, -1))
-            blocks[:, :, k] = (ahead - behind) / (2 * _CURVATURE_STEP)
-        blocks = (blocks + blocks.swapaxes(1, 2)) / 2 * pressing[nodes][:, None, None]
-        return _blocks(nodes, blocks, len(self.solid.mesh.nodes))
+        def solve(force: np.ndarray) -> np.ndarray:
+            moved = np.zeros(force.size)
+            moved[free] = fast(np.where(held, 0.0, force).ravel()[free, None])[:, 0]
+            return moved.reshape(-1, 3)
+
+        return solve
+
+    def _pull(self, solve, matrix, residual, prescribed, known, held, swell, excess, under_pressure, outer):  # noqa: ANN001, ANN202
+        """Step, reactions and rise of the fluid's pressure, with friction that follows the normal forces."""
+        rise = 0.0
+        for _ in range(_FRICTION_SWEEPS if outer.slips else 1):
+            load = -residual - known
+            load[outer.nodes] += outer.pull_in_frames()
+            step = prescribed + solve(load)
+            if self.cavity:
+                loose = np.where(held, 0.0, swell)
+                rise = -(excess + float((swell * step).sum())) / float((loose * under_pressure).sum())
+                step = step + rise * under_pressure
+            reaction = residual + (matrix @ step.ravel()).reshape(-1, 3) - rise * swell
+            outer.follow(reaction[outer.nodes])
+        return step, reaction, rise
 
 
-def _blocks(nodes: np.ndarray, blocks: np.ndarray, size: int):  # noqa: ANN202 (scipy sparse)
-    """Sparse (3 size, 3 size) with a 3 x 3 block on the diagonal at each of ``nodes``."""
-    import scipy.sparse
+def _held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+    """Curvature terms (k, 3, 3), no larger than a share of their nodes' own stiffness.
 
-    shape = blocks.shape
-    rows = np.broadcast_to(3 * nodes[:, None, None] + np.arange(3)[:, None], shape).ravel()
-    columns = np.broadcast_to(3 * nodes[:, None, None] + np.arange(3), shape).ravel()
-    return scipy.sparse.coo_matrix((blocks.ravel(), (rows, columns)), shape=(3 * size, 3 * size)).tocsc()
+    Where a node rides a ridge sharper than the mesh, the whole term would make the matrix indefinite; less of it costs
+    iterations, not exactness.
+    """
+    size = np.abs(bending).max(axis=(1, 2))
+    most = _MOST_BENDING * np.einsum("kii->k", stiffness) / 3
+    return bending * np.minimum(1.0, most / np.maximum(size, 1e-30))[:, None, None]
+
+
+_MOST_BENDING = 0.3
+_SLIP_WEIGHT = 2.0  # of a node's own stiffness: finds the direction of friction in the fewest iterations
+_SHARES = 1.0, 0.5, 0.25, 0.125  # of a step
+_KEPT_VOLUME = 0.3  # least share of its volume that a Gauss point keeps in one step
+_FIRST_DAMPING, _LEAST_DAMPING, _DAMPINGS = 0.02, 5e-3, 6  # of a node's own stiffness; tries
+
+
+class _PathEndsError(Exception):
+    """Even a small load step fails; part : of the way that was reached."""
+
+    def __init__(self, part: float) -> None:
+        super().__init__(part)
+        self.part = part
+
+
+_TURN_ARM = 5e-3  # m, lever arm at which a turn counts as travel: about a fingertip's radius

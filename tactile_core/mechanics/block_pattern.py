@@ -1,0 +1,81 @@
+"""Where the 3 x 3 blocks of a stiffness matrix lie: worked out once for a mesh, filled in every iteration."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+
+class BlockPattern:
+    """Sums cell matrices into one block a pair of neighbouring nodes, and hands them on as a sparse matrix.
+
+    rows, columns : (n_blocks,) node of each block; diagonal : (n_nodes,) its block
+    """
+
+    def __init__(self, cells: np.ndarray, clamped: np.ndarray) -> None:
+        """cells : (n_cells, k) nodes, every node belongs to one; clamped : (n,) bool, nodes that never move."""
+        self.n_nodes = n_nodes = len(clamped)
+        self.free = np.flatnonzero(np.repeat(~clamped, 3))  # degrees of freedom that ``upper`` has rows for
+        pairs = cells[:, :, None].astype(np.int64) * n_nodes + cells[:, None, :]
+        places, slots = np.unique(pairs.ravel(), return_inverse=True)
+        self.slots = slots.ravel().astype(np.int32)  # of (n_cells, k, k)
+        self._places = places
+        self.rows, self.columns = (places // n_nodes).astype(np.int32), (places % n_nodes).astype(np.int32)
+        self.diagonal = np.flatnonzero(self.rows == self.columns)
+        self.starts = np.searchsorted(self.rows, np.arange(n_nodes + 1)).astype(np.int32)
+
+    def gather(self, stiffness: np.ndarray) -> np.ndarray:
+        """Blocks (n_blocks, 3, 3) of cell matrices (n_cells, k, 3, 3, k) = (node, axis, axis, node)."""
+        blocks = np.empty((len(self.rows), 3, 3))
+        for i in range(3):
+            for j in range(3):
+                values = np.ascontiguousarray(stiffness[:, :, i, j, :]).ravel()
+                blocks[:, i, j] = np.bincount(self.slots, values, minlength=len(self.rows))
+        return blocks
+
+    def find(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Index into ``blocks`` of the blocks of pairs of nodes that share a cell."""
+        return np.searchsorted(self._places, rows.astype(np.int64) * self.n_nodes + columns)
+
+    def turn(self, blocks: np.ndarray, nodes: np.ndarray, frames: np.ndarray) -> None:
+        """Express ``nodes`` in their frames (k, 3, 3), axes as columns; in place."""
+        index = np.full(self.n_nodes, -1)
+        index[nodes] = np.arange(len(nodes))
+        for side, of in ((0, self.rows), (1, self.columns)):
+            here = np.flatnonzero(index[of] >= 0)
+            frame = frames[index[of[here]]]
+            blocks[here] = blocks[here] @ frame if side else frame.swapaxes(1, 2) @ blocks[here]
+
+    def sparse(self, blocks: np.ndarray):  # noqa: ANN201 (scipy is imported only where it is needed)
+        """The matrix (3 n, 3 n), scipy BSR."""
+        import scipy.sparse
+
+        size = 3 * self.n_nodes
+        return scipy.sparse.bsr_matrix((blocks, self.columns, self.starts), shape=(size, size))
+
+    @functools.cached_property
+    def _upper(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Rows, columns and places in ``blocks`` of the free entries on and above the diagonal, row by row; starts."""
+        place = np.full(3 * self.n_nodes, -1, np.int32)
+        place[self.free] = np.arange(len(self.free))
+        axis, shape = np.arange(3), (len(self.rows), 3, 3)
+        rows = np.broadcast_to(place[3 * self.rows[:, None, None] + axis[:, None]], shape).ravel()
+        columns = np.broadcast_to(place[3 * self.columns[:, None, None] + axis], shape).ravel()
+        keep = np.flatnonzero((columns >= rows) & (rows >= 0))
+        keep = keep[np.argsort(rows[keep].astype(np.int64) * len(self.free) + columns[keep])]
+        starts = np.searchsorted(rows[keep], np.arange(len(self.free) + 1)).astype(np.int32)
+        return rows[keep], columns[keep], keep, starts
+
+    def upper(self, blocks: np.ndarray, held: np.ndarray):  # noqa: ANN201
+        """Upper triangle of the free degrees of freedom, scipy CSR; rows and columns of ``held`` are the identity's.
+
+        held : (n_free,) bool. The pattern is the same every time: a solver may keep its analysis.
+        """
+        import scipy.sparse
+
+        rows, columns, places, starts = self._upper
+        data = blocks.ravel()[places]
+        data[held[rows] | held[columns]] = 0.0
+        data[starts[:-1][held]] = 1.0  # the diagonal comes first in its row
+        return scipy.sparse.csr_matrix((data, columns, starts), shape=(len(held), len(held)))

@@ -1,0 +1,106 @@
+"""The full and the reference tier: one finite-strain contact, on a mesh graded round it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+
+from .. import biotac_shape, digit_shape, sensors
+from ..indenters import Indenter, Pose
+from .core import Core, facing_core
+from .finite_strain import FiniteStrainSolid
+from .graded_mesh import Footprint, GradedMesh, graded_gel, graded_skin
+from .hex_mesh import HexMesh
+from .neo_hookean import NeoHookean
+from .newton import EXACT, FiniteStrainContact, Tolerance, Touch
+from .quadratic_cavity import QuadraticCavity
+from .shared_bulk import SharedBulk
+
+Sensor = Literal["biotac", "digit"]
+
+# m of a load step: without friction one is enough from rest, unless it fails and is halved; friction follows a path.
+ONE_STEP, FRICTION_STEP = 5e-3, 0.25e-3
+# Gaps to 1/100 of the penetration that MECHANICS allows. A last step of 0.15 um left forces in balance to 1e-6.
+_FULL = Tolerance(10e-9, 1e-7, 0.15e-6)
+_FIRST_SHARE = {"biotac": 0.7, "digit": 0.5}  # a ball on a half-space touches where it overlaps by half of the depth
+_REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth may come to touch it
+_ACROSS = 12  # nodes wanted across the fine part of a graded mesh
+_SPACING = 0.3, 1.5  # lattice lines, least and most between nodes there
+_MARGIN = 0.6  # of its size that the fine part reaches beyond the touching nodes
+_LEAST_HALF = 1.2  # lattice lines, half of the smallest fine part
+
+
+@dataclasses.dataclass(frozen=True)
+class Body:
+    """A sensor's solid with all that a contact on it needs; ``graded`` knows the way to the lattice's nodes."""
+
+    sensor: Sensor
+    tier: Literal["full", "reference"]
+    solid: FiniteStrainSolid
+    cavity: QuadraticCavity | None
+    core_nodes: np.ndarray
+    graded: GradedMesh
+
+    def contact(self, indenter: Indenter, pose: Pose, depth: float, friction: float) -> FiniteStrainContact:
+        """An indenter in front of this body, which will come ``depth`` m in at most."""
+        mesh = self.solid.mesh
+        distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])
+        near = mesh.surface[distance < _REACH]
+        return FiniteStrainContact(
+            self.solid, near[~mesh.clamped[near]], indenter, pose, self.cavity, friction=friction,
+            core=Core() if len(self.core_nodes) else None, inner=self.core_nodes,
+            factor=self.graded.factor, tolerance=_FULL if self.tier == "full" else EXACT,
+            first_share=_FIRST_SHARE[self.sensor],
+        )  # fmt: skip
+
+    def displacement(self, touch: Touch) -> np.ndarray:
+        """Displacement (n, 3) m of the sensor's surface lattice."""
+        moved = touch.state.displacement[self.solid.mesh.surface]
+        return self.graded.on_lattice(moved)
+
+    def contact_patch(self, touch: Touch) -> np.ndarray:
+        """(n,) bool, lattice nodes that carry force."""
+        flags = np.isin(self.solid.mesh.surface, touch.nodes[touch.pressing > 0])
+        return self.graded.nearest_on_lattice(flags)
+
+
+def graded_body(
+    sensor: Sensor, indenter: Indenter, pose: Pose, depth: float, tier: Literal["full", "reference"] = "full"
+) -> Body:
+    """A sensor's body, fine where the indenter, ``depth`` m in, overlaps the resting surface.
+
+    The reference tier's cells are half as large as the full tier's.
+    """
+    footprint = dataclasses.replace(_footprint(sensor, indenter, pose, depth), refine=1 if tier == "full" else 2)
+    graded = graded_gel(footprint) if sensor == "digit" else graded_skin(footprint)
+    mesh = graded.mesh
+    if sensor == "digit":
+        solid = FiniteStrainSolid(mesh, SharedBulk.of(NeoHookean.of(sensors.DIGIT_GEL)), graded.pattern)
+        return Body(sensor, tier, solid, None, np.empty(0, int), graded)
+    solid = FiniteStrainSolid(mesh, sensors.BIOTAC_SKIN, graded.pattern)
+    free = mesh.inner[~mesh.clamped[mesh.inner]]
+    cavity = QuadraticCavity(_inner_faces(mesh), len(mesh.nodes))
+    return Body(sensor, tier, solid, cavity, np.sort(free[facing_core(mesh.nodes[free])]), graded)
+
+
+def _inner_faces(mesh: HexMesh) -> np.ndarray:
+    """Quadratic faces (n, 9) of the inner skin, seen from outside the fluid: the undersides of the cells on it."""
+    inner = np.zeros(len(mesh.nodes), bool)
+    inner[mesh.inner] = True
+    faces = mesh.cells[:, :9][inner[mesh.cells[:, :9]].all(axis=1)]
+    return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)
+
+
+def _footprint(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float) -> Footprint:
+    """Row and column range of the lattice where the indenter, ``depth`` m in, overlaps the resting surface."""
+    lattice = digit_shape.gel_surface() if sensor == "digit" else biotac_shape.skin_surface()
+    rows, columns = lattice.shape
+    distance, _ = pose.moved(depth).distance(indenter, lattice.rest[: rows * columns])
+    inside = np.flatnonzero(distance <= _FIRST_SHARE[sensor] * distance.min() if distance.min() < 0 else distance.min())
+    at = np.column_stack([inside // columns + (sensor == "biotac"), inside % columns])
+    low, high = at.min(axis=0).astype(float), at.max(axis=0).astype(float)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, _LEAST_HALF) * (1 + _MARGIN)
+    spacing = float(np.clip(2 * half.max() / _ACROSS, *_SPACING))
+    return Footprint(tuple(middle - half), tuple(middle + half), spacing)

@@ -1,0 +1,44 @@
+"""What a solid may touch: a rigid body with a distance, its normal and its curvature."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Protocol
+
+import numpy as np
+
+from ..indenters import Indenter, Pose
+
+
+class Obstacle(Protocol):
+    """A rigid body in the sensor's frame."""
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance (n,) m, positive outside, and unit normal (n, 3) at points (n, 3) m."""
+
+    def curvature(self, points: np.ndarray) -> np.ndarray:
+        """Second derivatives (n, 3, 3) 1/m of the distance."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PlacedIndenter:
+    """An indenter at a pose."""
+
+    indenter: Indenter
+    pose: Pose
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See ``Obstacle``."""
+        return self.pose.distance(self.indenter, points)
+
+    def curvature(self, points: np.ndarray) -> np.ndarray:
+        """See ``Obstacle``."""
+        return self.pose.curvature(self.indenter, points)
+
+    def to_own(self, points: np.ndarray) -> np.ndarray:
+        """Sensor points (n, 3) m in the indenter's frame: where they stay as it moves, if they stick."""
+        return (points - self.pose.apex) @ self.pose.axes
+
+    def from_own(self, points: np.ndarray) -> np.ndarray:
+        """The inverse of ``to_own``."""
+        return points @ self.pose.axes.T + self.pose.apex
