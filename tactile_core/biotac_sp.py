@@ -1,0 +1,54 @@
+"""The BioTac SP of an independent COMSOL model as sensor data; each constant with its source.
+
+Frame of that model, metres: x along the finger, y across, z away from the pad, which looks toward -z. The model is a
+skin between two half ellipsoids z <= 0, clamped at its rim, filled with an incompressible fluid, over a rigid core
+that it does not touch. Sources: *config*, the ``config.csv`` beside each press of
+github.com/bsadr/biotac; *model*, the model exported as text in ``comsol/model/biotac.m`` there (July 2020).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+C10, C01 = 0.120342857e6, 0.0304571429e6  # Pa, two-term Mooney-Rivlin, Shore 35A (config)
+BULK = 1.5e9  # Pa (model)
+INITIAL_PRESSURE = 1750.0  # Pa, of the fluid before anything touches (model)
+THICKNESS = 0.2e-3  # m, outer less inner semi-axes (model)
+CORE = np.array([12.42e-3, 8.14e-3, 8.057e-3])  # m, semi-axes of the core (``comsol/matlab/Ray.m`` there)
+
+# m, semi-axes of the outer skin without load, and m3 of fluid under it at INITIAL_PRESSURE (model, its ``vol_0``).
+PUBLISHED_OUTER, PUBLISHED_VOLUME = np.array([14.23e-3, 9.94e-3, 9.94e-3]), 3.0524e-6
+
+# The presses were made with a later skin, whose semi-axes are not published: these are fitted so that
+# INITIAL_PRESSURE swells them to the resting skin of press 001, within 17 um rms.
+OUTER = np.array([13.918e-3, 9.508e-3, 9.788e-3])
+
+# Forces of the presses over those of the constants above, least squares over press 001: the one fitted number of the
+# comparison. It scales C10, C01 and the pressure together and leaves every shape as it is. Why the later COMSOL model
+# is stiffer than its own constants at 0.2 mm is not known: scripts there name a "thick" variant, not its thickness,
+# and an evenly thicker skin of those constants (1.25 mm has the force of 001) follows the curves less well.
+FORCE_SCALE = 9.17
+
+
+def core_radius(rays: np.ndarray) -> np.ndarray:
+    """Distance (n,) m from the origin to the core's surface along rays (n, 3) of any length."""
+    unit = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    return 1 / np.linalg.norm(unit / CORE, axis=-1)
+
+
+def radius_along(skin: np.ndarray, rays: np.ndarray) -> np.ndarray:
+    """Distance (n,) m from the origin to the skin along rays (n, 3); nan beside the skin.
+
+    skin : (k, 3) m, nodes of the whole outer skin, deformed or not
+    Once differentiable (Clough-Tocher) over the stereographic picture of the skin seen from the origin.
+    """
+    import scipy.interpolate
+
+    return scipy.interpolate.CloughTocher2DInterpolator(_picture(skin), np.linalg.norm(skin, axis=1))(_picture(rays))
+
+
+def _picture(points: np.ndarray) -> np.ndarray:
+    round_ = points / OUTER
+    unit = round_ / np.linalg.norm(round_, axis=-1, keepdims=True)
+    below = np.where(unit[..., 2:] < 0.5, 1 - unit[..., 2:], np.nan)  # far above the rim there is no skin
+    return unit[..., :2] / below
