@@ -11,18 +11,18 @@ from .. import __version__, atomic, sensors
 from ..errors import TactileError
 from ..recordings import Truth, write_simulated
 from ..scene import RecordingSpec, load_scene
-from .compliance import biotac_compliance, digit_compliance
-from .contact import Contact, fluid_pressure, surface_displacement
-from .electrodes import electrode_gaps, raw_counts, signal_of_gaps
+from .compliance import Compliance, biotac_compliance, digit_compliance
+from .corrected_press import CorrectedPress, FastContact
+from .electrodes import Wiring, electrode_gaps, readings, signal_of_gaps
 from .pairs import contact_center
-from .press import Placement, Press, biotac_pose, digit_pose, on_gel
+from .press import Placement, biotac_pose, depth_limit, digit_pose, on_gel
 
-PRESSURE_PER_COUNT = 100e3 / 4096  # Pa: the fluid's 0 to 100 kPa over 12 bits (sensors.md)
+# Pa a count: the range 0 to 100 kPa (SynTouch, BioTac sensor details, 2011) over the 12 bits of PDC: assumed.
+PRESSURE_PER_COUNT = 100e3 / 4096
 PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (sensors.md)
-REST_SPREAD = 150.0  # counts, spread of the rest readings from electrode to electrode: assumed
 _STILL_COUNT = 2000  # TDC and TAC, not simulated: a constant reading
 
-Pair = tuple[Contact, Contact]
+Pair = tuple[FastContact, FastContact]
 
 
 def simulate_recording(
@@ -30,12 +30,14 @@ def simulate_recording(
     out: str | os.PathLike,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
+    wiring: Wiring | None = None,
 ) -> None:
     """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
 
     The motion is linear between the scene's points; rolling and sliding differ in nothing else, for contact is without
-    friction here. progress : called with (frames done, frames). Raises TactileError for a scene without a recording, or
-    one that presses harder than the linear model may be asked.
+    friction here. progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
+    Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked, or
+    tared wiring: this kind of file holds raw counts.
     """
     scene, text = load_scene(scene_path)
     spec = scene.recording
@@ -43,6 +45,9 @@ def simulate_recording(
         raise TactileError(
             f"{scene_path}, recording", "missing", "a [recording] table", "See scenes/press_roll_slide/scene.toml"
         )
+    wiring = wiring or _wiring(spec)
+    if wiring.tared:
+        raise TactileError("wiring, tared", "True", "raw counts in a simulated recording", "Tare it when it is read")
     atomic.claim(out)
     _check_places(scene_path, spec)
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
@@ -53,15 +58,13 @@ def simulate_recording(
         frames.append(_solve(scene_path, indenter, at, newtons, t) if newtons > 0 else None)
         if progress:
             progress(len(frames), len(time))
-    random = np.random.default_rng(seed)
-    rest = sensors.REST_COUNT + np.round(random.uniform(-REST_SPREAD, REST_SPREAD, 19))
-    drift = random.uniform(-spec.drift_counts, spec.drift_counts, 19)
-    electrodes = raw_counts(_signals(frames), rest, spec.noise_counts, drift, seed)
+    electrodes = readings(_signals(frames), time, wiring, seed)
+    pressure = _pressure(frames)
     still = np.full(len(time), _STILL_COUNT, np.int16)
     write_simulated(
-        out, time=time, electrodes=electrodes, pdc=_pressure_counts(frames), tac=still, tdc=still, truth=_truth(frames),
+        out, time=time, electrodes=electrodes, pdc=pdc_counts(pressure), tac=still, tdc=still, truth=_truth(frames),
         scene=text, seed=seed, made_by=f"tactile {__version__}, mechanics.recording",
-        note=f"Simulated, not measured: {scene.description}",
+        note=f"Simulated, not measured: {scene.description} {_told(pressure)}",
     )  # fmt: skip
 
 
@@ -84,38 +87,65 @@ def _motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _solve(scene_path, indenter, place: Placement, force: float, time: float) -> Pair:  # noqa: ANN001
-    biotac = Press(biotac_compliance(), indenter, biotac_pose(indenter, place)).at_force(force)
-    digit = Press(digit_compliance(), indenter, digit_pose(indenter, place)).at_force(force)
+    biotac, digit = (
+        CorrectedPress(compliance, indenter, pose, depth_limit(compliance, indenter, pose)).at_force(force)
+        for compliance, pose in (
+            (biotac_compliance(), biotac_pose(indenter, place)), (digit_compliance(), digit_pose(indenter, place)),
+        )
+    )  # fmt: skip
     if biotac is None or digit is None:
         which = "BioTac" if biotac is None else "DIGIT"
         raise TactileError(
             f"{scene_path}, recording, {time:.2f} s", f"{force:.3g} N at ({place.x * 1e3:.1f}, {place.z * 1e3:.1f}) mm",
-            f"a force that the {which} bears within 1.2 mm and without touching its core", "Lower force_n there",
+            f"a force that the {which} bears within 60 % of its thickness", "Lower force_n there",
         )  # fmt: skip
     return biotac, digit
 
 
 def _signals(frames: list[Pair | None]) -> np.ndarray:
     skin = biotac_compliance()
-    return np.stack([np.zeros(19) if f is None else signal_of_gaps(electrode_gaps(skin, f[0])) for f in frames])
+    return np.stack([np.zeros(19) if f is None else signal_of_gaps(electrode_gaps(skin, f[0].linear)) for f in frames])
 
 
-def _pressure_counts(frames: list[Pair | None]) -> np.ndarray:
-    rise = np.array([0.0 if f is None else fluid_pressure(biotac_compliance(), f[0]) for f in frames])
-    return np.round((PRESSURE_AT_REST + rise) / PRESSURE_PER_COUNT).astype(np.int16)
+def _pressure(frames: list[Pair | None]) -> np.ndarray:
+    """The fluid's pressure (T,) Pa over the surrounding air."""
+    rise = [0.0 if f is None else f[0].pressure for f in frames]
+    return PRESSURE_AT_REST + np.array(rise)
+
+
+def pdc_counts(pressure: np.ndarray) -> np.ndarray:
+    """PDC (...,) int16 counts, 0..4095, for the fluid's pressure, Pa; the scale is assumed, as the range is given."""
+    return np.clip(np.round(pressure / PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
+
+
+def pressure_of_pdc(counts: np.ndarray) -> np.ndarray:
+    """The fluid's pressure (...,) Pa in a recording of ours, from PDC counts; half a count, 12 Pa, at most off."""
+    return np.asarray(counts, float) * PRESSURE_PER_COUNT
+
+
+def _told(pressure: np.ndarray) -> str:
+    """The fluid's pressure in words for the file."""
+    low, high = pressure.min() / 1e3, pressure.max() / 1e3
+    return f"Fluid pressure {low:.2f} to {high:.2f} kPa; PDC counts {PRESSURE_PER_COUNT:.2f} Pa each (assumed)."
+
+
+def _wiring(spec: RecordingSpec) -> Wiring:
+    """The scene's defects; its drift is given from the first to the last frame."""
+    lasts = spec.points[-1].time_s - spec.points[0].time_s
+    return Wiring(noise=spec.noise_counts, drift=spec.drift_counts / lasts)
 
 
 def _truth(frames: list[Pair | None]) -> Truth:
     skin, gel = biotac_compliance(), digit_compliance()
 
-    def moved(compliance, contact: Contact | None) -> np.ndarray:  # noqa: ANN001
+    def moved(compliance: Compliance, contact: FastContact | None) -> np.ndarray:
         if contact is None:
             return np.zeros((len(compliance.surface.rest), 3), np.float32)
-        return surface_displacement(compliance, contact).astype(np.float32)
+        return contact.corrected.displacement.astype(np.float32)
 
     return Truth(
         displacement_biotac=np.stack([moved(skin, f and f[0]) for f in frames]),
         displacement_digit=np.stack([moved(gel, f and f[1]) for f in frames]),
         force=np.stack([np.zeros(3) if f is None else f[0].force for f in frames]),
-        contact_center=np.stack([np.full(2, np.nan) if f is None else contact_center(f[1]) for f in frames]),
+        contact_center=np.stack([np.full(2, np.nan) if f is None else contact_center(f[1].linear) for f in frames]),
     )

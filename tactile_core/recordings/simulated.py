@@ -12,7 +12,7 @@ from __future__ import annotations
 import io
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from ..errors import TactileError
 from .assemble import assemble
 from .recording import ELECTRODES, Recording, Truth
 from .store import Store
+
+if TYPE_CHECKING:
+    import h5py
 
 FORMAT = "tactile-recording-1"
 SCALE = 5e-7  # m a unit of the truth's int16: steps of 0.5 um (0.14 um rms, below any error measured), reach +-16 mm
@@ -48,8 +51,6 @@ def write_simulated(
 
     Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm.
     """
-    import h5py
-
     path = Path(path)
     frames = len(time)
     _check_shape(path, "time", time, (frames,))
@@ -72,24 +73,31 @@ def write_simulated(
         "note": note,
         "start_time": float(start_time),
     }
-
-    def fill(file: h5py.File) -> None:
-        for key, value in attributes.items():
-            file.attrs[key] = value
-        packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "track_times": False}
-        file.create_dataset("time", data=np.asarray(time, np.float64), **packed)
-        for name, value in counts.items():
-            file.create_dataset(name, data=value, **packed)
-        for name, value in steps.items():
-            data = file.create_dataset(
-                f"truth/{name}", data=value, chunks=(min(BLOCK, frames), *value.shape[1:]), **packed
-            )
-            data.attrs["scale"] = SCALE
-        file.create_dataset("truth/force", data=np.asarray(truth.force, np.float32), **packed)
-        file.create_dataset("truth/contact_center", data=np.asarray(truth.contact_center, np.float32), **packed)
-
-    _write_whole(path, fill)
+    plain = {"time": np.asarray(time, np.float64)} | counts
+    forces = {f"truth/{name}": np.asarray(getattr(truth, name), np.float32) for name in ("force", "contact_center")}
+    _write_whole(path, lambda file: _fill(file, attributes, plain, steps, forces))
     return path
+
+
+def _fill(
+    file: h5py.File,
+    attributes: dict[str, Any],
+    plain: dict[str, np.ndarray],
+    steps: dict[str, np.ndarray],
+    forces: dict[str, np.ndarray],
+) -> None:
+    """The datasets of a file, always in this order, so that the same arrays give the same bytes."""
+    for key, value in attributes.items():
+        file.attrs[key] = value
+    packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "track_times": False}
+    for name, value in plain.items():
+        file.create_dataset(name, data=value, **packed)
+    for name, value in steps.items():
+        chunks = (min(BLOCK, len(value)), *value.shape[1:])
+        data = file.create_dataset(f"truth/{name}", data=value, chunks=chunks, **packed)
+        data.attrs["scale"] = SCALE
+    for name, value in forces.items():
+        file.create_dataset(name, data=value, **packed)
 
 
 def read_simulated(store: Store, layout: str) -> Recording:

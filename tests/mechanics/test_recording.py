@@ -1,11 +1,20 @@
 """A simulated recording reads back as a raw recording that knows its truth."""
 
+import re
+
 import numpy as np
 import pytest
 
-from tactile_core import recordings
+from tactile_core import recordings, sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.recording import simulate_recording
+from tactile_core.mechanics.electrodes import Wiring
+from tactile_core.mechanics.recording import (
+    PRESSURE_AT_REST,
+    PRESSURE_PER_COUNT,
+    pdc_counts,
+    pressure_of_pdc,
+    simulate_recording,
+)
 
 SHORT = """
 format = "tactile-scene-1"
@@ -33,10 +42,17 @@ def scene(tmp_path):
     return path
 
 
-def test_recording_carries_its_truth(scene, tmp_path):
-    out = tmp_path / "short.h5"
-    simulate_recording(scene, out, seed=4)
-    recording = recordings.read(out)
+@pytest.fixture(scope="module")
+def seed_4(tmp_path_factory):
+    """A simulated recording of the scene."""
+    folder = tmp_path_factory.mktemp("seed_4")
+    (folder / "scene.toml").write_text(SHORT, encoding="utf-8")
+    simulate_recording(folder, folder / "short.h5", seed=4)
+    return folder / "short.h5"
+
+
+def test_recording_carries_its_truth(seed_4):
+    recording = recordings.read(seed_4)
     assert recording.simulated and len(recording) == 61
     assert recording.about["scene"] == SHORT and "Simulated" in recording.about["note"]
     truth = recording.truth
@@ -46,14 +62,41 @@ def test_recording_carries_its_truth(scene, tmp_path):
     signals = recordings.prepare(recording)
     assert signals.kind == "raw" and not signals.flags.any()
     assert np.abs(signals.change[50]).max() > 10 > 5 > np.abs(signals.change[:41]).max()
-    assert recording.pdc[50] > recording.pdc[0]
+    pressure = pressure_of_pdc(recording.pdc)
+    np.testing.assert_allclose(pressure[:41], PRESSURE_AT_REST, atol=PRESSURE_PER_COUNT / 2)
+    assert pressure[50] > PRESSURE_AT_REST + 5 * PRESSURE_PER_COUNT
+    low, high = re.search(r"Fluid pressure ([\d.]+) to ([\d.]+) kPa", recording.about["note"]).groups()
+    assert float(low) == 1.75
+    assert float(high) == pytest.approx(pressure.max() / 1e3, abs=0.018)  # half a PDC count and half a printed digit
 
 
-def test_same_seed_same_bytes(scene, tmp_path):
-    files = [tmp_path / f"{name}.h5" for name in "abc"]
-    for file, seed in zip(files, (4, 4, 5), strict=True):
-        simulate_recording(scene, file, seed=seed)
-    assert files[0].read_bytes() == files[1].read_bytes() != files[2].read_bytes()
+def test_same_seed_same_bytes(scene, seed_4, tmp_path):
+    again, other = tmp_path / "again.h5", tmp_path / "other.h5"
+    simulate_recording(scene, again, seed=4)
+    simulate_recording(scene, other, seed=5)
+    assert seed_4.read_bytes() == again.read_bytes() != other.read_bytes()
+
+
+def test_wiring_changes_the_counts_and_nothing_else(scene, seed_4, tmp_path):
+    ideal = tmp_path / "ideal.h5"
+    simulate_recording(scene, ideal, seed=4, wiring=Wiring(rest_spread=0, drift=0, noise=0))
+    one, other = recordings.read(seed_4), recordings.read(ideal)
+    assert (one.electrodes != other.electrodes).any()
+    np.testing.assert_array_equal(other.electrodes[:41], sensors.REST_COUNT)
+    np.testing.assert_array_equal(one.truth.displacement_biotac, other.truth.displacement_biotac)
+    np.testing.assert_array_equal(one.pdc, other.pdc)
+
+
+def test_the_file_holds_raw_counts_only(scene, tmp_path):
+    with pytest.raises(TactileError, match="wiring, tared"):
+        simulate_recording(scene, tmp_path / "x.h5", wiring=Wiring(tared=True))
+    assert not (tmp_path / "x.h5").exists()
+
+
+def test_pdc_counts_hold_a_hundred_kilopascal():
+    np.testing.assert_array_equal(pdc_counts(np.array([-1e3, 0.0, 50e3, 100e3, 1e6])), [0, 0, 2048, 4095, 4095])
+    pressure = np.linspace(0, 99.9e3, 1000)
+    np.testing.assert_allclose(pressure_of_pdc(pdc_counts(pressure)), pressure, atol=PRESSURE_PER_COUNT / 2)
 
 
 def test_pressing_too_hard_names_the_moment(scene, tmp_path):
