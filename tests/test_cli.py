@@ -11,6 +11,7 @@ import fake_tools
 import pytest
 
 from tactile_core import cli, convert, networks
+from tactile_core.verbs import VERBS
 
 ROOT = Path(__file__).parent.parent
 
@@ -39,7 +40,7 @@ def only_line(text: str) -> str:
     return line
 
 
-@pytest.mark.parametrize("verb", ["convert", "info", "simulate", "pairs", "train"])
+@pytest.mark.parametrize("verb", ["convert", "info", "simulate", "pairs", "train", "mesh"])
 def test_each_verb_teaches_with_an_example(verb, capsys):
     with pytest.raises(SystemExit) as leave:
         cli.main([verb, "--help"])
@@ -50,7 +51,21 @@ def test_each_verb_teaches_with_an_example(verb, capsys):
 def test_help_names_every_verb_and_the_exit_statuses():
     done = command("--help")
     assert done.returncode == 0
-    assert all(word in done.stdout for word in ("convert", "info", "pairs", "train", "Exit status"))
+    assert all(word in done.stdout for word in (*VERBS, "Exit status"))
+
+
+def test_help_costs_no_numpy():
+    code = """
+import sys
+from tactile_core import cli, verbs
+for verb in ([], *([name] for name in verbs.VERBS)):
+    try: cli.main([*verb, "--help"])
+    except SystemExit: pass
+assert not {"numpy", "scipy", "h5py", "tqdm"} & set(sys.modules), sorted(sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": str(ROOT)},
+                          capture_output=True, text=True, timeout=60)  # fmt: skip
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("arguments", [[], ["convert"], ["convert", "a.csv"], ["fly"], ["convert", "a", "--out"]])
@@ -223,6 +238,9 @@ def test_info_may_be_cut_by_its_reader(slide_csv):
         (["pairs", "absent.toml", "--count", "4", "--out", "p.h5", "--workers", "0"], "--workers"),
         (["pairs", "absent.toml", "--count", "4", "--out", "p.h5", "--seed", "-1"], "--seed"),
         (["simulate", "absent.toml", "--out", "r.h5"], "absent.toml"),
+        (["simulate", "absent.toml", "--out", "r.h5", "--isaac-like", "absent.tet"], "absent.toml"),
+        (["simulate", "absent.toml", "--out", "r.h5", "--core", "core.obj"], "--core"),
+        (["simulate", "absent.toml", "--out", "r.h5", "--seed", "-1"], "--seed"),
         (["train", "absent.h5", "--out", "t", "--seed", "-1"], "--seed"),
         (["train", "absent.h5", "--out", "t", "--effort", "nan"], "--effort"),
     ],
@@ -235,11 +253,23 @@ def test_bad_jobs_end_in_one_message(arguments, words, tactile, tmp_path, monkey
     assert list(tmp_path.iterdir()) == []
 
 
+def test_frames_that_an_isaac_like_run_missed_are_told(tactile, tmp_path, monkeypatch):
+    from tactile_core.mechanics import isaac_recording
+
+    asked = []
+    monkeypatch.setattr(isaac_recording, "simulate_isaac_like", lambda *given: asked.append(given[:4]) or 3)
+    given = ("simulate", "scene", "--isaac-like", "skin.tet", "--core", "core.obj", "--out", tmp_path / "a.h5")
+    status, out, err = tactile(*given)
+    assert (status, out) == (0, f"{tmp_path / 'a.h5'}\n")
+    assert "3 frames did not reach their force" in only_line(err)
+    assert asked == [("scene", "skin.tet", str(tmp_path / "a.h5"), "core.obj")]
+
+
 def test_a_verb_names_the_extra_it_lacks(tactile, monkeypatch, tmp_path):
     def absent(options):
         raise ModuleNotFoundError("No module named 'torch'", name="torch")
 
-    monkeypatch.setattr(cli, "_train", absent)
+    monkeypatch.setattr(VERBS["train"], "run", absent)
     status, _, err = tactile("train", "pairs.h5", "--out", tmp_path)
     assert status == 2
     assert 'pip install "tactile-core[train]"' in only_line(err)
@@ -260,7 +290,7 @@ def test_what_an_interrupted_verb_leaves_is_told(verb, left, tactile, tmp_path, 
     def interrupted(options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, f"_{verb}", interrupted)
+    monkeypatch.setattr(VERBS[verb], "run", interrupted)
     count = ["--count", "4"] if verb == "pairs" else []
     status, _, err = tactile(verb, "given", "--out", tmp_path / "out", *count)
     assert status == 130

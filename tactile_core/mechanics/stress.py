@@ -1,0 +1,82 @@
+"""Stress in a deformed solid of 27-node cells: Cauchy and von Mises, at quadrature points and at nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .elasticity import reference_gradients
+from .finite_strain import FiniteStrainSolid, State
+
+_BATCH = 256  # cells at once: the law makes its tangent, too, 0.7 kB a point
+
+
+def cauchy(solid: FiniteStrainSolid, state: State) -> np.ndarray:
+    """Cauchy stress (n_cells, 27, 3, 3) Pa at the quadrature points, tension positive: P F^T / J.
+
+    P is the law's first Piola-Kirchhoff stress with the cell's own pressure. Raises FloatingPointError where a cell is
+    turned inside out.
+    """
+    return np.concatenate([
+        np.einsum("eqiJ,eqkJ,eq->eqik", piola, f, 1 / j) for piola, f, j in _points(solid, state)
+    ])  # fmt: skip
+
+
+def nodal_force(solid: FiniteStrainSolid, state: State) -> np.ndarray:
+    """Force (n, 3) N that holds each node where it is: contact, fluid and reactions; zero at free nodes.
+
+    Raises what ``cauchy`` raises.
+    """
+    size = len(solid.mesh.nodes)
+    piola = np.concatenate([piola for piola, _, _ in _points(solid, state)])
+    force = np.einsum("eq,eqiJ,eqaJ->eai", solid.weight, piola, solid.gradient, optimize=True).reshape(-1, 3)
+    nodes = solid.mesh.cells.ravel()
+    return np.stack([np.bincount(nodes, force[:, k], minlength=size) for k in range(3)], -1)
+
+
+def _points(solid: FiniteStrainSolid, state: State):  # noqa: ANN202 (batches of P, F, J)
+    f, j = solid.deformation(state.displacement)
+    if not (j > 0).all():
+        raise FloatingPointError("a cell is turned inside out")
+    p = state.pressure @ solid.linear.T
+    for start in range(0, len(j), _BATCH):
+        part = slice(start, start + _BATCH)
+        yield solid.law.stress_tangent(f[part], j[part], p[part])[0], f[part], j[part]
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """sqrt(3/2 s : s) (...,) Pa of stresses (..., 3, 3), s their deviator."""
+    mean = np.einsum("...ii->...", stress) / 3
+    deviator = stress - mean[..., None, None] * np.eye(3)
+    return np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator))
+
+
+def at_nodes(solid: FiniteStrainSolid, values: np.ndarray) -> np.ndarray:
+    """Values (n, ...) at the nodes of a field (n_cells, 27, ...) known at the quadrature points.
+
+    In each cell the trilinear function nearest to them (least squares with the volumes as weights, local L2
+    projection); at a node the mean of its cells, by their volumes. A field that is linear in a cell's own coordinates
+    comes back exactly. To smooth a stress, hand over the tensor and take its von Mises stress afterwards.
+    """
+    flat = values.reshape(*values.shape[:2], -1)
+    points, _, _ = reference_gradients()
+    basis, corner = _trilinear(points), _trilinear(_node_places())
+    weighted = basis * solid.weight[..., None]  # (e, q, 8)
+    fitted = np.linalg.solve(weighted.swapaxes(1, 2) @ basis, weighted.swapaxes(1, 2) @ flat)
+    local = corner @ fitted  # (e, 27, k)
+    volume = np.repeat(solid.weight.sum(1), 27)
+    nodes, size = solid.mesh.cells.ravel(), len(solid.mesh.nodes)
+    share = np.bincount(nodes, volume, minlength=size)
+    summed = [np.bincount(nodes, volume * column, minlength=size) for column in local.reshape(-1, flat.shape[2]).T]
+    return (np.stack(summed, -1) / share[:, None]).reshape(size, *values.shape[2:])
+
+
+def _trilinear(points: np.ndarray) -> np.ndarray:
+    """1, x, y, z, xy, xz, yz, xyz (n, 8) at points (n, 3)."""
+    x, y, z = points.T
+    return np.column_stack([np.ones(len(points)), x, y, z, x * y, x * z, y * z, x * y * z])
+
+
+def _node_places() -> np.ndarray:
+    """(27, 3) of a cell's nodes in its own coordinates, ``HexMesh``'s order."""
+    c, b, a = np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij")
+    return np.stack([a, b, c], -1).reshape(-1, 3)

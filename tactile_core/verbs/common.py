@@ -1,0 +1,29 @@
+"""What several verbs share."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..errors import TactileError
+
+# What a stopped verb leaves.
+NOTHING = "no half file is left"
+RESUMES = "the same command goes on where it stopped"
+
+MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
+
+
+def progress_argument(verb: argparse.ArgumentParser) -> None:
+    """``--progress``."""
+    verb.add_argument("--progress", action="store_true", help="show progress even where stderr is no terminal")
+
+
+def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
+    """``--seed``; ``same`` : what the same seed makes again."""
+    verb.add_argument("--seed", type=int, default=0, metavar="S", help=f"same seed, same {same} (default: 0)")
+
+
+def check_seed(seed: int) -> None:
+    """Raises TactileError for a seed that the generators do not take."""
+    if not 0 <= seed <= MAX_SEED:
+        raise TactileError("--seed", str(seed), f"0 to {MAX_SEED}", "Give another one")

@@ -1,0 +1,99 @@
+"""``tactile convert``: recordings to DIGIT pictures."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..errors import TactileError
+from ..terminal import bar, complain, say, tell
+from .common import NOTHING, progress_argument
+
+BRIEF = "recordings to DIGIT pictures"
+TEXT = """\
+Read, tare, translate and shade recordings. Each gets the folder DIR/<file name without extension> with
+  frames.h5          numbers of every frame: time, electrodes, force, contact_center, confidence, flags; and what
+                     --keep names
+  images/%05d.png    DIGIT pictures, 240 x 320, numbered by the frame's index in the recording (from 0)
+  contact_sheet.png  a few frames to look at
+  note.json          versions, weights, options, warnings
+  timings.json       ms a frame of each stage
+One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all."""
+# 4 B a number of 3,650 + 2,255 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
+# noisy real one), packed height maps at 200 kB.
+SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
+EPILOG = f"""\
+examples:
+  tactile convert touch.csv --out results
+  tactile convert day1/*.csv --out results --keep latent --overwrite
+  tactile convert touch.csv --out results --frames 200:300:5 --tare 0:50
+
+Size of a 700-frame result, measured: {SIZES}."""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("recordings", nargs="+", metavar="RECORDING", help="CSV, HDF5 or NPZ files, in any known layout")
+    verb.add_argument("--out", required=True, metavar="DIR", help="folder of the results; may exist and hold others")
+    verb.add_argument(
+        "--frames",
+        default=":",
+        metavar="A:B:STEP",
+        help="only these frames, counted from 0 as in Python; for a negative A write --frames=-50: ."
+        " Pictures keep their number in the recording, and the tare still sees the whole of it",
+    )
+    verb.add_argument(
+        "--keep",
+        default="latent,displacement,image",
+        metavar="WORDS",
+        help="what to write beside the numbers that are always there, out of"
+        " latent,displacement,height,image (default: %(default)s)",
+    )
+    verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
+    verb.add_argument(
+        "--tare",
+        default="auto",
+        metavar="auto|none|A:B",
+        help="frames without contact that give the resting reading (default: found automatically)",
+    )
+    verb.add_argument(
+        "--kind",
+        choices=("raw", "tared", "scaled", "rectified"),
+        help="what the file holds, where the automatic answer is wrong",
+    )
+    verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor to counts, for a scaled recording")
+    verb.add_argument("--no-drift", action="store_true", help="do not remove drift")
+    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Convert; one bad recording does not stop the others."""
+    from .. import convert, results
+    from ..recordings import PrepareOptions
+
+    prepare = PrepareOptions(
+        kind=options.kind,
+        tare=None if options.tare == "auto" else options.tare,
+        drift=not options.no_drift,
+        counts_per_unit=options.counts_per_unit,
+    )
+    keep, frames = results.parse_keep(options.keep), convert.parse_frames(options.frames)
+    job = convert.Options(frames=frames, keep=keep, prepare=prepare, overwrite=options.overwrite)
+    folders = results.result_folders(options.recordings, options.out, options.overwrite)
+    tools = convert.load_tools(options.weights)
+    failed = 0
+    for path, folder in zip(options.recordings, folders, strict=True):
+        try:
+            with bar(folder.name, "frame", options.progress) as shown:
+                done = convert.convert(path, folder, job, tools, shown)
+        except TactileError as error:
+            complain(str(error))
+            failed += 1
+            continue
+        for warning in done.warnings:
+            say(f"warning: {folder.name}: {warning}")
+        tell(str(done.folder))
+    if failed and len(folders) > 1:
+        complain(f"{failed} of {len(folders)} recordings were not converted")
+    return 2 if failed else 0

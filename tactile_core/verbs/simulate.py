@@ -1,0 +1,62 @@
+"""``tactile simulate``: the recording of a scene."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..errors import TactileError
+from ..terminal import bar, say, tell
+from .common import NOTHING, check_seed, progress_argument, seed_argument
+
+BRIEF = "simulate a recording"
+TEXT = """\
+Simulate the recording that a scene describes, marked so and with its true meshes.
+
+With --isaac-like the scene's motion presses a BioTac skin of your own, as Isaac Gym computed it: linear tetrahedra,
+E 1.552 MPa, nu 0.316, no fluid, hence no electrodes, and no friction. Ten frames a second of displacement, force and
+depth come out, for comparison with data that was made that way. Such meshes lock: the force is too high."""
+EPILOG = """\
+examples:
+  tactile simulate scenes/press_roll_slide/scene.toml --seed 1 --out press_roll_slide.h5
+  tactile simulate scenes/press_roll_slide --isaac-like skin.tet --core core.obj --out isaac.h5"""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("scene", metavar="SCENE", help="scene.toml with a [recording]")
+    seed_argument(verb, "file")
+    verb.add_argument("--out", required=True, metavar="FILE", help="HDF5 file to write")
+    verb.add_argument(
+        "--isaac-like",
+        metavar="FILE.tet",
+        help="a skin in Isaac Gym's text layout (lines `v x y z` in metres and `t a b c d`), in the frame"
+        " of the public BioTac mesh; a frame takes some seconds, and --seed changes nothing",
+    )
+    verb.add_argument(
+        "--core",
+        metavar="FILE.obj",
+        help="for --isaac-like: the rigid core that holds the skin, a closed triangle mesh in metres"
+        " (default: our own table of it, which moves forces by 1 %%)",
+    )
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate."""
+    check_seed(options.seed)
+    if options.core and not options.isaac_like:
+        raise TactileError("--core", options.core, "--isaac-like FILE.tet beside it", "Our own skin has its core")
+    with bar("simulate", "frame", options.progress) as shown:
+        if options.isaac_like:
+            from ..mechanics.isaac_recording import simulate_isaac_like
+
+            missed = simulate_isaac_like(options.scene, options.isaac_like, options.out, options.core, shown)
+            if missed:
+                say(f"warning: {missed} frames did not reach their force and are marked (converged is false)")
+        else:
+            from ..mechanics.recording import simulate_recording
+
+            simulate_recording(options.scene, options.out, options.seed, shown)
+    tell(options.out)
+    return 0

@@ -1,0 +1,51 @@
+"""``tactile train``: the networks, from pairs."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..errors import TactileError
+from ..terminal import bar, tell
+from .common import RESUMES, check_seed, progress_argument, seed_argument
+
+BRIEF = "train the networks on pairs"
+TEXT = "Train the networks and the force estimate; DIR/weights then holds weights and card."
+EPILOG = """\
+example:
+  tactile train pairs.h5 --out trained --seed 1
+  tactile convert touch.csv --out results --weights trained/weights
+
+Needs torch: pip install "tactile-core[train]". An interrupted run goes on where it stopped."""
+LEAVES = RESUMES
+MAX_EFFORT = 1000.0
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("pairs", metavar="PAIRS", help="HDF5 file of `tactile pairs`")
+    verb.add_argument("--out", required=True, metavar="DIR", help="folder to write")
+    seed_argument(verb, "weights")
+    verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="times the usual epochs (default: 1)")
+    verb.add_argument("--overwrite", action="store_true", help="train anew over older weights in DIR")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Train."""
+    check_seed(options.seed)
+    if not 0 < options.effort <= MAX_EFFORT:
+        raise TactileError("--effort", str(options.effort), f"above 0, at most {MAX_EFFORT}", "1 is the usual training")
+    from ..training.options import Options
+    from ..training.train import train
+
+    with bar("training", "%", options.progress) as shown:
+        train(
+            options.pairs,
+            options.out,
+            options.seed,
+            Options(effort=options.effort),
+            lambda share, text: shown(round(100 * share), 100),
+            overwrite=options.overwrite,
+        )
+    tell(options.out)
+    return 0
