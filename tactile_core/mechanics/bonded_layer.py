@@ -57,3 +57,44 @@ def dimitriadis(depth: float, radius: float, thickness: float, youngs: float, po
         + 16 * a / np.pi**4 * (a**3 + 3 * np.pi**2 / 5 * b) * chi**4
     )  # fmt: skip
     return float(4 / 3 * youngs / (1 - poisson**2) * np.sqrt(radius) * depth**1.5 * series)
+
+
+def exact_layer(
+    depth: float, radius: float, thickness: float, youngs: float, poisson: float
+) -> tuple[float, float, float]:
+    """Contact radius m, depth m and force N of a rigid paraboloid on a bonded layer, exact at small strain.
+
+    With p = integral of phi(t) cos(xi t) the pressure's Hankel transform, the dual integral equations become
+    pi/2 phi(x) - integral of K(x, t) phi(t) dt = E / (2 (1 - nu^2)) (d - x^2 / R), where phi vanishes at the contact's
+    edge. K holds what the layer's compliance lacks to the half space's. Lebedev, Ufliand, PMM 22, 1958; the compliance:
+    Dhaliwal, Int. J. Eng. Sci. 8, 1970. To 1e-10 up to a contact of ten thicknesses.
+    """
+    import scipy.optimize
+
+    equations = _LayerEquations(thickness, youngs, poisson)
+    hertz = np.sqrt(radius * depth)
+    contact = scipy.optimize.brentq(lambda a: equations.solve(a, radius)[0] - depth, 0.3 * hertz, 3 * hertz, xtol=1e-12)
+    return contact, *equations.solve(contact, radius)
+
+
+class _LayerEquations:
+    """The integral equation of ``exact_layer`` on Gauss points."""
+
+    def __init__(self, thickness: float, youngs: float, poisson: float) -> None:
+        self.stiffness = youngs / (2 * (1 - poisson**2))
+        point, weight = np.polynomial.legendre.leggauss(400)
+        u, k = 10 * (point + 1), 3 - 4 * poisson  # wave number times thickness, up to where 1 - L is 1e-15
+        compliance = (2 * k * np.sinh(2 * u) - 4 * u) / (2 * k * np.cosh(2 * u) + 4 * u**2 + 1 + k**2)
+        self.waves, self.lacking = u / thickness, 10 * weight * (1 - compliance) / thickness
+
+    def solve(self, contact: float, radius: float) -> tuple[float, float]:
+        """Depth m and force N at a contact radius m."""
+        point, weight = np.polynomial.legendre.leggauss(48)
+        t, weight = contact * (point + 1) / 2, contact * weight / 2
+        waves = np.cos(np.outer(np.r_[t, contact], self.waves))
+        kernel = (waves * self.lacking) @ waves[:-1].T * weight
+        loads = self.stiffness * np.column_stack([np.ones(len(t)), t**2])
+        flat, bowl = np.linalg.solve(np.pi / 2 * np.eye(len(t)) - kernel[:-1], loads).T
+        at_edge = kernel[-1] @ flat + self.stiffness, kernel[-1] @ bowl + self.stiffness * contact**2
+        depth = at_edge[1] / at_edge[0] / radius
+        return depth, float(2 * np.pi * weight @ (depth * flat - bowl / radius))

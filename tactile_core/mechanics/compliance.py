@@ -13,6 +13,7 @@ import json
 import logging
 import os
 import pathlib
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,14 +21,16 @@ from .. import atomic, biotac_shape, digit_shape, sensors, surface
 from ..errors import TactileError
 from ..lattice import Lattice
 from ..sensors import Material
-from .elasticity import assemble
-from .factor import factor
-from .hex_mesh import HexMesh, gel_mesh, skin_mesh
+from .condense import condense, mirror_nodes
+from .core import Core, facing_core
+from .hex_mesh import HexMesh, gel_mesh, inner_faces, skin_mesh
+from .quadratic_cavity import QuadraticCavity
 
 log = logging.getLogger(__name__)
-_FORMAT = 1  # raise when the meaning of the cached arrays changes
+_FORMAT = 3  # raise when the meaning of the cached arrays changes
 
 # Skin nodes that can be touched: those that unroll onto the gel or up to this far beside it, m.
+_ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 _BESIDE_GEL = 2.0e-3
 
 
@@ -38,11 +41,16 @@ class Compliance:
     name : ``"biotac"`` or ``"digit"``
     surface : the sensor's surface lattice, n nodes
     touchable : (m,) int, surface nodes that can carry contact force
-    move : (3 m, 3 n) float32, m/N; row 3 i + k is the surface displacement under 1 N along axis k at touchable node i
+    move : (3 r, 3 n) float32, m/N; row 3 i + k is the surface displacement under 1 N along axis k at the i-th of the r
+        touchable nodes with z >= 0, and mirrored that under the same force on its image (``answers``)
     watch : (3 m, w) float32, m/N; motion of the watched inner points along their watch directions (BioTac only:
-        first the 19 electrode feet, then the inner skin under the pad; toward the core is negative)
+        first the electrode feet, then the inner skin under the pad; toward the core is negative)
     watch_gap : (w,) float64, m, their distance to electrode or core at rest
     pressure : (3 m,) float64, Pa/N, fluid pressure under the same forces (zero for the gel)
+    inner_move : (w, 3 n) float32, m/N, surface displacement under 1 N at a watched point along its direction
+    inner_watch : (w, w) float32, m/N, motion of the watched points under the same forces
+    inner_pressure : (w,) float64, Pa/N, fluid pressure under them
+    feet : how many of the watched points, the first ones, are electrode feet; the core presses on the others
     """
 
     name: str
@@ -52,17 +60,41 @@ class Compliance:
     watch: np.ndarray
     watch_gap: np.ndarray
     pressure: np.ndarray
+    inner_move: np.ndarray
+    inner_watch: np.ndarray
+    inner_pressure: np.ndarray
+    feet: int = 0
+
+    @functools.cached_property
+    def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Row of ``move`` (m,) for each touchable node, whether it is the image's (m,) bool, and all images (n,)."""
+        image = mirror_nodes(self.surface.rest)
+        answered = answered_nodes(self.surface, self.touchable, image)
+        mirrored = self.surface.rest[self.touchable, 2] < -_ON_PLANE
+        return np.searchsorted(answered, np.where(mirrored, image[self.touchable], self.touchable)), mirrored, image
+
+
+class Arrays(NamedTuple):
+    """What is computed and cached of a ``Compliance``."""
+
+    move: np.ndarray
+    watch: np.ndarray
+    watch_gap: np.ndarray
+    pressure: np.ndarray
+    inner_move: np.ndarray
+    inner_watch: np.ndarray
+    inner_pressure: np.ndarray
 
 
 @functools.cache
 def biotac_compliance() -> Compliance:
-    """The BioTac's skin over incompressible fluid; built in about a minute, then read from the cache."""
+    """The BioTac's skin over incompressible fluid; built in under a minute, then read from the cache."""
     return _cached("biotac", sensors.biotac_surface(), _touchable_skin(), skin_mesh(), sensors.BIOTAC_SKIN)
 
 
 @functools.cache
 def digit_compliance() -> Compliance:
-    """The DIGIT's gel; built in about a minute, then read from the cache."""
+    """The DIGIT's gel; built in under a minute, then read from the cache."""
     lattice = sensors.digit_surface()
     return _cached("digit", lattice, np.arange(len(lattice.rest)), gel_mesh(), sensors.DIGIT_GEL)
 
@@ -92,18 +124,17 @@ def _cached(name: str, lattice: Lattice, touchable: np.ndarray, mesh: HexMesh, m
     try:
         loaded = _load(folder)
     except (OSError, ValueError):  # not built yet, or cut short
-        log.info("building the compliance of the %s in %s (about a minute, once)", name, folder)
+        log.info("building the compliance of the %s in %s (under a minute, once)", name, folder)
         _claim(folder)
-        _store(folder, dict(zip(_ARRAYS, build(mesh, material, touchable, lattice), strict=True)))
+        _store(folder, build(mesh, material, touchable, lattice)._asdict())
         loaded = _load(folder)
-    return Compliance(name, lattice, touchable, *loaded)
+    return Compliance(name, lattice, touchable, *loaded, len(electrode_feet().gap) if len(mesh.inner) else 0)
 
 
-_ARRAYS = ("move", "watch", "watch_gap", "pressure")
-
-
-def _load(folder: pathlib.Path) -> list[np.ndarray]:
-    return [np.load(folder / f"{array}.npy", mmap_mode="r", allow_pickle=False) for array in _ARRAYS]
+def _load(folder: pathlib.Path) -> Arrays:
+    read = (np.load(folder / f"{array}.npy", mmap_mode="r", allow_pickle=False) for array in Arrays._fields)
+    # A plain view: numpy's memory map class costs a microsecond at every slice.
+    return Arrays(*(array.view(np.ndarray) for array in read))
 
 
 def _claim(folder: pathlib.Path) -> None:
@@ -114,7 +145,7 @@ def _claim(folder: pathlib.Path) -> None:
         (folder / "probe").unlink()
     except OSError as error:
         found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, "a folder for 450 MB", "Name one in TACTILE_CACHE") from error
+        raise TactileError(folder, found, "a folder for 300 MB", "Name one in TACTILE_CACHE") from error
 
 
 def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
@@ -125,93 +156,81 @@ def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
                 np.save(file, values)
     except OSError as error:
         found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, "room for 450 MB", "Make room, or name a folder in TACTILE_CACHE") from error
+        raise TactileError(folder, found, "room for 300 MB", "Make room, or name a folder in TACTILE_CACHE") from error
 
 
-def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lattice) -> tuple[np.ndarray, ...]:
-    """``move``, ``watch``, ``watch_gap`` and ``pressure`` of a ``Compliance``, from a solid that is even in z.
+def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lattice) -> Arrays:
+    """The arrays of a ``Compliance``, from a solid that is even in z.
 
-    touchable : (m,) surface nodes that may carry force. Raises ValueError for a surface without mirror symmetry.
+    touchable : (m,) surface nodes that may carry force. Raises ValueError for a solid without mirror symmetry or held
+    nowhere, TactileError where the memory does not suffice.
     """
-    free = np.repeat(~mesh.clamped, 3)
-    place = np.cumsum(free) - 1  # degree of freedom -> row of the reduced system
-    solve = factor(assemble(mesh, material)[free][:, free].tocsc())
-
-    def spread(answer: np.ndarray) -> np.ndarray:
-        full = np.zeros((len(free), answer.shape[1]))
-        full[free] = answer
-        return full
-
-    surface_dofs = _dofs(mesh.surface)
-    watch, watch_gap = _watched(mesh)  # (3 n_nodes, w)
-    move = np.zeros((3 * len(touchable), len(surface_dofs)), np.float32)
-    mirror_node = _mirror(lattice)
-    done = np.zeros(len(touchable), bool)
-    index_of = {int(node): i for i, node in enumerate(touchable)}
-    adjoint = spread(solve(watch[free])) if watch.shape[1] else np.zeros((len(free), 0))
-    for first in _chunks([i for i, node in enumerate(touchable) if lattice.rest[node, 2] >= -1e-9]):
-        dofs = _dofs(mesh.surface[touchable[first]])
-        known = ~np.repeat(mesh.clamped[mesh.surface[touchable[first]]], 3)
-        load = np.zeros((int(free.sum()), len(dofs)))
-        load[place[dofs[known]], np.flatnonzero(known)] = 1.0
-        answer = spread(solve(load))[surface_dofs].T
-        _put_with_mirror(move, answer, first, touchable, mirror_node, index_of, done)
-    if not done.all():
-        raise ValueError("the surface is not mirror symmetric: some touchable nodes have no image")
-    pressure = np.zeros(3 * len(touchable))
-    touch_dofs = _dofs(mesh.surface[touchable])
-    watched = adjoint[touch_dofs].astype(np.float64)
-    if len(mesh.inner):
-        swell = _volume_gradient(mesh)
-        under_pressure = spread(solve(swell[free, None]))[:, 0]
-        stiffness = 1 / float(swell @ under_pressure)
-        pressure = -stiffness * under_pressure[touch_dofs]
-        for start in range(0, len(move), 512):  # in blocks: the whole outer product would double the memory
-            part = slice(start, start + 512)
-            move[part] += np.outer(pressure[part], under_pressure[surface_dofs]).astype(np.float32)
-        watched += np.outer(pressure, swell @ adjoint)
-    return move, watched.astype(np.float32), watch_gap, pressure
+    watch, watch_gap = _watched(mesh)
+    loads = np.column_stack([watch, _volume_gradient(mesh)]) if len(mesh.inner) else watch
+    half = np.flatnonzero(lattice.rest[:, 2] >= -_ON_PLANE)
+    try:
+        even, odd = (condense(mesh, material, mesh.surface[half], loads, parity) for parity in (1, -1))
+        image = mirror_nodes(lattice.rest)
+        place, answered = _Mirrored(half, image), answered_nodes(lattice, touchable, image)
+        move = place.forces(even.answer, odd.answer, answered)
+        inner_move = place.loads(even.under_loads, odd.under_loads)
+        among = even.among + odd.among
+        inner_pressure, pressure = np.zeros(watch.shape[1]), np.zeros(3 * len(touchable))
+        touch_dofs = axes_of(touchable)
+        if len(mesh.inner):  # the fluid keeps its volume: its pressure is one more force, and takes one more row away
+            swell, stiffness = inner_move[-1], 1 / among[-1, -1]
+            inner_pressure, pressure = -stiffness * among[-1, :-1], -stiffness * swell[touch_dofs]
+            on_answered = -stiffness * swell[axes_of(answered)]
+            for start in range(0, len(move), 512):  # in blocks: the whole outer product would double the memory
+                part = slice(start, start + 512)
+                move[part] += np.outer(on_answered[part], swell).astype(np.float32)
+            inner_move = inner_move[:-1] + np.outer(inner_pressure, swell)
+            among = among[:-1, :-1] + np.outer(inner_pressure, among[-1, :-1])
+        watch = np.ascontiguousarray(inner_move[:, touch_dofs].T, np.float32)
+    except MemoryError as error:
+        raise TactileError("compliance", "out of memory", "2 GB of free memory", "Close other programs") from error
+    inner = inner_move.astype(np.float32), among.astype(np.float32), inner_pressure
+    return Arrays(move, watch, watch_gap, pressure, *inner)
 
 
-def _dofs(nodes: np.ndarray) -> np.ndarray:
-    return (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
+def axes_of(nodes: np.ndarray) -> np.ndarray:
+    """The three numbers of each node's axes, (3 k,)."""
+    return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
-def _chunks(items: list[int], size: int = 42):  # noqa: ANN202 (42 nodes: 126 right-hand sides, one batch of the factor)
-    for start in range(0, len(items), size):
-        yield np.array(items[start : start + size])
+class _Mirrored:
+    """Puts the even and the odd half of a motion together. ``half`` (k,) surface nodes with z >= 0; ``image`` (n,)."""
+
+    def __init__(self, half: np.ndarray, image: np.ndarray) -> None:
+        self.half, self.image = half, image
+        self.sign = np.tile([1.0, 1.0, -1.0], len(half)).astype(np.float32)
+
+    def loads(self, even: np.ndarray, odd: np.ndarray) -> np.ndarray:
+        """Motion (w, 3 n) of all nodes from the halves' (3 k, w)."""
+        answer = np.empty((even.shape[1], 3 * len(self.image)))
+        answer[:, axes_of(self.image[self.half])] = ((even - odd) * self.sign[:, None]).T
+        answer[:, axes_of(self.half)] = (even + odd).T
+        return answer
+
+    def forces(self, even: np.ndarray, odd: np.ndarray, answered: np.ndarray) -> np.ndarray:
+        """Motion (3 r, 3 n) float32 of all nodes under unit forces on ``answered`` (r,) from the halves' (3 k, 3 k)."""
+        here, there = axes_of(self.half), axes_of(self.image[self.half])
+        move = np.empty((3 * len(answered), 3 * len(self.image)), np.float32)
+        for i, node in enumerate(np.searchsorted(self.half, answered)):
+            rows, answer = slice(3 * node, 3 * node + 3), move[3 * i : 3 * i + 3]
+            answer[:, there] = (even[rows] - odd[rows]) * self.sign
+            answer[:, here] = even[rows] + odd[rows]  # after the other: on the mirror plane this one is right
+        return move
 
 
-def _mirror(lattice: Lattice) -> np.ndarray:
-    """Surface node that is the image of each node under z -> -z."""
-    keys = np.round(lattice.rest * 1e8).astype(np.int64)
-    where = {tuple(key): i for i, key in enumerate(keys)}
-    return np.array([where.get((x, y, -z), -1) for x, y, z in keys.tolist()])
-
-
-def _put_with_mirror(move, answer, first, touchable, mirror_node, index_of, done) -> None:  # noqa: ANN001
-    """Store answers (3 k, 3 n) for touchable entries ``first`` and, mirrored in z, for their images."""
-    sign = np.array([1.0, 1.0, -1.0])
-    for row, i in enumerate(first):
-        block = answer[3 * row : 3 * row + 3].reshape(3, -1, 3)
-        move[3 * i : 3 * i + 3] = block.reshape(3, -1)
-        done[i] = True
-        image = index_of.get(int(mirror_node[touchable[i]]))
-        if image is not None and image != i:
-            flipped = block[:, mirror_node] * sign[:, None, None] * sign
-            move[3 * image : 3 * image + 3] = flipped.reshape(3, -1)
-            done[image] = True
+def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
+    """Surface nodes (r,) with z >= 0 whose answers also serve their mirror images: of every touchable node one."""
+    return np.unique(np.where(lattice.rest[touchable, 2] >= -_ON_PLANE, touchable, image[touchable]))
 
 
 def _volume_gradient(mesh: HexMesh) -> np.ndarray:
-    """d(fluid volume) / d(node) (3 n_nodes,), m2: area vectors of the inner skin that point away from the fluid."""
-    inner = biotac_shape.skin_surface("inner")
-    corners = inner.rest[inner.faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6
-    gradient = np.zeros((len(mesh.nodes), 3))
-    for corner in range(3):
-        np.add.at(gradient, mesh.inner[inner.faces[:, corner]], -area)  # the faces point into the fluid
-    return gradient.ravel()
+    """d(fluid volume) / d(node) (3 n_nodes,), m2, at rest."""
+    return QuadraticCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)
 
 
 def _watched(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
@@ -249,20 +268,8 @@ def electrode_feet() -> ElectrodeFeet:
     return ElectrodeFeet(face, weights, (place - positions) / gap[:, None], gap)
 
 
-_CORE_WATCH_STEP = 2  # every second node along and round: the gap varies slowly
-
-
 def _over_core(inner: Lattice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes under the pad that face the core: node, radial direction (n, 3), gap (n,) m."""
-    theta = biotac_shape.angles()
-    rows, columns = inner.shape
-    row, column = np.meshgrid(
-        np.arange(0, rows, _CORE_WATCH_STEP), np.arange(0, columns, _CORE_WATCH_STEP), indexing="ij"
-    )
-    nodes = (row * columns + column)[np.abs(theta[column]) <= biotac_shape.PAD_ANGLE]
-    x, y, z = inner.rest[nodes].T
-    radius = np.hypot(y - biotac_shape.AXIS_Y, z)
-    gap = radius - biotac_shape.core_radius(x, np.arctan2(z, biotac_shape.AXIS_Y - y))
-    keep = np.isfinite(gap) & (gap > 0.1e-3)
-    outward = np.column_stack([np.zeros(len(x)), y - biotac_shape.AXIS_Y, z]) / radius[:, None]
-    return nodes[keep], outward[keep], gap[keep]
+    """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m."""
+    nodes = np.flatnonzero(facing_core(inner.rest))
+    gap, outward = Core().distance(inner.rest[nodes])
+    return nodes, outward, gap

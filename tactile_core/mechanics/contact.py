@@ -1,8 +1,7 @@
-"""Frictionless contact of a rigid indenter with a sensor's surface: primal-dual active set on the compliance.
+"""Contact of a rigid indenter with a sensor's surface, solved on its compliance; every result is checked.
 
-Unknown are the normal forces of the touching nodes and, when a force is asked for, the depth. Each iteration
-linearises the indenter's signed distance at the deformed position and solves a small dense system.
-Hintermueller, Ito, Kunisch, SIAM J. Optim. 13, 2003: the active set as a semismooth Newton method.
+Only nodes that the indenter may touch enter a solve; the whole surface is then displaced and looked at, and nodes that
+would go through the indenter, or inner skin that would go through the core, are taken in and the solve goes on.
 """
 
 from __future__ import annotations
@@ -12,154 +11,255 @@ import dataclasses
 import numpy as np
 
 from ..indenters import Indenter, Pose
+from . import surface_answer
+from .active_set import UnsolvedError
+from .candidates import Candidates
 from .compliance import Compliance
+from .frictional import Frictional
+from .frictionless import Frictionless, Try
+from .landing import landing, landing_spots
+from .near_block import NearBlock
+from .pose_path import between, same_place
 
-GAP_TOLERANCE = 0.05e-6  # m: 1/20 of the 1 um penetration that MECHANICS allows
-NORMAL_TOLERANCE = 1e-3  # rad, between the normal a force was computed with and the one where it ends up
-MAX_ITERATIONS = 40
-_REACH = 1.5e-3  # m, nodes this far outside the indenter at the start of a solve may come to touch it
+PENETRATION = 1e-6  # m, what MECHANICS allows at any node
+_REACH = 0.8e-3  # m, nodes this far outside the indenter at the end of a solve may come to touch it
+_TAKE_IN = 20e-6  # m: where some nodes go through the indenter, those this close to it are taken in with them
+_CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps vary more
+_CLOSED = 0.3e-6  # m: gaps closed to this need no further look
+_MOST_ROUNDS = 12  # of taking in nodes
+_EASIER = (0.78, 0.3, 0.1, 0.03)  # coefficients of friction on the way to none, where none at once does not settle
+_DETOURS = (4,)  # steps from the start to the goal, where one does not settle
+_REFUSALS = 3  # of nodes that flip but touch no second face, after which no more creases are looked for
+_LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest overlap are first taken to touch
 
 
 @dataclasses.dataclass(frozen=True)
 class Contact:
     """One solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
 
-    depth : how far the indenter moved in from first touch; force : (3,); axial_force : its part along the motion
+    pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
+    force : (3,); axial_force : its part along the motion
     nodes : (k,) touchable indices that carry force; nodal_force : (k, 3)
-    converged : whether active set and gaps settled; iterations : how many it took
+    slipping : (k,) bool, nodes whose friction is spent; without friction all
+    converged : whether it may be used; iterations : linearised problems solved for it
+    displacement : (n, 3) float32, of the whole surface
+    core_nodes : (c,) watched inner points that press on the core; core_force : (c,), on the skin, away from the core
+    penetration : m, deepest place of a node in the indenter or of the inner skin in the core
+    sideways : nodal forces across the indenter's normals over the whole force: 0 without friction
     """
 
+    pose: Pose
     depth: float
     force: np.ndarray
     axial_force: float
     nodes: np.ndarray
     nodal_force: np.ndarray
+    slipping: np.ndarray
     converged: bool
     iterations: int
+    displacement: np.ndarray
+    core_nodes: np.ndarray
+    core_force: np.ndarray
+    penetration: float
+    sideways: float
 
 
 class ContactProblem:
-    """An indenter at a pose in front of one sensor; solves for a depth or for a force along the direction of motion.
+    """An indenter in front of one sensor; solves for depths, for forces along the motion, and for other poses.
 
     Nodes are followed only where the indenter can reach them, ``reach`` m in from the pose at depth 0.
+    friction : Coulomb's coefficient; with it a contact depends on the one it goes on from, and on the steps between.
     """
 
-    def __init__(self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float) -> None:
-        self.compliance, self.indenter, self.pose = compliance, indenter, pose
-        rest = compliance.surface.rest[compliance.touchable]
-        near, _ = pose.moved(reach).distance(indenter, rest)
-        self.near = np.flatnonzero(near < _REACH)
-        self.rest = rest[self.near]
-        rows = (3 * self.near[:, None] + np.arange(3)).ravel()
-        columns = (3 * compliance.touchable[self.near][:, None] + np.arange(3)).ravel()
-        block = np.asarray(compliance.move[rows][:, columns], np.float64)
-        k = len(self.near)
-        self.block = block.reshape(k, 3, k, 3)
+    def __init__(
+        self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, friction: float = 0.0
+    ) -> None:
+        self.compliance, self.indenter, self.pose, self.friction = compliance, indenter, pose, friction
+        self._rest = compliance.surface.rest[compliance.touchable]
+        self._block: NearBlock | None = None
+        self._look_near(pose.moved(reach))
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
-        """The contact at a given depth, m."""
-        return self._solve(depth, None, start)
+        """The contact at a given depth, m, going on from ``start`` where there is one."""
+        return self._walk(self.pose.moved(depth), None, start)
 
     def at_force(self, axial_force: float, start: Contact) -> Contact:
-        """The contact whose force along the motion is ``axial_force`` N, starting from a solved one."""
-        return self._solve(start.depth, axial_force, start)
+        """The contact whose force along the motion is ``axial_force`` N, in or out from where ``start`` stands."""
+        return self._walk(start.pose, axial_force, start)
 
-    def _solve(self, depth: float, axial_force: float | None, start: Contact | None) -> Contact:
-        direction = self.pose.direction
-        displacement, force = self._begin(start)
-        active = force.any(axis=1)
-        seen: set[bytes] = set()
-        for iteration in range(1, MAX_ITERATIONS + 1):
-            distance, normal = self.pose.moved(depth).distance(self.indenter, self.rest + displacement)
-            if not active.any():
-                force, displacement = np.zeros_like(force), np.zeros_like(displacement)
-                distance, normal = self.pose.moved(depth).distance(self.indenter, self.rest)
-                active = distance < 0
-                if not active.any():
-                    return self._result(depth, force, converged=axial_force is None, iterations=iteration)
-            index = np.flatnonzero(active)
-            pressing, step = self._newton(index, distance, normal, displacement, direction, axial_force)
-            depth += step
-            force = np.zeros_like(displacement)
-            force[index] = pressing[:, None] * normal[index]
-            displacement = np.einsum("ai,aibj->bj", force[index], self.block[index], optimize=True)
-            distance, turned = self.pose.moved(depth).distance(self.indenter, self.rest + displacement)
-            release = np.zeros_like(active)
-            release[index] = pressing < 0
-            enter = ~active & (distance < -GAP_TOLERANCE)
-            still = max(np.abs(distance[index]).max(), abs(step)) < GAP_TOLERANCE
-            still &= np.abs(turned[index] - normal[index]).max() < NORMAL_TOLERANCE
-            if still and not release.any() and not enter.any():
-                return self._result(depth, force, converged=True, iterations=iteration)
-            active = self._next(active, release, enter, distance, pressing, index, seen)
-        return self._result(depth, force, converged=False, iterations=MAX_ITERATIONS)
+    def at_pose(self, pose: Pose, start: Contact | None = None, axial_force: float | None = None) -> Contact:
+        """The contact of the indenter at another pose, moved there from ``start`` in one step.
 
-    def _next(self, active, release, enter, distance, pressing, index, seen) -> np.ndarray:  # noqa: ANN001
-        """The next active set; once a set comes back, one node is changed at a time, which breaks the cycle."""
-        proposal = (active & ~release) | enter
-        key = proposal.tobytes()
-        if key not in seen or not (release.any() or enter.any()):
-            seen.add(key)
-            return proposal
-        single = active.copy()
-        if release.any():
-            single[index[np.argmin(pressing)]] = False
+        axial_force : N; with it the indenter then moves along its own direction until it bears that force
+        """
+        self._look_near(pose)
+        return self._walk(pose, axial_force, start)
+
+    def _look_near(self, pose: Pose) -> None:
+        gap, _ = pose.distance(self.indenter, self._rest)
+        self.near = np.flatnonzero(gap < _REACH)
+
+    def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
+        """Solve in one step, or where that does not settle by a detour."""
+        contact = self._solve(pose, axial_force, start)
+        if not contact.converged and self.friction == 0:
+            contact = self._ease(pose, axial_force, start)
+        for steps in _DETOURS:
+            if contact.converged:
+                break
+            contact = self._steps(pose, axial_force, start, steps)
+        return contact
+
+    def _steps(self, pose: Pose, axial_force: float | None, start: Contact | None, steps: int) -> Contact:
+        """Go from the start to the goal in several steps."""
+        first = contact = start or self._nothing(self.pose)
+        for share in np.arange(1, steps + 1) / steps:
+            goal = None if axial_force is None else first.axial_force + share * (axial_force - first.axial_force)
+            there = between(first.pose, pose, share)
+            if axial_force is not None and same_place(first.pose, pose):
+                there = contact.pose  # only the force grows: each step starts as deep as the last one ended
+            contact = self._solve(there, goal, contact)
+        return contact
+
+    def _ease(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
+        """Start a contact without friction from ones with less and less of it: sticking nodes settle best."""
+        contact = start
+        for friction in _EASIER:
+            contact = self._solve(pose, axial_force, contact, friction)
+        return self._solve(pose, axial_force, contact)
+
+    def _solve(
+        self, pose: Pose, axial_force: float | None, start: Contact | None, friction: float | None = None
+    ) -> Contact:
+        before = start or self._nothing(self.pose)
+        moved = before.displacement[self.compliance.touchable[self.near]].astype(float)
+        gap, _ = pose.distance(self.indenter, self._rest[self.near] + moved)
+        touched = np.isin(self.near, before.nodes)
+        take = (gap < 0) | touched
+        if not take.any():
+            return self._nothing(pose, converged=axial_force is None)
+        active = touched[take] | (gap[take] < min(_LIKELY * gap.min(), 0))
+        far = 0.1e-3 + float(np.linalg.norm(pose.apex - before.pose.apex))
+        landed = moved[take] + landing(self.indenter, pose, self._rest[self.near[take]] + moved[take], far)
+        candidates = Candidates(self.near[take], landed, np.zeros_like(landed), active, before.core_nodes)
+        friction = self.friction if friction is None else friction
+        return self._rounds(pose, axial_force, before, candidates, friction)
+
+    def _rounds(
+        self, pose: Pose, axial_force: float | None, before: Contact, candidates: Candidates, friction: float
+    ) -> Contact:
+        """Solve, look at the whole surface, take in what it shows, until nothing more is found."""
+        iterations, shift, contact = 0, 0.0, None
+        for _ in range(_MOST_ROUNDS):
+            state = self._iterate(pose, axial_force, before, candidates, shift, friction)
+            if state is None:
+                return self._nothing(pose, iterations=iterations + 1, converged=False)
+            iterations, shift = iterations + state.iterations, state.shift
+            candidates.go_on(state.displacement, state.active)
+            there, rest = pose.moved(shift), self._rest[candidates.nodes]
+            if state.creases is not None:
+                candidates.refused += not candidates.split(*state.creases, self.indenter, there, rest)
+                continue
+            contact = self._result(there, state, candidates, iterations)
+            if not state.settled or not self._take_in(candidates, state, contact):
+                return contact
+        return dataclasses.replace(contact, converged=False)
+
+    def _iterate(self, pose, axial_force, before, candidates, shift, friction) -> Try | None:  # noqa: ANN001
+        block = self._block
+        if block is None or not (
+            np.array_equal(block.nodes, candidates.nodes) and np.array_equal(block.inner, candidates.inner)
+        ):
+            block = self._block = NearBlock(self.compliance, candidates.nodes, candidates.inner)
+        rest = self._rest[candidates.nodes]
+        active = np.r_[candidates.active, np.ones(block.c, bool)]
+        begin = Try(candidates.displacement, np.zeros_like(rest), np.zeros(block.c), shift, active)
+        core_gap = self.compliance.watch_gap[candidates.inner].astype(float)
+        if friction == 0:
+            solver = Frictionless(
+                block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.refused >= _REFUSALS
+            )
         else:
-            single[np.argmin(np.where(enter, distance, 0))] = True
-        return single
+            moved = before.displacement[self.compliance.touchable[candidates.nodes]]
+            touched = np.isin(candidates.nodes, before.nodes)
+            spots = landing_spots(self.indenter, before.pose, pose, rest + moved, touched)
+            solver = Frictional(block, rest, core_gap, self.indenter, pose, spots, friction)
+        try:
+            return solver.solve(begin, axial_force)
+        except UnsolvedError:
+            return None
 
-    def _begin(self, start: Contact | None) -> tuple[np.ndarray, np.ndarray]:
-        force = np.zeros((len(self.near), 3))
-        if start is None or not len(start.nodes):
-            return np.zeros_like(force), force
-        where = np.searchsorted(self.near, start.nodes)
-        force[where] = start.nodal_force
-        return np.einsum("ai,aibj->bj", force[where], self.block[where], optimize=True), force
+    def _take_in(self, candidates: Candidates, state: Try, contact: Contact) -> bool:
+        """Let the nodes enter that the solved contact lets through the indenter or the core; whether there are any."""
+        outside = np.setdiff1d(self.near, candidates.nodes, assume_unique=False)
+        moved = contact.displacement[self.compliance.touchable[outside]].astype(float)
+        gap, _ = contact.pose.distance(self.indenter, self._rest[outside] + moved)
+        found = gap.min(initial=0.0) < -_CLOSED
+        if found:
+            new = gap < _TAKE_IN
+            candidates.add(outside[new], moved[new], np.zeros_like(moved[new]))
+        if len(self.compliance.watch_gap):
+            core = watched_gaps(self.compliance, contact)[self.compliance.feet :]
+            if core.min() < -_CLOSED:
+                close = self.compliance.feet + np.flatnonzero(core < _CORE_TAKE_IN)
+                inner = np.union1d(candidates.inner, close)
+                found |= len(inner) > len(candidates.inner)
+                candidates.inner = inner
+        return bool(found)
 
-    def _newton(self, index, distance, normal, displacement, direction, axial_force):  # noqa: ANN001, ANN202
-        """Normal forces (k,) N that close the linearised gaps, and the step in depth, m."""
-        n = normal[index]
-        block = self.block[np.ix_(index, range(3), index, range(3))]
-        matrix = np.einsum("ai,aibj,bj->ab", n, block, n, optimize=True)
-        gap = np.einsum("ai,ai->a", n, displacement[index]) - distance[index]
-        if axial_force is None:
-            return np.linalg.solve(matrix, gap), 0.0
-        along = n @ direction
-        k = len(index)
-        bordered = np.zeros((k + 1, k + 1))
-        bordered[:k, :k], bordered[:k, k], bordered[k, :k] = matrix, -along, along
-        answer = np.linalg.solve(bordered, np.r_[gap, axial_force])
-        return answer[:k], float(answer[k])
-
-    def _result(self, depth: float, force: np.ndarray, *, converged: bool, iterations: int) -> Contact:
-        carrying = np.flatnonzero(force.any(axis=1))
-        total = force.sum(axis=0)
+    def _nothing(self, pose: Pose, *, converged: bool = True, iterations: int = 0) -> Contact:
+        """No contact, or one that was not found."""
+        still = np.zeros((len(self.compliance.surface.rest), 3), np.float32)
+        none, depth = np.empty(0, int), float((pose.apex - self.pose.apex) @ pose.direction)
         return Contact(
-            depth,
-            total,
-            float(total @ self.pose.direction),
-            self.near[carrying],
-            force[carrying],
-            converged,
-            iterations,
+            pose, depth, np.zeros(3), 0.0, none, np.zeros((0, 3)), np.zeros(0, bool), converged, iterations, still,
+            none, np.zeros(0), 0.0, 0.0,
+        )  # fmt: skip
+
+    def _result(self, pose: Pose, state: Try, candidates: Candidates, iterations: int) -> Contact:
+        nodes, first, merged = np.unique(candidates.nodes, return_index=True, return_inverse=True)
+        force, slipping = np.zeros((len(nodes), 3)), state.slipping[first]
+        np.add.at(force, merged, state.force)
+        carries, presses = force.any(axis=1), state.core_force > 0
+        nodes, force, slipping = nodes[carries], force[carries], slipping[carries]
+        inner, inner_force = candidates.inner[presses], state.core_force[presses]
+        displacement = surface_answer.displacement(self.compliance, nodes, force, inner, inner_force)
+        total = force.sum(axis=0)
+        placed = self._rest[self.near] + displacement[self.compliance.touchable[self.near]]
+        gap, normal = pose.distance(self.indenter, placed)
+        at = np.searchsorted(self.near, nodes)
+        contact = Contact(
+            pose, float((pose.apex - self.pose.apex) @ pose.direction), total, float(total @ pose.direction),
+            nodes, force, slipping, state.settled, iterations, displacement, inner, inner_force,
+            0.0, _sideways(force, normal[at]),
+        )  # fmt: skip
+        core = watched_gaps(self.compliance, contact)[self.compliance.feet :]
+        penetration = max(-gap.min(initial=0.0), -core.min(initial=0.0))
+        return dataclasses.replace(
+            contact, penetration=float(penetration), converged=bool(state.settled and penetration <= PENETRATION)
         )
+
+
+def _sideways(force: np.ndarray, normal: np.ndarray) -> float:
+    size = np.linalg.norm(force.sum(axis=0))
+    across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
+    return float(np.linalg.norm(across) / size) if size else 0.0
 
 
 def surface_displacement(compliance: Compliance, contact: Contact) -> np.ndarray:
     """Displacement (n, 3) m of the whole surface in a contact."""
-    return _answer(compliance.move, contact).reshape(-1, 3)
+    return contact.displacement.astype(float)
 
 
 def watched_gaps(compliance: Compliance, contact: Contact) -> np.ndarray:
     """Gaps (w,) m of the watched points in a contact: 19 electrodes, then inner skin over the core."""
-    return compliance.watch_gap + _answer(compliance.watch, contact)
+    return surface_answer.watched_gaps(
+        compliance, contact.nodes, contact.nodal_force, contact.core_nodes, contact.core_force
+    )
 
 
 def fluid_pressure(compliance: Compliance, contact: Contact) -> float:
     """Rise of the fluid's pressure in a contact, Pa."""
-    return float(_answer(compliance.pressure[:, None], contact)[0])
-
-
-def _answer(matrix: np.ndarray, contact: Contact) -> np.ndarray:
-    rows = (3 * contact.nodes[:, None] + np.arange(3)).ravel()
-    return contact.nodal_force.ravel() @ np.asarray(matrix[rows], np.float64)
+    at_nodes = compliance.pressure.reshape(-1, 3)[contact.nodes]
+    at_core = compliance.inner_pressure[contact.core_nodes]
+    return float((contact.nodal_force * at_nodes).sum() + contact.core_force @ at_core)

@@ -14,7 +14,7 @@ from .hex_mesh import HexMesh
 _POINTS, _POINT_WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
-def _quadratic(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def quadratic(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values and slopes (n, 3) of the quadratic Lagrange polynomials on nodes -1, 0, 1."""
     value = np.stack([t * (t - 1) / 2, 1 - t**2, t * (t + 1) / 2], -1)
     slope = np.stack([t - 0.5, -2 * t, t + 0.5], -1)
@@ -25,7 +25,7 @@ def reference_gradients() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gauss points (27, 3), weights (27,) and shape gradients (27, 27, 3) in the reference cube."""
     points = np.stack(np.meshgrid(_POINTS, _POINTS, _POINTS, indexing="ij"), -1).reshape(-1, 3)
     weights = np.einsum("a,b,c->abc", *[_POINT_WEIGHTS] * 3).ravel()
-    (fx, dx), (fy, dy), (fz, dz) = (_quadratic(points[:, k]) for k in range(3))
+    (fx, dx), (fy, dy), (fz, dz) = (quadratic(points[:, k]) for k in range(3))
 
     def product(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         return np.einsum("qa,qb,qc->qcba", x, y, z).reshape(len(points), 27)

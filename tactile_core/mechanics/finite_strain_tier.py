@@ -12,7 +12,7 @@ from ..indenters import Indenter, Pose
 from .core import Core, facing_core
 from .finite_strain import FiniteStrainSolid
 from .graded_mesh import Footprint, GradedMesh, graded_gel, graded_skin
-from .hex_mesh import HexMesh
+from .hex_mesh import inner_faces
 from .neo_hookean import NeoHookean
 from .newton import EXACT, FiniteStrainContact, Tolerance, Touch
 from .quadratic_cavity import QuadraticCavity
@@ -81,16 +81,8 @@ def graded_body(
         return Body(sensor, tier, solid, None, np.empty(0, int), graded)
     solid = FiniteStrainSolid(mesh, sensors.BIOTAC_SKIN, graded.pattern)
     free = mesh.inner[~mesh.clamped[mesh.inner]]
-    cavity = QuadraticCavity(_inner_faces(mesh), len(mesh.nodes))
+    cavity = QuadraticCavity(inner_faces(mesh), len(mesh.nodes))
     return Body(sensor, tier, solid, cavity, np.sort(free[facing_core(mesh.nodes[free])]), graded)
-
-
-def _inner_faces(mesh: HexMesh) -> np.ndarray:
-    """Quadratic faces (n, 9) of the inner skin, seen from outside the fluid: the undersides of the cells on it."""
-    inner = np.zeros(len(mesh.nodes), bool)
-    inner[mesh.inner] = True
-    faces = mesh.cells[:, :9][inner[mesh.cells[:, :9]].all(axis=1)]
-    return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)
 
 
 def _footprint(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float) -> Footprint:

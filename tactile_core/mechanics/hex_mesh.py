@@ -85,6 +85,14 @@ def skin_solid(outer: np.ndarray, inner: np.ndarray, glued: np.ndarray, layers: 
     return HexMesh(nodes, hex_cells(closed), clamped, surface_ids(-1), surface_ids(0))
 
 
+def inner_faces(mesh: HexMesh) -> np.ndarray:
+    """Quadratic faces (n, 9) of the inner skin, seen from outside the fluid: the undersides of the cells on it."""
+    inner = np.zeros(len(mesh.nodes), bool)
+    inner[mesh.inner] = True
+    faces = mesh.cells[:, :9][inner[mesh.cells[:, :9]].all(axis=1)]
+    return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)
+
+
 @functools.cache
 def gel_mesh() -> HexMesh:
     """The DIGIT's gel on the lattice of its surface; about 20,000 nodes."""

@@ -20,16 +20,20 @@ import numpy as np
 from .. import __version__, atomic, digit_shape, sensors
 from ..errors import TactileError
 from ..hdf5_disk import Disk
+from ..indenters import Indenter, Pose
 from ..scene import PairSpec, Scene, load_scene
-from .compliance import biotac_compliance, digit_compliance
-from .contact import Contact, fluid_pressure, surface_displacement
+from .compliance import Compliance, biotac_compliance, digit_compliance
+from .contact import Contact
+from .corrected_press import CorrectedPress, FastContact
 from .electrodes import electrode_gaps, signal_of_gaps
-from .press import Placement, Press, biotac_pose, digit_pose, on_gel
+from .press import Placement, biotac_pose, digit_pose, on_gel, touched_point
+from .thickness import thickness
 
 log = logging.getLogger(__name__)
 
 FORMAT = "tactile-pairs-1"
 SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
+MOST_DEPTH = 2.5e-3  # m: 60 % of the gel; where the BioTac has no core below, its thickness says little
 BLOCK = 16  # presses a block: a few seconds of work
 
 
@@ -168,15 +172,19 @@ def _no_room(path: pathlib.Path, error: OSError | RuntimeError) -> TactileError:
 
 
 def _press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray]]:
-    """The contacts of one press: force grows by the scene's ratio until one of the sensors reaches its limit."""
+    """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
+
+    Forces begin log-uniformly within one ratio, so over many presses they are log-uniform.
+    """
     spec = scene.pairs
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which = int(random.integers(len(scene.indenters)))
     indenter = scene.indenters[which].build()
     place = _draw_place(random, spec)
-    limit = spec.depth_max_mm * 1e-3
-    on_biotac = Press(biotac_compliance(), indenter, biotac_pose(indenter, place), limit)
-    on_digit = Press(digit_compliance(), indenter, digit_pose(indenter, place), limit)
+    on_biotac, on_digit = (
+        _press(compliance, indenter, pose(indenter, place), spec)
+        for compliance, pose in ((biotac_compliance(), biotac_pose), (digit_compliance(), digit_pose))
+    )
     force = spec.force_min_n * spec.force_ratio ** random.uniform()
     rows = []
     while True:
@@ -185,6 +193,12 @@ def _press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarra
             return rows
         rows.append({"press": np.int32(press), "indenter": np.int16(which), **pair_row(biotac, digit)})
         force *= spec.force_ratio
+
+
+def _press(compliance: Compliance, indenter: Indenter, pose: Pose, spec: PairSpec) -> CorrectedPress:
+    thick = thickness(compliance.name, touched_point(compliance, indenter, pose))
+    limit = min(spec.depth_max_percent / 100 * thick, MOST_DEPTH)
+    return CorrectedPress(compliance, indenter, pose, limit, spec.friction)
 
 
 def _draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
@@ -197,23 +211,23 @@ def _draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
     return Placement(x, z, float(lean), float(random.uniform(0, 2 * np.pi)))
 
 
-def pair_row(biotac: Contact, digit: Contact) -> dict[str, np.ndarray]:
-    """What one paired contact stores; arrays as in the file, see ``DATASETS``."""
+def pair_row(biotac: FastContact, digit: FastContact) -> dict[str, np.ndarray]:
+    """What one paired contact stores; arrays as in the file, see ``DATASETS``. Electrode gaps are not corrected."""
     skin, gel = biotac_compliance(), digit_compliance()
-    gaps = electrode_gaps(skin, biotac)
+    gaps = electrode_gaps(skin, biotac.linear)
     return {
-        "displacement_biotac": quantise(surface_displacement(skin, biotac)),
-        "displacement_digit": quantise(surface_displacement(gel, digit)),
+        "displacement_biotac": quantise(biotac.corrected.displacement),
+        "displacement_digit": quantise(digit.corrected.displacement),
         "signal": signal_of_gaps(gaps).astype(np.float32),
         "gap": gaps.astype(np.float32),
         "force": biotac.force.astype(np.float32),
         "force_digit": digit.force.astype(np.float32),
-        "pressure": np.float32(fluid_pressure(skin, biotac)),
-        "depth_biotac": np.float32(biotac.depth),
-        "depth_digit": np.float32(digit.depth),
-        "contact_center": contact_center(digit).astype(np.float32),
-        "contact_patch_biotac": _patch(len(skin.surface.rest), skin.touchable[biotac.nodes]),
-        "contact_patch_digit": _patch(len(gel.surface.rest), gel.touchable[digit.nodes]),
+        "pressure": np.float32(biotac.pressure),
+        "depth_biotac": np.float32(biotac.linear.depth),
+        "depth_digit": np.float32(digit.linear.depth),
+        "contact_center": contact_center(digit.linear).astype(np.float32),
+        "contact_patch_biotac": _patch(len(skin.surface.rest), skin.touchable[biotac.linear.nodes]),
+        "contact_patch_digit": _patch(len(gel.surface.rest), gel.touchable[digit.linear.nodes]),
     }
 
 

@@ -3,30 +3,40 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Iterable, Iterator
 from typing import Literal
 
 import numpy as np
 
-from .. import biotac_shape, sensors
+from .. import digit_shape, sensors
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
-from .cavity import Cavity
 from .compliance import biotac_compliance, digit_compliance
-from .contact import fluid_pressure, surface_displacement
-from .finite_strain import FiniteStrainSolid
-from .hex_mesh import HexMesh, gel_mesh, skin_mesh
+from .corrected_press import CorrectedPress
+from .expected_error import expected_error
+from .finite_strain import FiniteStrainSolid, State
+from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Body, Sensor, graded_body
 from .newton import FiniteStrainContact, Touch
-from .press import MAX_DEPTH, Placement, Press, biotac_pose, digit_pose, on_gel
+from .press import FRICTION, Placement, biotac_pose, digit_pose, on_gel
+from .thickness import DEPTH_LIMIT, thickness
 
-Sensor = Literal["biotac", "digit"]
-Tier = Literal["fast", "reference"]
+Tier = Literal["fast", "full", "reference"]
+TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
 
-LOAD_STEP = {"biotac": 0.3e-3, "digit": 0.2e-3}  # m; Newton's method takes 5 or 6 iterations a step of this size
-_REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth may come to touch it
-_FORCE_TOLERANCE = 1e-4  # relative, of the reference tier's search for a force
-_SEARCH_STEPS = 12
+_FORCE_TOLERANCE = 1e-4  # relative, of the search for a force
+_SEARCH_STEPS = 20
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """A place on a path: ``depth`` m or ``force`` N along the motion, and how far the indenter has slid, m.
+
+    slide : along the finger and across, in the indenter's own axes, from where it first touched
+    """
+
+    depth: float | None = None
+    force: float | None = None
+    slide: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,6 +47,10 @@ class Solution:
     displacement : (n, 3) m of the sensor's surface nodes; contact_patch : (n,) bool, nodes that carry force
     force : (3,) N, exerted by the indenter on the sensor; depth : m from first touch
     pressure : Pa, rise of the BioTac's fluid pressure, 0 for the DIGIT
+    shape_error, force_error : expected, rms m over nodes that move more than 10 um, and relative; NaN where unknown
+    penetration : m, deepest place of a node in the indenter or the core; slipping : share of the touching nodes
+    core_nodes : inner-skin nodes that press on the core; load_steps : how many it took to get here from the last
+    volume : the solid and its state, of the full and the reference tier
     """
 
     tier: Tier
@@ -47,6 +61,13 @@ class Solution:
     force: np.ndarray
     depth: float
     pressure: float
+    shape_error: float
+    force_error: float
+    penetration: float
+    slipping: float
+    core_nodes: int
+    load_steps: int = 1
+    volume: tuple[FiniteStrainSolid, State] | None = None
 
 
 def solve(
@@ -57,126 +78,160 @@ def solve(
     depth: float | None = None,
     force: float | None = None,
     tier: Tier = "fast",
+    friction: float = FRICTION,
 ) -> Solution:
     """Press ``indenter`` into ``sensor`` at ``place`` to a depth, m, or a force along the motion, N.
 
-    ``fast`` is linear (milliseconds, right for small depths), ``reference`` finite strain on the same mesh (minutes).
-    Raises TactileError for an impossible request, or for one beyond what the tier may be asked.
+    ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round the
+    contact (about a second; with friction several), ``reference`` the same on cells half as large (a minute).
+    Raises TactileError for an impossible request, or for one beyond what the tier finds.
     """
-    _check(depth, force)
-    pose = _pose(sensor, indenter, place)
-    if force == 0:
-        depth, force = 0.0, None
-    if tier == "fast":
-        return _fast(sensor, indenter, pose, depth, force)
-    problem = _problem(sensor, indenter, pose)
-    touch = problem.press(depth, step=LOAD_STEP[sensor]) if force is None else _at_force(problem, sensor, force)
-    return _solution(sensor, problem, touch)
+    return next(solve_path(sensor, indenter, place, [Step(depth, force)], tier, friction))
 
 
 def solve_path(
-    sensor: Sensor, indenter: Indenter, place: Placement, depths: Iterable[float], tier: Tier = "fast"
+    sensor: Sensor,
+    indenter: Indenter,
+    place: Placement,
+    steps: Iterable[Step],
+    tier: Tier = "fast",
+    friction: float = FRICTION,
 ) -> Iterator[Solution]:
-    """Solutions at growing depths, m, each going on from the one before; those already yielded are kept on an error.
+    """Solutions along a path, each going on from the one before; those already yielded are kept on an error.
 
     Raises what ``solve`` raises.
     """
-    pose = _pose(sensor, indenter, place)
-    problem, touch = (_problem(sensor, indenter, pose), None) if tier == "reference" else (None, None)
-    for depth in depths:
-        _check(depth, None)
-        if problem is None:
-            yield _fast(sensor, indenter, pose, depth, None)
-            continue
-        touch = problem.press(depth, touch, LOAD_STEP[sensor])
-        yield _solution(sensor, problem, touch)
-
-
-def _pose(sensor: Sensor, indenter: Indenter, place: Placement) -> Pose:
+    steps = list(steps)
+    if tier not in TIERS:
+        raise TactileError("solve, tier", repr(tier), "fast, full or reference")
+    if not (np.isfinite(friction) and friction >= 0):
+        raise TactileError("solve, friction", repr(friction), "a coefficient of zero or more")
     if not on_gel(place.x, place.z):
         found = f"({place.x * 1e3:g}, {place.z * 1e3:g}) mm"
         raise TactileError("solve, place", found, "a place on the DIGIT's gel (x, z), see digit_shape.outline_distance")
-    return (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
+    pose = (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
+    rest = (sensors.biotac_surface() if sensor == "biotac" else sensors.digit_surface()).rest
+    thick = thickness(sensor, rest[int(np.argmin(pose.distance(indenter, rest)[0]))])
+    for step in steps:
+        _check(step, DEPTH_LIMIT * thick)
+    path = (_Fast if tier == "fast" else _FiniteStrain)(sensor, indenter, pose, thick, steps, tier, friction)
+    for step in steps:
+        yield path.to(step)
 
 
-def _check(depth: float | None, force: float | None) -> None:
-    if (depth is None) == (force is None):
-        raise TactileError("solve", f"depth {depth!r} and force {force!r}", "one of the two")
-    name, value, unit = ("depth", depth, "m") if force is None else ("force", force, "N")
+def _check(step: Step, limit: float) -> None:
+    if (step.depth is None) == (step.force is None):
+        raise TactileError("solve", f"depth {step.depth!r} and force {step.force!r}", "one of the two")
+    name, value, unit = ("depth", step.depth, "m") if step.force is None else ("force", step.force, "N")
     if not (np.isfinite(value) and value >= 0):
         raise TactileError(f"solve, {name}", f"{value!r} {unit}", "zero or more, and finite")
-    if depth is not None and depth > MAX_DEPTH:
-        raise TactileError("solve, depth", f"{depth * 1e3:g} mm", f"at most {MAX_DEPTH * 1e3:g} mm",
-                           "Deeper contacts are not modelled yet")  # fmt: skip
+    if step.depth is not None and step.depth > limit:
+        expected = f"at most {limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
+        raise TactileError("solve, depth", f"{step.depth * 1e3:g} mm", expected, "Press less")
+    if not (np.isfinite(step.slide).all() and np.abs(step.slide).max() <= _FARTHEST_SLIDE):
+        found = f"{tuple(1e3 * s for s in step.slide)} mm"
+        raise TactileError("solve, slide", found, f"two lengths of at most {_FARTHEST_SLIDE * 1e3:g} mm")
 
 
-def _fast(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float | None, force: float | None) -> Solution:
-    compliance = biotac_compliance() if sensor == "biotac" else digit_compliance()
-    press = Press(compliance, indenter, pose)
-    contact = press.at_force(force) if depth is None else press.at_depth(depth)
-    if contact is None:
-        found = f"force {force:g} N" if depth is None else f"depth {depth * 1e3:g} mm"
-        expected = f"at most {MAX_DEPTH * 1e3:g} mm deep, and the skin clear of its core"
-        raise TactileError(f"solve, {sensor}, fast tier", found, expected, "Press less")
-    patch = np.zeros(len(compliance.surface.rest), bool)
-    patch[compliance.touchable[contact.nodes]] = True
-    return Solution(
-        "fast", contact.converged, contact.iterations, surface_displacement(compliance, contact), patch,
-        contact.force, contact.depth, fluid_pressure(compliance, contact),
-    )  # fmt: skip
+_FARTHEST_SLIDE = 10e-3  # m, half of the gel
 
 
-@functools.cache
-def _solid(sensor: Sensor) -> tuple[FiniteStrainSolid, Cavity | None]:
-    if sensor == "digit":
-        return FiniteStrainSolid(gel_mesh(), sensors.DIGIT_GEL), None
-    mesh = skin_mesh()
-    into_skin = mesh.inner[biotac_shape.skin_surface("inner").faces][:, ::-1]
-    return FiniteStrainSolid(mesh, sensors.BIOTAC_SKIN), Cavity(into_skin, len(mesh.nodes))
+def _slid(pose: Pose, slide: tuple[float, float]) -> Pose:
+    return Pose(pose.apex + pose.axes[:, 0] * slide[0] + pose.axes[:, 1] * slide[1], pose.axes)
 
 
-def _problem(sensor: Sensor, indenter: Indenter, pose: Pose) -> FiniteStrainContact:
-    solid, cavity = _solid(sensor)
-    distance, _ = pose.moved(MAX_DEPTH).distance(indenter, solid.mesh.nodes[solid.mesh.surface])
-    return FiniteStrainContact(solid, solid.mesh.surface[distance < _REACH], indenter, pose, cavity)
+class _Path:
+    """A path of one indenter on one sensor; ``to`` goes on from the step before."""
+
+    def __init__(
+        self, sensor: Sensor, indenter: Indenter, pose: Pose, thick: float, steps: list[Step], tier: Tier,
+        friction: float,
+    ) -> None:  # fmt: skip
+        self.sensor, self.indenter, self.pose, self.tier, self.friction = sensor, indenter, pose, tier, friction
+        self.thickness, self.limit = thick, DEPTH_LIMIT * thick
+        self.deepest = max((step.depth for step in steps if step.depth is not None), default=0.0)
+        if any(step.force for step in steps):
+            self.deepest = self.limit
+
+    def unreachable(self, force: float) -> TactileError:
+        """What is said where no depth within the limit gives a force."""
+        expected = f"a force that is reached within {self.limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
+        return TactileError(f"solve, {self.sensor}, {self.tier} tier", f"force {force:g} N", expected, "Press less")
 
 
-def _at_force(problem: FiniteStrainContact, sensor: Sensor, force: float) -> Touch:
-    """The contact at a force along the motion, by regula falsi on F^(2/3), which is nearly straight in the depth."""
-    touch, below = problem.start(), (0.0, 0.0)
-    direction = problem.pose.direction
-    goal = force ** (2 / 3)
-    depth = LOAD_STEP[sensor] / 2
-    for _ in range(_SEARCH_STEPS):
-        if depth > MAX_DEPTH:
-            raise TactileError("solve, force", f"{force:g} N", f"a force within {MAX_DEPTH * 1e3:g} mm", "Lower it")
-        touch = problem.press(depth, touch if touch.depth < depth else None, LOAD_STEP[sensor])
-        found = max(float(touch.force @ direction), 0.0)
-        if abs(found - force) <= _FORCE_TOLERANCE * force:
-            return touch
-        root = found ** (2 / 3)
-        slope = max((root - below[1]) / (depth - below[0]), 1e-6)  # no node is touched yet: go on by a whole step
-        if root < goal:
-            below = (depth, root)
-        depth = depth + float(np.clip((goal - root) / slope, -depth / 2, LOAD_STEP[sensor]))
-    raise TactileError("solve, force", f"{found:g} N after {_SEARCH_STEPS} steps", f"{force:g} N", "Give a depth")
+class _Fast(_Path):
+    def __init__(self, *arguments) -> None:  # noqa: ANN002
+        super().__init__(*arguments)
+        compliance = biotac_compliance() if self.sensor == "biotac" else digit_compliance()
+        self.press = CorrectedPress(compliance, self.indenter, self.pose, self.limit, self.friction)
+
+    def to(self, step: Step) -> Solution:
+        """See ``solve_path``. The force asked for is the corrected one."""
+        pose, compliance = _slid(self.pose, step.slide), self.press.compliance
+        if step.force:
+            found = self.press.at_force(step.force, pose)
+            if found is None:
+                raise self.unreachable(step.force)
+        else:
+            found = self.press.at_depth(step.depth or 0.0, pose)
+        contact, corrected = found.linear, found.corrected
+        patch = np.zeros(len(compliance.surface.rest), bool)
+        patch[compliance.touchable[contact.nodes]] = True
+        return Solution(
+            "fast", contact.converged, contact.iterations, corrected.displacement, patch, found.force, contact.depth,
+            found.pressure, corrected.shape_error, corrected.force_error, contact.penetration,
+            float(contact.slipping.mean()) if len(contact.slipping) and self.friction else 0.0, len(contact.core_nodes),
+        )  # fmt: skip
 
 
-def _solution(sensor: Sensor, problem: FiniteStrainContact, touch: Touch) -> Solution:
-    mesh = problem.solid.mesh
-    if sensor == "biotac" and _core_gap(mesh, touch.state.displacement) < 0:
-        found = f"the skin goes through its core at {touch.depth * 1e3:g} mm"
-        raise TactileError("solve, biotac, reference tier", found, "a skin clear of its core", "Press less")
-    patch = np.isin(mesh.surface, touch.nodes)
-    displacement = touch.state.displacement[mesh.surface]
-    return Solution("reference", True, touch.iterations, displacement, patch, touch.force, touch.depth, touch.fluid)
+class _FiniteStrain(_Path):
+    body: Body
+    problem: FiniteStrainContact
 
+    def __init__(self, *arguments) -> None:  # noqa: ANN002
+        super().__init__(*arguments)
+        self.body = graded_body(self.sensor, self.indenter, self.pose, self.deepest, self.tier)
+        self.problem = self.body.contact(self.indenter, self.pose, self.deepest, self.friction)
+        self.step = FRICTION_STEP if self.friction else ONE_STEP
+        self.last = self.problem.start()
 
-def _core_gap(mesh: HexMesh, displacement: np.ndarray) -> float:
-    """Smallest distance, m, along the radius between core and free inner skin; contact there is not modelled."""
-    free = mesh.inner[~mesh.clamped[mesh.inner]]
-    x, y, z = (mesh.nodes[free] + displacement[free]).T
-    angle = np.arctan2(z, biotac_shape.AXIS_Y - y)
-    pad = np.abs(angle) < biotac_shape.PAD_ANGLE  # beyond it the skin rests beside the core, 0.2 mm away or less
-    gap = np.hypot(y - biotac_shape.AXIS_Y, z) - biotac_shape.core_radius(x, angle)
-    return float(np.nanmin(gap[pad]))
+    def to(self, step: Step) -> Solution:
+        """See ``solve_path``."""
+        pose = _slid(self.pose, step.slide)
+        if step.force:
+            self.last = self._at_force(pose, step.force)
+        elif step.depth or self.last.depth:
+            self.last = self.problem.move(pose.moved(step.depth or 0.0), self.last, self.step)
+        return self._solution(self.last)
+
+    def _at_force(self, pose: Pose, force: float) -> Touch:
+        """The contact at a force along the motion, by regula falsi on F^(2/3), which is nearly straight in the depth."""
+        direction, goal = pose.direction, force ** (2 / 3)
+        before, at = self.last, (self.last.depth, max(float(self.last.force @ self.pose.direction), 0.0) ** (2 / 3))
+        depth = max(at[0], self.limit / 8)
+        for _ in range(_SEARCH_STEPS):
+            if depth > self.limit:
+                raise self.unreachable(force)
+            touch = self.problem.move(pose.moved(depth), before, self.step)
+            found = max(float(touch.force @ direction), 0.0)
+            if abs(found - force) <= _FORCE_TOLERANCE * force:
+                return touch
+            root = found ** (2 / 3)
+            slope = max((root - at[1]) / (depth - at[0]) if depth != at[0] else 0.0, 1e-6)
+            if root < goal:
+                before, at = touch, (depth, root)
+                depth += float(np.clip((goal - root) / slope, 0, self.limit / 4))
+            else:
+                depth = at[0] + float(np.clip((goal - at[1]) / slope, 0, depth - at[0]))
+        raise self.unreachable(force)
+
+    def _solution(self, touch: Touch) -> Solution:
+        gap = touch.outer.gaps(self.body.solid.mesh.nodes + touch.state.displacement)
+        shape_error, force_error = expected_error(self.tier, self.sensor, touch.depth / self.thickness)
+        slips = touch.outer.slipping[touch.outer.active]
+        return Solution(
+            self.tier, True, touch.iterations, self.body.displacement(touch), self.body.contact_patch(touch),
+            touch.force, touch.depth, touch.fluid, shape_error, force_error, float(-gap.min(initial=0.0)),
+            float(slips.mean()) if len(slips) and self.friction else 0.0, len(touch.inner.nodes), touch.steps,
+            (self.body.solid, touch.state),
+        )  # fmt: skip

@@ -6,6 +6,7 @@ from slab import slab_mesh
 
 from tactile_core.errors import TactileError
 from tactile_core.mechanics import compliance
+from tactile_core.mechanics.near_block import NearBlock
 from tactile_core.sensors import Material
 
 
@@ -41,3 +42,28 @@ def test_a_cache_that_cannot_be_written_is_told_before_the_work(tiny, tmp_path, 
     monkeypatch.setattr(compliance, "build", lambda *arguments: pytest.fail("worked first"))
     with pytest.raises(TactileError, match="TACTILE_CACHE"):
         tiny()
+
+
+def test_too_little_memory_is_told_in_words(tiny, monkeypatch):
+    def full(*arguments):
+        raise MemoryError
+
+    monkeypatch.setattr(compliance, "condense", full)
+    with pytest.raises(TactileError, match="memory"):
+        tiny()
+
+
+def test_a_full_disk_is_told_and_leaves_nothing_half_written(tiny, tmp_path, monkeypatch):
+    def no_room(*arguments, **named):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(compliance.np, "save", no_room)
+    with pytest.raises(TactileError, match="No space left"):
+        tiny()
+    assert not list((tmp_path / "cache").rglob("*.npy"))
+
+
+def test_response_between_two_nodes_is_mutual(tiny):
+    """Maxwell and Betti, on the mirror plane too."""
+    block = NearBlock(tiny(), np.arange(25), np.empty(0, int)).matrix
+    np.testing.assert_array_equal(block, block.T)

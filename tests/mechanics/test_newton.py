@@ -26,7 +26,7 @@ def problem(solid, indenter=BALL, **more):
 
 
 def slid(touch, x):
-    return Pose(touch.pose.apex + [x, 0, 0], touch.pose.axes)
+    return Pose(touch.pose.apex + np.array([x, 0, 0]), touch.pose.axes)
 
 
 def test_without_friction_nothing_rubs(solid):

@@ -55,6 +55,15 @@ class Press:
     skin: np.ndarray
 
 
+def rows(quick: bool, data: Path) -> Iterator[Row]:
+    """All presses of the outside data; without it, and in the quick form, what needs none of them."""
+    folder = data / "biotac_comsol"
+    if quick or not folder.is_dir():
+        yield published_volume(COARSE)
+    else:
+        yield from comsol(folder)
+
+
 def comsol(folder: Path, intervals: tuple[int, int, int] = INTERVALS) -> Iterator[Row]:
     """Rows of all presses in a folder; raises TactileError for one that is not of the module's layout."""
     cases = sorted(path.parent for path in folder.glob("*/config.csv"))

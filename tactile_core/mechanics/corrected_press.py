@@ -1,0 +1,86 @@
+"""A press in the fast tier whose forces and shapes are the corrected ones."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ..indenters import Indenter, Pose
+from .compliance import Compliance
+from .contact import Contact, ContactProblem, fluid_pressure
+from .correction import Corrected, correct
+
+FORCE_TOLERANCE = 1e-4  # relative, of the force asked for
+_FIRST_DEPTH = 30e-6  # m, where a search for a force starts
+_GROWTH = 1.6  # largest change of force in one step of a search, which a warm start follows safely
+_SEARCH_STEPS = 24
+
+
+@dataclasses.dataclass(frozen=True)
+class FastContact:
+    """A contact of the linear model, and what its correction makes of it. Forces N, by the indenter on the sensor.
+
+    linear : as solved; corrected : shape and factor; force : (3,); axial_force : along the motion
+    pressure : Pa, rise of the fluid's
+    """
+
+    linear: Contact
+    corrected: Corrected
+    force: np.ndarray
+    axial_force: float
+    pressure: float
+
+
+class CorrectedPress:
+    """An indenter in front of one sensor; contacts follow each other, at depths or at corrected forces.
+
+    pose : at first touch; limit : m, the greatest depth; friction : Coulomb's coefficient
+    """
+
+    def __init__(
+        self, compliance: Compliance, indenter: Indenter, pose: Pose, limit: float, friction: float = 0.0
+    ) -> None:
+        self.compliance, self.pose, self.limit = compliance, pose, limit
+        self.problem = ContactProblem(compliance, indenter, pose, limit, friction)
+        self.last: Contact | None = None
+
+    def at_depth(self, depth: float, pose: Pose | None = None) -> FastContact:
+        """The contact at a depth, m, of the press's pose or of another one; it may not have converged."""
+        contact = self.problem.at_pose((pose or self.pose).moved(depth), self.last)
+        if contact.converged:
+            self.last = contact
+        return self._with_correction(contact)
+
+    def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
+        """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if none is found.
+
+        The factor changes slowly with depth, so the linear force is simply scaled by what is missing, a few times.
+        """
+        pose = pose or self.pose
+        contact = self.last or self._first(pose)
+        for _ in range(_SEARCH_STEPS):
+            if contact is None or not contact.converged or contact.depth > self.limit:
+                return None
+            found = self._with_correction(contact)
+            if found.axial_force > 0 and abs(found.axial_force / force - 1) < FORCE_TOLERANCE:
+                self.last = contact
+                return found
+            growth = float(np.clip(force / max(found.axial_force, 1e-12), 1 / _GROWTH, _GROWTH))
+            contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force * growth)
+        return None
+
+    def _first(self, pose: Pose) -> Contact | None:
+        """The first contact that carries force; a coarse lattice may be missed by the shallowest depths."""
+        depth = _FIRST_DEPTH
+        while depth <= self.limit:
+            contact = self.problem.at_pose(pose.moved(depth))
+            if contact.converged and contact.axial_force > 0:
+                return contact
+            depth *= 1.5
+        return None
+
+    def _with_correction(self, contact: Contact) -> FastContact:
+        made = correct(self.compliance, contact)
+        pressure = made.factor * fluid_pressure(self.compliance, contact)
+        return FastContact(contact, made, made.factor * contact.force, made.factor * contact.axial_force, pressure)

@@ -1,0 +1,196 @@
+"""What the fast tier's linear model leaves out, learned from the full tier: a factor of force and a field of shape.
+
+Both are smooth functions of what a fast contact looks like (depth, patch, place, lean, fluid), found by kernel ridge
+regression; nothing depends on which indenter it was. The field is a sum of a few learned fields in a frame that moves
+with the contact and is scaled by its size. See ``learn_correction`` for how they are made.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib.resources
+
+import numpy as np
+
+from .. import biotac_shape, digit_shape, sensors, surface
+from .compliance import Compliance
+from .contact import Contact
+
+REACH = 12.0  # patch radii, how far the learned fields go; they fade over the last of their cells
+LINES = 33  # of their grid, even in asinh(distance / radius): fine at the patch, coarse far from it
+_SMALLEST_RADIUS = 0.3e-3  # m, added to a patch's: one touching node has a size, too
+FILE = "mechanics_correction.npz"
+
+
+@dataclasses.dataclass(frozen=True)
+class Frame:
+    """A frame that moves with a contact: centre (2,) m in unrolled coordinates, radius m of its patch."""
+
+    centre: np.ndarray
+    radius: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Learned:
+    """One sensor's correction. f features, n supports, k fields on a grid of g = LINES x LINES points.
+
+    shift, scale : (f,) of the features; supports : (n, f) scaled features; width : of the kernel
+    force_weights : (n,), of the logarithm of the force's factor; field_weights : (n, k); fields : (k, g, 3), per metre
+        of depth, in the surface's own frames
+    errors : (bins, 4), upper end of depth over thickness, then the 95th percentile of the rms shape error m and of the
+        relative force error, found on presses kept apart, and how many there were
+    """
+
+    shift: np.ndarray
+    scale: np.ndarray
+    supports: np.ndarray
+    width: float
+    force_weights: np.ndarray
+    field_weights: np.ndarray
+    fields: np.ndarray
+    errors: np.ndarray
+
+    def predict(self, features: np.ndarray) -> tuple[float, np.ndarray]:
+        """Factor of the force, and the correction on the grid (g, 3), per metre of depth."""
+        x = (features - self.shift) / self.scale
+        near = kernel(x[None], self.supports, self.width)[0]
+        weights = near @ self.field_weights
+        return float(np.exp(near @ self.force_weights)), np.tensordot(weights, self.fields, 1)
+
+
+def kernel(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
+    """Inverse multiquadric and linear kernel (n, m) of scaled features (n, f) and (m, f): smooth, and tame far out."""
+    products = a @ b.T
+    squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * products
+    return 1 / np.sqrt(1 + np.maximum(squares, 0) / width**2) + 0.01 * (products + 1)
+
+
+@functools.cache
+def plane(sensor: str) -> np.ndarray:
+    """Unrolled places (n, 2) = (x, z) m of a sensor's surface nodes; the BioTac's back goes on round its axis."""
+    if sensor == "digit":
+        return digit_shape.gel_surface().rest[:, [0, 2]]
+    x, z = np.broadcast_arrays(surface._rolled_x()[1:-1, None], surface.PAD_RADIUS * biotac_shape.angles())
+    ends = [[surface._rolled_x()[0], 0.0], [surface._rolled_x()[-1], 0.0]]
+    return np.concatenate([np.stack([x, z], -1).reshape(-1, 2), ends])
+
+
+@functools.cache
+def node_frames(sensor: str) -> np.ndarray:
+    """Axes (n, 3, 3) of each surface node as columns: along the finger, outward, across."""
+    if sensor == "digit":
+        axes = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
+        return np.broadcast_to(axes, (len(digit_shape.gel_surface().rest), 3, 3))
+    lattice = biotac_shape.skin_surface()
+    outward = surface.node_normals(lattice.rest, lattice.faces)
+    along = np.array([1.0, 0, 0]) - outward[:, :1] * outward
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    along = np.where(length > 1e-3, along / np.maximum(length, 1e-3), [0.0, 1.0, 0.0])
+    return np.stack([along, outward, np.cross(along, outward)], -1)
+
+
+@functools.cache
+def _areas(sensor: str) -> np.ndarray:
+    lattice = digit_shape.gel_surface() if sensor == "digit" else biotac_shape.skin_surface()
+    return surface.node_areas(lattice.rest, lattice.faces)
+
+
+def frame(compliance: Compliance, contact: Contact) -> Frame:
+    """Where a contact's fields lie: about the centre of its forces, with its patch's radius."""
+    nodes = compliance.touchable[contact.nodes]
+    load = np.linalg.norm(contact.nodal_force, axis=1)
+    centre = load @ plane(compliance.name)[nodes] / load.sum()
+    return Frame(centre, float(np.sqrt(_areas(compliance.name)[nodes].sum() / np.pi)) + _SMALLEST_RADIUS)
+
+
+def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
+    """What a fast contact looks like: (f,) numbers without a unit, lengths over the thickness, stresses over E."""
+    digit = compliance.name == "digit"
+    material = sensors.DIGIT_GEL if digit else sensors.BIOTAC_SKIN
+    thickness = digit_shape.THICKNESS if digit else biotac_shape.SKIN_THICKNESS
+    nodes = compliance.touchable[contact.nodes]
+    load = np.linalg.norm(contact.nodal_force, axis=1)
+    share = load / load.sum()
+    offset = (plane(compliance.name)[nodes] - at.centre) / thickness
+    spread = np.einsum("k,ki,kj->ij", share, offset, offset)
+    local = np.einsum("kji,kj->i", node_frames(compliance.name)[nodes], contact.nodal_force) / load.sum()
+    towards = node_frames(compliance.name)[nodes[np.argmax(load)]].T @ contact.pose.direction
+    depth = contact.depth / thickness
+    force = np.log(load.sum() / (material.youngs * thickness**2) + 1e-6)
+    core = contact.core_force.sum() / load.sum() if len(contact.core_force) else 0.0
+    return np.array([
+        depth, np.sqrt(depth), force, at.radius / thickness, np.log(at.radius / thickness),
+        spread[0, 0], spread[1, 1], spread[0, 1], at.centre[0] / 5e-3, at.centre[1] / 5e-3, (at.centre[1] / 5e-3) ** 2,
+        local[0], local[2], towards[0], towards[2], core, np.log(depth / (at.radius / thickness)),
+        share.max() * len(share), float(len(share) < _FEW),
+    ])  # fmt: skip
+
+
+_FEW = 4  # touching nodes, below which a patch's shape means little
+MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1.0])  # features under z -> -z
+
+
+def grid_places() -> np.ndarray:
+    """Places (LINES, LINES, 2) of the fields' grid, in patch radii."""
+    line = np.sinh(np.linspace(-np.arcsinh(REACH), np.arcsinh(REACH), LINES))
+    return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
+
+
+def spread_field(sensor: str, at: Frame, field: np.ndarray) -> np.ndarray:
+    """A field on the grid (g, 3), at all nodes of a sensor (n, 3), in the sensor's axes: bilinear, 0 beyond."""
+    place = np.arcsinh((plane(sensor) - at.centre) / at.radius) / np.arcsinh(REACH)
+    inside = np.flatnonzero((np.abs(place) < 1).all(axis=1))
+    position = (place[inside] + 1) * ((LINES - 1) / 2)
+    cell = np.minimum(position.astype(int), LINES - 2)
+    u, v = (position - cell).T
+    grid = field.reshape(LINES, LINES, 3)
+    i, j = cell.T
+    local = ((1 - u) * (1 - v))[:, None] * grid[i, j] + (u * (1 - v))[:, None] * grid[i + 1, j]
+    local += ((1 - u) * v)[:, None] * grid[i, j + 1] + (u * v)[:, None] * grid[i + 1, j + 1]
+    moved = np.zeros((len(place), 3))
+    moved[inside] = np.einsum("kij,kj->ki", node_frames(sensor)[inside], local)
+    return moved
+
+
+@functools.cache
+def learned() -> dict[str, Learned]:
+    """The shipped correction of each sensor."""
+    path = importlib.resources.files("tactile_core").joinpath("data", FILE)
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+        return {
+            sensor: Learned(**{
+                field.name: _plain(arrays[f"{sensor}_{field.name}"]) for field in dataclasses.fields(Learned)
+            })
+            for sensor in ("biotac", "digit")
+        }  # fmt: skip
+
+
+def _plain(values: np.ndarray) -> np.ndarray | float:
+    return float(values) if values.ndim == 0 else values.astype(np.float64)
+
+
+@dataclasses.dataclass(frozen=True)
+class Corrected:
+    """A fast contact with its correction. displacement : (n, 3) m; factor : of all forces
+
+    shape_error, force_error : 95 % of presses kept apart lay below: rms m, and relative
+    """
+
+    displacement: np.ndarray
+    factor: float
+    shape_error: float
+    force_error: float
+
+
+def correct(compliance: Compliance, contact: Contact, parts: Learned | None = None) -> Corrected:
+    """A fast contact as the full tier would have it, at the same depth."""
+    parts = parts or learned()[compliance.name]
+    if not len(contact.nodes):
+        return Corrected(contact.displacement, 1.0, 0.0, 0.0)
+    at = frame(compliance, contact)
+    factor, field = parts.predict(features(compliance, contact, at))
+    moved = contact.displacement + contact.depth * spread_field(compliance.name, at, field)
+    relative = contact.depth / (digit_shape.THICKNESS if compliance.name == "digit" else biotac_shape.SKIN_THICKNESS)
+    row = parts.errors[min(int(np.searchsorted(parts.errors[:, 0], relative)), len(parts.errors) - 1)]
+    return Corrected(moved, factor, float(row[1]), float(row[2]))

@@ -1,0 +1,41 @@
+"""Where surface nodes meet an indenter that moves onto them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..indenters import Indenter, Pose
+
+_TRACE_STEPS = 6  # of sphere tracing: the start of an iteration needs no more
+_SPOT_STEPS = 20  # where a node sticks matters, so its spot is found to well below a micrometre
+
+
+def landing(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> np.ndarray:
+    """Displacements (n, 3) m along the motion that bring points (n, 3) m to the front of an indenter standing at
+    ``pose``.
+
+    far : m, how deep points may lie in the indenter. Points that lie in front of it already stay.
+    """
+    direction = pose.direction
+    travel = np.full(len(points), far)
+    for _ in range(_TRACE_STEPS):
+        gap, _ = pose.distance(indenter, points + travel[:, None] * direction)
+        travel -= np.maximum(gap, 0)
+    return np.maximum(travel, 0)[:, None] * direction
+
+
+def landing_spots(indenter: Indenter, before: Pose, pose: Pose, points: np.ndarray, touched: np.ndarray) -> np.ndarray:
+    """Where on the indenter points (n, 3) m first meet it as it moves from ``before`` to ``pose``: (n, 3) m, own frame.
+
+    touched : (n,) bool, points that it touched before: they stay where they were on it
+    Points that it does not meet are given as they stand at the end. Between the poses they move on straight lines in
+    the indenter's frame.
+    """
+    first, last = (points - before.apex) @ before.axes, (points - pose.apex) @ pose.axes
+    way = last - first
+    length = np.maximum(np.linalg.norm(way, axis=1), 1e-12)
+    share = np.zeros(len(points))
+    for _ in range(_SPOT_STEPS):
+        gap, _ = indenter.distance(first + share[:, None] * way)
+        share = np.minimum(share + np.maximum(gap, 0) / length, 1)
+    return first + np.where(touched, 0.0, share)[:, None] * way

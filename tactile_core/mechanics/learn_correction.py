@@ -1,0 +1,219 @@
+"""Making the fast tier's correction: full-tier contacts on a sample of presses, and a kernel regression on them."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import time
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from ..errors import TactileError
+from ..sensors import biotac_surface, digit_surface
+from . import correction
+from .compliance import biotac_compliance, digit_compliance
+from .contact import ContactProblem
+from .correction import LINES, MIRRORED, Frame, Learned, features, frame, kernel
+from .finite_strain_tier import ONE_STEP, Sensor, graded_body
+from .press import biotac_pose, digit_pose
+from .random_contacts import RandomContact
+from .thickness import thickness
+
+log = logging.getLogger(__name__)
+
+DEEPEST = 2.4e-3  # m: 60 % of the gel; where the BioTac has no core below, its "thickness" says little
+SHARES = 0.4, 0.7, 1.0  # of a press's depth, at which it is sampled
+FIELDS = 32  # learned fields a sensor
+_WIDTHS = 1.5, 3.0, 6.0  # of the kernel, in standard deviations of a feature
+_RIDGES = 1e-5, 1e-4, 1e-3, 1e-2
+_FOLDS = 5
+_BINS = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 2.0  # depth over thickness, of the table of errors
+_SIGNIFICANT = 10e-6  # m, nodes that move less do not count (issue 3, point 8)
+
+
+
+@dataclasses.dataclass(frozen=True)
+class Sample:
+    """One contact in the full and the fast tier.
+
+    press : number of its press; features (f,); frame; depth m; ratio : force of the full tier over that of the fast
+    fast, full : displacement (n, 3) float32 m
+    """
+
+    press: int
+    features: np.ndarray
+    frame: Frame
+    depth: float
+    ratio: float
+    fast: np.ndarray
+    full: np.ndarray
+
+
+def full_press(sensor: Sensor, press: RandomContact) -> dict[str, np.ndarray]:
+    """The full tier's contacts of a press at its ``SHARES``, without friction, as far as they converge.
+
+    Returns depths (k,) m wanted, displacement (c, n, 3) float32 m, force (c, 3) N and iterations (c,) of the c <= k that
+    converged, steps (c,) of their load, and seconds (c,) each took.
+    """
+    pose = (digit_pose if sensor == "digit" else biotac_pose)(press.indenter, press.place)
+    rest = (digit_surface() if sensor == "digit" else biotac_surface()).rest
+    touched = rest[int(np.argmin(pose.distance(press.indenter, rest)[0]))]
+    deepest = min(press.depth * thickness(sensor, touched), DEEPEST)
+    body = graded_body(sensor, press.indenter, pose, deepest)
+    problem = body.contact(press.indenter, pose, deepest, 0.0)
+    touch, found = None, []
+    for depth in np.array(SHARES) * deepest:
+        began = time.process_time()
+        try:
+            touch = problem.press(depth, touch, ONE_STEP)
+        except TactileError as error:
+            log.info("%s: %s", press.name, error)
+            break
+        took = time.process_time() - began
+        found.append((body.displacement(touch).astype(np.float32), touch.force, touch.iterations, touch.steps, took))
+    names = ("displacement", "force", "iterations", "steps", "seconds")
+    columns = zip(*found, strict=True) if found else [[]] * len(names)
+    arrays = {name: np.array(values) for name, values in zip(names, columns, strict=True)}
+    return {"depths": np.array(SHARES) * deepest, **arrays}
+
+
+def paired(sensor: Sensor, number: int, press: RandomContact, full: dict[str, np.ndarray]) -> Iterator[Sample]:
+    """The press in the fast tier, beside the full tier's contacts of ``full_press``; those that converged in both."""
+    compliance = digit_compliance() if sensor == "digit" else biotac_compliance()
+    pose = (digit_pose if sensor == "digit" else biotac_pose)(press.indenter, press.place)
+    problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]))
+    contact = None
+    for depth, moved, force in zip(full["depths"], full["displacement"], full["force"], strict=False):
+        contact = problem.at_depth(float(depth), contact if contact is not None and contact.converged else None)
+        along = float(force @ pose.direction)
+        if not contact.converged or contact.axial_force <= 0 or along <= 0:
+            continue
+        at = frame(compliance, contact)
+        yield Sample(
+            number, features(compliance, contact, at), at, float(depth), along / contact.axial_force,
+            contact.displacement, moved,
+        )  # fmt: skip
+
+
+def residual_on_grid(sensor: str, at: Frame, residual: np.ndarray) -> np.ndarray:
+    """A field (n, 3) at a sensor's nodes, in the frames of its nodes, on the moving grid (g, 3); 0 beyond the nodes."""
+    import scipy.interpolate
+
+    local = np.einsum("kji,kj->ki", correction.node_frames(sensor), residual)
+    places = at.centre + at.radius * correction.grid_places().reshape(-1, 2)
+    on_grid = scipy.interpolate.LinearNDInterpolator(_triangulation(sensor), local, fill_value=0.0)(places)
+    return on_grid
+
+
+def _triangulation(sensor: str):  # noqa: ANN202
+    import scipy.spatial
+
+    if sensor not in _TRIANGULATIONS:
+        _TRIANGULATIONS[sensor] = scipy.spatial.Delaunay(correction.plane(sensor))
+    return _TRIANGULATIONS[sensor]
+
+
+_TRIANGULATIONS: dict = {}
+
+
+def mirrored(field: np.ndarray) -> np.ndarray:
+    """A field on the grid (..., g, 3) under z -> -z."""
+    grid = field.reshape(*field.shape[:-2], LINES, LINES, 3)[..., :, ::-1, :]
+    return (grid * [1.0, 1.0, -1.0]).reshape(field.shape)
+
+
+def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Learned, list[dict]]:
+    """The correction of one sensor, and rows of its errors on presses kept apart (five folds by press)."""
+    samples = list(samples)
+    x = np.array([s.features for s in samples])
+    fields = np.array([residual_on_grid(sensor, s.frame, s.full - s.fast) / s.depth for s in samples])
+    log_ratio = np.log([s.ratio for s in samples])
+    fold = np.array([s.press for s in samples]) % _FOLDS
+    guess = [np.empty(len(samples)), np.empty((len(samples), *fields.shape[1:]))]
+    choice = _choose(x, log_ratio, fields, fold)
+    for f in range(_FOLDS):
+        part = _fit(x[fold != f], log_ratio[fold != f], fields[fold != f], *choice)
+        for i in np.flatnonzero(fold == f):
+            guess[0][i], guess[1][i] = part.predict(x[i])
+    errors = [_errors(sensor, s, guess[0][i], guess[1][i]) for i, s in enumerate(samples)]
+    table, rows = _tabulate(sensor, samples, np.array(errors))
+    return dataclasses.replace(_fit(x, log_ratio, fields, *choice), errors=table), rows
+
+
+def _fit(x: np.ndarray, log_ratio: np.ndarray, fields: np.ndarray, width: float, ridge: float) -> Learned:
+    """Kernel ridge regression on samples and their mirror images."""
+    x = np.concatenate([x, x * MIRRORED])
+    fields = np.concatenate([fields, mirrored(fields)])
+    log_ratio = np.concatenate([log_ratio, log_ratio])
+    shift, scale = x.mean(axis=0) * (MIRRORED > 0), x.std(axis=0) + 1e-9
+    scaled = (x - shift) / scale
+    flat = fields.reshape(len(fields), -1)
+    _, _, basis = np.linalg.svd(flat, full_matrices=False) if len(flat) < flat.shape[1] else _by_covariance(flat)
+    basis = basis[:FIELDS]
+    goals = np.column_stack([log_ratio, flat @ basis.T])
+    near = kernel(scaled, scaled, width)
+    weights = np.linalg.solve(near + ridge * np.eye(len(near)) * np.trace(near) / len(near), goals)
+    shape = (len(basis), LINES * LINES, 3)
+    return Learned(
+        shift, scale, scaled.astype(np.float32), width, weights[:, 0], weights[:, 1:].astype(np.float32),
+        basis.reshape(shape).astype(np.float16), np.zeros((0, 4)),
+    )  # fmt: skip
+
+
+def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
+    values, vectors = np.linalg.eigh(flat.T @ flat)
+    return None, None, vectors[:, np.argsort(values)[::-1]].T
+
+
+def _choose(x: np.ndarray, log_ratio: np.ndarray, fields: np.ndarray, fold: np.ndarray) -> tuple[float, float]:
+    """Kernel width and ridge with the least error on one fold."""
+    held = fold == 0
+    best = (np.inf, 0.0, 0.0)
+    for width in _WIDTHS:
+        for ridge in _RIDGES:
+            part = _fit(x[~held], log_ratio[~held], fields[~held], width, ridge)
+            found = [part.predict(row) for row in x[held]]
+            force = np.abs(np.log([f for f, _ in found]) - log_ratio[held]).mean()
+            shape = np.sqrt(((np.array([g for _, g in found]) - fields[held]) ** 2).mean(axis=(1, 2))).mean()
+            null = np.abs(log_ratio[held]).mean(), np.sqrt((fields[held] ** 2).mean(axis=(1, 2))).mean()
+            score = force / null[0] + shape / null[1]
+            log.info("kernel width %g, ridge %g: force %.3f, shape %.3f of doing nothing", width, ridge,
+                     force / null[0], shape / null[1])  # fmt: skip
+            best = min(best, (score, width, ridge))
+    return best[1], best[2]
+
+
+def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> list[float]:
+    """rms and largest shape error m, relative force error; each after the correction, then before."""
+    truth = sample.full.astype(float)
+    counts = np.linalg.norm(truth, axis=1) > _SIGNIFICANT
+    after = sample.fast + sample.depth * correction.spread_field(sensor, sample.frame, field) - truth
+    out = []
+    for error in (after[counts], (sample.fast - truth)[counts]):
+        size = np.linalg.norm(error, axis=1) if counts.any() else np.zeros(1)
+        out += [float(np.sqrt((size**2).mean())), float(size.max())]
+    return [out[0], out[1], factor / sample.ratio - 1, out[2], out[3], 1 / sample.ratio - 1]
+
+
+def _tabulate(sensor: str, samples: list[Sample], errors: np.ndarray) -> tuple[np.ndarray, list[dict]]:
+    relative = np.array([s.features[0] for s in samples])
+    table, rows, low = [], [], 0.0
+    for high in _BINS:
+        here = (relative > low) & (relative <= high)
+        if here.sum() < _LEAST:
+            low = high
+            continue
+        part = errors[here]
+        table.append([high, *np.quantile(np.abs(part[:, [0, 2]]), 0.95, axis=0), here.sum()])
+        name = f"{sensor}_corrected_{low:g}_to_{high:g}"
+        measures = ("shape_rms", 0, 3, 1e6, "um"), ("shape_max", 1, 4, 1e6, "um"), ("force_error", 2, 5, 100, "percent")
+        for what, after, before, unit_scale, unit in measures:
+            value, null = (float(np.abs(part[:, k]).mean() * unit_scale) for k in (after, before))
+            rows.append({"name": f"{name}_{what}", "value": value, "unit": unit, "target": None, "ok": None,
+                         "null": null, "set": f"{here.sum()} contacts of presses kept apart"})  # fmt: skip
+        low = high
+    return np.array(table), rows
+
+
+_LEAST = 8  # contacts, below which a bin of the table of errors says nothing

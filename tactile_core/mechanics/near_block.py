@@ -1,0 +1,101 @@
+"""The compliance among the nodes near an indenter, gathered once from the large matrix of a whole sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compliance import Compliance, axes_of
+
+# Relative stiffness added to each node: 1e-6 moves a gap by nanometres and keeps single precision definite, also where
+# one node presses two faces of a concave corner.
+_RIDGE = 1e-6
+
+
+def runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
+    """Stretches of consecutive numbers in sorted ``indices``: (start, stop) there, and first and last + 1 number."""
+    cuts = np.flatnonzero(np.diff(indices) != 1) + 1
+    starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
+    return list(
+        zip(starts.tolist(), stops.tolist(), indices[starts].tolist(), (indices[stops - 1] + 1).tolist(), strict=True)
+    )
+
+
+class NearBlock:
+    """Compliance of k surface nodes (three axes) and c points of the inner skin that may press on the core.
+
+    nodes : (k,) sorted touchable indices, twice where a node touches two faces; inner : (c,) sorted watched points
+    matrix : (3 k + c, 3 k + c) float32, m/N: surface axes first
+    """
+
+    def __init__(self, compliance: Compliance, nodes: np.ndarray, inner: np.ndarray) -> None:
+        self.nodes, self.inner = nodes, inner
+        self.k, self.c = len(nodes), len(inner)
+        size = 3 * self.k
+        self.matrix = np.empty((size + self.c, size + self.c), np.float32)
+        self.matrix[:size, :size] = _surface_block(compliance, nodes)
+        if self.c:
+            rows = axes_of(nodes)
+            self.matrix[:size, size:] = compliance.watch[rows].take(inner, axis=1)
+            self.matrix[size:, :size] = self.matrix[:size, size:].T
+            self.matrix[size:, size:] = compliance.inner_watch[np.ix_(inner, inner)]
+
+    def respond(self, force: np.ndarray, pressing_core: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement (k, 3) m and motion of the inner points (c,) m, away from the core, under forces (k, 3), (c,)
+        N."""
+        answer = np.concatenate([force.ravel(), pressing_core]).astype(np.float32) @ self.matrix
+        return answer[: 3 * self.k].reshape(self.k, 3).astype(float), answer[3 * self.k :].astype(float)
+
+    def along(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """Compliance (k, k) m/N between forces along ``right`` (k, 3) and displacement along ``left`` (k, 3)."""
+        size = 3 * self.k
+        return _contract(self.matrix[:size, :size], left.astype(np.float32), right.astype(np.float32)).astype(float)
+
+    def normal(self, normals: np.ndarray) -> np.ndarray:
+        """Compliance (k + c, k + c) m/N of the gaps: along ``normals`` (k, 3), and of the core's gaps."""
+        k, size = self.k, 3 * self.k
+        matrix = np.empty((k + self.c, k + self.c))
+        matrix[:k, :k] = self.along(normals, normals)
+        if self.c:
+            side = np.einsum("aic,ai->ac", self.matrix[:size, size:].reshape(k, 3, self.c), normals)
+            matrix[:k, k:], matrix[k:, :k] = side, side.T
+            matrix[k:, k:] = self.matrix[size:, size:]
+        matrix.flat[:: k + self.c + 1] *= 1 + _RIDGE
+        return matrix
+
+
+def _surface_block(compliance: Compliance, nodes: np.ndarray) -> np.ndarray:
+    """Compliance (3 k, 3 k) float32 m/N among touchable nodes; half of them by mirror images."""
+    rows, mirror, image = compliance.answers
+    row, mirrored = rows[nodes], mirror[nodes]
+    at = compliance.touchable[nodes]
+    if not mirrored.any():
+        return _rows(compliance.move, row, axes_of(at))
+    there = image[at]
+    block = np.empty((3 * len(nodes), 3 * len(nodes)), np.float32)
+    direct, turned = np.flatnonzero(~mirrored), np.flatnonzero(mirrored)
+    turned = turned[np.argsort(row[turned], kind="stable")]
+    block[axes_of(direct)] = _rows(compliance.move, row[direct], axes_of(at))
+    answer = _rows(compliance.move, row[turned], axes_of(there))
+    answer[:, 2::3] *= -1
+    answer[2::3] *= -1
+    block[axes_of(turned)] = answer
+    return block
+
+
+def _rows(move: np.ndarray, row: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Entries of three rows each for sorted ``row`` (k,) in ``columns`` (j,): (3 k, j)."""
+    answer = np.empty((3 * len(row), len(columns)), np.float32)
+    for start, stop, first, last in runs(row) if len(row) else ():
+        move[3 * first : 3 * last].take(columns, axis=1, out=answer[3 * start : 3 * stop], mode="clip")
+    return answer
+
+
+def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """sum over axes i, j of source[a, i] block[a i, b j] target[b, j]; sums over strides are faster than einsum
+    here."""
+    k = len(source)
+    half = block[:, 0::3] * target[:, 0]
+    half += block[:, 1::3] * target[:, 1]
+    half += block[:, 2::3] * target[:, 2]
+    half = half.reshape(k, 3, k)
+    return half[:, 0] * source[:, :1] + half[:, 1] * source[:, 1:2] + half[:, 2] * source[:, 2:]

@@ -1,0 +1,45 @@
+"""How thick a sensor is where it is touched: the measure of depth in per cent."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import biotac_shape, digit_shape, sensors
+
+DEPTH_LIMIT = 0.6  # of the thickness: as deep as MECHANICS is asked to go
+_STEP = 20e-6  # m, of the march through the BioTac; the last step is divided linearly
+_FARTHEST = 8e-3  # m, more than from the pad to the finger's axis
+
+
+def thickness(sensor: str, point: np.ndarray) -> float:
+    """Rest distance, m, from the outer surface to the rigid support along the inward normal near ``point`` (3,) m.
+
+    ``"digit"``: to the flat back of the gel; ``"biotac"``: through skin and fluid to the core, or to the finger's axis
+    where the normal passes the core by. Raises ValueError for another sensor.
+    """
+    if sensor == "digit":
+        on_dome, outward = digit_shape.dome_point(float(point[0]), float(point[2]))
+        return float((digit_shape.BACK_Y - on_dome[1]) / -outward[1])
+    if sensor != "biotac":
+        raise ValueError(f"the thickness of a {sensor!r} is not known")
+    lattice = sensors.biotac_surface()
+    node = int(np.argmin(((lattice.rest - point) ** 2).sum(axis=1)))
+    outward = _outward()[node]
+    distance = np.arange(0, _FARTHEST, _STEP)
+    x, y, z = (point - distance[:, None] * outward).T
+    radius = np.hypot(y - biotac_shape.AXIS_Y, z)
+    over = radius - biotac_shape.core_radius(x, np.arctan2(z, biotac_shape.AXIS_Y - y))
+    inside = np.flatnonzero(over <= 0)
+    if not len(inside):
+        return float(distance[np.argmin(radius)])
+    last = int(inside[0])
+    before = over[last - 1] if last else np.nan
+    back = over[last] / (over[last] - before) if np.isfinite(before) else 0.0
+    return float(distance[last] - back * _STEP)
+
+
+def _outward() -> np.ndarray:
+    from .. import surface
+
+    lattice = sensors.biotac_surface()
+    return surface.node_normals(lattice.rest, lattice.faces)

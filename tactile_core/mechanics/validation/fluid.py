@@ -1,0 +1,69 @@
+"""A block with a cavity full of incompressible fluid: its volume stays, or is what was pumped in."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...indenters import Sphere, pose_on
+from ...sensors import Material
+from ..cavity import Cavity
+from ..finite_strain import FiniteStrainSolid
+from ..hex_mesh import HexMesh
+from ..newton import FiniteStrainContact, Touch
+from .block import block
+from .rows import Row, row
+
+TARGET = 1e-12  # issue MECHANICS
+_SIDE, _DEPTH = 4.5e-3, 0.6e-3  # m
+
+
+@functools.cache
+def hollow() -> tuple[HexMesh, Cavity]:
+    """3 x 3 x 3 cells without the middle one, clamped at the back, and the cavity that it leaves."""
+    planes = np.linspace(0, _SIDE, 7)
+    full = block(planes, -planes, planes)
+    cells = np.delete(full.cells, 13, axis=0)
+    used, renumbered = np.unique(cells, return_inverse=True)
+    new = np.full(len(full.nodes), -1)
+    new[used] = np.arange(len(used))
+    cube = new[full.cells[13]].reshape(3, 3, 3)
+    sides = [np.moveaxis(cube, axis, 0)[end] for axis in range(3) for end in (0, -1)]
+    quads = np.concatenate([
+        np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], -1).reshape(-1, 4) for side in sides
+    ])  # fmt: skip
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    nodes = full.nodes[used]
+    corners = nodes[faces]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("fi,fi->f", outward, corners.mean(1) - nodes[cube].reshape(-1, 3)[:26].mean(0)) < 0
+    faces[inward] = faces[inward, ::-1]
+    mesh = HexMesh(nodes, renumbered.reshape(cells.shape), full.clamped[used], new[full.surface], np.unique(faces))
+    return mesh, Cavity(faces, len(nodes))
+
+
+def pressed(*, full: bool, pumped: float = 0.0) -> tuple[Touch, float]:
+    """A ball on the block, the cavity ``full`` of fluid or empty; also the cavity's volume, m3."""
+    mesh, cavity = hollow()
+    ball = Sphere(2e-3)
+    pose = pose_on(ball, np.array([_SIDE / 2, -_SIDE, _SIDE / 2]), np.array([0, -1.0, 0]))
+    solid = FiniteStrainSolid(mesh, Material(1e6, 0.48))
+    contact = FiniteStrainContact(solid, mesh.surface, ball, pose, cavity if full else None, pumped)
+    touch = contact.press(_DEPTH, step=_DEPTH / 3)
+    return touch, cavity.volume(mesh.nodes + touch.state.displacement)
+
+
+def rows(quick: bool) -> Iterator[Row]:
+    """Volume at depth, pressed and pumped up."""
+    mesh, cavity = hollow()
+    rest = cavity.volume(mesh.nodes)
+    empty, lost = pressed(full=False)
+    of = f"hollow block of {_SIDE * 1e3:g} mm, 2 mm ball {_DEPTH * 1e3:g} mm deep"
+    for name, pumped in (("fluid", 0.0), ("pumped_fluid", 0.02 * rest)):
+        touch, volume = pressed(full=True, pumped=pumped)
+        yield row(f"{name}_volume_error", volume / (rest + pumped) - 1, "1", TARGET, null=lost / rest - 1, of=of)
+    touch, _ = pressed(full=True)
+    stiffer = float(touch.force[1] / empty.force[1])
+    yield row("fluid_force_over_empty", stiffer, "1", 1.0, null=1.0, of=of, at_least=True)

@@ -1,0 +1,78 @@
+"""Where a press starts, how deep it may go, and paths of force."""
+
+import numpy as np
+import pytest
+
+from tactile_core import digit_shape, sensors, surface
+from tactile_core.indenters import Box, Cylinder, Pose, Ring, Sphere, pose_on
+from tactile_core.mechanics.compliance import biotac_compliance, digit_compliance
+from tactile_core.mechanics.first_touch import first_touch
+from tactile_core.mechanics.press import Placement, Press, biotac_pose, depth_limit, digit_pose
+from tactile_core.mechanics.thickness import thickness
+
+PLACES = [Placement(-8e-3, 0.0), Placement(-14e-3, 4e-3, 0.3, 1.0), Placement(-3e-3, -6e-3, 0.5, 4.0)]
+INDENTERS = [Sphere(3.5e-3), Cylinder(3.5e-3, 0.5e-3), Box((14e-3,) * 3, 0.5e-3), Ring(2.5e-3, 1e-3)]
+
+
+def dome(pose: Pose, reach: float) -> np.ndarray:
+    """The analytic gel within ``reach`` m of the place under the indenter, (n, 3) m, every 5 um."""
+    x = pose[0] + np.arange(-reach, reach, 5e-6)
+    z = pose[2] + np.arange(-reach, reach, 5e-6)
+    x, z = np.meshgrid(x, z)
+    return np.stack([x, digit_shape.BACK_Y - digit_shape.dome_height(x, z), z], -1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("indenter", INDENTERS, ids=lambda i: type(i).__name__)
+def test_first_touch_is_on_the_true_dome(indenter, place):
+    """The lattice's interpolation stands for the dome: found from above, the touch is exact to a micrometre."""
+    pose = digit_pose(indenter, place)
+    rest = sensors.digit_surface().rest
+    near = rest[np.argmin(pose.distance(indenter, rest)[0])]
+    gap = pose.distance(indenter, dome(near, 0.4e-3))[0].min()
+    assert abs(gap) < 0.5e-6  # m: 5 um of the sampling leave 0.01 um on edges of 0.5 mm; the rest is interpolation
+
+
+@pytest.mark.parametrize("lattice", [sensors.digit_surface(), sensors.biotac_surface()], ids=["digit", "biotac"])
+def test_first_touch_does_not_depend_on_where_the_motion_starts(lattice):
+    ball = Sphere(2e-3)
+    centre = lattice.rest[np.argmin(lattice.rest[:, 1])]
+    there = pose_on(ball, centre, np.array([0.0, -1.0, 0.0]), 0.2, 1.0)
+    places = [first_touch(lattice, ball, there.moved(by)).apex for by in (-0.5e-3, 0.0, 0.7e-3)]
+    np.testing.assert_allclose(places, places[:1] * 3, atol=20e-9)
+
+
+def test_ball_set_on_a_smooth_place_stays_there():
+    ball = Sphere(3.5e-3)
+    point, outward = digit_shape.dome_point(-8e-3, 1e-3)
+    there = pose_on(ball, point, outward)
+    moved = (first_touch(sensors.digit_surface(), ball, there).apex - there.apex) @ there.direction
+    assert abs(moved) < 0.2e-6
+
+
+def test_thickness_of_the_gel_and_of_skin_and_fluid():
+    on_dome, _ = digit_shape.dome_point(-8e-3, 0.0)
+    # at the top of the dome the normal is nearly upright
+    assert thickness("digit", on_dome) == pytest.approx(digit_shape.BACK_Y - on_dome[1], rel=1e-3)
+    on_skin, _ = surface.roll_up(np.array([-8e-3, 0.0]))
+    # sensors.md: skin 1.58 mm and a fluid film of up to 2.45 mm
+    assert 1.58e-3 + 0.5e-3 < thickness("biotac", on_skin) < 1.63e-3 + 2.45e-3
+    with pytest.raises(ValueError, match="not known"):
+        thickness("finger", on_skin)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.78])
+def test_a_path_of_growing_force_ends_at_the_depth_limit(friction):
+    ball = Sphere(3.5e-3)
+    for compliance, pose_of in ((biotac_compliance(), biotac_pose), (digit_compliance(), digit_pose)):
+        pose = pose_of(ball, PLACES[0])
+        press, depths = Press(compliance, ball, pose, friction=friction), []
+        force = 0.05
+        while (contact := press.at_force(force)) is not None:
+            assert contact.axial_force == pytest.approx(force, rel=1e-6)
+            depths.append(contact.depth)
+            force *= 1.6
+        limit = depth_limit(compliance, ball, pose)
+        assert np.all(np.diff(depths) > 0) and len(depths) > 4
+        assert depths[-1] <= limit and press.problem.at_depth(limit).axial_force < force
+        assert press.at_depth(1.01 * limit) is None
