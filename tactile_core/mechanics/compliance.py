@@ -27,7 +27,7 @@ from .hex_mesh import HexMesh, gel_mesh, inner_faces, skin_mesh
 from .quadratic_cavity import QuadraticCavity
 
 log = logging.getLogger(__name__)
-_FORMAT = 3  # raise when the meaning of the cached arrays changes
+_FORMAT = 5  # raise when the meaning of the cached arrays changes
 
 # Skin nodes that can be touched: those that unroll onto the gel or up to this far beside it, m.
 _ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
@@ -166,15 +166,21 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
     nowhere, TactileError where the memory does not suffice.
     """
     watch, watch_gap = _watched(mesh)
-    loads = np.column_stack([watch, _volume_gradient(mesh)]) if len(mesh.inner) else watch
+    source, mirrored = _images(mesh, watch.shape[1])
+    kept = np.unique(source)
+    loads, column, sign = watch[:, kept], np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
+    if len(mesh.inner):
+        loads = np.column_stack([loads, _volume_gradient(mesh)])
+        column, sign = np.r_[column, len(kept)], np.r_[sign, 1.0]
     half = np.flatnonzero(lattice.rest[:, 2] >= -_ON_PLANE)
     try:
         even, odd = (condense(mesh, material, mesh.surface[half], loads, parity) for parity in (1, -1))
         image = mirror_nodes(lattice.rest)
         place, answered = _Mirrored(half, image), answered_nodes(lattice, touchable, image)
         move = place.forces(even.answer, odd.answer, answered)
-        inner_move = place.loads(even.under_loads, odd.under_loads)
-        among = even.among + odd.among
+        inner_move = place.loads(even.under_loads, odd.under_loads, column, sign)
+        every = np.ix_(column, column)
+        among = even.among[every] + odd.among[every] * np.outer(sign, sign)
         inner_pressure, pressure = np.zeros(watch.shape[1]), np.zeros(3 * len(touchable))
         touch_dofs = axes_of(touchable)
         if len(mesh.inner):  # the fluid keeps its volume: its pressure is one more force, and takes one more row away
@@ -205,11 +211,12 @@ class _Mirrored:
         self.half, self.image = half, image
         self.sign = np.tile([1.0, 1.0, -1.0], len(half)).astype(np.float32)
 
-    def loads(self, even: np.ndarray, odd: np.ndarray) -> np.ndarray:
-        """Motion (w, 3 n) of all nodes from the halves' (3 k, w)."""
-        answer = np.empty((even.shape[1], 3 * len(self.image)))
-        answer[:, axes_of(self.image[self.half])] = ((even - odd) * self.sign[:, None]).T
-        answer[:, axes_of(self.half)] = (even + odd).T
+    def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
+        """Motion (w, 3 n) of all nodes from the halves' (3 k, v): load i is load ``column[i]``, its image for sign -1."""
+        even, odd = even.T[column], odd.T[column] * sign[:, None]
+        answer = np.empty((len(column), 3 * len(self.image)))
+        answer[:, axes_of(self.image[self.half])] = (even - odd) * self.sign
+        answer[:, axes_of(self.half)] = even + odd
         return answer
 
     def forces(self, even: np.ndarray, odd: np.ndarray, answered: np.ndarray) -> np.ndarray:
@@ -239,7 +246,7 @@ def _watched(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros((3 * len(mesh.nodes), 0)), np.zeros(0)
     inner = biotac_shape.skin_surface("inner")
     feet = electrode_feet()
-    core_nodes, core_out, core_gap = _over_core(inner)
+    core_nodes, core_out, core_gap = _over_core(mesh)
     weights = np.zeros((len(mesh.nodes), 3, len(feet.gap) + len(core_nodes)))
     for e, (face, barycentric, out) in enumerate(zip(feet.face, feet.weights, feet.outward, strict=True)):
         for node, weight in zip(inner.faces[face], barycentric, strict=True):
@@ -268,8 +275,30 @@ def electrode_feet() -> ElectrodeFeet:
     return ElectrodeFeet(face, weights, (place - positions) / gap[:, None], gap)
 
 
-def _over_core(inner: Lattice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m."""
-    nodes = np.flatnonzero(facing_core(inner.rest))
-    gap, outward = Core().distance(inner.rest[nodes])
-    return nodes, outward, gap
+def _over_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m; even in z."""
+    inner = biotac_shape.skin_surface("inner")
+    nodes = _facing(mesh)
+    image = mirror_nodes(inner.rest)
+    mirrored = inner.rest[nodes, 2] < -_ON_PLANE
+    gap, outward = Core().distance(inner.rest[np.where(mirrored, image[nodes], nodes)])
+    return nodes, np.where(mirrored[:, None], outward * [1.0, 1.0, -1.0], outward), gap
+
+
+def _facing(mesh: HexMesh) -> np.ndarray:
+    """Inner nodes that may come to press on the core, each with its mirror image."""
+    inner = biotac_shape.skin_surface("inner")
+    faces = facing_core(inner.rest) & ~mesh.clamped[mesh.inner]
+    return np.flatnonzero(faces & faces[mirror_nodes(inner.rest)])
+
+
+def _images(mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """For each of ``count`` watched points the one whose mirror image it is, else itself; and whether it is an image."""
+    source, mirrored = np.arange(count), np.zeros(count, bool)
+    if count:
+        nodes, rest = _facing(mesh), biotac_shape.skin_surface("inner").rest
+        first = count - len(nodes)
+        image = mirror_nodes(rest)[nodes]
+        mirrored[first:] = rest[nodes, 2] < -_ON_PLANE
+        source[first:] = first + np.where(mirrored[first:], np.searchsorted(nodes, image), np.arange(len(nodes)))
+    return source, mirrored

@@ -63,7 +63,7 @@ def kernel(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
     """Inverse multiquadric and linear kernel (n, m) of scaled features (n, f) and (m, f): smooth, and tame far out."""
     products = a @ b.T
     squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * products
-    return 1 / np.sqrt(1 + np.maximum(squares, 0) / width**2) + 0.01 * (products + 1)
+    return 1 / np.sqrt(1 + np.maximum(squares, 0) / width**2) + 0.1 * (products / a.shape[1] + 1)
 
 
 @functools.cache
@@ -127,6 +127,7 @@ def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
     ])  # fmt: skip
 
 
+ESSENTIAL = np.array([0, 2, 4, 15, 16, 18])  # depth, force, radius, core, depth over radius, few nodes
 _FEW = 4  # touching nodes, below which a patch's shape means little
 MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1.0])  # features under z -> -z
 
