@@ -24,6 +24,7 @@ from ..sensors import Material
 from .condense import condense, mirror_nodes
 from .core import Core, facing_core
 from .hex_mesh import HexMesh, gel_mesh, inner_faces, skin_mesh
+from .mirrored_halves import MirroredHalves, axes_of
 from .quadratic_cavity import QuadraticCavity
 
 log = logging.getLogger(__name__)
@@ -176,7 +177,7 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
     try:
         even, odd = (condense(mesh, material, mesh.surface[half], loads, parity) for parity in (1, -1))
         image = mirror_nodes(lattice.rest)
-        place, answered = _Mirrored(half, image), answered_nodes(lattice, touchable, image)
+        place, answered = MirroredHalves(half, image), answered_nodes(lattice, touchable, image)
         move = place.forces(even.answer, odd.answer, answered)
         inner_move = place.loads(even.under_loads, odd.under_loads, column, sign)
         every = np.ix_(column, column)
@@ -197,37 +198,6 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
         raise TactileError("compliance", "out of memory", "2 GB of free memory", "Close other programs") from error
     inner = inner_move.astype(np.float32), among.astype(np.float32), inner_pressure
     return Arrays(move, watch, watch_gap, pressure, *inner)
-
-
-def axes_of(nodes: np.ndarray) -> np.ndarray:
-    """The three numbers of each node's axes, (3 k,)."""
-    return (3 * nodes[:, None] + np.arange(3)).ravel()
-
-
-class _Mirrored:
-    """Puts the even and the odd half of a motion together. ``half`` (k,) surface nodes with z >= 0; ``image`` (n,)."""
-
-    def __init__(self, half: np.ndarray, image: np.ndarray) -> None:
-        self.half, self.image = half, image
-        self.sign = np.tile([1.0, 1.0, -1.0], len(half)).astype(np.float32)
-
-    def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Motion (w, 3 n) of all nodes from the halves' (3 k, v): load i is load ``column[i]``, its image for sign -1."""
-        even, odd = even.T[column], odd.T[column] * sign[:, None]
-        answer = np.empty((len(column), 3 * len(self.image)))
-        answer[:, axes_of(self.image[self.half])] = (even - odd) * self.sign
-        answer[:, axes_of(self.half)] = even + odd
-        return answer
-
-    def forces(self, even: np.ndarray, odd: np.ndarray, answered: np.ndarray) -> np.ndarray:
-        """Motion (3 r, 3 n) float32 of all nodes under unit forces on ``answered`` (r,) from the halves' (3 k, 3 k)."""
-        here, there = axes_of(self.half), axes_of(self.image[self.half])
-        move = np.empty((3 * len(answered), 3 * len(self.image)), np.float32)
-        for i, node in enumerate(np.searchsorted(self.half, answered)):
-            rows, answer = slice(3 * node, 3 * node + 3), move[3 * i : 3 * i + 3]
-            answer[:, there] = (even[rows] - odd[rows]) * self.sign
-            answer[:, here] = even[rows] + odd[rows]  # after the other: on the mirror plane this one is right
-        return move
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
@@ -276,7 +246,8 @@ def electrode_feet() -> ElectrodeFeet:
 
 
 def _over_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m; even in z."""
+    """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m; even in
+    z."""
     inner = biotac_shape.skin_surface("inner")
     nodes = _facing(mesh)
     image = mirror_nodes(inner.rest)
@@ -293,7 +264,8 @@ def _facing(mesh: HexMesh) -> np.ndarray:
 
 
 def _images(mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """For each of ``count`` watched points the one whose mirror image it is, else itself; and whether it is an image."""
+    """For each of ``count`` watched points the one whose mirror image it is, else itself; and whether it is an
+    image."""
     source, mirrored = np.arange(count), np.zeros(count, bool)
     if count:
         nodes, rest = _facing(mesh), biotac_shape.skin_surface("inner").rest

@@ -11,7 +11,7 @@ from .compliance import Compliance
 from .contact import Contact, ContactProblem, fluid_pressure
 from .correction import Corrected, correct
 
-FORCE_TOLERANCE = 1e-4  # relative, of the force asked for
+FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
 _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
 _GROWTH = 1.6  # largest change of force in one step of a search, which a warm start follows safely
 _SEARCH_STEPS = 24
@@ -53,7 +53,7 @@ class CorrectedPress:
         return self._with_correction(contact)
 
     def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
-        """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if none is found.
+        """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found.
 
         The factor changes slowly with depth, so the linear force is simply scaled by what is missing, a few times.
         """

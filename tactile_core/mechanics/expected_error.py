@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 # Depth over thickness, rms shape error m over nodes that move more than 10 um, relative error of force.
-# Full tier: against the reference tier, 7 mm ball, scripts/validate_mechanics.py. The reference tier's own error is taken
-# as a third of that: halving cells of order 2 leaves a quarter, and the rest is a margin (assumed).
+# Full tier: against the reference tier, 7 mm ball, scripts/validate_mechanics.py. The reference tier's own error is
+# taken as a third of that: halving cells of order 2 leaves a quarter, and the rest is a margin (assumed).
 _FULL = {
     "digit": np.array([[0.05, 1e-6, 0.005], [0.15, 1.5e-6, 0.005], [0.3, 4e-6, 0.005], [0.6, 10e-6, 0.01]]),
     "biotac": np.array([[0.1, 3e-6, 0.01], [0.3, 6e-6, 0.01], [0.6, 12e-6, 0.01]]),

@@ -54,8 +54,8 @@ class Sample:
 def full_press(sensor: Sensor, press: RandomContact) -> dict[str, np.ndarray]:
     """The full tier's contacts of a press at its ``SHARES``, without friction, as far as they converge.
 
-    Returns depths (k,) m wanted, displacement (c, n, 3) float32 m, force (c, 3) N and iterations (c,) of the c <= k that
-    converged, steps (c,) of their load, and seconds (c,) each took.
+    Returns depths (k,) m wanted; of the c <= k that converged displacement (c, n, 3) float32 m, force (c, 3) N,
+    iterations (c,), load steps (c,) and seconds (c,).
     """
     pose = (digit_pose if sensor == "digit" else biotac_pose)(press.indenter, press.place)
     rest = (digit_surface() if sensor == "digit" else biotac_surface()).rest

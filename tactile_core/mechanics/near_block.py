@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compliance import Compliance, axes_of
+from .compliance import Compliance
+from .mirrored_halves import axes_of
 
 # Relative stiffness added to each node: 1e-6 moves a gap by nanometres and keeps single precision definite, also where
 # one node presses two faces of a concave corner.

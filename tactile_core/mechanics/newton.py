@@ -124,7 +124,7 @@ class FiniteStrainContact:
         if cavity:
             rows, columns, _ = cavity.hessian(solid.mesh.nodes)
             self._cavity_places = solid.pattern.find(rows, columns)
-        # Of the size of a node's own: weighs a slip against friction, and damps. Only the way to the answer depends on it.
+        # Of the size of a node's own: weighs a slip against friction, and damps; only the way to the answer depends on it.
         spacing = np.median(np.linalg.norm(np.diff(solid.mesh.nodes[solid.mesh.cells[:, :2]], axis=1), axis=-1))
         self._stiffness = solid.law.bulk * 0.05 * spacing
         self._damping = 0.0
@@ -223,7 +223,7 @@ class FiniteStrainContact:
     def _newton(
         self, state: State, outer: Touching, inner: Touching, fluid: float
     ) -> tuple[np.ndarray, float, float, np.ndarray]:
-        """Steps of displacement (n, 3), of the fluid's pressure and of the cells' (n_cells, 4); imbalance before them."""
+        """Steps of displacement (n, 3), the fluid's pressure and the cells' (n_cells, 4); the imbalance before them."""
         lines = self.solid.linearise(state)
         largest = np.abs(lines.internal_force(condensed=False)).max()
         pattern, at = self.solid.pattern, self._at(state)

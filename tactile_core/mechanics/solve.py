@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from .. import digit_shape, sensors
+from .. import sensors
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
 from .compliance import biotac_compliance, digit_compliance
@@ -205,7 +205,7 @@ class _FiniteStrain(_Path):
         return self._solution(self.last)
 
     def _at_force(self, pose: Pose, force: float) -> Touch:
-        """The contact at a force along the motion, by regula falsi on F^(2/3), which is nearly straight in the depth."""
+        """The contact at a force along the motion, by regula falsi on F^(2/3), nearly straight in the depth."""
         direction, goal = pose.direction, force ** (2 / 3)
         before, at = self.last, (self.last.depth, max(float(self.last.force @ self.pose.direction), 0.0) ** (2 / 3))
         depth = max(at[0], self.limit / 8)

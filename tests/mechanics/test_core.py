@@ -30,7 +30,7 @@ def test_the_normal_is_the_gaps_gradient_where_it_is_closed():
 def test_curvature_is_symmetric_and_bounded():
     blocks = Core().curvature(on_core())
     np.testing.assert_allclose(blocks, blocks.swapaxes(1, 2), atol=1e-9)
-    assert np.abs(np.linalg.eigvalsh(blocks)).max() < 1 / 0.5e-3  # no edge of the core is sharper than half a millimetre
+    assert np.abs(np.linalg.eigvalsh(blocks)).max() < 1 / 0.5e-3  # no edge sharper than half a millimetre
 
 
 def test_the_smoothed_table_stays_with_the_table():

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...sensors import Material
-from ..elasticity import quadratic
-from ..elasticity import reference_gradients
+from ..elasticity import quadratic, reference_gradients
 from ..finite_strain import FiniteStrainSolid, State
 from .block import block, equilibrium, inside
 from .rows import Row, order, row
