@@ -1,10 +1,10 @@
 """What a converted recording leaves behind: the layout of a result folder, and where it may stand.
 
-    <recording>/frames.h5           numbers, T first, SI units; see ``frames_file``
-    <recording>/images/%05d.png     DIGIT pictures, 240 wide, 320 high, numbered by the frame's index in the recording
-    <recording>/contact_sheet.png   a few frames to look at
-    <recording>/note.json           where it came from: versions, weights, options, warnings; same input, same bytes
-    <recording>/timings.json        ms a frame of each stage on this machine; differs from run to run
+<recording>/frames.h5           numbers, T first, SI units; see ``frames_file``
+<recording>/images/%05d.png     DIGIT pictures, 240 wide, 320 high, numbered by the frame's index in the recording
+<recording>/contact_sheet.png   a few frames to look at
+<recording>/note.json           where it came from: versions, weights, options, warnings; same input, same bytes
+<recording>/timings.json        ms a frame of each stage on this machine; differs from run to run
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ IMAGE_NAME = "{:05d}.png"
 
 KEEPABLE = ("latent", "displacement", "height", "image")
 DEFAULT_KEEP = ("latent", "displacement", "image")
+
 
 def parse_keep(text: str) -> tuple[str, ...]:
     """``"latent,image"`` -> ("latent", "image") in the order of KEEPABLE; ``""`` keeps only what is always written.

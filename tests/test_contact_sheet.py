@@ -100,4 +100,3 @@ def test_frames_are_the_strongest_that_lie_apart() -> None:
     strength[31] = np.nan
     assert 29 in choose_frames(strength)
     assert len(choose_frames(np.full(30, np.nan))) == 6
-

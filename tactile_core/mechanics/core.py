@@ -29,12 +29,14 @@ class Core:
         theta = np.clip(np.arctan2(z, biotac_shape.AXIS_Y - y), -_THETA, _THETA)
         r = np.maximum(np.hypot(y - biotac_shape.AXIS_Y, z), 1e-6)
         radius = _spline()
-        along, around = radius.ev(x, theta, dx=1), radius.ev(x, theta, dy=1) / r
+        along = (radius.ev(x, theta, dx=1) + radius.ev(x, -theta, dx=1)) / 2  # the core is even in z, the spline nearly
+        around = (radius.ev(x, theta, dy=1) - radius.ev(x, -theta, dy=1)) / (2 * r)
         # d theta / d(y, z) = (sin, cos) / r of the angle, whose own direction outward is (-cos, sin)
         sine, cosine = np.sin(theta), np.cos(theta)
         gradient = np.column_stack([-along, -cosine - around * sine, sine - around * cosine])
         length = np.linalg.norm(gradient, axis=1)
-        return (r - radius.ev(x, theta)) / length, gradient / length[:, None]
+        height = r - (radius.ev(x, theta) + radius.ev(x, -theta)) / 2
+        return height / length, gradient / length[:, None]
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """Derivative (n, 3, 3) 1/m of the normal, symmetric part, by central differences."""

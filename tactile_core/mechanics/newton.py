@@ -124,7 +124,7 @@ class FiniteStrainContact:
         if cavity:
             rows, columns, _ = cavity.hessian(solid.mesh.nodes)
             self._cavity_places = solid.pattern.find(rows, columns)
-        # Of the size of a node's own: weighs a slip against friction, and damps; only the way to the answer depends on it.
+        # Of the size of a node's own: weighs a slip against friction, and damps. Only the way to the answer needs it.
         spacing = np.median(np.linalg.norm(np.diff(solid.mesh.nodes[solid.mesh.cells[:, :2]], axis=1), axis=-1))
         self._stiffness = solid.law.bulk * 0.05 * spacing
         self._damping = 0.0

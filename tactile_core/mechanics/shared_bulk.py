@@ -13,8 +13,8 @@ import numpy as np
 
 from .neo_hookean import NeoHookean
 
-# Of the shear modulus, for the gel; the skin, which bends, does not need it, and it would stiffen it by 2 %. Measured on
-# the graded gel under a 7 mm ball against the mesh twice as fine: 0 and 5 give -0.3 and +0.1 % of force, 1.3 and 1.1 um
+# Of the shear modulus, for the gel; the skin, which bends, does not need it, and would be 2 % stiffer. Measured on the
+# graded gel under a 7 mm ball against the mesh twice as fine: 0 and 5 give -0.3 and +0.1 % of force, 1.3 and 1.1 um
 # of shape at 0.6 mm.
 SHARE = 4.0
 

@@ -128,7 +128,7 @@ class Touching:
     def bending(self, at: np.ndarray) -> np.ndarray:
         """Change (k, 3, 3) N/m of the contact forces with the normals' turn: pressing times the Hessian.
 
-        Taken where the nodes will come to lie, on the obstacle: deep in it, near a centre of curvature, it says nothing.
+        Taken where the nodes will come to lie, on the obstacle: near a centre of curvature, deep in it, it is no guide.
         """
         if not self.active.any():
             return np.empty((0, 3, 3))

@@ -120,4 +120,3 @@ def test_the_answer_does_not_depend_on_the_first_guess(solid):
     one = problem(solid).press(0.5e-3, step=5e-3)
     other = problem(solid, first_share=0.9).press(0.5e-3, step=0.1e-3)
     np.testing.assert_allclose(one.force, other.force, rtol=1e-7, atol=1e-7 * np.abs(one.force).max())
-
