@@ -60,5 +60,5 @@ def biotac_surface() -> Lattice:
 
 
 def digit_surface() -> Lattice:
-    """The DIGIT's coated gel surface at rest, 2,255 nodes; see ``digit_shape.gel_surface``."""
+    """The DIGIT's coated gel surface at rest, 2,867 nodes; see ``digit_shape.gel_surface``."""
     return digit_shape.gel_surface()

@@ -90,22 +90,21 @@ def node_frames(sensor: str) -> np.ndarray:
     return np.stack([along, outward, np.cross(along, outward)], -1)
 
 
-@functools.cache
-def _areas(sensor: str) -> np.ndarray:
-    lattice = digit_shape.gel_surface() if sensor == "digit" else biotac_shape.skin_surface()
-    return surface.node_areas(lattice.rest, lattice.faces)
-
-
 def frame(compliance: Compliance, contact: Contact) -> Frame:
     """Where a contact's fields lie: about the centre of its forces, with its patch's radius."""
-    nodes = compliance.touchable[contact.nodes]
+    places = plane(compliance.name)[compliance.touchable[contact.nodes]]
     load = np.linalg.norm(contact.nodal_force, axis=1)
-    centre = load @ plane(compliance.name)[nodes] / load.sum()
-    return Frame(centre, float(np.sqrt(_areas(compliance.name)[nodes].sum() / np.pi)) + _SMALLEST_RADIUS)
+    share = load / load.sum()
+    centre = share @ places
+    # Hertz's pressure has 2/5 of the radius squared as its mean square distance; a count of nodes would jump.
+    return Frame(centre, float(np.sqrt(2.5 * (share @ ((places - centre) ** 2).sum(axis=1)))) + _SMALLEST_RADIUS)
 
 
 def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
-    """What a fast contact looks like: (f,) numbers without a unit, lengths over the thickness, stresses over E."""
+    """What a fast contact looks like: (f,) numbers without a unit, lengths over the thickness, stresses over E.
+
+    All are continuous in the nodal forces, so that a force can be searched for.
+    """
     digit = compliance.name == "digit"
     material = sensors.DIGIT_GEL if digit else sensors.BIOTAC_SKIN
     thickness = digit_shape.THICKNESS if digit else biotac_shape.SKIN_THICKNESS
@@ -115,7 +114,8 @@ def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
     offset = (plane(compliance.name)[nodes] - at.centre) / thickness
     spread = np.einsum("k,ki,kj->ij", share, offset, offset)
     local = np.einsum("kji,kj->i", node_frames(compliance.name)[nodes], contact.nodal_force) / load.sum()
-    towards = node_frames(compliance.name)[nodes[np.argmax(load)]].T @ contact.pose.direction
+    towards = np.einsum("k,kji,j->i", share, node_frames(compliance.name)[nodes], contact.pose.direction)
+    alike = 1 / float(share @ share)  # how many nodes would carry as evenly
     depth = contact.depth / thickness
     force = np.log(load.sum() / (material.youngs * thickness**2) + 1e-6)
     core = contact.core_force.sum() / load.sum() if len(contact.core_force) else 0.0
@@ -123,12 +123,11 @@ def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
         depth, np.sqrt(depth), force, at.radius / thickness, np.log(at.radius / thickness),
         spread[0, 0], spread[1, 1], spread[0, 1], at.centre[0] / 5e-3, at.centre[1] / 5e-3, (at.centre[1] / 5e-3) ** 2,
         local[0], local[2], towards[0], towards[2], core, np.log(depth / (at.radius / thickness)),
-        share.max() * len(share), float(len(share) < _FEW),
+        share.max() * alike, 1 / alike,
     ])  # fmt: skip
 
 
 ESSENTIAL = np.array([0, 2, 4, 15, 16, 18])  # depth, force, radius, core, depth over radius, few nodes
-_FEW = 4  # touching nodes, below which a patch's shape means little
 MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1.0])  # features under z -> -z
 
 

@@ -18,7 +18,7 @@ Read, tare, translate and shade recordings. Each gets the folder DIR/<file name 
   note.json          versions, weights, options, warnings
   timings.json       ms a frame of each stage
 One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all."""
-# 4 B a number of 3,650 + 2,255 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
+# 4 B a number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
 # noisy real one), packed height maps at 200 kB.
 SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
 EPILOG = f"""\
