@@ -9,7 +9,7 @@ import pytest
 from tactile_core.indenters import Sphere
 from tactile_core.mechanics import correction, learn_correction
 from tactile_core.mechanics.compliance import digit_compliance
-from tactile_core.mechanics.corrected_press import CorrectedPress
+from tactile_core.mechanics.corrected_press import FORCE_TOLERANCE, CorrectedPress
 from tactile_core.mechanics.correction import LINES, MIRRORED, Frame, correct, features, frame
 from tactile_core.mechanics.press import Placement, digit_pose
 
@@ -41,7 +41,7 @@ def test_a_field_is_spread_where_it_belongs_and_fades():
     moved = correction.spread_field("digit", at, field.reshape(-1, 3))
     plane = correction.plane("digit")
     far = np.linalg.norm(plane - at.centre, axis=1) > 0.4e-3  # a cell of the grid at the centre is 0.2 mm
-    assert not moved[far].any() and moved[:, 1].max() > 0.2 and not moved[:, [0, 2]].any()
+    assert not moved[far].any() and moved[:, 1].max() > 0.1 and not moved[:, [0, 2]].any()
 
 
 def test_a_field_on_the_nodes_survives_the_way_to_the_grid_and_back():
@@ -62,8 +62,8 @@ def test_features_of_a_mirrored_contact_are_mirrored():
 
 def test_force_asked_for_is_the_corrected_one(contact):
     found = press().at_force(contact.axial_force)
-    assert found.axial_force == pytest.approx(contact.axial_force, rel=1e-4)
-    assert found.linear.depth == pytest.approx(0.5e-3, rel=1e-3)
+    assert found.axial_force == pytest.approx(contact.axial_force, rel=FORCE_TOLERANCE)
+    assert found.linear.depth == pytest.approx(0.5e-3, rel=2 * FORCE_TOLERANCE)
     assert press().at_force(1e3) is None
 
 

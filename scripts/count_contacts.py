@@ -1,0 +1,88 @@
+"""Count how many random contacts a tier settles, and how long it takes: nine indenters, tilts to 30 degrees, the whole
+pad, depths to half of the thickness.
+
+    python3 scripts/count_contacts.py digit --count 1000 [--tier fast] [--friction 0] [--seed 0] [--json FILE]
+
+A contact counts as silently wrong when it says that it converged although a surface node lies more than 1 um in the
+indenter. Prints a table by indenter; exits 1 when one is silently wrong, or when fewer than 99 % converge.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import pathlib
+import sys
+import time
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from tactile_core import atomic, sensors  # noqa: E402
+from tactile_core.errors import TactileError  # noqa: E402
+from tactile_core.mechanics.press import biotac_pose, digit_pose  # noqa: E402
+from tactile_core.mechanics.random_contacts import RandomContact, random_contacts  # noqa: E402
+from tactile_core.mechanics.solve import TIERS, Solution, solve  # noqa: E402
+from tactile_core.mechanics.thickness import thickness  # noqa: E402
+from tactile_core.mechanics.validation.rows import failed, row  # noqa: E402
+
+DEEPEST = 2.4e-3  # m: 60 % of the gel; where the BioTac has no core below, its thickness says little
+TARGET, PENETRATION = 99.0, 1e-6  # per cent, m: issue MECHANICS
+
+
+def settle(sensor: str, contact: RandomContact, tier: str, friction: float) -> tuple[Solution | None, float]:
+    """The contact, or None where the tier says that it finds none, and CPU seconds."""
+    rest = (sensors.digit_surface() if sensor == "digit" else sensors.biotac_surface()).rest
+    pose = (digit_pose if sensor == "digit" else biotac_pose)(contact.indenter, contact.place)
+    touched = rest[int(np.argmin(pose.distance(contact.indenter, rest)[0]))]
+    depth = min(contact.depth * thickness(sensor, touched), DEEPEST)
+    began = time.process_time()
+    try:
+        found = solve(sensor, contact.indenter, contact.place, depth=depth, tier=tier, friction=friction)
+    except TactileError:
+        found = None
+    return (found if found is not None and found.converged else None), time.process_time() - began
+
+
+def main() -> int:
+    """Count, print, report."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sensor", choices=("biotac", "digit"))
+    parser.add_argument("--count", type=int, default=1000, help="contacts (1000)")
+    parser.add_argument("--tier", choices=TIERS, default="fast", help="(fast)")
+    parser.add_argument("--friction", type=float, default=0.0, help="Coulomb's coefficient (0)")
+    parser.add_argument("--seed", type=int, default=0, help="(0)")
+    parser.add_argument("--json", type=pathlib.Path, help="write the rows here")
+    options = parser.parse_args()
+    settled, times, wrong = collections.Counter(), collections.defaultdict(list), 0
+    for number, contact in enumerate(random_contacts(options.count, options.seed), 1):
+        found, took = settle(options.sensor, contact, options.tier, options.friction)
+        times[contact.name].append(1e3 * took)
+        settled[contact.name] += found is not None
+        wrong += found is not None and found.penetration > PENETRATION
+        if number % 100 == 0:
+            print(f"{number}/{options.count}", file=sys.stderr, flush=True)
+    rows, of = [], f"{options.tier} tier, friction {options.friction:g}, seed {options.seed}"
+    for name, took in times.items():
+        label = f"{options.sensor}_{name.replace(' ', '_')}"
+        share = 100 * settled[name] / len(took)
+        print(f"{name:18} {settled[name]:5} of {len(took):5} settled, ms mean {np.mean(took):8.1f} median "
+              f"{np.median(took):8.1f} p95 {np.quantile(took, 0.95):8.1f}")  # fmt: skip
+        rows.append(row(f"{label}_settled", share, "percent", of=of))
+    every = np.concatenate(list(times.values()))
+    rows.append(
+        row(f"{options.sensor}_settled", 100 * settled.total() / len(every), "percent", TARGET, of=of, at_least=True)
+    )
+    rows.append(row(f"{options.sensor}_silently_wrong", wrong, "1", 0.0, of=of))
+    rows.append(row(f"{options.sensor}_mean_time", float(every.mean()), "ms", of=of + ", with its set-up"))
+    for found in rows[-3:]:
+        print(f"{found['name']}: {found['value']} {found['unit']}, {of}")
+    if options.json:
+        atomic.write_json(options.json, rows)
+    return int(bool(failed(rows)))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
