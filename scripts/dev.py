@@ -28,7 +28,11 @@ DEMO_RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
 # Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
-SIZES_MB = {"": "50", "dev": "60", "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)"}
+SIZES_MB = {
+    "": "50",
+    "dev": "300 (most of it MKL, on x86-64)",
+    "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)",
+}
 NETWORK_SIGNS = (
     "NewConnectionError",
     "NameResolutionError",

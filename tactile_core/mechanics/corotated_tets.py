@@ -49,19 +49,20 @@ class CorotatedTets:
         """No displacement; this solid has no pressure unknowns."""
         return State(np.zeros_like(self.mesh.nodes), np.zeros(0))
 
-    def deformation(self, displacement: np.ndarray) -> np.ndarray:
-        """Deformation gradient F (n_cells, 3, 3)."""
-        return np.einsum("eai,eaj->eij", displacement[self.mesh.cells], self.gradient) + np.eye(3)
+    def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Deformation gradient F (n_cells, 3, 3) and its determinant (n_cells,)."""
+        f = np.einsum("eai,eaj->eij", displacement[self.mesh.cells], self.gradient) + np.eye(3)
+        return f, np.linalg.det(f)
 
     def energy(self, state: State) -> float:
         """Stored elastic energy, J."""
-        _, stretch, _ = np.linalg.svd(self.deformation(state.displacement))
+        _, stretch, _ = np.linalg.svd(self.deformation(state.displacement)[0])
         density = self.shear * ((stretch - 1) ** 2).sum(1) + self.lame / 2 * (stretch.sum(1) - 3) ** 2
         return float(density @ self.volume)
 
     def linearise(self, state: State) -> Linearised:
         """Residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
-        f = self.deformation(state.displacement)
+        f, _ = self.deformation(state.displacement)
         if not (np.linalg.det(f) > 0).all():  # NaN, too
             raise FloatingPointError("a cell is turned inside out")
         stress, tangent = self.stress_tangent(f)

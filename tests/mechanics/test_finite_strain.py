@@ -6,7 +6,6 @@ from slab import slab_mesh
 
 from tactile_core.errors import TactileError
 from tactile_core.indenters import Sphere, pose_on
-from tactile_core.mechanics import solve
 from tactile_core.mechanics.bonded_layer import (
     GOLDEN_BALL,
     GOLDEN_FORCE,
@@ -116,9 +115,3 @@ def test_golden_forces_to_half_the_thickness_and_work_equals_energy(layer):
 def test_a_step_that_fails_is_halved_until_it_is_reported(layer):
     with pytest.raises(TactileError, match="no equilibrium beyond"):
         layer.press(2.9e-3, step=2.9e-3)
-
-
-def test_the_search_for_a_force_finds_it(layer):
-    touch = solve._at_force(layer, "digit", 0.4)
-    assert touch.force[1] == pytest.approx(0.4, rel=1.1e-4)  # the search's own tolerance is 1e-4
-    assert layer.press(touch.depth, step=0.2e-3).force[1] == pytest.approx(0.4, rel=1e-3)

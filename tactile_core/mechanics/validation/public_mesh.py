@@ -20,7 +20,7 @@ from ...sensors import Material
 from ...tet_file import TetMesh, checked, read_tet
 from .. import isaac_like
 from ..finite_strain import FiniteStrainSolid
-from ..finite_strain_tier import FULL_STEP, Body, graded_body
+from ..finite_strain_tier import ONE_STEP, Body, graded_body
 from ..newton import FiniteStrainContact
 from ..press import Placement, biotac_pose, digit_pose
 from .rows import Row, row
@@ -81,7 +81,7 @@ def _tets(mesh: TetMesh, held: np.ndarray, pose: Pose, depth: float, material: M
 
 
 def _own(body: Body, pose: Pose, depth: float) -> Answer:
-    touch = body.contact(_BALL, pose, depth, 0.0).press(depth, step=FULL_STEP)
+    touch = body.contact(_BALL, pose, depth, 0.0).press(depth, step=ONE_STEP)
     return body.displacement(touch), touch.force
 
 
