@@ -28,23 +28,10 @@ DEMO_RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
 # Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
-SIZES_MB = {
-    "": "50",
-    "dev": "300 (most of it MKL, on x86-64)",
-    "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)",
-}
-NETWORK_SIGNS = (
-    "NewConnectionError",
-    "NameResolutionError",
-    "ConnectTimeoutError",
-    "ReadTimeoutError",
-    "ProxyError",
-    "Max retries exceeded",
-    "Failed to establish",
-    "Temporary failure",
-    "SSLError",
-    "(from versions: none)",
-)
+SIZES_MB = {"": "50", "dev": "300", "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)"}
+NETWORK_SIGNS = ("NewConnectionError", "NameResolutionError", "ConnectTimeoutError", "ReadTimeoutError", "ProxyError",
+                 "Max retries exceeded", "Failed to establish", "Temporary failure", "SSLError",
+                 "(from versions: none)")
 
 
 class SetupError(Exception):
@@ -201,17 +188,10 @@ def pip_install(python: Path, folder: Path, extras: tuple[str, ...], numpy: str 
     target = ".[{}]".format(",".join(extras)) if extras else "."
     command = [str(python), "-m", "pip", "install", "--no-input", "--constraint", str(constraints)]
     log = folder / LOG
-    with (
-        subprocess.Popen(
-            [*command, "--editable", target],
-            cwd=str(ROOT),
-            env=environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
-        ) as process,
-        open(str(log), "w", encoding="utf-8") as record,
-    ):
+    with subprocess.Popen(
+        [*command, "--editable", target], cwd=str(ROOT), env=environment(),
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+    ) as process, open(str(log), "w", encoding="utf-8") as record:
         for raw in process.stdout:
             line = raw.decode(errors="replace")
             record.write(line)

@@ -201,9 +201,9 @@ def interrupt(how: int, path: Path, out: Path) -> subprocess.Popen:
 def test_a_full_disk_costs_one_recording_and_no_half_result_is_left(keep, slide_csv, tmp_path):
     paths, out = [slide_csv("long", frames=500), slide_csv("short", frames=5)], tmp_path / "out"
     root = Path(__file__).parent.parent
-    limited = (  # 400 kB: enough for 5 frames and a sheet. Python ignores SIGXFSZ: writing gives OSError
+    limited = (  # 500 kB: enough for 5 frames and a sheet. Python ignores SIGXFSZ: writing gives OSError
         "import resource, runpy, sys; sys.argv = sys.argv[1:]; sys.path.insert(0, sys.argv[0].rpartition('/')[0]);"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000)); runpy.run_path(sys.argv[0], None, '__main__')"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000)); runpy.run_path(sys.argv[0], None, '__main__')"
     )
     done = subprocess.run(
         [sys.executable, "-c", limited, str(root / "tests" / "fake_tools.py"),

@@ -158,7 +158,7 @@ def test_every_dependency_is_pinned():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"].values()
     wanted = [*project["dependencies"], *(line for extra in extras for line in extra)]
-    named = {re.split(r"[\[<>=~! ]", line)[0] for line in wanted} - {project["name"]}
+    named = {re.split(r"[\[<>=~!; ]", line)[0] for line in wanted} - {project["name"]}
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     pinned = {line.partition("==")[0] for line in lines if line and not line.startswith("#")}
     assert named <= pinned
