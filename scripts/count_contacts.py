@@ -20,24 +20,20 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from tactile_core import atomic, sensors  # noqa: E402
+from tactile_core import atomic  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.mechanics.press import biotac_pose, digit_pose  # noqa: E402
+from tactile_core.mechanics.placement import pose_at  # noqa: E402
 from tactile_core.mechanics.random_contacts import RandomContact, random_contacts  # noqa: E402
 from tactile_core.mechanics.solve import TIERS, Solution, solve  # noqa: E402
-from tactile_core.mechanics.thickness import thickness  # noqa: E402
+from tactile_core.mechanics.thickness import depth_at  # noqa: E402
 from tactile_core.mechanics.validation.rows import failed, row  # noqa: E402
 
-DEEPEST = 2.4e-3  # m: 60 % of the gel; where the BioTac has no core below, its thickness says little
 TARGET, PENETRATION = 99.0, 1e-6  # per cent, m: issue MECHANICS
 
 
 def settle(sensor: str, contact: RandomContact, tier: str, friction: float) -> tuple[Solution | None, float]:
     """The contact, or None where the tier says that it finds none, and CPU seconds."""
-    rest = (sensors.digit_surface() if sensor == "digit" else sensors.biotac_surface()).rest
-    pose = (digit_pose if sensor == "digit" else biotac_pose)(contact.indenter, contact.place)
-    touched = rest[int(np.argmin(pose.distance(contact.indenter, rest)[0]))]
-    depth = min(contact.depth * thickness(sensor, touched), DEEPEST)
+    depth = depth_at(contact.depth, sensor, contact.indenter, pose_at(sensor, contact.indenter, contact.place))
     began = time.process_time()
     try:
         found = solve(sensor, contact.indenter, contact.place, depth=depth, tier=tier, friction=friction)

@@ -10,7 +10,6 @@ import numpy as np
 from . import sensors
 from .errors import TactileError
 from .frames_file import FORMAT as CONVERTED
-from .lattice import Lattice
 from .recordings.simulated import FORMAT as SIMULATED
 from .recordings.store import open_hdf5
 
@@ -18,13 +17,8 @@ if TYPE_CHECKING:
     from .recordings.store import Store
 
 
-def sensor_surface(sensor: str) -> Lattice:
-    """The resting surface of ``"biotac"`` or ``"digit"``."""
-    return sensors.biotac_surface() if sensor == "biotac" else sensors.digit_surface()
-
-
 def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.ndarray:
-    """Displacement (n, 3) m of the nodes of ``sensor_surface(sensor)`` in a frame, by its number in the recording.
+    """Displacement (n, 3) m of a sensor's surface nodes in a frame, by its number in the recording.
 
     Raises TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was
     not kept or lies on another surface, and a frame that it does not hold.
@@ -53,7 +47,7 @@ def _array(store: Store, name: str, sensor: str) -> np.ndarray:
     if name not in store.shapes:
         advice = "Convert with --keep displacement" if name.startswith("displacement") else ""
         raise TactileError(f"{store.path}, {name}", "missing", "the deformation of each frame", advice)
-    shape, count = store.shapes[name][0], len(sensor_surface(sensor).rest)
+    shape, count = store.shapes[name][0], len(sensors.sensor_surface(sensor).rest)
     if shape[1:] != (count, 3):
         raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {count}, 3)",
                            "It was made with another version of the surface: make it anew")  # fmt: skip

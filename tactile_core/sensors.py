@@ -62,3 +62,8 @@ def biotac_surface() -> Lattice:
 def digit_surface() -> Lattice:
     """The DIGIT's coated gel surface at rest, 2,867 nodes; see ``digit_shape.gel_surface``."""
     return digit_shape.gel_surface()
+
+
+def sensor_surface(sensor: str) -> Lattice:
+    """The resting surface of ``"biotac"`` or ``"digit"``."""
+    return biotac_surface() if sensor == "biotac" else digit_surface()

@@ -53,10 +53,6 @@ class BiotacSheet:
         """Thickness (k,) m for a displacement (n_inner, 3) m of the whole inner skin; at least ``FILM_FLOOR``."""
         return np.maximum(self.film + np.einsum("ki,ki->k", displacement[self.wet], self.outward), FILM_FLOOR)
 
-    def electrode_films(self, displacement: np.ndarray) -> np.ndarray:
-        """Mean thickness (19,) m over each electrode."""
-        return self.sheet.mean_over_electrodes(self.films(displacement))[:19]
-
     def resistances(self, displacement: np.ndarray) -> np.ndarray:
         """Resistance (19,) ohm of each electrode to the excitation, for a displacement (n_inner, 3) m."""
         films = self.films(displacement)

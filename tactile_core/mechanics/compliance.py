@@ -89,15 +89,20 @@ class Arrays(NamedTuple):
 
 @functools.cache
 def biotac_compliance() -> Compliance:
-    """The BioTac's skin over incompressible fluid; built in under a minute, then read from the cache."""
+    """The BioTac's skin over incompressible fluid; built in about a minute, then read from the cache."""
     return _cached("biotac", sensors.biotac_surface(), _touchable_skin(), skin_mesh(), sensors.BIOTAC_SKIN)
 
 
 @functools.cache
 def digit_compliance() -> Compliance:
-    """The DIGIT's gel; built in under a minute, then read from the cache."""
+    """The DIGIT's gel; built in about a minute, then read from the cache."""
     lattice = sensors.digit_surface()
     return _cached("digit", lattice, np.arange(len(lattice.rest)), gel_mesh(), sensors.DIGIT_GEL)
+
+
+def compliance_of(sensor: str) -> Compliance:
+    """That of ``"biotac"`` or ``"digit"``."""
+    return biotac_compliance() if sensor == "biotac" else digit_compliance()
 
 
 def _touchable_skin() -> np.ndarray:
@@ -125,7 +130,7 @@ def _cached(name: str, lattice: Lattice, touchable: np.ndarray, mesh: HexMesh, m
     try:
         loaded = _load(folder)
     except (OSError, ValueError):  # not built yet, or cut short
-        log.info("building the compliance of the %s in %s (under a minute, once)", name, folder)
+        log.info("building the compliance of the %s in %s (about a minute, once)", name, folder)
         _claim(folder)
         _store(folder, build(mesh, material, touchable, lattice)._asdict())
         loaded = _load(folder)

@@ -60,10 +60,13 @@ class CorrectedPress:
         pose = pose or self.pose
         contact = self.last or self._first(pose)
         for _ in range(_SEARCH_STEPS):
-            if contact is None or not contact.converged or contact.depth > self.limit:
+            if contact is None or not contact.converged:
                 return None
             found = self._with_correction(contact)
-            if found.axial_force > 0 and abs(found.axial_force / force - 1) < FORCE_TOLERANCE:
+            close = found.axial_force > 0 and abs(found.axial_force / force - 1) < FORCE_TOLERANCE
+            if contact.depth > self.limit and (close or found.axial_force < force):
+                return None
+            if close:
                 self.last = contact
                 return found
             growth = float(np.clip(force / max(found.axial_force, 1e-12), 1 / _GROWTH, _GROWTH))

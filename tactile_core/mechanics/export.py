@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import TactileError
-from ..frame_surface import sensor_surface
+from ..sensors import sensor_surface
 from . import mesh_files
 from .hex_mesh import HexMesh, gel_mesh, skin_mesh
 from .solve import Sensor, Solution

@@ -22,7 +22,7 @@ from ..scene import RecordingSpec, load_scene
 from ..tet_file import TetMesh, read_tet
 from . import isaac_like
 from .isaac_like import Press, Solution, attached_to, first_touch, near_body
-from .press import Placement, biotac_pose, on_gel
+from .placement import Placement, biotac_pose, on_gel
 
 FORMAT = "tactile-isaac-like-1"
 RATE = 10.0  # Hz: a tenth of the sensor's, for each frame takes seconds

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import logging
 import time
 from collections.abc import Iterable, Iterator
@@ -10,19 +11,17 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import biotac_surface, digit_surface
 from . import correction
-from .compliance import biotac_compliance, digit_compliance
+from .compliance import compliance_of
 from .contact import ContactProblem
 from .correction import LINES, MIRRORED, Frame, Learned, features, frame, kernel
 from .finite_strain_tier import ONE_STEP, Sensor, graded_body
-from .press import biotac_pose, digit_pose
+from .placement import pose_at
 from .random_contacts import RandomContact
-from .thickness import thickness
+from .thickness import depth_at
 
 log = logging.getLogger(__name__)
 
-DEEPEST = 2.4e-3  # m: 60 % of the gel; where the BioTac has no core below, its "thickness" says little
 SHARES = 0.4, 0.7, 1.0  # of a press's depth, at which it is sampled
 FIELDS = 32  # learned fields a sensor
 _WIDTHS = 2.0, 4.0, 8.0  # of the kernel, in standard deviations of a feature
@@ -57,10 +56,8 @@ def full_press(sensor: Sensor, press: RandomContact) -> dict[str, np.ndarray]:
     Returns depths (k,) m wanted; of the c <= k that converged displacement (c, n, 3) float32 m, force (c, 3) N,
     iterations (c,), load steps (c,) and seconds (c,).
     """
-    pose = (digit_pose if sensor == "digit" else biotac_pose)(press.indenter, press.place)
-    rest = (digit_surface() if sensor == "digit" else biotac_surface()).rest
-    touched = rest[int(np.argmin(pose.distance(press.indenter, rest)[0]))]
-    deepest = min(press.depth * thickness(sensor, touched), DEEPEST)
+    pose = pose_at(sensor, press.indenter, press.place)
+    deepest = depth_at(press.depth, sensor, press.indenter, pose)
     body = graded_body(sensor, press.indenter, pose, deepest)
     problem = body.contact(press.indenter, pose, deepest, 0.0)
     touch, found = None, []
@@ -81,8 +78,7 @@ def full_press(sensor: Sensor, press: RandomContact) -> dict[str, np.ndarray]:
 
 def paired(sensor: Sensor, number: int, press: RandomContact, full: dict[str, np.ndarray]) -> Iterator[Sample]:
     """The press in the fast tier, beside the full tier's contacts of ``full_press``; those that converged in both."""
-    compliance = digit_compliance() if sensor == "digit" else biotac_compliance()
-    pose = (digit_pose if sensor == "digit" else biotac_pose)(press.indenter, press.place)
+    compliance, pose = compliance_of(sensor), pose_at(sensor, press.indenter, press.place)
     problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]))
     contact = None
     for depth, moved, force in zip(full["depths"], full["displacement"], full["force"], strict=False):
@@ -106,15 +102,11 @@ def residual_on_grid(sensor: str, at: Frame, residual: np.ndarray) -> np.ndarray
     return scipy.interpolate.LinearNDInterpolator(_triangulation(sensor), local, fill_value=0.0)(places)
 
 
+@functools.cache
 def _triangulation(sensor: str):  # noqa: ANN202
     import scipy.spatial
 
-    if sensor not in _TRIANGULATIONS:
-        _TRIANGULATIONS[sensor] = scipy.spatial.Delaunay(correction.plane(sensor))
-    return _TRIANGULATIONS[sensor]
-
-
-_TRIANGULATIONS: dict = {}
+    return scipy.spatial.Delaunay(correction.plane(sensor))
 
 
 def mirrored(field: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
-from .cavity import Cavity
+from .quadratic_cavity import QuadraticCavity
 from .factor import NotPositiveDefiniteError, PatternFactor
 from .finite_strain import FiniteStrainSolid, State
 from .obstacle import Obstacle, PlacedIndenter
@@ -105,7 +105,7 @@ class FiniteStrainContact:
         touchable: np.ndarray,
         indenter: Indenter,
         pose: Pose,
-        cavity: Cavity | None = None,
+        cavity: QuadraticCavity | None = None,
         pre_inflation: float = 0.0,
         fixed: np.ndarray | None = None,
         core: Obstacle | None = None,

@@ -20,20 +20,19 @@ import numpy as np
 from .. import __version__, atomic, digit_shape, sensors
 from ..errors import TactileError
 from ..hdf5_disk import Disk
-from ..indenters import Indenter, Pose
+from ..indenters import Indenter
 from ..scene import PairSpec, Scene, load_scene
-from .compliance import Compliance, biotac_compliance, digit_compliance
+from .compliance import biotac_compliance, compliance_of, digit_compliance
 from .contact import Contact
 from .corrected_press import CorrectedPress, FastContact
 from .electrodes import electrode_gaps, signal_of_gaps
-from .press import Placement, biotac_pose, digit_pose, on_gel, touched_point
-from .thickness import thickness
+from .placement import Placement, on_gel, pose_at
+from .thickness import depth_at
 
 log = logging.getLogger(__name__)
 
 FORMAT = "tactile-pairs-1"
 SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
-MOST_DEPTH = 2.5e-3  # m: 60 % of the gel; where the BioTac has no core below, its thickness says little
 BLOCK = 16  # presses a block: a few seconds of work
 
 
@@ -181,10 +180,7 @@ def _press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarra
     which = int(random.integers(len(scene.indenters)))
     indenter = scene.indenters[which].build()
     place = _draw_place(random, spec)
-    on_biotac, on_digit = (
-        _press(compliance, indenter, pose(indenter, place), spec)
-        for compliance, pose in ((biotac_compliance(), biotac_pose), (digit_compliance(), digit_pose))
-    )
+    on_biotac, on_digit = (_press(sensor, indenter, place, spec) for sensor in ("biotac", "digit"))
     force = spec.force_min_n * spec.force_ratio ** random.uniform()
     rows = []
     while True:
@@ -195,10 +191,10 @@ def _press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarra
         force *= spec.force_ratio
 
 
-def _press(compliance: Compliance, indenter: Indenter, pose: Pose, spec: PairSpec) -> CorrectedPress:
-    thick = thickness(compliance.name, touched_point(compliance, indenter, pose))
-    limit = min(spec.depth_max_percent / 100 * thick, MOST_DEPTH)
-    return CorrectedPress(compliance, indenter, pose, limit, spec.friction)
+def _press(sensor: str, indenter: Indenter, place: Placement, spec: PairSpec) -> CorrectedPress:
+    pose = pose_at(sensor, indenter, place)
+    limit = depth_at(spec.depth_max_percent / 100, sensor, indenter, pose)
+    return CorrectedPress(compliance_of(sensor), indenter, pose, limit, spec.friction)
 
 
 def _draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:

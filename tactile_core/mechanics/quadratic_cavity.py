@@ -1,4 +1,4 @@
-"""A fluid's volume under a skin of quadratic cells, by the cells' own curved faces."""
+"""The BioTac's fluid in finite strain: incompressible, one pressure in the whole cavity."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import functools
 
 import numpy as np
 
-from .cavity import _cross_matrix
 from .elasticity import _POINT_WEIGHTS, _POINTS, quadratic
 
 
 class QuadraticCavity:
-    """What ``Cavity`` answers, for faces of nine nodes: the pressure's nodal forces fit the cells' shape functions.
+    """Volume under a skin of quadratic cells by their own curved faces, with its exact first and second derivatives.
 
     V = 1/3 of the integral of x . (dx/dxi x dx/deta) over the faces: trilinear in the nodes, and summed with
     coefficients that are antisymmetric in them, since x_a . (x_b x x_c) is.
@@ -56,3 +55,10 @@ def _coefficients() -> np.ndarray:
     even = sum(product.transpose(order) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
     odd = sum(product.transpose(order) for order in ((1, 0, 2), (0, 2, 1), (2, 1, 0)))
     return (even - odd) / 6
+
+
+def _cross_matrix(v: np.ndarray) -> np.ndarray:
+    """Matrices (n, 3, 3) with M w = v x w."""
+    zero = np.zeros(len(v))
+    x, y, z = v.T
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(-1, 3, 3)

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import digit_shape
 from ..indenters import Box, BumpyCube, Cylinder, Indenter, LyingCylinder, Ring, Sphere
-from .press import Placement, on_gel
+from .placement import Placement, on_gel
 
 # Diameters and sizes as MECHANICS names them, in m; edges, wire and bumps are assumed.
 INDENTERS: dict[str, Indenter] = {

@@ -9,13 +9,15 @@ import numpy as np
 
 from .. import __version__, atomic, sensors
 from ..errors import TactileError
+from ..indenters import Indenter
 from ..recordings import Truth, write_simulated
 from ..scene import RecordingSpec, load_scene
-from .compliance import Compliance, biotac_compliance, digit_compliance
+from .compliance import Compliance, biotac_compliance, compliance_of, digit_compliance
 from .corrected_press import CorrectedPress, FastContact
 from .electrodes import Wiring, electrode_gaps, readings, signal_of_gaps
 from .pairs import contact_center
-from .press import Placement, biotac_pose, depth_limit, digit_pose, on_gel
+from .placement import Placement, on_gel, pose_at
+from .thickness import DEPTH_LIMIT, thickness_under
 
 # Pa a count: the range 0 to 100 kPa (SynTouch, BioTac sensor details, 2011) over the 12 bits of PDC: assumed.
 PRESSURE_PER_COUNT = 100e3 / 4096
@@ -87,12 +89,7 @@ def _motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _solve(scene_path, indenter, place: Placement, force: float, time: float) -> Pair:  # noqa: ANN001
-    biotac, digit = (
-        CorrectedPress(compliance, indenter, pose, depth_limit(compliance, indenter, pose)).at_force(force)
-        for compliance, pose in (
-            (biotac_compliance(), biotac_pose(indenter, place)), (digit_compliance(), digit_pose(indenter, place)),
-        )
-    )  # fmt: skip
+    biotac, digit = (_press(sensor, indenter, place).at_force(force) for sensor in ("biotac", "digit"))
     if biotac is None or digit is None:
         which = "BioTac" if biotac is None else "DIGIT"
         raise TactileError(
@@ -100,6 +97,11 @@ def _solve(scene_path, indenter, place: Placement, force: float, time: float) ->
             f"a force that the {which} bears within 60 % of its thickness", "Lower force_n there",
         )  # fmt: skip
     return biotac, digit
+
+
+def _press(sensor: str, indenter: Indenter, place: Placement) -> CorrectedPress:
+    pose = pose_at(sensor, indenter, place)
+    return CorrectedPress(compliance_of(sensor), indenter, pose, DEPTH_LIMIT * thickness_under(sensor, indenter, pose))
 
 
 def _signals(frames: list[Pair | None]) -> np.ndarray:
@@ -116,11 +118,6 @@ def _pressure(frames: list[Pair | None]) -> np.ndarray:
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
     """PDC (...,) int16 counts, 0..4095, for the fluid's pressure, Pa; the scale is assumed, as the range is given."""
     return np.clip(np.round(pressure / PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
-
-
-def pressure_of_pdc(counts: np.ndarray) -> np.ndarray:
-    """The fluid's pressure (...,) Pa in a recording of ours, from PDC counts; half a count, 12 Pa, at most off."""
-    return np.asarray(counts, float) * PRESSURE_PER_COUNT
 
 
 def _told(pressure: np.ndarray) -> str:

@@ -8,17 +8,16 @@ from typing import Literal
 
 import numpy as np
 
-from .. import sensors
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
-from .compliance import biotac_compliance, digit_compliance
+from .compliance import compliance_of
 from .corrected_press import CorrectedPress
 from .expected_error import expected_error
 from .finite_strain import FiniteStrainSolid, State
 from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Body, Sensor, graded_body
 from .newton import FiniteStrainContact, Touch
-from .press import FRICTION, Placement, biotac_pose, digit_pose, on_gel
-from .thickness import DEPTH_LIMIT, thickness
+from .placement import FRICTION, Placement, on_gel, pose_at
+from .thickness import DEPTH_LIMIT, thickness_under
 
 Tier = Literal["fast", "full", "reference"]
 TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
@@ -109,9 +108,8 @@ def solve_path(
     if not on_gel(place.x, place.z):
         found = f"({place.x * 1e3:g}, {place.z * 1e3:g}) mm"
         raise TactileError("solve, place", found, "a place on the DIGIT's gel (x, z), see digit_shape.outline_distance")
-    pose = (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
-    rest = (sensors.biotac_surface() if sensor == "biotac" else sensors.digit_surface()).rest
-    thick = thickness(sensor, rest[int(np.argmin(pose.distance(indenter, rest)[0]))])
+    pose = pose_at(sensor, indenter, place)
+    thick = thickness_under(sensor, indenter, pose)
     for step in steps:
         _check(step, DEPTH_LIMIT * thick)
     path = (_Fast if tier == "fast" else _FiniteStrain)(sensor, indenter, pose, thick, steps, tier, friction)
@@ -162,8 +160,7 @@ class _Path:
 class _Fast(_Path):
     def __init__(self, *arguments) -> None:  # noqa: ANN002
         super().__init__(*arguments)
-        compliance = biotac_compliance() if self.sensor == "biotac" else digit_compliance()
-        self.press = CorrectedPress(compliance, self.indenter, self.pose, self.limit, self.friction)
+        self.press = CorrectedPress(compliance_of(self.sensor), self.indenter, self.pose, self.limit, self.friction)
 
     def to(self, step: Step) -> Solution:
         """See ``solve_path``. The force asked for is the corrected one."""

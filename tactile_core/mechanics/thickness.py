@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from .. import biotac_shape, digit_shape, sensors
+from ..indenters import Indenter, Pose
 
 DEPTH_LIMIT = 0.6  # of the thickness: as deep as MECHANICS is asked to go
+_DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
 _STEP = 20e-6  # m, of the march through the BioTac; the last step is divided linearly
 _FARTHEST = 8e-3  # m, more than from the pad to the finger's axis
 
@@ -36,6 +38,17 @@ def thickness(sensor: str, point: np.ndarray) -> float:
     before = over[last - 1] if last else np.nan
     back = over[last] / (over[last] - before) if np.isfinite(before) else 0.0
     return float(distance[last] - back * _STEP)
+
+
+def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
+    """The thickness, m, at the node of the resting surface nearest to an indenter at first touch."""
+    rest = sensors.sensor_surface(sensor).rest
+    return thickness(sensor, rest[int(np.argmin(pose.distance(indenter, rest)[0]))])
+
+
+def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:
+    """A share of the thickness under an indenter at first touch, m, and at most 2.4 mm."""
+    return min(share * thickness_under(sensor, indenter, pose), _DEEPEST)
 
 
 def _outward() -> np.ndarray:

@@ -133,7 +133,7 @@ def _of_scene(options: argparse.Namespace) -> Indenter:
 def _pressed(options: argparse.Namespace, indenter: Indenter) -> Solution:
     import math
 
-    from ..mechanics.press import Placement
+    from ..mechanics.placement import Placement
     from ..mechanics.solve import solve
 
     place = Placement(options.x_mm * 1e-3, options.z_mm * 1e-3, math.radians(options.tilt_deg))

@@ -11,9 +11,9 @@ from tactile_core.indenters import Cylinder, Sphere, pose_on
 from tactile_core.mechanics.bonded_layer import GOLDEN_FORCE, dimitriadis
 from tactile_core.mechanics.compliance import biotac_compliance, digit_compliance
 from tactile_core.mechanics.contact import ContactProblem, surface_displacement, watched_gaps
-from tactile_core.mechanics.press import Placement, Press, biotac_pose, digit_pose, touched_point
+from tactile_core.mechanics.placement import Placement, biotac_pose, digit_pose
 from tactile_core.mechanics.random_contacts import random_contacts
-from tactile_core.mechanics.thickness import thickness
+from tactile_core.mechanics.thickness import thickness_under
 from tactile_core.sensors import Material
 
 THICKNESS, RADIUS = 3e-3, 3.5e-3
@@ -82,16 +82,12 @@ def test_no_penetration_no_tension_balance(indenter, place):
 def test_force_control_meets_the_force_and_agrees_with_depth_control():
     ball, place = Sphere(3.5e-3), PLACES[0]
     for compliance, pose in sensors_and_poses(ball, place):
-        by_force = Press(compliance, ball, pose).at_force(0.3)
-        by_depth = ContactProblem(compliance, ball, pose, 1.2e-3).at_depth(by_force.depth)
+        problem = ContactProblem(compliance, ball, pose, 1.2e-3)
+        by_force = problem.at_force(0.3, problem.at_depth(0.3e-3))
+        by_depth = problem.at_depth(by_force.depth)
         assert by_force.axial_force == pytest.approx(0.3, rel=1e-9)
         # gaps are closed to 0.05 um of about 500 um
         assert by_depth.axial_force == pytest.approx(0.3, rel=1e-3)
-
-
-def test_a_force_beyond_the_range_gives_no_contact():
-    ball = Sphere(3.5e-3)
-    assert Press(biotac_compliance(), ball, biotac_pose(ball, PLACES[0])).at_force(50.0) is None
 
 
 def test_mirrored_place_gives_mirrored_displacement():
@@ -159,7 +155,7 @@ def test_random_contacts_settle(sensor, friction):
     settled = []
     for drawn in random_contacts(18, seed=3):
         pose = pose_of(drawn.indenter, drawn.place)
-        depth = drawn.depth * thickness(sensor, touched_point(compliance, drawn.indenter, pose))
+        depth = drawn.depth * thickness_under(sensor, drawn.indenter, pose)
         contact = ContactProblem(compliance, drawn.indenter, pose, depth, friction).at_depth(depth)
         settled.append(contact.converged)
         if contact.converged:

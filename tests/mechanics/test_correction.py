@@ -11,7 +11,7 @@ from tactile_core.mechanics import correction, learn_correction
 from tactile_core.mechanics.compliance import digit_compliance
 from tactile_core.mechanics.corrected_press import FORCE_TOLERANCE, CorrectedPress
 from tactile_core.mechanics.correction import LINES, MIRRORED, Frame, correct, features, frame
-from tactile_core.mechanics.press import Placement, digit_pose
+from tactile_core.mechanics.placement import Placement, digit_pose
 
 BALL = Sphere(3.5e-3)
 

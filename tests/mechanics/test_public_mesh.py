@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.mechanics.press import biotac_pose
+from tactile_core.mechanics.placement import biotac_pose
 from tactile_core.mechanics.validation import public_mesh
 from tactile_core.tet_file import read_tet
 

@@ -12,7 +12,6 @@ from tactile_core.mechanics.recording import (
     PRESSURE_AT_REST,
     PRESSURE_PER_COUNT,
     pdc_counts,
-    pressure_of_pdc,
     simulate_recording,
 )
 
@@ -62,7 +61,7 @@ def test_recording_carries_its_truth(seed_4):
     signals = recordings.prepare(recording)
     assert signals.kind == "raw" and not signals.flags.any()
     assert np.abs(signals.change[50]).max() > 10 > 5 > np.abs(signals.change[:41]).max()
-    pressure = pressure_of_pdc(recording.pdc)
+    pressure = recording.pdc * PRESSURE_PER_COUNT
     np.testing.assert_allclose(pressure[:41], PRESSURE_AT_REST, atol=PRESSURE_PER_COUNT / 2)
     assert pressure[50] > PRESSURE_AT_REST + 5 * PRESSURE_PER_COUNT
     low, high = re.search(r"Fluid pressure ([\d.]+) to ([\d.]+) kPa", recording.about["note"]).groups()
@@ -96,7 +95,7 @@ def test_the_file_holds_raw_counts_only(scene, tmp_path):
 def test_pdc_counts_hold_a_hundred_kilopascal():
     np.testing.assert_array_equal(pdc_counts(np.array([-1e3, 0.0, 50e3, 100e3, 1e6])), [0, 0, 2048, 4095, 4095])
     pressure = np.linspace(0, 99.9e3, 1000)
-    np.testing.assert_allclose(pressure_of_pdc(pdc_counts(pressure)), pressure, atol=PRESSURE_PER_COUNT / 2)
+    np.testing.assert_allclose(pdc_counts(pressure) * PRESSURE_PER_COUNT, pressure, atol=PRESSURE_PER_COUNT / 2)
 
 
 def test_pressing_too_hard_names_the_moment(scene, tmp_path):

@@ -5,7 +5,7 @@ import pytest
 
 from tactile_core.errors import TactileError
 from tactile_core.indenters import Sphere
-from tactile_core.mechanics.press import Placement
+from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import Step, solve, solve_path
 
 BALL, PLACE = Sphere(7e-3), Placement(-8e-3, 1e-3)

@@ -7,17 +7,18 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ... import biotac_shape, digit_shape, sensors
+from ... import digit_shape, sensors
 from ...indenters import Cylinder, Indenter, Sphere
 from ..biotac_sheet import CONDUCTIVITY, BiotacSheet, biotac_sheet, divider_counts
-from ..cavity import Cavity
 from ..compliance import biotac_compliance
-from ..contact import Contact
+from ..contact import Contact, ContactProblem
 from ..elasticity import assemble
 from ..electrodes import FILM_CONSTANT, electrode_gaps, signal_of_gaps
 from ..factor import factor
-from ..hex_mesh import skin_mesh
-from ..press import Placement, Press, biotac_pose, on_gel
+from ..hex_mesh import inner_faces, skin_mesh
+from ..placement import Placement, biotac_pose, on_gel
+from ..quadratic_cavity import QuadraticCavity
+from ..thickness import DEPTH_LIMIT, thickness_under
 from ..thin_sheet import ThinSheet, resistances
 from .rows import Row, row
 
@@ -97,7 +98,7 @@ def _inner_skin() -> Callable[[Contact], np.ndarray]:
     mesh, compliance = skin_mesh(), biotac_compliance()
     free = np.repeat(~mesh.clamped, 3)
     solve = factor(assemble(mesh, sensors.BIOTAC_SKIN)[free][:, free].tocsc())
-    swell = Cavity(mesh.inner[biotac_shape.skin_surface("inner").faces], len(mesh.nodes)).gradient(mesh.nodes)[free]
+    swell = QuadraticCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)[free]
     under_pressure = solve(swell[:, None])[:, 0]
 
     def moved(contact: Contact) -> np.ndarray:
@@ -126,9 +127,11 @@ def _contacts(count: int) -> list[Contact]:
 
 
 def _press(indenter: Indenter, place: Placement, depths: tuple[float, ...]) -> list[Contact]:
-    press = Press(biotac_compliance(), indenter, biotac_pose(indenter, place))
-    followed = (press.at_depth(depth) for depth in depths)
-    return [contact for contact in followed if contact is not None and not len(contact.core_nodes)]
+    pose = biotac_pose(indenter, place)
+    limit = DEPTH_LIMIT * thickness_under("biotac", indenter, pose)
+    problem = ContactProblem(biotac_compliance(), indenter, pose, limit)
+    followed = (problem.at_depth(depth) for depth in depths if depth <= limit)
+    return [contact for contact in followed if contact.converged and not len(contact.core_nodes)]
 
 
 def _rms(values: np.ndarray) -> float:

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...indenters import Sphere, pose_on
 from ...sensors import Material
-from ..cavity import Cavity
 from ..finite_strain import FiniteStrainSolid
 from ..hex_mesh import HexMesh
 from ..newton import FiniteStrainContact, Touch
+from ..quadratic_cavity import QuadraticCavity
 from .block import block
 from .rows import Row, row
 
@@ -21,7 +21,7 @@ _SIDE, _DEPTH = 4.5e-3, 0.6e-3  # m
 
 
 @functools.cache
-def hollow() -> tuple[HexMesh, Cavity]:
+def hollow() -> tuple[HexMesh, QuadraticCavity]:
     """3 x 3 x 3 cells without the middle one, clamped at the back, and the cavity that it leaves."""
     planes = np.linspace(0, _SIDE, 7)
     full = block(planes, -planes, planes)
@@ -31,17 +31,17 @@ def hollow() -> tuple[HexMesh, Cavity]:
     new[used] = np.arange(len(used))
     cube = new[full.cells[13]].reshape(3, 3, 3)
     sides = [np.moveaxis(cube, axis, 0)[end] for axis in range(3) for end in (0, -1)]
-    quads = np.concatenate([
-        np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], -1).reshape(-1, 4) for side in sides
-    ])  # fmt: skip
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     nodes = full.nodes[used]
-    corners = nodes[faces]
-    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("fi,fi->f", outward, corners.mean(1) - nodes[cube].reshape(-1, 3)[:26].mean(0)) < 0
-    faces[inward] = faces[inward, ::-1]
+    middle = nodes[np.concatenate(sides)].reshape(-1, 3).mean(0)
+    faces = np.stack([_outward(side, nodes, middle).ravel() for side in sides])
     mesh = HexMesh(nodes, renumbered.reshape(cells.shape), full.clamped[used], new[full.surface], np.unique(faces))
-    return mesh, Cavity(faces, len(nodes))
+    return mesh, QuadraticCavity(faces, len(nodes))
+
+
+def _outward(side: np.ndarray, nodes: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """A face's nodes (3, 3), its two directions and outward right-handed."""
+    across = np.cross(nodes[side[2, 1]] - nodes[side[0, 1]], nodes[side[1, 2]] - nodes[side[1, 0]])
+    return side if across @ (nodes[side[1, 1]] - middle) > 0 else side.T
 
 
 def pressed(*, full: bool, pumped: float = 0.0) -> tuple[Touch, float]:

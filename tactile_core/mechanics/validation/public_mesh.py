@@ -22,7 +22,7 @@ from .. import isaac_like
 from ..finite_strain import FiniteStrainSolid
 from ..finite_strain_tier import ONE_STEP, Body, graded_body
 from ..newton import FiniteStrainContact
-from ..press import Placement, biotac_pose, digit_pose
+from ..placement import Placement, biotac_pose, digit_pose
 from .rows import Row, row
 
 _BALL, _PLACE = Sphere(3.5e-3), Placement(-8e-3, 0.0)

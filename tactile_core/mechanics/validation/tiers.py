@@ -11,7 +11,7 @@ from ... import digit_shape, metrics
 from ...cubic_spline import EvenSpline
 from ...indenters import Sphere
 from ..finite_strain import FiniteStrainSolid
-from ..press import FRICTION, Placement
+from ..placement import FRICTION, Placement
 from ..solve import Sensor, Solution, Step, Tier, solve, solve_path
 from .incompressible import quality_rows
 from .rows import Row, row

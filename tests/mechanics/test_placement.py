@@ -1,13 +1,12 @@
-"""Where a press starts, how deep it may go, and paths of force."""
+"""Where a press starts, and how thick the sensor is there."""
 
 import numpy as np
 import pytest
 
 from tactile_core import digit_shape, sensors, surface
 from tactile_core.indenters import Box, Cylinder, Pose, Ring, Sphere, pose_on
-from tactile_core.mechanics.compliance import biotac_compliance, digit_compliance
 from tactile_core.mechanics.first_touch import first_touch
-from tactile_core.mechanics.press import Placement, Press, biotac_pose, depth_limit, digit_pose
+from tactile_core.mechanics.placement import Placement, digit_pose
 from tactile_core.mechanics.thickness import thickness
 
 PLACES = [Placement(-8e-3, 0.0), Placement(-14e-3, 4e-3, 0.3, 1.0), Placement(-3e-3, -6e-3, 0.5, 4.0)]
@@ -59,20 +58,3 @@ def test_thickness_of_the_gel_and_of_skin_and_fluid():
     assert 1.58e-3 + 0.5e-3 < thickness("biotac", on_skin) < 1.63e-3 + 2.45e-3
     with pytest.raises(ValueError, match="not known"):
         thickness("finger", on_skin)
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.78])
-def test_a_path_of_growing_force_ends_at_the_depth_limit(friction):
-    ball = Sphere(3.5e-3)
-    for compliance, pose_of in ((biotac_compliance(), biotac_pose), (digit_compliance(), digit_pose)):
-        pose = pose_of(ball, PLACES[0])
-        press, depths = Press(compliance, ball, pose, friction=friction), []
-        force = 0.05
-        while (contact := press.at_force(force)) is not None:
-            assert contact.axial_force == pytest.approx(force, rel=1e-6)
-            depths.append(contact.depth)
-            force *= 1.6
-        limit = depth_limit(compliance, ball, pose)
-        assert np.all(np.diff(depths) > 0) and len(depths) > 4
-        assert depths[-1] <= limit and press.problem.at_depth(limit).axial_force < force
-        assert press.at_depth(1.01 * limit) is None

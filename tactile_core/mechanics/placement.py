@@ -1,0 +1,47 @@
+"""Where an indenter stands: the same unrolled place and angle on both sensors."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from .. import digit_shape, sensors, surface
+from ..indenters import Indenter, Pose, pose_on
+from .first_touch import first_touch
+
+FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (sensors.md), taken for both sensors
+
+
+@dataclasses.dataclass(frozen=True)
+class Placement:
+    """A place and an angle: (x, z) m on the DIGIT's plane, and the lean of the indenter's axis, rad."""
+
+    x: float
+    z: float
+    tilt: float = 0.0
+    tilt_heading: float = 0.0
+
+
+def biotac_pose(indenter: Indenter, place: Placement) -> Pose:
+    """First touch on the BioTac, at the place of its pad that rolls onto (x, z) of the DIGIT's plane."""
+    point, outward = surface.roll_up(np.array([place.x, place.z]))
+    pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
+    return first_touch(sensors.biotac_surface(), indenter, pose)
+
+
+def digit_pose(indenter: Indenter, place: Placement) -> Pose:
+    """First touch on the DIGIT's gel at (x, z), leaning as much off the dome's normal as off the BioTac's."""
+    point, outward = digit_shape.dome_point(place.x, place.z)
+    pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
+    return first_touch(sensors.digit_surface(), indenter, pose)
+
+
+def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
+    """First touch on ``"biotac"`` or ``"digit"``."""
+    return (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
+
+
+def on_gel(x: float, z: float, margin: float = 0.0) -> bool:
+    """Whether a place of the DIGIT's plane lies on the gel, at least ``margin`` m inside its outline."""
+    return bool(digit_shape.outline_distance(np.array(x), np.array(z)) > margin)

@@ -1,0 +1,31 @@
+"""Presses at corrected forces."""
+
+import numpy as np
+import pytest
+
+from tactile_core.indenters import Sphere
+from tactile_core.mechanics.compliance import compliance_of
+from tactile_core.mechanics.corrected_press import FORCE_TOLERANCE, CorrectedPress
+from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.thickness import depth_at
+
+BALL, PLACE = Sphere(3.5e-3), Placement(-8e-3, 0.0)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.78])
+@pytest.mark.parametrize("sensor", ["biotac", "digit"])
+def test_a_path_of_growing_force_ends_at_the_depth_limit(sensor, friction):
+    pose = pose_at(sensor, BALL, PLACE)
+    limit = depth_at(0.6, sensor, BALL, pose)
+    press, depths, force = CorrectedPress(compliance_of(sensor), BALL, pose, limit, friction), [], 0.05
+    while (contact := press.at_force(force)) is not None:
+        assert contact.axial_force == pytest.approx(force, rel=FORCE_TOLERANCE)
+        depths.append(contact.linear.depth)
+        force *= 1.6
+    assert np.all(np.diff(depths) > 0) and len(depths) > 4
+    assert depths[-1] <= limit and press.at_depth(limit).axial_force < force
+
+
+def test_a_force_beyond_the_range_gives_no_contact():
+    press = CorrectedPress(compliance_of("biotac"), BALL, pose_at("biotac", BALL, PLACE), 2.4e-3)
+    assert press.at_force(50.0) is None
