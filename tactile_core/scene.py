@@ -25,6 +25,8 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     rim_margin_mm: Annotated[float, Meta(ge=0, le=8)] = 1.0
     depth_max_percent: Annotated[float, Meta(gt=0, le=60)] = 60.0  # of the thickness under the first touch
     friction: Annotated[float, Meta(ge=0, le=5)] = 0.78  # Coulomb's coefficient (sensors.md)
+    slide_share: Annotated[float, Meta(ge=0, le=1)] = 0.0  # of the presses end with a slide at constant force
+    slide_max_mm: Annotated[float, Meta(ge=0, le=3)] = 0.0  # slides are evenly long up to this
 
 
 class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

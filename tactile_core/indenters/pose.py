@@ -33,6 +33,10 @@ class Pose:
         """The pose after moving ``depth`` m along ``direction``."""
         return Pose(self.apex + depth * self.direction, self.axes)
 
+    def slid(self, along: float, across: float) -> Pose:
+        """The pose after sliding, m, along the indenter's own x and y."""
+        return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes)
+
     def distance(self, indenter: Indenter, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance (n,) m and gradient (n, 3) of the placed indenter at sensor points (n, 3) m."""
         distance, gradient = indenter.distance((points - self.apex) @ self.axes)

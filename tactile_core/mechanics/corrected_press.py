@@ -10,6 +10,7 @@ from ..indenters import Indenter, Pose
 from .compliance import Compliance
 from .contact import Contact, ContactProblem, fluid_pressure
 from .correction import Corrected, correct
+from .pose_path import same_line
 
 FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
 _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
@@ -59,6 +60,8 @@ class CorrectedPress:
         """
         pose = pose or self.pose
         contact = self.last or self._first(pose)
+        if contact is not None and not same_line(contact.pose, pose):
+            contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
         for _ in range(_SEARCH_STEPS):
             if contact is None or not contact.converged:
                 return None

@@ -17,23 +17,17 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from .. import __version__, atomic, digit_shape, sensors
+from .. import __version__, atomic, sensors
 from ..errors import TactileError
-from ..hdf5_disk import Disk
-from ..indenters import Indenter
-from ..scene import PairSpec, Scene, load_scene
-from .compliance import biotac_compliance, compliance_of, digit_compliance
-from .contact import Contact
-from .corrected_press import CorrectedPress, FastContact
-from .electrodes import electrode_gaps, signal_of_gaps
-from .placement import Placement, on_gel, pose_at
-from .thickness import depth_at
+from ..scene import load_scene
+from .compliance import biotac_compliance, digit_compliance
+from .pair_file import merge, no_room
+from .pair_rows import press_rows
 
 log = logging.getLogger(__name__)
 
-FORMAT = "tactile-pairs-1"
-SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 BLOCK = 16  # presses a block: a few seconds of work
+_MOST_BLOCKS = 64  # at a time: whoever waits at their end waits for one block in so many
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +63,7 @@ def make_pairs(
     digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
     folder = _parts_folder(out, text, seed)
     files = _run_blocks(str(scene_path), seed, folder, count, workers, progress)
-    _merge(files, count, out, text, seed, [spec.name for spec in scene.indenters])
+    merge(files, count, out, text, seed, [spec.name for spec in scene.indenters])
     for file in folder.iterdir():
         file.unlink()
     folder.rmdir()
@@ -109,7 +103,8 @@ def _run_blocks(scene_file, seed, folder, count, workers, progress) -> list[path
     pool = _Pool(workers)
     try:
         while have < count:
-            batch = [_Job(scene_file, seed, len(files) + i, str(folder)) for i in range(max(workers, 1))]
+            size = _batch(have, len(files), count, workers)
+            batch = [_Job(scene_file, seed, len(files) + i, str(folder)) for i in range(size)]
             for file, contacts in pool.map(_make_block, batch):
                 files.append(pathlib.Path(file))
                 have += contacts
@@ -121,6 +116,12 @@ def _run_blocks(scene_file, seed, folder, count, workers, progress) -> list[path
     finally:
         pool.close()
     return files
+
+
+def _batch(have: int, blocks: int, count: int, workers: int) -> int:
+    """How many blocks to make before looking whether they suffice: about those still missing, within reason."""
+    missing = (count - have) / max(have / blocks, 1) if have else 1
+    return int(np.clip(np.ceil(missing), max(workers, 1), _MOST_BLOCKS))
 
 
 class _Pool:
@@ -154,146 +155,12 @@ def _make_block(job: _Job) -> tuple[str, int]:
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         pass  # not made yet, or cut short: made now
     scene, _ = load_scene(job.scene_file)
-    rows = [row for i in range(BLOCK) for row in _press_rows(scene, job.seed, job.block * BLOCK + i)]
+    rows = [row for i in range(BLOCK) for row in press_rows(scene, job.seed, job.block * BLOCK + i)]
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
     content = io.BytesIO()
     np.savez(content, count=len(rows), **columns)
     try:
         atomic.write_bytes(file, content.getvalue())
     except OSError as error:
-        raise _no_room(file, error) from error
+        raise no_room(file, error) from error
     return str(file), len(rows)
-
-
-def _no_room(path: pathlib.Path, error: OSError | RuntimeError) -> TactileError:
-    reason = getattr(error, "strerror", None) or str(error).split("\n")[0]
-    return TactileError(path, f"cannot be written ({reason})", "room for it", "Make room, then give the command again")
-
-
-def _press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray]]:
-    """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
-
-    Forces begin log-uniformly within one ratio, so over many presses they are log-uniform.
-    """
-    spec = scene.pairs
-    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
-    which = int(random.integers(len(scene.indenters)))
-    indenter = scene.indenters[which].build()
-    place = _draw_place(random, spec)
-    on_biotac, on_digit = (_press(sensor, indenter, place, spec) for sensor in ("biotac", "digit"))
-    force = spec.force_min_n * spec.force_ratio ** random.uniform()
-    rows = []
-    while True:
-        biotac, digit = on_biotac.at_force(force), on_digit.at_force(force)
-        if biotac is None or digit is None:
-            return rows
-        rows.append({"press": np.int32(press), "indenter": np.int16(which), **pair_row(biotac, digit)})
-        force *= spec.force_ratio
-
-
-def _press(sensor: str, indenter: Indenter, place: Placement, spec: PairSpec) -> CorrectedPress:
-    pose = pose_at(sensor, indenter, place)
-    limit = depth_at(spec.depth_max_percent / 100, sensor, indenter, pose)
-    return CorrectedPress(compliance_of(sensor), indenter, pose, limit, spec.friction)
-
-
-def _draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
-    while True:
-        x = random.uniform(digit_shape.X_TIP, digit_shape.X_BASE)
-        z = random.uniform(-digit_shape.HALF_WIDTH, digit_shape.HALF_WIDTH)
-        if on_gel(x, z, spec.rim_margin_mm * 1e-3):
-            break
-    lean = np.arccos(random.uniform(np.cos(np.radians(spec.tilt_max_deg)), 1))
-    return Placement(x, z, float(lean), float(random.uniform(0, 2 * np.pi)))
-
-
-def pair_row(biotac: FastContact, digit: FastContact) -> dict[str, np.ndarray]:
-    """What one paired contact stores; arrays as in the file, see ``DATASETS``. Electrode gaps are not corrected."""
-    skin, gel = biotac_compliance(), digit_compliance()
-    gaps = electrode_gaps(skin, biotac.linear)
-    return {
-        "displacement_biotac": quantise(biotac.corrected.displacement),
-        "displacement_digit": quantise(digit.corrected.displacement),
-        "signal": signal_of_gaps(gaps).astype(np.float32),
-        "gap": gaps.astype(np.float32),
-        "force": biotac.force.astype(np.float32),
-        "force_digit": digit.force.astype(np.float32),
-        "pressure": np.float32(biotac.pressure),
-        "depth_biotac": np.float32(biotac.linear.depth),
-        "depth_digit": np.float32(digit.linear.depth),
-        "contact_center": contact_center(digit.linear).astype(np.float32),
-        "contact_patch_biotac": _patch(len(skin.surface.rest), skin.touchable[biotac.linear.nodes]),
-        "contact_patch_digit": _patch(len(gel.surface.rest), gel.touchable[digit.linear.nodes]),
-    }
-
-
-def contact_center(digit: Contact) -> np.ndarray:
-    """Centre of pressure (2,) = (x, z) m on the resting gel: touching nodes weighted by their force."""
-    gel = digit_compliance()
-    weight = np.linalg.norm(digit.nodal_force, axis=1)
-    return weight @ gel.surface.rest[gel.touchable[digit.nodes]][:, [0, 2]] / weight.sum()
-
-
-def quantise(displacement: np.ndarray, scale: float = SCALE) -> np.ndarray:
-    """Displacement in m as int16 steps of ``scale`` m."""
-    return np.round(displacement / scale).astype(np.int16)
-
-
-def _patch(size: int, nodes: np.ndarray) -> np.ndarray:
-    patch = np.zeros(size, bool)
-    patch[nodes] = True
-    return patch
-
-
-# Unit of each dataset; the leading axis counts contacts.
-DATASETS = {
-    "displacement_biotac": "m", "displacement_digit": "m", "signal": "counts", "gap": "m", "force": "N",
-    "force_digit": "N", "pressure": "Pa", "depth_biotac": "m", "depth_digit": "m", "contact_center": "m",
-    "contact_patch_biotac": "1", "contact_patch_digit": "1", "press": "1", "indenter": "1",
-}  # fmt: skip
-
-
-def _merge(files, count, out, text, seed, names) -> None:  # noqa: ANN001
-    """One HDF5 file from the blocks in order, cut to ``count`` contacts; written beside and renamed."""
-    try:
-        _write_merged(files, count, out, text, seed, names)
-    except (OSError, RuntimeError) as error:  # h5py reports a full disk as either
-        raise _no_room(out, error) from error
-
-
-def _write_merged(files, count, out, text, seed, names) -> None:  # noqa: ANN001
-    import h5py
-
-    with atomic.new_file(out) as partial, Disk(partial) as disk, h5py.File(disk, "w") as file:
-        file.attrs.update({
-            "format": FORMAT, "scene": text, "seed": seed, "version": __version__, "indenters": json.dumps(names),
-            "biotac_nodes_sha256": sensors.biotac_surface().sha256,
-            "digit_nodes_sha256": sensors.digit_surface().sha256,
-        })  # fmt: skip
-        done = 0
-        for path in files:
-            with np.load(path, allow_pickle=False) as block:
-                take = min(int(block["count"]), count - done)
-                for name in DATASETS if take else ():
-                    _append(file, name, block[name][:take], count, done)
-                done += take
-            disk.check()
-
-
-def _append(file, name: str, values: np.ndarray, count: int, start: int) -> None:  # noqa: ANN001
-    if name not in file:
-        chunk = (min(32, count), *values.shape[1:])
-        dataset = file.create_dataset(
-            name,
-            (count, *values.shape[1:]),
-            values.dtype,
-            chunks=chunk,
-            compression="gzip",
-            compression_opts=1,
-            shuffle=True,
-            track_times=False,
-        )
-        dataset.attrs["unit"] = DATASETS[name]
-        if values.dtype == np.int16 and name.startswith("displacement"):
-            dataset.attrs["scale"] = SCALE
-    file[name][start : start + len(values)] = values

@@ -6,10 +6,19 @@ import numpy as np
 
 from ..indenters import Pose
 
+_ROUNDING = 1e-12  # m
+
 
 def same_place(first: Pose, second: Pose) -> bool:
     """Whether two poses are one."""
     return np.array_equal(first.apex, second.apex) and np.array_equal(first.axes, second.axes)
+
+
+def same_line(first: Pose, second: Pose) -> bool:
+    """Whether two poses differ in depth alone."""
+    apart = second.apex - first.apex
+    sideways = apart - (apart @ first.direction) * first.direction
+    return bool(np.abs(sideways).max() < _ROUNDING and np.array_equal(first.axes, second.axes))
 
 
 def between(first: Pose, second: Pose, share: float) -> Pose:

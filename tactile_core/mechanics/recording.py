@@ -15,7 +15,7 @@ from ..scene import RecordingSpec, load_scene
 from .compliance import Compliance, biotac_compliance, compliance_of, digit_compliance
 from .corrected_press import CorrectedPress, FastContact
 from .electrodes import Wiring, electrode_gaps, readings, signal_of_gaps
-from .pairs import contact_center
+from .pair_rows import contact_center
 from .placement import Placement, on_gel, pose_at
 from .thickness import DEPTH_LIMIT, thickness_under
 

@@ -134,10 +134,6 @@ def _check(step: Step, limit: float) -> None:
 _FARTHEST_SLIDE = 10e-3  # m, half of the gel
 
 
-def _slid(pose: Pose, slide: tuple[float, float]) -> Pose:
-    return Pose(pose.apex + pose.axes[:, 0] * slide[0] + pose.axes[:, 1] * slide[1], pose.axes)
-
-
 class _Path:
     """A path of one indenter on one sensor; ``to`` goes on from the step before."""
 
@@ -164,7 +160,7 @@ class _Fast(_Path):
 
     def to(self, step: Step) -> Solution:
         """See ``solve_path``. The force asked for is the corrected one."""
-        pose, compliance = _slid(self.pose, step.slide), self.press.compliance
+        pose, compliance = self.pose.slid(*step.slide), self.press.compliance
         if step.force:
             found = self.press.at_force(step.force, pose)
             if found is None:
@@ -194,7 +190,7 @@ class _FiniteStrain(_Path):
 
     def to(self, step: Step) -> Solution:
         """See ``solve_path``."""
-        pose = _slid(self.pose, step.slide)
+        pose = self.pose.slid(*step.slide)
         if step.force:
             self.last = self._at_force(pose, step.force)
         elif step.depth or self.last.depth:

@@ -1,4 +1,4 @@
-"""The pairs file (HDF5, written by `mechanics/pairs.py`) as training reads it, and its split by presses."""
+"""The pairs file (HDF5, written by `mechanics/pair_file.py`) as training reads it, and its split by presses."""
 
 from __future__ import annotations
 

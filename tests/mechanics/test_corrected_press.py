@@ -29,3 +29,13 @@ def test_a_path_of_growing_force_ends_at_the_depth_limit(sensor, friction):
 def test_a_force_beyond_the_range_gives_no_contact():
     press = CorrectedPress(compliance_of("biotac"), BALL, pose_at("biotac", BALL, PLACE), 2.4e-3)
     assert press.at_force(50.0) is None
+
+
+@pytest.mark.parametrize("sensor", ["biotac", "digit"])
+def test_a_slide_at_the_same_force_drags_the_skin_along(sensor):
+    pose = pose_at(sensor, BALL, PLACE)
+    press = CorrectedPress(compliance_of(sensor), BALL, pose, depth_at(0.6, sensor, BALL, pose), 0.78)
+    still, slid = press.at_force(0.5), press.at_force(0.5, pose.slid(0.3e-3, 0.0))
+    assert slid.axial_force == pytest.approx(0.5, rel=FORCE_TOLERANCE)
+    dragged = (slid.force - still.force) @ pose.axes[:, 0]
+    assert 0.05 < dragged / 0.5 <= 0.78 * 1.1  # a tenth: forces lean with the surface, by which the cone leans too

@@ -8,7 +8,7 @@ import pytest
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics import pairs
+from tactile_core.mechanics import pair_file
 from tactile_core.mechanics.pairs import make_pairs
 
 SCENE = "scenes/press_sphere"
@@ -30,10 +30,10 @@ def test_file_holds_what_it_says(made):
     import h5py
 
     with h5py.File(made) as file:
-        assert file.attrs["format"] == pairs.FORMAT
+        assert file.attrs["format"] == pair_file.FORMAT
         assert file.attrs["biotac_nodes_sha256"] == sensors.biotac_surface().sha256
         assert json.loads(file.attrs["indenters"]) == ["sphere_7mm", "sphere_14mm"]
-        assert set(file) == set(pairs.DATASETS)
+        assert set(file) == set(pair_file.DATASETS)
         assert all(len(file[name]) == 40 and file[name].attrs["unit"] for name in file)
         biotac, digit = file["force"][()], file["force_digit"][()]
         depth, press = file["depth_biotac"][()], file["press"][()]
@@ -78,6 +78,26 @@ def test_another_seed_makes_other_contacts(made, scene, tmp_path):
     make_pairs(scene, 5, 8, other)
     with h5py.File(made) as a, h5py.File(other) as b:
         assert not np.array_equal(a["signal"][:5], b["signal"][:5])
+
+
+def test_a_press_may_end_with_a_slide_at_constant_force(scene, tmp_path):
+    import h5py
+
+    text = (scene / "scene.toml").read_text(encoding="utf-8").replace("friction = 0.0", "friction = 0.78")
+    sliding = tmp_path / "scene.toml"
+    sliding.write_text(text.rstrip() + "\nslide_share = 1.0\nslide_max_mm = 1.0\n", encoding="utf-8")
+    make_pairs(sliding, 30, 7, tmp_path / "pairs.h5")
+    with h5py.File(tmp_path / "pairs.h5") as file:
+        far = np.linalg.norm(file["slide"][()], axis=1)
+        force, press = (file[name][()] for name in ("force", "press"))
+    slid = np.flatnonzero(far > 0)
+    assert len(slid) > 3 and far.max() <= 1e-3
+    before = slid[np.r_[True, np.diff(press[slid]) > 0]] - 1
+    assert (press[before] == press[before + 1]).all() and (far[before] == 0).all()
+    # Sticking skin answers 0.2 mm of sliding with shear; the force along the motion is held, so the whole force turns.
+    held = dict(zip(press[before], force[before], strict=True))
+    turned = [np.linalg.norm(force[i] - held[press[i]]) / np.linalg.norm(force[i]) for i in slid if far[i] > 0.2e-3]
+    assert turned and min(turned) > 0.05
 
 
 def test_an_existing_file_is_kept(made, scene):
@@ -125,7 +145,7 @@ def test_a_block_cut_short_is_made_again(scene, made, tmp_path):
 def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, monkeypatch):
     out = tmp_path / "pairs.h5"
     full = OSError(errno.ENOSPC, "No space left on device")
-    monkeypatch.setattr(pairs.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
+    monkeypatch.setattr(pair_file.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
     with pytest.raises(TactileError, match="No space left"):
         make_pairs(scene, 5, 7, out)
     assert not out.exists()

@@ -1,0 +1,114 @@
+"""The contacts of one press on both sensors, as rows of a file of pairs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from .. import digit_shape, surface
+from ..indenters import Indenter
+from ..scene import PairSpec, Scene
+from .compliance import biotac_compliance, compliance_of, digit_compliance
+from .contact import Contact
+from .corrected_press import CorrectedPress, FastContact
+from .electrodes import electrode_gaps, signal_of_gaps
+from .pair_file import quantise
+from .placement import Placement, on_gel, pose_at
+from .thickness import depth_at
+
+_SLIDE_FROM, _SLIDE_TO = 2, 10  # steps of a path's force at which a slide may begin (assumed)
+_SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping ones (assumed)
+
+
+def press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray]]:
+    """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
+
+    Forces begin log-uniformly within one ratio, so over many presses they are log-uniform. A press that slides ends
+    with its slide, at the force it had reached, by the same way on both sensors.
+    """
+    spec = scene.pairs
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
+    which = int(random.integers(len(scene.indenters)))
+    indenter = scene.indenters[which].build()
+    place = _draw_place(random, spec)
+    on_both = [_press(sensor, indenter, place, spec) for sensor in ("biotac", "digit")]
+    rows = []
+    for force, slide in _path(random, spec):
+        biotac, digit = (on_one.at_force(force, on_one.pose.slid(*slide)) for on_one in on_both)
+        if biotac is None or digit is None:
+            break
+        named = {"press": np.int32(press), "indenter": np.int16(which), "slide": slide.astype(np.float32)}
+        rows.append({**named, **pair_row(biotac, digit)})
+    return rows
+
+
+def _path(random: np.random.Generator, spec: PairSpec) -> Iterator[tuple[float, np.ndarray]]:
+    """Force, N, and slide (2,), m, of each contact of a press, without an end unless it slides."""
+    force = spec.force_min_n * spec.force_ratio ** random.uniform()
+    begin = int(random.integers(_SLIDE_FROM, _SLIDE_TO)) if random.uniform() < spec.slide_share else None
+    heading, length = random.uniform(0, 2 * np.pi), 1e-3 * spec.slide_max_mm * random.uniform()
+    for step in itertools.count():
+        yield force, np.zeros(2)
+        if step == begin:
+            break
+        force *= spec.force_ratio
+    for share in np.arange(1, _SLIDE_STEPS + 1) / _SLIDE_STEPS:
+        yield force, share * length * np.array([np.cos(heading), np.sin(heading)])
+
+
+def _press(sensor: str, indenter: Indenter, place: Placement, spec: PairSpec) -> CorrectedPress:
+    pose = pose_at(sensor, indenter, place)
+    limit = depth_at(spec.depth_max_percent / 100, sensor, indenter, pose)
+    return CorrectedPress(compliance_of(sensor), indenter, pose, limit, spec.friction)
+
+
+def _draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
+    while True:
+        x = random.uniform(digit_shape.X_TIP, digit_shape.X_BASE)
+        z = random.uniform(-digit_shape.HALF_WIDTH, digit_shape.HALF_WIDTH)
+        if on_gel(x, z, spec.rim_margin_mm * 1e-3):
+            break
+    lean = np.arccos(random.uniform(np.cos(np.radians(spec.tilt_max_deg)), 1))
+    return Placement(x, z, float(lean), float(random.uniform(0, 2 * np.pi)))
+
+
+def pair_row(biotac: FastContact, digit: FastContact) -> dict[str, np.ndarray]:
+    """What one paired contact stores; arrays as in the file, see ``DATASETS``. Electrode gaps are not corrected."""
+    skin, gel = biotac_compliance(), digit_compliance()
+    gaps = electrode_gaps(skin, biotac.linear)
+    return {
+        "displacement_biotac": quantise(biotac.corrected.displacement),
+        "displacement_digit": quantise(digit.corrected.displacement),
+        "signal": signal_of_gaps(gaps).astype(np.float32),
+        "gap": gaps.astype(np.float32),
+        "force": biotac.force.astype(np.float32),
+        "force_digit": digit.force.astype(np.float32),
+        "pressure": np.float32(biotac.pressure),
+        "depth_biotac": np.float32(biotac.linear.depth),
+        "depth_digit": np.float32(digit.linear.depth),
+        "contact_center": contact_center(digit.linear).astype(np.float32),
+        "beyond_digit": np.bool_(_beyond_digit(biotac.linear)),
+        "contact_patch_biotac": _patch(len(skin.surface.rest), skin.touchable[biotac.linear.nodes]),
+        "contact_patch_digit": _patch(len(gel.surface.rest), gel.touchable[digit.linear.nodes]),
+    }
+
+
+def contact_center(digit: Contact) -> np.ndarray:
+    """Centre of pressure (2,) = (x, z) m on the resting gel: touching nodes weighted by their force."""
+    gel = digit_compliance()
+    weight = np.linalg.norm(digit.nodal_force, axis=1)
+    return weight @ gel.surface.rest[gel.touchable[digit.nodes]][:, [0, 2]] / weight.sum()
+
+
+def _beyond_digit(biotac: Contact) -> bool:
+    """Whether the BioTac is touched beside what rolls onto the DIGIT's gel: no contact of the gel is its equal."""
+    x, z = surface.unrolled_nodes()[biotac_compliance().touchable[biotac.nodes]].T
+    return bool((digit_shape.outline_distance(x, z) < 0).any())
+
+
+def _patch(size: int, nodes: np.ndarray) -> np.ndarray:
+    patch = np.zeros(size, bool)
+    patch[nodes] = True
+    return patch
