@@ -1,16 +1,17 @@
 """Make the fast tier's correction: solve a sample of presses in the full tier, learn from them, write one small file.
 
-    python3 scripts/make_correction.py --work DIR [--presses 350] [--seed 0] [--workers 2]
+    python3 scripts/make_correction.py --work DIR [--presses 150] [--seed 0] [--workers 2]
 
 Stop it at any time: presses that are solved stay in DIR and are not solved again. Writes
 tactile_core/data/mechanics_correction.npz and prints how far the corrected fast tier is from the full tier on presses
-kept apart. About an hour on two cores.
+kept apart. Each press is solved without friction and with. A few hours on two cores.
 """
 
 from __future__ import annotations
 
 import argparse
 import concurrent.futures
+import itertools
 import logging
 import os
 import pathlib
@@ -23,19 +24,26 @@ sys.path.insert(0, str(ROOT))
 
 from tactile_core import atomic  # noqa: E402
 from tactile_core.mechanics import correction, learn_correction  # noqa: E402
+from tactile_core.mechanics.placement import FRICTION  # noqa: E402
 from tactile_core.mechanics.random_contacts import random_contacts  # noqa: E402
 
 SENSORS = "digit", "biotac"
+FRICTIONS = 0.0, FRICTION
 
 
-def solve_one(job: tuple[str, int, int, pathlib.Path]) -> str:
+def file_of(folder: pathlib.Path, sensor: str, seed: int, number: int, friction: float) -> pathlib.Path:
+    """Where a press's contacts in the full tier are kept."""
+    return folder / f"{sensor}_{seed}_{number:05d}_friction_{friction:g}.npz"
+
+
+def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
     """Solve one press in the full tier, unless its file is there; returns a line to print."""
-    sensor, seed, number, folder = job
-    path = folder / f"{sensor}_{seed}_{number:05d}.npz"
+    _, sensor, seed, number, friction = job
+    path = file_of(*job)
     if path.exists():
         return f"{path.name}: was there"
     press = list(random_contacts(number + 1, seed))[-1]
-    found = learn_correction.full_press(sensor, press)
+    found = learn_correction.full_press(sensor, press, friction)
     with atomic.new_file(path) as partial, open(partial, "wb") as file:
         np.savez(file, **found)
     solved = len(found["force"])
@@ -47,12 +55,12 @@ def learn_all(arguments: argparse.Namespace) -> list[dict]:
     rows, arrays = [], {}
     for sensor in SENSORS:
         samples, wanted, solved = [], 0, 0
-        for number, press in enumerate(random_contacts(arguments.presses, arguments.seed)):
-            path = arguments.work / f"{sensor}_{arguments.seed}_{number:05d}.npz"
-            with np.load(path, allow_pickle=False) as file:
+        drawn = enumerate(random_contacts(arguments.presses, arguments.seed))
+        for (number, press), friction in itertools.product(drawn, FRICTIONS):
+            with np.load(file_of(arguments.work, sensor, arguments.seed, number, friction), allow_pickle=False) as file:
                 full = dict(file)
             wanted, solved = wanted + len(full["depths"]), solved + len(full["force"])
-            samples += learn_correction.paired(sensor, number, press, full)
+            samples += learn_correction.paired(sensor, number, press, friction, full)
         print(f"{sensor}: {solved} of {wanted} contacts solved in the full tier, {len(samples)} in both", flush=True)
         learned, found = learn_correction.learn(sensor, samples)
         rows += found
@@ -69,7 +77,7 @@ def main() -> int:
     """Solve, learn, write, report."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
-    parser.add_argument("--presses", type=int, default=350, help="presses a sensor, three contacts each (350)")
+    parser.add_argument("--presses", type=int, default=150, help="presses a sensor, three contacts each (150)")
     parser.add_argument("--seed", type=int, default=0, help="of the presses (0)")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     parser.add_argument("--json", type=pathlib.Path, help="write the rows of errors here")
@@ -77,7 +85,8 @@ def main() -> int:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     arguments.work.mkdir(parents=True, exist_ok=True)
     os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
-    jobs = [(s, arguments.seed, n, arguments.work) for n in range(arguments.presses) for s in SENSORS]
+    every = itertools.product(range(arguments.presses), FRICTIONS, SENSORS)
+    jobs = [(arguments.work, sensor, arguments.seed, number, friction) for number, friction, sensor in every]
     with concurrent.futures.ProcessPoolExecutor(arguments.workers) as pool:
         for done, line in enumerate(pool.map(solve_one, jobs), 1):
             print(f"{done}/{len(jobs)} {line}", flush=True)

@@ -38,6 +38,7 @@ class Learned:
     shift, scale : (f,) of the features; supports : (n, f) scaled features; width : of the kernel
     force_weights : (n,), of the logarithm of the force's factor; field_weights : (n, k); fields : (k, g, 3), per metre
         of depth, in the surface's own frames
+    trust : (bins, 3), depth over thickness, and how much of the predicted logarithm and field is applied there, 0 to 1
     errors : (bins, 4), upper end of depth over thickness, then the 95th percentile of the rms shape error m and of the
         relative force error, found on presses kept apart, and how many there were
     """
@@ -49,6 +50,7 @@ class Learned:
     force_weights: np.ndarray
     field_weights: np.ndarray
     fields: np.ndarray
+    trust: np.ndarray
     errors: np.ndarray
 
     def predict(self, features: np.ndarray) -> tuple[float, np.ndarray]:
@@ -56,7 +58,8 @@ class Learned:
         x = (features - self.shift) / self.scale
         near = kernel(x[None], self.supports, self.width)[0]
         weights = near @ self.field_weights
-        return float(np.exp(near @ self.force_weights)), np.tensordot(weights, self.fields, 1)
+        of_force, of_field = (np.interp(features[0], self.trust[:, 0], self.trust[:, k]) for k in (1, 2))
+        return float(np.exp(of_force * (near @ self.force_weights))), of_field * np.tensordot(weights, self.fields, 1)
 
 
 def kernel(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
@@ -123,12 +126,12 @@ def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
         depth, np.sqrt(depth), force, at.radius / thickness, np.log(at.radius / thickness),
         spread[0, 0], spread[1, 1], spread[0, 1], at.centre[0] / 5e-3, at.centre[1] / 5e-3, (at.centre[1] / 5e-3) ** 2,
         local[0], local[2], towards[0], towards[2], core, np.log(depth / (at.radius / thickness)),
-        share.max() * alike, 1 / alike,
+        share.max() * alike, 1 / alike, contact.sideways,
     ])  # fmt: skip
 
 
-ESSENTIAL = np.array([0, 2, 4, 15, 16, 18])  # depth, force, radius, core, depth over radius, few nodes
-MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1.0])  # features under z -> -z
+ESSENTIAL = np.array([0, 2, 4, 15, 16, 18, 19])  # depth, force, radius, core, depth over radius, few nodes, friction
+MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1, 1.0])  # features under z -> -z
 
 
 def grid_places() -> np.ndarray:

@@ -15,7 +15,7 @@ from . import correction
 from .compliance import compliance_of
 from .contact import ContactProblem
 from .correction import LINES, MIRRORED, Frame, Learned, features, frame, kernel
-from .finite_strain_tier import ONE_STEP, Sensor, graded_body
+from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Sensor, graded_body
 from .placement import pose_at
 from .random_contacts import RandomContact
 from .thickness import depth_at
@@ -50,8 +50,8 @@ class Sample:
     full: np.ndarray
 
 
-def full_press(sensor: Sensor, press: RandomContact) -> dict[str, np.ndarray]:
-    """The full tier's contacts of a press at its ``SHARES``, without friction, as far as they converge.
+def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[str, np.ndarray]:
+    """The full tier's contacts of a press at its ``SHARES`` with Coulomb's ``friction``, as far as they converge.
 
     Returns depths (k,) m wanted; of the c <= k that converged displacement (c, n, 3) float32 m, force (c, 3) N,
     iterations (c,), load steps (c,) and seconds (c,).
@@ -59,12 +59,12 @@ def full_press(sensor: Sensor, press: RandomContact) -> dict[str, np.ndarray]:
     pose = pose_at(sensor, press.indenter, press.place)
     deepest = depth_at(press.depth, sensor, press.indenter, pose)
     body = graded_body(sensor, press.indenter, pose, deepest)
-    problem = body.contact(press.indenter, pose, deepest, 0.0)
+    problem = body.contact(press.indenter, pose, deepest, friction)
     touch, found = None, []
     for depth in np.array(SHARES) * deepest:
         began = time.process_time()
         try:
-            touch = problem.press(depth, touch, ONE_STEP)
+            touch = problem.press(depth, touch, FRICTION_STEP if friction else ONE_STEP)
         except TactileError as error:
             log.info("%s: %s", press.name, error)
             break
@@ -76,10 +76,12 @@ def full_press(sensor: Sensor, press: RandomContact) -> dict[str, np.ndarray]:
     return {"depths": np.array(SHARES) * deepest, **arrays}
 
 
-def paired(sensor: Sensor, number: int, press: RandomContact, full: dict[str, np.ndarray]) -> Iterator[Sample]:
+def paired(
+    sensor: Sensor, number: int, press: RandomContact, friction: float, full: dict[str, np.ndarray]
+) -> Iterator[Sample]:
     """The press in the fast tier, beside the full tier's contacts of ``full_press``; those that converged in both."""
     compliance, pose = compliance_of(sensor), pose_at(sensor, press.indenter, press.place)
-    problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]))
+    problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]), friction)
     contact = None
     for depth, moved, force in zip(full["depths"], full["displacement"], full["force"], strict=False):
         contact = problem.at_depth(float(depth), contact if contact is not None and contact.converged else None)
@@ -122,16 +124,40 @@ def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Learned, list[dict]]:
     fields = np.array([residual_on_grid(sensor, s.frame, s.full - s.fast) / s.depth for s in samples])
     log_ratio = np.log([s.ratio for s in samples])
     fold = np.array([s.press for s in samples]) % _FOLDS
-    guess = [np.empty(len(samples)), np.empty((len(samples), *fields.shape[1:]))]
     choice = _choose(x, log_ratio, fields, fold)
     log.info("%s: %d features, kernel width %g, ridge %g", sensor, len(choice[0]), choice[1], choice[2])
+    guess = np.empty(len(samples)), np.empty_like(fields)
     for f in range(_FOLDS):
         part = _fit(x[fold != f], log_ratio[fold != f], fields[fold != f], *choice)
         for i in np.flatnonzero(fold == f):
-            guess[0][i], guess[1][i] = part.predict(x[i])
-    errors = [_errors(sensor, s, guess[0][i], guess[1][i]) for i, s in enumerate(samples)]
-    table, rows = _tabulate(sensor, samples, np.array(errors))
-    return dataclasses.replace(_fit(x, log_ratio, fields, *choice), errors=table), rows
+            factor, guess[1][i] = part.predict(x[i])
+            guess[0][i] = np.log(factor)
+    errors = np.empty((len(samples), 6))
+    for f in range(_FOLDS):  # what is trusted on a fold is found on the others
+        trust = _trust(
+            x[fold != f, 0], guess[0][fold != f], log_ratio[fold != f], guess[1][fold != f], fields[fold != f]
+        )
+        for i in np.flatnonzero(fold == f):
+            of_force, of_field = (np.interp(x[i, 0], trust[:, 0], trust[:, k]) for k in (1, 2))
+            errors[i] = _errors(sensor, samples[i], np.exp(of_force * guess[0][i]), of_field * guess[1][i])
+    table, rows = _tabulate(sensor, samples, errors)
+    trust = _trust(x[:, 0], guess[0], log_ratio, guess[1], fields)
+    return dataclasses.replace(_fit(x, log_ratio, fields, *choice), trust=trust, errors=table), rows
+
+
+def _trust(
+    depth: np.ndarray, log_guess: np.ndarray, log_ratio: np.ndarray, guess: np.ndarray, fields: np.ndarray
+) -> np.ndarray:
+    """See ``Learned``: the share of what was predicted for presses kept apart that leaves the least squares."""
+    rows, low = [], 0.0
+    for high in _BINS:
+        here = (depth > low) & (depth <= high)
+        if here.sum() >= _LEAST:
+            pairs = (log_guess[here], np.clip(log_ratio[here], -_MOST, _MOST)), (guess[here], fields[here])
+            shares = [float(np.clip((g * t).sum() / max((g * g).sum(), 1e-30), 0, 1)) for g, t in pairs]
+            rows.append([float(depth[here].mean()), *shares])
+        low = high
+    return np.array(rows) if rows else np.array([[0.0, 1.0, 1.0]])
 
 
 def _fit(
@@ -153,7 +179,7 @@ def _fit(
     shape = (len(basis), LINES * LINES, 3)
     return Learned(
         shift, scale, scaled.astype(np.float32), width, weights[:, 0], weights[:, 1:].astype(np.float32),
-        basis.reshape(shape).astype(np.float16), np.zeros((0, 4)),
+        basis.reshape(shape).astype(np.float16), np.array([[0.0, 1.0, 1.0]]), np.zeros((0, 4)),
     )  # fmt: skip
 
 
