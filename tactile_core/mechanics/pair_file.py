@@ -14,12 +14,12 @@ from ..hdf5_disk import Disk
 FORMAT = "tactile-pairs-1"
 SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 
-# Unit of each dataset; the leading axis counts contacts.
+# Unit of each dataset; the leading axis counts contacts. A place is (x, z) on the DIGIT's plane, tilt and heading.
 DATASETS = {
     "displacement_biotac": "m", "displacement_digit": "m", "signal": "counts", "gap": "m", "force": "N",
     "force_digit": "N", "pressure": "Pa", "depth_biotac": "m", "depth_digit": "m", "contact_center": "m",
-    "slide": "m", "contact_patch_biotac": "1", "contact_patch_digit": "1", "beyond_digit": "1", "press": "1",
-    "indenter": "1",
+    "place": "m, m, rad, rad", "slide": "m", "contact_patch_biotac": "1", "contact_patch_digit": "1",
+    "beyond_digit": "1", "press": "1", "indenter": "1",
 }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Iterator
 
@@ -34,12 +35,17 @@ def press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray
     indenter = scene.indenters[which].build()
     place = _draw_place(random, spec)
     on_both = [_press(sensor, indenter, place, spec) for sensor in ("biotac", "digit")]
-    rows = []
+    rows, stood = [], np.array(dataclasses.astuple(place), np.float32)
     for force, slide in _path(random, spec):
         biotac, digit = (on_one.at_force(force, on_one.pose.slid(*slide)) for on_one in on_both)
         if biotac is None or digit is None:
             break
-        named = {"press": np.int32(press), "indenter": np.int16(which), "slide": slide.astype(np.float32)}
+        named = {
+            "press": np.int32(press),
+            "indenter": np.int16(which),
+            "slide": slide.astype(np.float32),
+            "place": stood,
+        }
         rows.append({**named, **pair_row(biotac, digit)})
     return rows
 
