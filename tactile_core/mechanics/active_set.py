@@ -49,44 +49,27 @@ def complement(
     factors : Cholesky factors of this symmetric matrix by active set, used and added to
     Raises UnsolvedError.
     """
-    from scipy.linalg import lapack
-
     fewest, patience = len(gap) + 1, _PATIENCE
-    pressing = np.zeros(len(gap))
+    pressing, step = np.zeros(len(gap)), 0.0
     for _ in range(_MOST_EXCHANGES):
         index = np.flatnonzero(active)
         if along is not None and not (len(index) and (carry[index] > 0).any()):
             raise UnsolvedError("no node can carry the force")
         right = -gap[index] if along is None else np.column_stack([-gap[index], along[index]])
-        known = factors.get(active.tobytes()) if factors is not None else None
-        block = matrix if len(index) == len(gap) or known is not None else matrix.take(index, 0).take(index, 1)
-        if not len(index):
-            factor, answer, failed = block, right, 0
-        elif known is not None:
-            factor = known
-            answer, failed = lapack.dpotrs(factor, right, lower=1)
-        elif symmetric:
-            factor, answer, failed = lapack.dposv(block, right, lower=1)
-            if factors is not None:
-                factors[active.tobytes()] = factor
-        else:
-            factor, _, answer, failed = lapack.dgesv(block, right)
-        if failed:
-            raise UnsolvedError("the compliance of the touching nodes is not positive definite")
-        step = 0.0
+        factor, answer = _closed(matrix, active, index, right, symmetric, factors)
         if along is not None:
             answer, per_step = answer.T
-            step = (force - carry[index] @ answer) / (carry[index] @ per_step)
+            step = float((force - carry[index] @ answer) / (carry[index] @ per_step))
             answer = answer + step * per_step
         pressing[:] = 0
         pressing[index] = answer
-        open_gap = gap + (matrix[index].T if symmetric else matrix[:, index]) @ answer
+        open_gap = gap + matrix @ pressing
         if along is not None:
             open_gap -= step * along
         wrong = np.where(active, pressing < -_FORCE_NOISE, open_gap < -_GAP_NOISE)
         count = int(wrong.sum())
         if not count:
-            return Pressing(pressing, active, float(step), factor)
+            return Pressing(pressing, active, step, factor)
         if count < fewest:
             fewest, patience = count, _PATIENCE
         else:
@@ -95,3 +78,24 @@ def complement(
             wrong[: np.flatnonzero(wrong)[-1]] = False
         active = active ^ wrong
     raise UnsolvedError(f"the active set did not settle in {_MOST_EXCHANGES} exchanges")
+
+
+def _closed(matrix, active, index, right, symmetric, factors) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN001
+    """Factor of the block of the ``active`` (k,) nodes, ``index`` (j,), and what solves it for ``right`` (j, ...)."""
+    from scipy.linalg import lapack
+
+    known = factors.get(active.tobytes()) if factors is not None else None
+    if not len(index):
+        return matrix[:0, :0], right
+    if known is not None:
+        return known, lapack.dpotrs(known, right, lower=1)[0]
+    block = matrix if len(index) == len(active) else matrix.take(index, 0).take(index, 1)
+    if symmetric:
+        factor, answer, failed = lapack.dposv(block, right, lower=1)
+        if factors is not None:
+            factors[active.tobytes()] = factor
+    else:
+        factor, _, answer, failed = lapack.dgesv(block, right)
+    if failed:
+        raise UnsolvedError("the compliance of the touching nodes is not positive definite")
+    return factor, answer

@@ -19,7 +19,7 @@ class Candidates:
 
     nodes : (k,) touchable indices; displacement : (k, 3) m, first guess; probe : (k, 3) m, see ``split``
     active : (k,) bool, first guess of which touch; inner : (c,) watched points of the inner skin that may press
-    refused : how often nodes flipped between faces of which ``split`` found only one
+    faced : (k,) bool, nodes whose faces are known: they stand twice, or ``split`` found only one
     """
 
     nodes: np.ndarray
@@ -27,7 +27,7 @@ class Candidates:
     probe: np.ndarray
     active: np.ndarray
     inner: np.ndarray
-    refused: int = 0
+    faced: np.ndarray
 
     def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:
         """Take an iterate as the new first guess; ``active`` may go on with that of the inner points."""
@@ -35,28 +35,28 @@ class Candidates:
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
         """Let more nodes enter, all of them touching at first."""
+        self.faced = np.concatenate([self.faced, np.isin(nodes, self.nodes)])
         every = np.concatenate([self.nodes, nodes])
         order = np.argsort(every, kind="stable")
-        self.nodes = every[order]
+        self.nodes, self.faced = every[order], self.faced[order]
         self.displacement = np.concatenate([self.displacement, displacement])[order]
         self.probe = np.concatenate([self.probe, probe])[order]
         self.active = np.concatenate([self.active, np.ones(len(nodes), bool)])[order]
 
-    def split(self, at: np.ndarray, normals: np.ndarray, indenter: Indenter, pose: Pose, rest: np.ndarray) -> bool:
-        """Let nodes ``at`` (j,) touch a second face with ``normals`` (j, 3) too, where there is one; whether any is
-        new.
+    def split(self, at: np.ndarray, normals: np.ndarray, indenter: Indenter, pose: Pose, rest: np.ndarray) -> None:
+        """Let nodes ``at`` (j,) touch a second face with ``normals`` (j, 3) too, where there is one.
 
-        A little toward the second face it is the nearer one, so its distance is measured there.
+        A little toward a face it is the nearer one: there its distance is measured, for both of them.
         """
-        single = np.bincount(self.nodes, minlength=self.nodes.max() + 1)[self.nodes[at]] == 1
+        self.faced[at] = True
+        gap, first = pose.distance(indenter, rest[at] + self.displacement[at])
+        points = rest[at] + self.displacement[at] - np.minimum(gap, 0)[:, None] * first
         new, probe = np.zeros(len(at), bool), np.zeros_like(normals)
         for reach in _CREASE_PROBES:
-            tried = -reach * normals
-            _, found = pose.distance(indenter, rest[at] + self.displacement[at] + tried)
-            hit = single & ~new & (np.einsum("ai,ai->a", found, normals) > _SAME_FACE)
-            probe[hit] = tried[hit]
+            hit = ~new
+            for face in (normals, first):
+                _, found = pose.distance(indenter, points - reach * face)
+                hit &= np.einsum("ai,ai->a", found, face) > _SAME_FACE
+            probe[hit], self.probe[at[hit]] = -reach * normals[hit], -reach * first[hit]
             new |= hit
-        at = at[new]
-        if len(at):
-            self.add(self.nodes[at], self.displacement[at], probe[new])
-        return len(at) > 0
+        self.add(self.nodes[at[new]], self.displacement[at[new]], probe[new])

@@ -27,9 +27,7 @@ _TAKE_IN = 20e-6  # m: where some nodes go through the indenter, those this clos
 _CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps vary more
 _CLOSED = 0.3e-6  # m: gaps closed to this need no further look
 _MOST_ROUNDS = 12  # of taking in nodes
-_EASIER = (0.78, 0.3, 0.1, 0.03)  # coefficients of friction on the way to none, where none at once does not settle
-_DETOURS = (4,)  # steps from the start to the goal, where one does not settle
-_REFUSALS = 3  # of nodes that flip but touch no second face, after which no more creases are looked for
+_DETOURS = (4, 8)  # steps from the start to the goal, where one does not settle
 _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest overlap are first taken to touch
 
 
@@ -102,8 +100,6 @@ class ContactProblem:
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
         """Solve in one step, or where that does not settle by a detour."""
         contact = self._solve(pose, axial_force, start)
-        if not contact.converged and self.friction == 0:
-            contact = self._ease(pose, axial_force, start)
         for steps in _DETOURS:
             if contact.converged:
                 break
@@ -121,51 +117,41 @@ class ContactProblem:
             contact = self._solve(there, goal, contact)
         return contact
 
-    def _ease(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
-        """Start a contact without friction from ones with less and less of it: sticking nodes settle best."""
-        contact = start
-        for friction in _EASIER:
-            contact = self._solve(pose, axial_force, contact, friction)
-        return self._solve(pose, axial_force, contact)
-
-    def _solve(
-        self, pose: Pose, axial_force: float | None, start: Contact | None, friction: float | None = None
-    ) -> Contact:
+    def _solve(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
         before = start or self._nothing(self.pose)
         moved = before.displacement[self.compliance.touchable[self.near]].astype(float)
         gap, _ = pose.distance(self.indenter, self._rest[self.near] + moved)
         touched = np.isin(self.near, before.nodes)
-        take = (gap < 0) | touched
+        take = (gap < _way_in(before, axial_force)) | touched
         if not take.any():
             return self._nothing(pose, converged=axial_force is None)
         active = touched[take] | (gap[take] < min(_LIKELY * gap.min(), 0))
         far = 0.1e-3 + float(np.linalg.norm(pose.apex - before.pose.apex))
         landed = moved[take] + landing(self.indenter, pose, self._rest[self.near[take]] + moved[take], far)
-        candidates = Candidates(self.near[take], landed, np.zeros_like(landed), active, before.core_nodes)
-        friction = self.friction if friction is None else friction
-        return self._rounds(pose, axial_force, before, candidates, friction)
+        candidates = Candidates(
+            self.near[take], landed, np.zeros_like(landed), active, before.core_nodes, np.zeros(len(active), bool)
+        )
+        return self._rounds(pose, axial_force, before, candidates)
 
-    def _rounds(
-        self, pose: Pose, axial_force: float | None, before: Contact, candidates: Candidates, friction: float
-    ) -> Contact:
+    def _rounds(self, pose: Pose, axial_force: float | None, before: Contact, candidates: Candidates) -> Contact:
         """Solve, look at the whole surface, take in what it shows, until nothing more is found."""
         iterations, shift, contact = 0, 0.0, None
         for _ in range(_MOST_ROUNDS):
-            state = self._iterate(pose, axial_force, before, candidates, shift, friction)
+            state = self._iterate(pose, axial_force, before, candidates, shift)
             if state is None:
                 return self._nothing(pose, iterations=iterations + 1, converged=False)
             iterations, shift = iterations + state.iterations, state.shift
             candidates.go_on(state.displacement, state.active)
             there, rest = pose.moved(shift), self._rest[candidates.nodes]
             if state.creases is not None:
-                candidates.refused += not candidates.split(*state.creases, self.indenter, there, rest)
+                candidates.split(*state.creases, self.indenter, there, rest)
                 continue
             contact = self._result(there, state, candidates, iterations)
             if not state.settled or not self._take_in(candidates, state, contact):
                 return contact
         return dataclasses.replace(contact, converged=False)
 
-    def _iterate(self, pose, axial_force, before, candidates, shift, friction) -> Try | None:  # noqa: ANN001
+    def _iterate(self, pose, axial_force, before, candidates, shift) -> Try | None:  # noqa: ANN001
         block = self._block
         if block is None or not (
             np.array_equal(block.nodes, candidates.nodes) and np.array_equal(block.inner, candidates.inner)
@@ -175,15 +161,13 @@ class ContactProblem:
         active = np.r_[candidates.active, np.ones(block.c, bool)]
         begin = Try(candidates.displacement, np.zeros_like(rest), np.zeros(block.c), shift, active)
         core_gap = self.compliance.watch_gap[candidates.inner].astype(float)
-        if friction == 0:
-            solver = Frictionless(
-                block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.refused >= _REFUSALS
-            )
+        if self.friction == 0:
+            solver = Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
         else:
             moved = before.displacement[self.compliance.touchable[candidates.nodes]]
             touched = np.isin(candidates.nodes, before.nodes)
             spots = landing_spots(self.indenter, before.pose, pose, rest + moved, touched)
-            solver = Frictional(block, rest, core_gap, self.indenter, pose, spots, friction)
+            solver = Frictional(block, rest, core_gap, self.indenter, pose, spots, self.friction)
         try:
             return solver.solve(begin, axial_force)
         except UnsolvedError:
@@ -238,6 +222,13 @@ class ContactProblem:
         return dataclasses.replace(
             contact, penetration=float(penetration), converged=bool(state.settled and penetration <= PENETRATION)
         )
+
+
+def _way_in(before: Contact, axial_force: float | None) -> float:
+    """About how much deeper, m, an indenter will stand when its force grows from that of ``before``: Hertz's law."""
+    if axial_force is None or before.axial_force <= 0 or before.depth <= 0:
+        return 0.0
+    return min(before.depth * max((axial_force / before.axial_force) ** (2 / 3) - 1, 0.0), _REACH / 2)
 
 
 def _sideways(force: np.ndarray, normal: np.ndarray) -> float:

@@ -8,13 +8,15 @@ from .. import biotac_shape
 from ..indenters import Indenter, Pose
 from ..lattice import Lattice
 
-_ADVANCES = 60  # of the whole body by its smallest distance: it never goes through
+_ADVANCES = 60  # of a body by its smallest distance: more than any shape needs
 _TOUCHES = 1e-9  # m, smallest distance at which the body is taken to touch
 _CLOSE = 60e-6  # m: nodes this little farther than the first one may hide the true first place between them
 _MOST_PLACES = 12
 _FINER = (4, 16, 64, 256)  # of a lattice spacing: 1.4 um at last, which hides less than 1 nm of a ball of 1 mm
+_HIDDEN = 6e-6  # m, more than a quarter of a spacing hides: (0.045 mm)^2 / 2 over the smallest edge radius, 0.2 mm
 _CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no indenter reaches the sensor
-_NEAR = 4e-3  # m, nodes this much farther than the nearest one are not touched first, for all tilts to 45 degrees
+_LEAST_RATE = 0.5  # of approach: where the body slides past a point its distance says little about the way to it
+_NEAREST = 16  # nodes with which the motion is tried first
 
 
 def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
@@ -22,53 +24,74 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
 
     Between nodes the surface is the lattice's cubic (Catmull-Rom) interpolation.
     """
-    for clear in _CLEAR:
-        away = pose.moved(-clear)
-        gap, _ = away.distance(indenter, lattice.rest)
-        if gap.min() > 0:
-            break
-    pose = _advance(indenter, away, lattice.rest[gap < gap.min() + _NEAR])
-    gap, _ = pose.distance(indenter, lattice.rest)
+    pose, nodes = _on_nodes(lattice.rest, indenter, pose)
     rows, columns = lattice.shape
-    order = np.argsort(gap, kind="stable")[:_MOST_PLACES]
-    nodes = order[(gap[order] < gap[order[0]] + _CLOSE) & (order < rows * columns)]
+    nodes = nodes[nodes < rows * columns]
     grid = lattice.grid(lattice.rest)
     closed = len(lattice.rest) > rows * columns  # a surface with poles closes round its axis
     places = np.stack([nodes // columns, nodes % columns], -1).astype(float)
     around = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij"), -1).reshape(1, -1, 2)
     for finer in _FINER if len(places) else ():
         tried = places[:, None] + around / finer
-        gap, _ = pose.distance(indenter, _on_surface(grid, tried.reshape(-1, 2), closed=closed))
-        best = np.argmin(gap.reshape(len(places), -1), axis=1)
-        places = tried[np.arange(len(places)), best]
-        pose = _advance(indenter, pose.moved(-_CLOSE), _on_surface(grid, places, closed=closed))
+        points = _on_surface(grid, tried.reshape(-1, 2), closed=closed)
+        gap, _ = pose.distance(indenter, points)
+        best = np.argmin(gap.reshape(len(places), -1), axis=1) + np.arange(len(places)) * around.shape[1]
+        best = best[gap[best] < gap[best].min() + _HIDDEN]
+        places, first = np.unique(tried.reshape(-1, 2)[best], axis=0, return_index=True)
+        pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), points[best[first]])
     return pose
 
 
+def _on_nodes(rest: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
+    """The pose that just touches the first of the nodes (n, 3) m, and the nodes that are close then, nearest first."""
+    for clear in _CLEAR:
+        away = pose.moved(-clear)
+        gap, _ = away.distance(indenter, rest)
+        if gap.min() > 0:
+            break
+    some = np.argsort(gap, kind="stable")[:_NEAREST]
+    while True:
+        pose = _advance(indenter, away, rest[some])
+        travel = np.linalg.norm(pose.apex - away.apex)
+        reached = np.flatnonzero(gap < travel + _CLOSE)  # no distance falls faster than the indenter moves
+        now, _ = pose.distance(indenter, rest[reached])
+        missed = np.setdiff1d(reached[now < -_TOUCHES], some)
+        if not len(missed):
+            order = np.argsort(now, kind="stable")[:_MOST_PLACES]
+            return pose, reached[order[now[order] < now[order[0]] + _CLOSE]]
+        some = np.r_[some, missed]
+
+
 def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
+    """Move until the first of the points (n, 3) m is touched.
+
+    Toward a convex part Newton's steps never go through; where another part lets them, the distance leads back.
+    """
     for _ in range(_ADVANCES):
-        gap, _ = pose.distance(indenter, points)
-        smallest = float(gap.min())
-        pose = pose.moved(smallest)
+        gap, normal = pose.distance(indenter, points)
+        step = smallest = float(gap.min())
         if abs(smallest) < _TOUCHES:
             break
+        if smallest > 0:
+            step = float((gap / np.maximum(-(normal @ pose.direction), _LEAST_RATE)).min())
+        pose = pose.moved(step)
     return pose
 
 
 def _on_surface(grid: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray:
     """Points (n, 3) of the interpolated surface at fractional (row, column) places (n, 2)."""
     rows, columns = grid.shape[:2]
-    row = np.clip(places[:, 0], 0, rows - 1)
-    column = places[:, 1] if closed else np.clip(places[:, 1], 0, columns - 1)
+    row = np.minimum(np.maximum(places[:, 0], 0), rows - 1)
+    column = places[:, 1] if closed else np.minimum(np.maximum(places[:, 1], 0), columns - 1)
     i = np.minimum(np.floor(row).astype(int), rows - 2)
     j = np.floor(column).astype(int)
     if not closed:
         j = np.minimum(j, columns - 2)
     across, along = biotac_shape.catmull_rom(row - i), biotac_shape.catmull_rom(column - j)
-    points = np.zeros((len(places), 3))
-    for a in range(4):
-        for b in range(4):
-            at_row = np.clip(i + a - 1, 0, rows - 1)
-            at_column = (j + b - 1) % columns if closed else np.clip(j + b - 1, 0, columns - 1)
-            points += (across[a] * along[b])[:, None] * grid[at_row, at_column]
-    return points
+    steps = np.arange(-1, 3)
+    at_row = np.minimum(np.maximum(i[:, None] + steps, 0), rows - 1)
+    at_column = j[:, None] + steps
+    at_column = at_column % columns if closed else np.minimum(np.maximum(at_column, 0), columns - 1)
+    nodes = grid.reshape(-1, 3).take(at_row[:, :, None] * columns + at_column[:, None], axis=0)
+    weights = across.T[:, :, None] * along.T[:, None]
+    return (weights.reshape(-1, 1, 16) @ nodes.reshape(-1, 16, 3))[:, 0]

@@ -23,13 +23,14 @@ MAX_ITERATIONS = 60
 _MOST_CURVED = 20  # tangent directions in the Newton step: more cost more than the iterations they save
 _FEELS_CURVATURE = 0.1  # least curvature x force x compliance of such a direction
 _FEELS_AT_ONCE, _LATER = 0.4, 5  # from the second iteration on only for more than this: plain iterations are cheaper
-# Beyond 1 a tangential mode runs away from its equilibrium: it then takes a long step down the slope instead.
-_MOST_UNSTABLE = 0.9
+# Assumed, tried on random contacts: what Newton's step divides by at least, and at most where a mode runs away.
+_LEAST_STIFFNESS, _SLOPE_STIFFNESS = 0.02, 0.1
 _LARGEST_TURN = 0.3  # rad, of a normal in one Newton step
 _LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
 _CREASE_ANGLE = np.cos(np.radians(20.0))
 _CREASE_ITERATION = 6  # from which nodes that flip between two faces are taken to sit in the crease between them
 _STALE = 0.1  # rad: the compliance along the normals is made anew when one has turned by more
+_FEW = 0.3  # of the nodes: their part of the compliance costs less to make than the whole
 _FREE_ITERATIONS = 4  # in which steps are taken whole, whatever they bring
 _PROGRESS, _SHRINK, _GROW, _LEAST_TRUST = 0.8, 0.6, 1.3, 0.1
 
@@ -88,15 +89,15 @@ class Frictionless:
     """Solves for the nodes of one block.
 
     rest : (k, 3) m; core_gap : (c,) m; probe : (k, 3) m, toward the second face of nodes in a crease
-    creased : whether no more creases need to be looked for
+    faced : (k,) bool, nodes whose faces are known: they are not looked at for creases
     """
 
     def __init__(
         self, block: NearBlock, rest: np.ndarray, core_gap: np.ndarray, indenter: Indenter, pose: Pose,
-        probe: np.ndarray, creased: bool,
+        probe: np.ndarray, faced: np.ndarray,
     ) -> None:  # fmt: skip
         self.block, self.rest, self.core_gap = block, rest, core_gap
-        self.indenter, self.pose, self.probe, self.creased = indenter, pose, probe, creased
+        self.indenter, self.pose, self.probe, self.faced = indenter, pose, probe, faced
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
         """Gaps (k,) m and normals (k, 3); at a crease's second face measured a little toward it."""
@@ -110,8 +111,7 @@ class Frictionless:
         gap, normal = self.distance(place, state.shift)
         flips = np.zeros(len(gap), int)
         for iteration in range(1, MAX_ITERATIONS + 1):
-            if model is None or np.abs(normal - model.normal).max() > _STALE:
-                model = _Model(normal, self.block.normal(normal), {})
+            model = self._model(normal, model)
             offset = self._offset(gap, normal, place, model, solved)
             solved = self._complement(model, offset, normal, state.active, axial_force)
             state = self._step(state, place, model.matrix, normal, solved, iteration)
@@ -121,8 +121,8 @@ class Frictionless:
             if state.settled:
                 return state
             flipped = solved.active[: len(gap)] & (np.einsum("ai,ai->a", turned, normal) < _CREASE_ANGLE)
-            if iteration >= _CREASE_ITERATION and not self.creased:
-                flips += flipped
+            if iteration >= _CREASE_ITERATION:
+                flips += flipped & ~self.faced
                 if (flips >= 2).any():
                     nodes = np.flatnonzero(flips >= 2)
                     state.creases = nodes, normal[nodes]
@@ -131,6 +131,19 @@ class Frictionless:
             place = place + trust * (state.displacement - place)
             gap, normal = (gap, turned) if trust == 1 else self.distance(place, state.shift)
         return state
+
+    def _model(self, normal: np.ndarray, older: _Model | None) -> _Model:
+        """The model at new normals (k, 3), or the older one while they have hardly turned."""
+        if older is None:
+            return _Model(normal, self.block.normal(normal), {})
+        stale = np.flatnonzero(np.abs(normal - older.normal).max(axis=1) > _STALE)
+        if not len(stale):
+            return older
+        if len(stale) > _FEW * len(normal):
+            return _Model(normal, self.block.normal(normal), {})
+        mixed = older.normal.copy()
+        mixed[stale] = normal[stale]
+        return _Model(mixed, self.block.turned(older.matrix, mixed, stale), {})
 
     def _offset(self, gap, normal, place, model, solved) -> np.ndarray:  # noqa: ANN001
         """Gaps without any forces; with a model of older normals only the change of the forces is left to it."""
@@ -207,7 +220,7 @@ class Frictionless:
         among = np.einsum("qri,ri->qr", on_surface[:, nodes], tangent) - onto_gaps @ relief
         mode, shape = np.linalg.eigh((among + among.T) / 2)
         driven = shape.T @ np.einsum("qi,qi->q", tangent, travel[nodes])
-        amount = shape @ (driven / (1 - np.minimum(mode, _MOST_UNSTABLE)))
+        amount = shape @ (driven / _stiffness(mode))
         turn = np.abs(amount / root * curvature.ravel()[chosen]).max()
         amount *= min(1.0, _LARGEST_TURN / max(turn, 1e-30))
         change = np.zeros(len(solved.pressing))
@@ -230,3 +243,10 @@ class Frictionless:
             return False
         axial = float(state.force.sum(0) @ self.pose.direction)
         return axial_force is None or abs(axial - axial_force) <= FORCE_TOLERANCE * abs(axial_force)
+
+
+def _stiffness(mode: np.ndarray) -> np.ndarray:
+    """1 - mode, by which Newton's step divides; beyond 1 a mode runs away from its equilibrium, and the step goes
+    that way."""
+    away = np.minimum(mode - 1, _SLOPE_STIFFNESS)
+    return np.maximum(np.where(mode < 1, 1 - mode, away), _LEAST_STIFFNESS)

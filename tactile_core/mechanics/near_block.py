@@ -63,6 +63,19 @@ class NearBlock:
         matrix.flat[:: k + self.c + 1] *= 1 + _RIDGE
         return matrix
 
+    def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """``normal`` at ``normals`` (k, 3) from what it was when those of the nodes ``at`` (j,) were others."""
+        k, size = self.k, 3 * self.k
+        rows = self.matrix.take(axes_of(at), axis=0)
+        strips = _contract(rows[:, :size], normals[at].astype(np.float32), normals.astype(np.float32)).astype(float)
+        strips[np.arange(len(at)), at] *= 1 + _RIDGE
+        matrix = matrix.copy()
+        matrix[at, :k], matrix[:k, at] = strips, strips.T
+        if self.c:
+            side = np.einsum("aic,ai->ac", rows[:, size:].reshape(len(at), 3, self.c), normals[at])
+            matrix[at, k:], matrix[k:, at] = side, side.T
+        return matrix
+
 
 def _surface_block(compliance: Compliance, nodes: np.ndarray) -> np.ndarray:
     """Compliance (3 k, 3 k) float32 m/N among touchable nodes; half of them by mirror images."""
@@ -94,9 +107,8 @@ def _rows(move: np.ndarray, row: np.ndarray, columns: np.ndarray) -> np.ndarray:
 def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
     """sum over axes i, j of source[a, i] block[a i, b j] target[b, j]; sums over strides are faster than einsum
     here."""
-    k = len(source)
     half = block[:, 0::3] * target[:, 0]
     half += block[:, 1::3] * target[:, 1]
     half += block[:, 2::3] * target[:, 2]
-    half = half.reshape(k, 3, k)
+    half = half.reshape(len(source), 3, len(target))
     return half[:, 0] * source[:, :1] + half[:, 1] * source[:, 1:2] + half[:, 2] * source[:, 2:]
