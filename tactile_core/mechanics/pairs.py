@@ -21,6 +21,7 @@ from .. import __version__, atomic, sensors
 from ..errors import TactileError
 from ..scene import load_scene
 from .compliance import biotac_compliance, digit_compliance
+from .pair_card import card, card_path
 from .pair_file import merge, no_room
 from .pair_rows import press_rows
 
@@ -48,7 +49,8 @@ def make_pairs(
 ) -> None:
     """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
 
-    progress : called with (contacts so far, count). Blocks wait in ``<out>.parts`` and are removed at the end.
+    progress : called with (contacts so far, count). Blocks wait in ``<out>.parts`` and are removed at the end; the
+        file's card (``pair_card``) is written beside it.
     Raises TactileError for a bad scene, count, or for parts of another scene or seed.
     """
     scene, text = load_scene(scene_path)
@@ -64,6 +66,7 @@ def make_pairs(
     folder = _parts_folder(out, text, seed)
     files = _run_blocks(str(scene_path), seed, folder, count, workers, progress)
     merge(files, count, out, text, seed, [spec.name for spec in scene.indenters])
+    atomic.write_json(card_path(out), card(out))
     for file in folder.iterdir():
         file.unlink()
     folder.rmdir()

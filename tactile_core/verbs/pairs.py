@@ -23,7 +23,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("scene", metavar="SCENE", help="scene.toml: indenters and their range of places, angles, depths")
     verb.add_argument("--count", type=int, required=True, metavar="N", help="number of paired contacts")
     seed_argument(verb, "file")
-    verb.add_argument("--out", required=True, metavar="FILE", help="HDF5 file to write")
+    verb.add_argument(
+        "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json, what is in it, goes beside"
+    )
     verb.add_argument("--workers", type=int, default=1, metavar="N", help="processes; changes no bit (default: 1)")
     progress_argument(verb)
 

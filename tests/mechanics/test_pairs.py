@@ -9,6 +9,7 @@ import pytest
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.mechanics import pair_file
+from tactile_core.mechanics.pair_card import card, card_path
 from tactile_core.mechanics.pairs import make_pairs
 
 SCENE = "scenes/press_sphere"
@@ -49,6 +50,11 @@ def test_file_holds_what_it_says(made):
         touched = sensors.digit_surface().rest[patch[contact]]
         apart = np.linalg.norm(touched - sensors.digit_surface().rest[deepest], axis=1).min()
         assert apart < 1e-3  # the gel moves most where it is touched, to about two nodes
+
+
+def test_the_card_lies_beside_the_file(made):
+    beside = json.loads(card_path(made).read_text(encoding="utf-8"))
+    assert beside == card(made) and beside["contacts"] == 40
 
 
 def interrupt(scene, out):
