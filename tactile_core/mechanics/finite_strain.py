@@ -13,6 +13,7 @@ import numpy as np
 
 from ..sensors import Material
 from .block_pattern import BlockPattern
+from .determinants import cofactors, determinants
 from .elasticity import reference_gradients
 from .hex_mesh import HexMesh
 from .neo_hookean import Law, NeoHookean
@@ -71,7 +72,7 @@ class FiniteStrainSolid:
         """Deformation gradient F (n_cells, 27, 3, 3) and its determinant J (n_cells, 27)."""
         moved = displacement[self.mesh.cells].swapaxes(1, 2)
         f = (moved @ self._by_node).reshape(-1, 3, 27, 3).swapaxes(1, 2) + np.eye(3)
-        return f, np.linalg.det(f)
+        return f, determinants(f)
 
     def energy(self, state: State) -> float:
         """Stored elastic energy, J."""
@@ -109,7 +110,7 @@ class FiniteStrainSolid:
         weight = self.weight[part]
         along = (weight[..., None, None] * stress).swapaxes(2, 3)  # (e, q, J, i)
         residual[part] = by_node @ along.reshape(n, 81, 3)
-        cofactor = (weight * j)[..., None, None] * np.linalg.inv(f)  # (e, q, J, i)
+        cofactor = weight[..., None, None] * cofactors(f).swapaxes(-1, -2)  # (e, q, J, i)
         spread = cofactor[:, :, :, None, :] * self.linear[:, None, :, None]
         couple[part] = (by_node @ spread.reshape(n, 81, 12)).reshape(n, 27, 4, 3)
         tangent = weight[..., None, None, None, None] * tangent.transpose(0, 1, 3, 2, 4, 5)  # (e, q, J, i, k, L)

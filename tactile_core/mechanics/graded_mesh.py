@@ -7,7 +7,6 @@ surface is the sensor's own. What is found on the lines is carried to the lattic
 from __future__ import annotations
 
 import dataclasses
-import functools
 
 import numpy as np
 
@@ -32,7 +31,7 @@ class Footprint:
     low: tuple[float, float]
     high: tuple[float, float]
     spacing: float = 1.0
-    growth: float = 1.0
+    growth: float = 1.5
     refine: int = 1
 
 
@@ -96,7 +95,7 @@ def graded_gel(footprint: Footprint) -> GradedMesh:
         [place[..., 0], digit_shape.BACK_Y - digit_shape.dome_height(*np.moveaxis(place, -1, 0)), place[..., 1]], -1
     )
     mesh = gel_solid(top, _divided(_gel_layers(footprint.spacing), 2 * footprint.refine))
-    pattern, factor = _pattern("digit", len(rows), len(columns), _Held(mesh))
+    pattern, factor = _pattern(mesh, "digit", len(rows), len(columns))
     to_rows, to_columns = _spline(rows, plan.shape[0]), _spline(columns, plan.shape[1])
     return GradedMesh(mesh, pattern, factor, rows, columns, to_rows, to_columns)
 
@@ -110,7 +109,7 @@ def graded_skin(footprint: Footprint) -> GradedMesh:
     outer, inner = (_skin_points(layer, rows, columns[:-1]) for layer in ("outer", "inner"))
     nearest = glued[np.rint(rows).astype(int)][:, np.rint(columns[:-1]).astype(int) % around]
     mesh = skin_solid(outer, inner, nearest, 2 * footprint.refine * (SKIN_LAYERS // 2) + 1)
-    pattern, factor = _pattern("biotac", len(rows), len(columns), _Held(mesh))
+    pattern, factor = _pattern(mesh, "biotac", len(rows), len(columns))
     to_columns = _spline(columns, around, periodic=True)
     return GradedMesh(mesh, pattern, factor, rows, columns, _spline(rows, stations), to_columns)
 
@@ -190,19 +189,14 @@ def _spline(lines: np.ndarray, count: int, *, periodic: bool = False) -> np.ndar
     return spline(np.arange(count))
 
 
-class _Held:
-    """A mesh that the cache of patterns looks at when it has to, and does not compare."""
-
-    def __init__(self, mesh: HexMesh) -> None:
-        self.mesh = mesh
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held) and np.array_equal(self.mesh.clamped, other.mesh.clamped)
-
-    def __hash__(self) -> int:
-        return hash(self.mesh.clamped.tobytes())
+_PATTERNS: dict[tuple, tuple[BlockPattern, PatternFactor]] = {}  # the latest used comes last
 
 
-@functools.lru_cache(maxsize=_KEPT)
-def _pattern(sensor: str, rows: int, columns: int, held: _Held) -> tuple[BlockPattern, PatternFactor]:
-    return BlockPattern(held.mesh.cells, held.mesh.clamped), PatternFactor()
+def _pattern(mesh: HexMesh, *kind: str | int) -> tuple[BlockPattern, PatternFactor]:
+    """Kept for meshes of one ``kind`` (sensor, rows, columns) with the same clamped nodes: their cells are the same."""
+    key = (*kind, len(mesh.nodes), mesh.clamped.tobytes())
+    found = _PATTERNS.pop(key, None) or (BlockPattern(mesh.cells, mesh.clamped), PatternFactor())
+    _PATTERNS[key] = found
+    while len(_PATTERNS) > _KEPT:
+        del _PATTERNS[next(iter(_PATTERNS))]
+    return found

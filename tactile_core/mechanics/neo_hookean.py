@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from ..sensors import Material
+from .determinants import cofactors
 
 
 class Law(Protocol):
@@ -41,7 +42,7 @@ class NeoHookean:
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Law.stress_tangent``."""
-        g = np.linalg.inv(f).swapaxes(-1, -2)
+        g = cofactors(f) / j[..., None, None]
         i1 = np.einsum("...ij,...ij->...", f, f)
         scale, pj = self.shear * j ** (-2 / 3), p * j
         stress = scale[..., None, None] * f + (pj - scale * i1 / 3)[..., None, None] * g

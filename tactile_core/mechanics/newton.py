@@ -15,15 +15,18 @@ import numpy as np
 
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
-from .quadratic_cavity import QuadraticCavity
+from .damped_factor import DampedFactor, held_back
 from .factor import NotPositiveDefiniteError, PatternFactor
 from .finite_strain import FiniteStrainSolid, State
 from .obstacle import Obstacle, PlacedIndenter
 from .pose_path import between
+from .quadratic_cavity import QuadraticCavity
 from .touching import Touching
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
 MAX_ITERATIONS = 40
+MOST_FAILURES = 8  # of load steps on one path: bounds its time (assumed; the longest path that was found had 8)
+_EASY = 8  # iterations, of a load step after which the next may be longer again (assumed)
 SMALLEST_STEP = 1 / 16  # of a load step, or of the way where that is less; halved below that, the path has ended
 _FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the normal forces
 
@@ -120,14 +123,10 @@ class FiniteStrainContact:
         self.volume = pre_inflation + (cavity.volume(solid.mesh.nodes) if cavity else 0.0)
         self.core, self.inner = core, np.empty(0, int) if inner is None or core is None else inner
         self.friction, self.tolerance, self.first_share = friction, tolerance, first_share
-        self._factor = factor or PatternFactor()
+        self._factor = DampedFactor(solid, factor or PatternFactor())
         if cavity:
             rows, columns, _ = cavity.hessian(solid.mesh.nodes)
             self._cavity_places = solid.pattern.find(rows, columns)
-        # Of the size of a node's own: weighs a slip against friction, and damps. Only the way to the answer needs it.
-        spacing = np.median(np.linalg.norm(np.diff(solid.mesh.nodes[solid.mesh.cells[:, :2]], axis=1), axis=-1))
-        self._stiffness = solid.law.bulk * 0.05 * spacing
-        self._damping = 0.0
 
     def start(self) -> Touch:
         """Nothing is deformed; a pre-inflated skin finds its shape in the first step."""
@@ -136,7 +135,8 @@ class FiniteStrainContact:
     def press(self, depth: float, start: Touch | None = None, step: float = 0.1e-3) -> Touch:
         """The contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
 
-        A step that fails is halved. Raises TactileError with the depth reached where even 1/64 of a step fails.
+        A step that fails is halved. Raises TactileError with the depth reached where a sixteenth of a step fails, or
+        where too many have failed.
         """
         touch = start or self.start()
         if depth <= touch.depth + 1e-12:
@@ -170,15 +170,15 @@ class FiniteStrainContact:
 
     def _follow(self, along: Callable[[float], Pose], start: Touch, step: float) -> Touch:
         """Load steps from ``along(0)``, where ``start`` is solved, to ``along(1)``; a step that fails is halved."""
-        touch, done, size, steps = start, 0.0, step, 0
+        touch, done, size, steps, failures = start, 0.0, step, 0, 0
         while done < 1 - 1e-9:
             goal = min(done + size, 1.0)
             try:
                 touch = self._solve(along(goal), touch)
-                done, size = goal, min(step, 2 * size)
+                done, size = goal, min(step, 2 * size) if touch.iterations <= _EASY else size
             except (_NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError):
-                size = min(size, goal - done) / 2
-                if size < min(step, 1.0) * SMALLEST_STEP:
+                size, failures = min(size, goal - done) / 2, failures + 1
+                if size < min(step, 1.0) * SMALLEST_STEP or failures > MOST_FAILURES:
                     raise _PathEndsError(done) from None
             steps += 1
         return dataclasses.replace(touch, steps=steps)
@@ -191,7 +191,7 @@ class FiniteStrainContact:
             PlacedIndenter(self.indenter, pose), self.touchable, at, self.friction, self.first_share
         )
         inner = start.inner.carried(self.core, self.inner, at)
-        self._damping = 0.0
+        self._factor.damping = 0.0
         for iteration in range(1, MAX_ITERATIONS + 1):
             step, rise, imbalance, pressure_step = self._newton(state, outer, inner, fluid)
             share = self._share(state, step)
@@ -200,13 +200,14 @@ class FiniteStrainContact:
             fluid += share * rise
             at = self._at(state)
             settled = [
-                touching.update(at, self.tolerance.gap, _SLIP_WEIGHT * self._stiffness) for touching in (outer, inner)
+                touching.update(at, self.tolerance.gap, _SLIP_WEIGHT * self._factor.stiffness)
+                for touching in (outer, inner)
             ]
             enough = max(self.tolerance.balance, SLIDING_TOLERANCE) if outer.slips else self.tolerance.balance
-            small = np.abs(step).max() < self.tolerance.step and not outer.slips and not self._damping
+            small = np.abs(step).max() < self.tolerance.step and not outer.slips and not self._factor.damping
             if all(settled) and share == 1 and (small or max(outer.imbalance, imbalance) < enough):
                 return Touch(start.depth, pose, state, outer, inner, fluid, iteration)
-            self._damping = self._damping / 4 if self._damping > _LEAST_DAMPING else 0.0
+            self._factor.relax()
         raise _NotConvergedError
 
     def _share(self, state: State, step: np.ndarray) -> float:
@@ -236,7 +237,7 @@ class FiniteStrainContact:
         held, step = self.fixed.copy(), np.zeros_like(residual)
         nodes = np.concatenate([outer.nodes, inner.nodes])
         frames = np.concatenate([touching.begin(at) for touching in (outer, inner)])
-        blocks[pattern.diagonal[nodes]] -= _held_back(
+        blocks[pattern.diagonal[nodes]] -= held_back(
             np.concatenate([outer.bending(at), inner.bending(at)]), blocks[pattern.diagonal[nodes]]
         )
         held[nodes] = np.einsum("nij,ni->nj", frames**2, self.fixed[nodes]) > 0.5
@@ -246,7 +247,7 @@ class FiniteStrainContact:
         matrix = pattern.sparse(blocks)
         for values in (residual, swell):
             values[nodes] = np.einsum("nji,nj->ni", frames, values[nodes])
-        solve = self._solver(blocks, held)
+        solve = self._factor.solver(blocks, held)
         known = (matrix @ step.ravel()).reshape(-1, 3)
         under_pressure = solve(swell) if self.cavity else swell
         step, reaction, rise = self._pull(
@@ -261,31 +262,6 @@ class FiniteStrainContact:
         step[nodes] = np.einsum("nij,nj->ni", frames, step[nodes])
         imbalance = float(max(imbalance, abs(excess) / max(self.volume, 1e-12)))
         return step, rise, imbalance, lines.pressure_step(step)
-
-    def _solver(self, blocks: np.ndarray, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """A function from forces (n, 3) to displacements (n, 3) of what is not held.
-
-        Where the solid is unstable (a node about to slide off a ridge) it is damped until it is not: the iteration then
-        follows it down to the next equilibrium. Raises NotPositiveDefiniteError where even much damping is too little.
-        """
-        free, pattern = self.solid.pattern.free, self.solid.pattern
-        for _ in range(_DAMPINGS):
-            blocks[pattern.diagonal] += self._damping * self._stiffness * np.eye(3)
-            try:
-                fast = self._factor(pattern.upper(blocks, held.ravel()[free]))
-                break
-            except NotPositiveDefiniteError:
-                blocks[pattern.diagonal] -= self._damping * self._stiffness * np.eye(3)
-                self._damping = max(4 * self._damping, _FIRST_DAMPING)
-        else:
-            raise NotPositiveDefiniteError("the solid is unstable, damped or not")
-
-        def solve(force: np.ndarray) -> np.ndarray:
-            moved = np.zeros(force.size)
-            moved[free] = fast(np.where(held, 0.0, force).ravel()[free, None])[:, 0]
-            return moved.reshape(-1, 3)
-
-        return solve
 
     def _pull(self, solve, matrix, residual, prescribed, known, held, swell, excess, under_pressure, outer):  # noqa: ANN001, ANN202
         """Step, reactions and rise of the fluid's pressure, with friction that follows the normal forces."""
@@ -303,22 +279,9 @@ class FiniteStrainContact:
         return step, reaction, rise
 
 
-def _held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Curvature terms (k, 3, 3), no larger than a share of their nodes' own stiffness.
-
-    Where a node rides a ridge sharper than the mesh, the whole term would make the matrix indefinite; less of it costs
-    iterations, not exactness.
-    """
-    size = np.abs(bending).max(axis=(1, 2))
-    most = _MOST_BENDING * np.einsum("kii->k", stiffness) / 3
-    return bending * np.minimum(1.0, most / np.maximum(size, 1e-30))[:, None, None]
-
-
-_MOST_BENDING = 0.3
 _SLIP_WEIGHT = 2.0  # of a node's own stiffness: finds the direction of friction in the fewest iterations
 _SHARES = 1.0, 0.5, 0.25, 0.125  # of a step
 _KEPT_VOLUME = 0.3  # least share of its volume that a Gauss point keeps in one step
-_FIRST_DAMPING, _LEAST_DAMPING, _DAMPINGS = 0.02, 5e-3, 6  # of a node's own stiffness; tries
 
 
 class _PathEndsError(Exception):

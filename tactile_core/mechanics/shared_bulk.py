@@ -11,6 +11,7 @@ import dataclasses
 
 import numpy as np
 
+from .determinants import cofactors
 from .neo_hookean import NeoHookean
 
 # Of the shear modulus, for the gel; the skin, which bends, does not need it, and would be 2 % stiffer. Measured on the
@@ -43,6 +44,6 @@ class SharedBulk:
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Law.stress_tangent``."""
         stress, tangent = self.law.stress_tangent(f, j, p + self.at_points * (j - 1))
-        cofactor = j[..., None, None] * np.linalg.inv(f).swapaxes(-1, -2)
+        cofactor = cofactors(f)
         tangent += self.at_points * cofactor[..., :, :, None, None] * cofactor[..., None, None, :, :]
         return stress, tangent

@@ -33,6 +33,12 @@ class Touching:
     obstacle: Obstacle | None = None
     friction: float = 0.0
     imbalance: float = 0.0
+    # Of the active nodes, as ``begin`` saw them: distance (k,) m, frames (k, 3, 3), and the way (k, 3) m to where they
+    # stick; and the friction (k, 3) N that pulls those that slip.
+    _distance: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0), repr=False)
+    _frames: np.ndarray = dataclasses.field(default_factory=lambda: np.empty((0, 3, 3)), repr=False)
+    _to_anchor: np.ndarray = dataclasses.field(default_factory=lambda: np.empty((0, 3)), repr=False)
+    _pull: np.ndarray = dataclasses.field(default_factory=lambda: np.empty((0, 3)), repr=False)
 
     @classmethod
     def none(cls) -> Touching:

@@ -75,3 +75,26 @@ def test_held_degrees_of_freedom_keep_what_the_right_side_says(solid, blocks, pa
 def test_an_unstable_matrix_is_refused(solid, blocks, pattern_factor):
     with pytest.raises(NotPositiveDefiniteError):
         pattern_factor(solid.pattern.upper(-blocks, np.zeros(len(solid.pattern.free), bool)))
+
+
+def test_the_analysis_of_a_pattern_is_made_once(solid, blocks, monkeypatch):
+    """It costs about as much as a factor; SciPy wraps a pattern's arrays anew for every matrix."""
+    if factors._pardiso() is None:
+        pytest.skip("pypardiso is not installed")
+    phases, run = [], PatternFactor._run
+    monkeypatch.setattr(
+        PatternFactor, "_run", lambda self, a, b, phase: (phases.append(phase), run(self, a, b, phase))[1]
+    )
+    factor, held = PatternFactor(), np.zeros(len(solid.pattern.free), bool)
+    for scale in (1.0, 2.0, 3.0):
+        factor(solid.pattern.upper(scale * blocks, held))
+    assert phases.count(factors._ANALYSE) == 1 and phases.count(factors._FACTORISE) == 3
+
+
+def test_a_refused_matrix_leaves_the_factor_usable(solid, blocks, pattern_factor):
+    held = np.zeros(len(solid.pattern.free), bool)
+    load = np.ones((len(held), 1))
+    before = pattern_factor(solid.pattern.upper(blocks, held))(load)
+    with pytest.raises(NotPositiveDefiniteError):
+        pattern_factor(solid.pattern.upper(-blocks, held))
+    np.testing.assert_array_equal(pattern_factor(solid.pattern.upper(blocks, held))(load), before)
