@@ -37,6 +37,14 @@ class Pose:
         """The pose after sliding, m, along the indenter's own x and y."""
         return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes)
 
+    def to_own(self, points: np.ndarray) -> np.ndarray:
+        """Sensor points (n, 3) m in the indenter's frame: where they stay as it moves, if they stick."""
+        return (points - self.apex) @ self.axes
+
+    def from_own(self, points: np.ndarray) -> np.ndarray:
+        """The inverse of ``to_own``."""
+        return points @ self.axes.T + self.apex
+
     def distance(self, indenter: Indenter, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance (n,) m and gradient (n, 3) of the placed indenter at sensor points (n, 3) m."""
         distance, gradient = indenter.distance((points - self.apex) @ self.axes)

@@ -31,11 +31,19 @@ def landing_spots(indenter: Indenter, before: Pose, pose: Pose, points: np.ndarr
     Points that it does not meet are given as they stand at the end. Between the poses they move on straight lines in
     the indenter's frame.
     """
-    first, last = (points - before.apex) @ before.axes, (points - pose.apex) @ pose.axes
+    first, last = before.to_own(points), pose.to_own(points)
+    return np.where(touched[:, None], first, meeting(indenter, first, last))
+
+
+def meeting(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Where points that move straight from ``first`` to ``last`` (n, 3) m first meet an indenter, in its frame (n, 3).
+
+    Points that it does not meet are given as they stand at the end.
+    """
     way = last - first
     length = np.maximum(np.linalg.norm(way, axis=1), 1e-12)
-    share = np.zeros(len(points))
+    share = np.zeros(len(first))
     for _ in range(_SPOT_STEPS):
         gap, _ = indenter.distance(first + share[:, None] * way)
         share = np.minimum(share + np.maximum(gap, 0) / length, 1)
-    return first + np.where(touched, 0.0, share)[:, None] * way
+    return first + share[:, None] * way

@@ -15,7 +15,7 @@ from . import correction
 from .compliance import compliance_of
 from .contact import ContactProblem
 from .correction import LINES, MIRRORED, Frame, Learned, features, frame, kernel
-from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Sensor, graded_body
+from .finite_strain_tier import ONE_STEP, Sensor, graded_body
 from .placement import pose_at
 from .random_contacts import RandomContact
 from .thickness import depth_at
@@ -23,6 +23,8 @@ from .thickness import depth_at
 log = logging.getLogger(__name__)
 
 SHARES = 0.4, 0.7, 1.0  # of a press's depth, at which it is sampled
+# m of a load step with friction: on a 7 mm ball 0.06 mm steps differ from it by 4 um rms and 1.6 % of force.
+_RUBBING_STEP = 0.5e-3
 FIELDS = 32  # learned fields a sensor
 _WIDTHS = 2.0, 4.0, 8.0  # of the kernel, in standard deviations of a feature
 _RIDGES = 1e-3, 1e-2, 1e-1
@@ -64,7 +66,7 @@ def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[st
     for depth in np.array(SHARES) * deepest:
         began = time.process_time()
         try:
-            touch = problem.press(depth, touch, FRICTION_STEP if friction else ONE_STEP)
+            touch = problem.press(depth, touch, _RUBBING_STEP if friction else ONE_STEP)
         except TactileError as error:
             log.info("%s: %s", press.name, error)
             break

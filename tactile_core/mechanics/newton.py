@@ -1,9 +1,9 @@
 """Contact of a rigid indenter with a finite-strain solid: Newton's method with an exact active set.
 
 A touching node may slide on the indenter but not leave along its normal: its degrees of freedom are turned into the
-indenter's frame and the normal one is prescribed, so the matrix stays symmetric positive definite. With friction a
-node that sticks has all three prescribed, and one that slips is pulled by mu times its normal force. The BioTac's
-fluid adds one unknown, its pressure, by a bordered solve; its core is a second obstacle, for the inner skin.
+indenter's frame and the normal one is prescribed, so the matrix stays symmetric positive definite. Friction holds it by
+a spring that slips at mu times the normal force (``touching``). The BioTac's fluid adds one unknown, its pressure, by a
+bordered solve; its core is a second obstacle, for the inner skin.
 """
 
 from __future__ import annotations
@@ -188,21 +188,19 @@ class FiniteStrainContact:
         state, fluid = start.state.copy(), start.fluid
         at = self._at(state)
         outer = start.outer.carried(
-            PlacedIndenter(self.indenter, pose), self.touchable, at, self.friction, self.first_share
-        )
+            PlacedIndenter(self.indenter, pose), self.touchable, at, start.pose, self.friction,
+            _GRIP * self._factor.stiffness, self.first_share,
+        )  # fmt: skip
         inner = start.inner.carried(self.core, self.inner, at)
-        self._factor.damping = 0.0
+        self._factor.damping, imbalance = 0.0, 1.0
         for iteration in range(1, MAX_ITERATIONS + 1):
-            step, rise, imbalance, pressure_step = self._newton(state, outer, inner, fluid)
-            share = self._share(state, step)
+            step, rise, imbalance, pressure_step, slide = self._newton(state, outer, inner, fluid, imbalance)
+            share = self._share(state, step) * (slide if iteration > 1 else 1.0)
             state.displacement += share * step
             state.pressure += share * pressure_step
             fluid += share * rise
             at = self._at(state)
-            settled = [
-                touching.update(at, self.tolerance.gap, _SLIP_WEIGHT * self._factor.stiffness)
-                for touching in (outer, inner)
-            ]
+            settled = [touching.update(at, self.tolerance.gap) for touching in (outer, inner)]
             enough = max(self.tolerance.balance, SLIDING_TOLERANCE) if outer.slips else self.tolerance.balance
             small = np.abs(step).max() < self.tolerance.step and not outer.slips and not self._factor.damping
             if all(settled) and share == 1 and (small or max(outer.imbalance, imbalance) < enough):
@@ -222,9 +220,10 @@ class FiniteStrainContact:
         return self.solid.mesh.nodes + state.displacement
 
     def _newton(
-        self, state: State, outer: Touching, inner: Touching, fluid: float
-    ) -> tuple[np.ndarray, float, float, np.ndarray]:
-        """Steps of displacement (n, 3), the fluid's pressure and the cells' (n_cells, 4); the imbalance before them."""
+        self, state: State, outer: Touching, inner: Touching, fluid: float, unrest: float
+    ) -> tuple[np.ndarray, float, float, np.ndarray, float]:
+        """Steps of displacement (n, 3), the fluid's pressure and the cells' (n_cells, 4); the imbalance before them,
+        and the share of the step that friction allows."""
         lines = self.solid.linearise(state)
         largest = np.abs(lines.internal_force(condensed=False)).max()
         pattern, at = self.solid.pattern, self._at(state)
@@ -240,6 +239,7 @@ class FiniteStrainContact:
         blocks[pattern.diagonal[nodes]] -= held_back(
             np.concatenate([outer.bending(at), inner.bending(at)]), blocks[pattern.diagonal[nodes]]
         )
+        blocks[pattern.diagonal[outer.nodes]] += outer.gripping(min(unrest, _MOST_ALONG))
         held[nodes] = np.einsum("nij,ni->nj", frames**2, self.fixed[nodes]) > 0.5
         for touching in (outer, inner):
             held[touching.nodes], step[touching.nodes] = touching.prescribe(held[touching.nodes])
@@ -256,19 +256,21 @@ class FiniteStrainContact:
         for touching in (outer, inner):
             touching.press(reaction[touching.nodes])
         loose = ~held
+        forces = (float((values[loose] * step[loose]).sum()) for values in (residual, reaction - residual))
+        slide = outer.slide_share(step[outer.nodes], *forces)
         pulled = residual.copy()
-        pulled[outer.nodes] -= outer.pull_in_frames()
+        pulled[outer.nodes] -= outer.rubbing_in_frames()
         imbalance = np.abs(pulled[loose]).max(initial=0.0) / max(largest, 1e-12)
         step[nodes] = np.einsum("nij,nj->ni", frames, step[nodes])
         imbalance = float(max(imbalance, abs(excess) / max(self.volume, 1e-12)))
-        return step, rise, imbalance, lines.pressure_step(step)
+        return step, rise, imbalance, lines.pressure_step(step), slide
 
     def _pull(self, solve, matrix, residual, prescribed, known, held, swell, excess, under_pressure, outer):  # noqa: ANN001, ANN202
         """Step, reactions and rise of the fluid's pressure, with friction that follows the normal forces."""
         rise = 0.0
         for _ in range(_FRICTION_SWEEPS if outer.slips else 1):
             load = -residual - known
-            load[outer.nodes] += outer.pull_in_frames()
+            load[outer.nodes] += outer.rubbing_in_frames()
             step = prescribed + solve(load)
             if self.cavity:
                 loose = np.where(held, 0.0, swell)
@@ -279,8 +281,9 @@ class FiniteStrainContact:
         return step, reaction, rise
 
 
-_SLIP_WEIGHT = 2.0  # of a node's own stiffness: finds the direction of friction in the fewest iterations
+_GRIP = 30.0  # of a node's own stiffness: springs of friction that yield some micrometres at most
 _SHARES = 1.0, 0.5, 0.25, 0.125  # of a step
+_MOST_ALONG = 0.6  # of the secant's stiffness, for springs that slip while forces are far from balance (assumed)
 _KEPT_VOLUME = 0.3  # least share of its volume that a Gauss point keeps in one step
 
 

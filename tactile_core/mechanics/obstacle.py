@@ -34,11 +34,3 @@ class PlacedIndenter:
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Obstacle``."""
         return self.pose.curvature(self.indenter, points)
-
-    def to_own(self, points: np.ndarray) -> np.ndarray:
-        """Sensor points (n, 3) m in the indenter's frame: where they stay as it moves, if they stick."""
-        return (points - self.pose.apex) @ self.pose.axes
-
-    def from_own(self, points: np.ndarray) -> np.ndarray:
-        """The inverse of ``to_own``."""
-        return points @ self.pose.axes.T + self.pose.apex
