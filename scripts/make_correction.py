@@ -1,17 +1,16 @@
 """Make the fast tier's correction: solve a sample of presses in the full tier, learn from them, write one small file.
 
-    python3 scripts/make_correction.py --work DIR [--presses 150] [--seed 0] [--workers 2]
+    python3 scripts/make_correction.py --work DIR [--presses 150] [--rubbing 50] [--seed 0] [--workers 2]
 
 Stop it at any time: presses that are solved stay in DIR and are not solved again. Writes
 tactile_core/data/mechanics_correction.npz and prints how far the corrected fast tier is from the full tier on presses
-kept apart. Each press is solved without friction and with. A few hours on two cores.
+kept apart. All presses are solved without friction, the first ones with friction too. Two hours on two cores.
 """
 
 from __future__ import annotations
 
 import argparse
 import concurrent.futures
-import itertools
 import logging
 import os
 import pathlib
@@ -28,7 +27,6 @@ from tactile_core.mechanics.placement import FRICTION  # noqa: E402
 from tactile_core.mechanics.random_contacts import random_contacts  # noqa: E402
 
 SENSORS = "digit", "biotac"
-FRICTIONS = 0.0, FRICTION
 
 
 def file_of(folder: pathlib.Path, sensor: str, seed: int, number: int, friction: float) -> pathlib.Path:
@@ -50,13 +48,20 @@ def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
     return f"{path.name}: {press.name}, {solved} of {len(found['depths'])} contacts, {found['seconds'].sum():.1f} s"
 
 
+def wanted_contacts(arguments: argparse.Namespace) -> list[tuple[int, float]]:
+    """Number and friction of each press to solve."""
+    rubbing = [(number, FRICTION) for number in range(min(arguments.rubbing, arguments.presses))]
+    return [(number, 0.0) for number in range(arguments.presses)] + rubbing
+
+
 def learn_all(arguments: argparse.Namespace) -> list[dict]:
     """Read every solved press, learn both sensors' corrections and write them; returns rows of errors."""
     rows, arrays = [], {}
     for sensor in SENSORS:
         samples, wanted, solved = [], 0, 0
-        drawn = enumerate(random_contacts(arguments.presses, arguments.seed))
-        for (number, press), friction in itertools.product(drawn, FRICTIONS):
+        presses = list(random_contacts(arguments.presses, arguments.seed))
+        for number, friction in wanted_contacts(arguments):
+            press = presses[number]
             with np.load(file_of(arguments.work, sensor, arguments.seed, number, friction), allow_pickle=False) as file:
                 full = dict(file)
             wanted, solved = wanted + len(full["depths"]), solved + len(full["force"])
@@ -78,6 +83,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
     parser.add_argument("--presses", type=int, default=150, help="presses a sensor, three contacts each (150)")
+    parser.add_argument("--rubbing", type=int, default=50, help="of them also with friction (50)")
     parser.add_argument("--seed", type=int, default=0, help="of the presses (0)")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     parser.add_argument("--json", type=pathlib.Path, help="write the rows of errors here")
@@ -85,8 +91,11 @@ def main() -> int:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     arguments.work.mkdir(parents=True, exist_ok=True)
     os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
-    every = itertools.product(range(arguments.presses), FRICTIONS, SENSORS)
-    jobs = [(arguments.work, sensor, arguments.seed, number, friction) for number, friction, sensor in every]
+    jobs = [
+        (arguments.work, sensor, arguments.seed, number, friction)
+        for number, friction in wanted_contacts(arguments)
+        for sensor in SENSORS
+    ]
     with concurrent.futures.ProcessPoolExecutor(arguments.workers) as pool:
         for done, line in enumerate(pool.map(solve_one, jobs), 1):
             print(f"{done}/{len(jobs)} {line}", flush=True)

@@ -16,6 +16,7 @@ FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the er
 _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
 _GROWTH = 1.6  # largest change of force in one step of a search, which a warm start follows safely
 _SEARCH_STEPS = 24
+_POWER_FROM, _POWERS = 1e-2, (0.7, 1.5)  # least growth that tells the power; what it may be (assumed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,6 +46,7 @@ class CorrectedPress:
         self.compliance, self.pose, self.limit = compliance, pose, limit
         self.problem = ContactProblem(compliance, indenter, pose, limit, friction)
         self.last: Contact | None = None
+        self._last_power = 1.0
 
     def at_depth(self, depth: float, pose: Pose | None = None) -> FastContact:
         """The contact at a depth, m, of the press's pose or of another one; it may not have converged."""
@@ -56,12 +58,13 @@ class CorrectedPress:
     def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
         """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found.
 
-        The factor changes slowly with depth, so the linear force is simply scaled by what is missing, a few times.
+        A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
         """
         pose = pose or self.pose
         contact = self.last or self._first(pose)
         if contact is not None and not same_line(contact.pose, pose):
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
+        before: FastContact | None = None
         for _ in range(_SEARCH_STEPS):
             if contact is None or not contact.converged:
                 return None
@@ -72,9 +75,21 @@ class CorrectedPress:
             if close:
                 self.last = contact
                 return found
-            growth = float(np.clip(force / max(found.axial_force, 1e-12), 1 / _GROWTH, _GROWTH))
-            contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force * growth)
+            growth = np.clip(
+                (force / max(found.axial_force, 1e-12)) ** (1 / self._power(before, found)), 1 / _GROWTH, _GROWTH
+            )
+            before = found
+            contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force * float(growth))
         return None
+
+    def _power(self, before: FastContact | None, found: FastContact) -> float:
+        """By which power the corrected force grows with the linear one, between two contacts; kept for the next."""
+        if before is not None and before.axial_force > 0 and found.axial_force > 0:
+            linear = np.log(found.linear.axial_force / before.linear.axial_force)
+            if abs(linear) > _POWER_FROM:
+                power = np.log(found.axial_force / before.axial_force) / linear
+                self._last_power = float(np.clip(power, *_POWERS))
+        return self._last_power
 
     def _first(self, pose: Pose) -> Contact | None:
         """The first contact that carries force; a coarse lattice may be missed by the shallowest depths."""
