@@ -27,8 +27,8 @@ from .pair_rows import press_rows
 
 log = logging.getLogger(__name__)
 
-BLOCK = 16  # presses a block: a few seconds of work
-_MOST_BLOCKS = 64  # at a time: whoever waits at their end waits for one block in so many
+BLOCK = 4  # presses a block: a few seconds of work
+_MOST_BLOCKS = 256  # at a time: whoever waits at their end waits for one block in so many
 
 
 @dataclasses.dataclass(frozen=True)
