@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import logging
 import time
 from collections.abc import Iterable, Iterator
@@ -19,6 +20,7 @@ from .finite_strain_tier import ONE_STEP, Sensor, graded_body
 from .placement import pose_at
 from .random_contacts import RandomContact
 from .thickness import depth_at
+from .validation.rows import Row, row
 
 log = logging.getLogger(__name__)
 
@@ -39,11 +41,13 @@ _SIGNIFICANT = 10e-6  # m, nodes that move less do not count (issue 3, point 8)
 class Sample:
     """One contact in the full and the fast tier.
 
-    press : number of its press; features (f,); frame; depth m; ratio : force of the full tier over that of the fast
+    press : number of its press; friction : Coulomb's coefficient; features (f,); frame; depth m
+    ratio : force of the full tier over that of the fast
     fast, full : displacement (n, 3) float32 m
     """
 
     press: int
+    friction: float
     features: np.ndarray
     frame: Frame
     depth: float
@@ -92,7 +96,7 @@ def paired(
             continue
         at = frame(compliance, contact)
         yield Sample(
-            number, features(compliance, contact, at), at, float(depth), along / contact.axial_force,
+            number, friction, features(compliance, contact, at), at, float(depth), along / contact.axial_force,
             contact.displacement, moved,
         )  # fmt: skip
 
@@ -119,7 +123,7 @@ def mirrored(field: np.ndarray) -> np.ndarray:
     return (grid * [1.0, 1.0, -1.0]).reshape(field.shape)
 
 
-def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Learned, list[dict]]:
+def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Learned, list[Row]]:
     """The correction of one sensor, and rows of its errors on presses kept apart (five folds by press)."""
     samples = list(samples)
     x = np.array([s.features for s in samples])
@@ -142,23 +146,25 @@ def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Learned, list[dict]]:
         for i in np.flatnonzero(fold == f):
             of_force, of_field = (np.interp(x[i, 0], trust[:, 0], trust[:, k]) for k in (1, 2))
             errors[i] = _errors(sensor, samples[i], np.exp(of_force * guess[0][i]), of_field * guess[1][i])
-    table, rows = _tabulate(sensor, samples, errors)
-    trust = _trust(x[:, 0], guess[0], log_ratio, guess[1], fields)
-    return dataclasses.replace(_fit(x, log_ratio, fields, *choice), trust=trust, errors=table), rows
+    depth, frictions = x[:, 0], np.array([s.friction for s in samples])
+    learned = dataclasses.replace(
+        _fit(x, log_ratio, fields, *choice),
+        trust=_trust(depth, guess[0], log_ratio, guess[1], fields),
+        errors=_table(depth, errors),
+    )
+    each = ((friction, frictions == friction) for friction in np.unique(frictions))
+    return learned, [found for friction, part in each for found in _rows(sensor, friction, depth[part], errors[part])]
 
 
 def _trust(
     depth: np.ndarray, log_guess: np.ndarray, log_ratio: np.ndarray, guess: np.ndarray, fields: np.ndarray
 ) -> np.ndarray:
     """See ``Learned``: the share of what was predicted for presses kept apart that leaves the least squares."""
-    rows, low = [], 0.0
-    for high in _BINS:
-        here = (depth > low) & (depth <= high)
-        if here.sum() >= _LEAST:
-            pairs = (log_guess[here], np.clip(log_ratio[here], -_MOST, _MOST)), (guess[here], fields[here])
-            shares = [float(np.clip((g * t).sum() / max((g * g).sum(), 1e-30), 0, 1)) for g, t in pairs]
-            rows.append([float(depth[here].mean()), *shares])
-        low = high
+    rows = []
+    for _, _, here in _bins(depth):
+        pairs = (log_guess[here], np.clip(log_ratio[here], -_MOST, _MOST)), (guess[here], fields[here])
+        shares = [float(np.clip((g * t).sum() / max((g * g).sum(), 1e-30), 0, 1)) for g, t in pairs]
+        rows.append([float(depth[here].mean()), *shares])
     return np.array(rows) if rows else np.array([[0.0, 1.0, 1.0]])
 
 
@@ -230,24 +236,29 @@ def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> li
     return [out[0], out[1], factor / sample.ratio - 1, out[2], out[3], 1 / sample.ratio - 1]
 
 
-def _tabulate(sensor: str, samples: list[Sample], errors: np.ndarray) -> tuple[np.ndarray, list[dict]]:
-    relative = np.array([s.features[0] for s in samples])
-    table, rows, low = [], [], 0.0
-    for high in _BINS:
-        here = (relative > low) & (relative <= high)
-        if here.sum() < _LEAST:
-            low = high
-            continue
-        part = errors[here]
-        table.append([high, *np.quantile(np.abs(part[:, [0, 2]]), 0.95, axis=0), here.sum()])
-        name = f"{sensor}_corrected_{low:g}_to_{high:g}"
-        measures = ("shape_rms", 0, 3, 1e6, "um"), ("shape_max", 1, 4, 1e6, "um"), ("force_error", 2, 5, 100, "percent")
-        for what, after, before, unit_scale, unit in measures:
-            value, null = (float(np.median(np.abs(part[:, k])) * unit_scale) for k in (after, before))
-            rows.append({"name": f"{name}_{what}", "value": value, "unit": unit, "target": None, "ok": None,
-                         "null": null, "set": f"{here.sum()} contacts of presses kept apart, median"})  # fmt: skip
-        low = high
-    return np.array(table), rows
+def _bins(depth: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:
+    """Ends of each bin of depth over thickness that holds enough contacts, and which (n,) bool those are."""
+    for low, high in itertools.pairwise((0.0, *_BINS)):
+        here = (depth > low) & (depth <= high)
+        if here.sum() >= _LEAST:
+            yield low, high, here
+
+
+def _table(depth: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """See ``Learned.errors``."""
+    sizes = np.abs(errors[:, [0, 2]])
+    return np.array([[end, *np.quantile(sizes[here], 0.95, axis=0), here.sum()] for _, end, here in _bins(depth)])
+
+
+def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -> Iterator[Row]:
+    """Median errors with the correction, beside those without it, in bins of depth."""
+    measures = ("shape_rms", 0, 3, 1e6, "um"), ("shape_max", 1, 4, 1e6, "um"), ("force_error", 2, 5, 100, "percent")
+    for low, high, here in _bins(depth):
+        for what, after, before, scale, unit in measures:
+            value, null = (float(np.median(np.abs(errors[here, k])) * scale) for k in (after, before))
+            name = f"{sensor}_friction_{friction:g}_corrected_{low:g}_to_{high:g}_{what}"
+            of = f"{here.sum()} contacts of presses kept apart, median; null: uncorrected"
+            yield row(name, value, unit, null=null, of=of)
 
 
 _LEAST = 8  # contacts, below which a bin of the table of errors says nothing

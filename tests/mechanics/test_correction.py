@@ -80,7 +80,9 @@ def test_learning_recovers_a_known_factor_and_field(contact):
         grid = np.exp(-(correction.grid_places() ** 2).sum(axis=-1)).reshape(-1, 1) * [0.0, 0.05 + 0.3 * x[0], 0.0]
         full = found.displacement + found.depth * correction.spread_field("digit", at, grid)
         samples.append(
-            learn_correction.Sample(number, x, at, found.depth, 1 + x[0], found.displacement, full.astype(np.float32))
+            learn_correction.Sample(
+                number, 0.0, x, at, found.depth, 1 + x[0], found.displacement, full.astype(np.float32)
+            )
         )
     parts, rows = learn_correction.learn("digit", samples)
     by_name = {row["name"]: row for row in rows}
