@@ -1,26 +1,57 @@
 """Contact with Coulomb friction: nodes stick to the spot of the indenter where they landed until friction is spent.
 
-Two exact solves take turns: normal forces with the tangential ones held (a linear complementarity problem), and
-tangential forces within the discs that the normal forces allow (Newton's method on stick and slip). P.
-Panagiotopoulos, Ingenieur- Archiv 44, 1975.
+Newton's method on all forces at once, normal and tangential ones. Which points touch and which slip follows from each
+step: a semi-smooth Newton method. P. Alart, A. Curnier, Computer Methods in Applied Mechanics and Engineering 92, 1991,
+353-375.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
 
 import numpy as np
 
 from ..indenters import Indenter, Pose
-from .active_set import Pressing, complement
 from .frictionless import FORCE_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pace, Try
+from .mirrored_halves import axes_of
 from .near_block import NearBlock
-from .stick_slip import hold
+from .stick_slip import LEAST_FORCE, Slipping, Step
 
-MAX_ITERATIONS = 60
+SLIP_TOLERANCE = 0.05e-6  # m, motion of a sticking node that counts as none: a quarter of the gaps' tolerance
+MAX_ITERATIONS = 24  # most contacts take 3 to 7; smaller steps help those that do not settle
 _LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
-_STALE = 0.03  # rad: compliances are made anew when a normal has turned by more
+_GAP_NOISE = 1e-9  # m: below what single precision of the compliance resolves
+_BEYOND = 1e-9  # relative, by which a sticking force may pass its limit before the node slips
+_NEARLY_CLOSED = 5e-6  # m, assumed: with larger gaps Newton's step in turning normals leads astray at edges
+_MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # as without friction: nodes, and curvature x force x compliance
+
+
+@dataclasses.dataclass
+class _Guess:
+    """Forces (k, 3), (c,) N, which points (k + c,) carry them, which nodes (k,) slip, and the shift, m."""
+
+    force: np.ndarray
+    core: np.ndarray
+    active: np.ndarray
+    slips: np.ndarray
+    shift: float
+
+
+@dataclasses.dataclass(frozen=True)
+class _Seen:
+    """What the guessed forces do, linearised about a place: what ``_Guess`` lets move (k, 3) m and open (k,), (c,) m.
+
+    normal, lean : (k, 3), of the indenter and of slipping nodes' friction; slip : (k, 3) m, from the spots
+    moves : (k, 3) m, from the place; bend : (k, 3, 3) 1/m, see ``Slipping``
+    """
+
+    normal: np.ndarray
+    lean: np.ndarray
+    slip: np.ndarray
+    gap: np.ndarray
+    core_gap: np.ndarray
+    moves: np.ndarray
+    bend: np.ndarray
 
 
 class Frictional:
@@ -38,159 +69,138 @@ class Frictional:
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
         """From a first guess to the contact at its depth, or at a force along the motion, N. Raises UnsolvedError."""
-        k, state = self.block.k, begin
-        tangential, slips = np.zeros((k, 3)), np.zeros(k, bool)
-        place = state.displacement
-        gap, normal = self.pose.moved(state.shift).distance(self.indenter, self.rest + place)
-        basis, pace, known = None, Pace(), np.zeros(k + self.block.c)
+        guess = _Guess(begin.force, begin.core_force, begin.active, begin.slipping, begin.shift)
+        state, place, pace, k = begin, begin.displacement, Pace(), self.block.k
+        there, calm, left = self.pose.moved(guess.shift), False, np.zeros(k, bool)
+        gap, normal = there.distance(self.indenter, self.rest + place)
         for iteration in range(1, MAX_ITERATIONS + 1):
-            basis = Basis.at(self.block, normal, basis)
-            tangential = basis.in_plane(tangential)
-            held = np.where(slips[:, None], 0.0, tangential)
-            lean = basis.lean(np.where(slips[:, None], tangential, 0.0), self.friction)
-            leaning = normal + basis.in_space(lean)
-            moved, core_moved = self.block.respond(known[:k, None] * leaning + held, known[k:])
-            now = np.r_[gap + np.einsum("ai,ai->a", normal, moved - place), self.core_gap + core_moved]
-            solved = self._complement(basis, lean, now, known, state.active, axial_force, held)
-            known = solved.pressing
-            shift, pressing, core = state.shift + solved.step, known[:k], known[k:]
-            there = self.pose.moved(shift)
-            tangential = held + pressing[:, None] * (leaning - normal)
-            moved, _ = self.block.respond(pressing[:, None] * normal + tangential, core)
-            away = self.rest + moved - (there.apex + self.spots @ there.axes.T)
-            tangential, slips = basis.hold(away, self.friction * pressing, tangential, slips)
-            force = pressing[:, None] * normal + tangential
-            displacement, _ = self.block.respond(force, core)
+            seen = self._seen(guess, place, there, gap, normal, curved=calm)
+            guess = self._step(guess, seen, axial_force)
+            there = self.pose.moved(guess.shift)
+            displacement, core_moved = self.block.respond(guess.force, guess.core)
             gap, turned = there.distance(self.indenter, self.rest + displacement)
-            state = Try(displacement, force, core, shift, solved.active, iterations=iteration, slipping=slips)
-            state.settled = self._settled(state, gap, turned, normal, axial_force)
+            slip = self._slip(displacement, there, normal)
+            active, slips, changed = self._sort(guess, seen, slip, gap, self.core_gap + core_moved)
+            state = Try(
+                displacement, guess.force, guess.core, guess.shift, guess.active,
+                iterations=iteration, slipping=guess.slips,
+            )  # fmt: skip
+            state.settled = not changed and self._settled(state, gap, slip, turned - normal, axial_force)
             if state.settled:
                 return state
-            trust = pace.after(gap, state.active[:k])
+            back = left & active[:k] & ~guess.active[:k]
+            left |= guess.active[:k] & ~active[:k]
+            guess.active, guess.slips = active, slips
+            self._come_back(guess, back, slip, turned)
+            calm = not changed and bool(np.abs(gap[active[:k]]).max(initial=0.0) < _NEARLY_CLOSED)
+            trust = pace.after(gap, active[:k])
             place = place + trust * (displacement - place)
             gap, normal = (gap, turned) if trust == 1 else there.distance(self.indenter, self.rest + place)
         return state
 
-    def _complement(self, basis, lean, now, known, active, axial_force, held) -> Pressing:  # noqa: ANN001
-        """Normal forces while sticking nodes bear ``held`` and slipping ones bear ``lean`` times their normal force.
+    def _seen(self, guess: _Guess, place, there: Pose, gap, normal, *, curved: bool) -> _Seen:  # noqa: ANN001
+        """What the forces do once brought within Coulomb's law at the normals (k, 3) of the place (k, 3) m."""
+        k = self.block.k
+        guess.force = np.where(guess.active[:k, None], guess.force, 0.0)
+        guess.core = np.where(guess.active[k:], np.maximum(guess.core, 0), 0.0)
+        lean = _across(guess.force, normal)
+        size = np.linalg.norm(lean, axis=1)
+        guess.slips = guess.slips & (size > 0)
+        lean = np.where(guess.slips, 1 / np.where(size > 0, size, 1), 0.0)[:, None] * lean
+        pressing = np.maximum(_dot(guess.force, normal), 0.0)[:, None]
+        guess.force = np.where(guess.slips[:, None], pressing * (normal + self.friction * lean), guess.force)
+        moved, core_moved = self.block.respond(guess.force, guess.core)
+        moves = moved - place
+        slip = self._slip(place, there, normal) + _across(moves, normal)
+        bend = self._bend(guess, place, there) if curved else np.zeros((k, 3, 3))
+        return _Seen(normal, lean, slip, gap + _dot(normal, moves), self.core_gap + core_moved, moves, bend)
 
-        now : (k + c,) m, gaps under the forces ``known`` (k + c,) N
-        """
-        matrix = basis.leaning(lean)
-        offset = now - matrix @ known
-        if axial_force is None:
-            return complement(matrix, offset, active, symmetric=False)
-        none = np.zeros(self.block.c)
-        along = np.r_[basis.normal @ self.pose.direction, none]
-        carry = np.r_[(basis.normal + basis.in_space(lean)) @ self.pose.direction, none]
-        force = axial_force - float((held @ self.pose.direction).sum())
-        solved = complement(matrix, offset, active, along, carry, force, symmetric=False)
-        if abs(solved.step) <= _LARGEST_STEP:
-            return solved
-        step = float(np.clip(solved.step, -_LARGEST_STEP, _LARGEST_STEP))
-        return dataclasses.replace(complement(matrix, offset - step * along, solved.active, symmetric=False), step=step)
+    def _slip(self, place: np.ndarray, there: Pose, normal: np.ndarray) -> np.ndarray:
+        """How far nodes at ``place`` (k, 3) m stand from their spots, across ``normal`` (k, 3)."""
+        return _across(self.rest + place - there.from_own(self.spots), normal)
 
-    def _settled(self, state: Try, gap, turned, normal, axial_force) -> bool:  # noqa: ANN001
+    def _bend(self, guess: _Guess, place: np.ndarray, there: Pose) -> np.ndarray:
+        """Curvatures (k, 3, 3) 1/m of the indenter at the slipping nodes that feel them most, 0 elsewhere."""
+        bend, at = np.zeros((len(place), 3, 3)), np.flatnonzero(guess.slips)
+        if not len(at):
+            return bend
+        found = there.curvature(self.indenter, self.rest[at] + place[at])
+        compliance = self.block.matrix.diagonal()[3 * at]
+        feels = np.linalg.norm(guess.force[at], axis=1) * compliance * np.linalg.norm(found, axis=(1, 2))
+        felt = np.argsort(-feels, kind="stable")[:_MOST_CURVED]
+        felt = felt[feels[felt] > _FEELS_CURVATURE]
+        bend[at[felt]] = found[felt]
+        return bend
+
+    def _step(self, guess: _Guess, seen: _Seen, axial_force: float | None) -> _Guess:
+        """The forces with which linearised gaps close and sticking nodes stay, among what touches and slips now."""
+        k, direction = self.block.k, self.pose.direction
+        at, core_at = np.flatnonzero(guess.active[:k]), np.flatnonzero(guess.active[k:])
+        away = (seen.slip + seen.gap[:, None] * seen.normal)[at]
+        number = np.flatnonzero(guess.slips[at])
+        s = at[number]
+        slipping = Slipping(
+            number, seen.normal[s], seen.lean[s], _dot(guess.force[s], seen.normal[s]), seen.slip[s], seen.moves[s],
+            seen.bend[s], self.friction,
+        )  # fmt: skip
+        solved, step = Step(
+            self.block.matrix, np.concatenate([axes_of(at), 3 * k + core_at]),
+            np.concatenate([away.ravel(), seen.core_gap[core_at]]),
+            np.concatenate([np.tile(direction, len(at)), np.zeros(len(core_at))]), slipping,
+        ), 0.0  # fmt: skip
+        if axial_force is not None:
+            step = solved.step_for(axial_force - float((guess.force @ direction).sum()))
+            step = float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
+        change, of_slipping = solved.change(step)
+        force, core = guess.force.copy(), guess.core.copy()
+        force[at] += change[: 3 * len(at)].reshape(-1, 3)
+        force[s] = of_slipping
+        core[core_at] += change[3 * len(at) :]
+        return _Guess(force, core, guess.active, guess.slips, guess.shift + step)
+
+    def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap):  # noqa: ANN001, ANN202
+        """Which points (k + c,) touch and which nodes (k,) slip after a step, and whether that is another answer."""
+        k = len(gap)
+        pressing = _dot(guess.force, seen.normal)
+        opening = np.concatenate([gap, core_gap])
+        active = np.where(
+            guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -_GAP_NOISE
+        )
+        held = active[:k] & guess.active[:k]
+        over = np.linalg.norm(_across(guess.force, seen.normal), axis=1) > (
+            self.friction * pressing * (1 + _BEYOND) + LEAST_FORCE
+        )
+        slips = held & np.where(guess.slips, _dot(slip, seen.lean) <= SLIP_TOLERANCE, over)
+        wrong = (guess.active & ~active).any() or (opening[~guess.active] < -GAP_TOLERANCE).any()
+        return active, slips, bool(wrong or (slips != guess.slips)[held].any())
+
+    def _come_back(self, guess: _Guess, back: np.ndarray, slip: np.ndarray, normal: np.ndarray) -> None:
+        """Let nodes (k,) bool that touch again slip: sticking drew them off the indenter before."""
+        size = np.linalg.norm(slip, axis=1)
+        back = back & (size > 0)
+        guess.force[back] = LEAST_FORCE * (normal[back] - self.friction * slip[back] / size[back, None])
+        guess.slips = guess.slips | back
+
+    def _settled(self, state: Try, gap, slip, turn, axial_force) -> bool:  # noqa: ANN001
         active = state.active[: len(gap)]
         if not active.any():
             return bool((gap > -GAP_TOLERANCE).all()) and axial_force is None
         if gap.min() < -GAP_TOLERANCE or np.abs(gap[active]).max() > GAP_TOLERANCE:
             return False
+        sticks = active & ~state.slipping
+        if np.linalg.norm(slip[sticks], axis=1).max(initial=0.0) > SLIP_TOLERANCE:
+            return False
         size = np.linalg.norm(state.force.sum(0))
-        if np.linalg.norm((turned - normal) * np.linalg.norm(state.force, axis=1)[:, None]) > SIDEWAYS_TOLERANCE * size:
+        if np.linalg.norm(turn * np.linalg.norm(state.force, axis=1)[:, None]) > SIDEWAYS_TOLERANCE * size:
             return False
         axial = float(state.force.sum(0) @ self.pose.direction)
         return axial_force is None or abs(axial - axial_force) <= FORCE_TOLERANCE * abs(axial_force)
 
 
-class Responses:
-    """Compliances along normals (k, 3) and two tangents (k, 2, 3), each made when it is first asked for."""
-
-    def __init__(self, block: NearBlock, normal: np.ndarray, tangents: np.ndarray) -> None:
-        self.block, self.normal_then, self.tangents = block, normal, tangents
-
-    @functools.cached_property
-    def normal(self) -> np.ndarray:
-        """(k + c, k + c) m/N, of the gaps under normal forces."""
-        return self.block.normal(self.normal_then)
-
-    @functools.cached_property
-    def along(self) -> np.ndarray:
-        """(2 k, 2 k) m/N, along the tangents under forces along the tangents."""
-        k = self.block.k
-        along = np.empty((k, 2, k, 2))
-        for i, j in ((0, 0), (0, 1), (1, 1)):
-            along[:, i, :, j] = self.block.along(self.tangents[:, i], self.tangents[:, j])
-        along[:, 1, :, 0] = along[:, 0, :, 1].T
-        return along.reshape(2 * k, 2 * k)
-
-    @functools.cached_property
-    def across(self) -> np.ndarray:
-        """(2, k + c, k) m/N, of the gaps under forces along the two tangents."""
-        block, size = self.block, 3 * self.block.k
-        across = np.empty((2, block.k + block.c, block.k))
-        for j in (0, 1):
-            across[j, : block.k] = block.along(self.normal_then, self.tangents[:, j])
-            core = block.matrix[size:, :size].reshape(block.c, block.k, 3)
-            across[j, block.k :] = np.einsum("cai,ai->ca", core, self.tangents[:, j])
-        return across
+def _dot(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    return np.einsum("ai,ai->a", left, right)
 
 
-@dataclasses.dataclass(frozen=True)
-class Basis:
-    """Normals (k, 3) and tangents (k, 2, 3) of now, and compliances along those of now or of a little before."""
-
-    normal: np.ndarray
-    tangents: np.ndarray
-    responses: Responses
-
-    @staticmethod
-    def at(block: NearBlock, normal: np.ndarray, older: Basis | None) -> Basis:
-        """The basis at new normals, with the compliances of an older one while the normals have hardly turned."""
-        lead = np.eye(3)[np.argmin(np.abs(normal), axis=1)] if older is None else older.tangents[:, 0]
-        first = lead - np.einsum("ai,ai->a", lead, normal)[:, None] * normal
-        first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-9)
-        tangents = np.stack([first, np.cross(normal, first)], axis=1)
-        if older is not None and np.abs(normal - older.responses.normal_then).max() < _STALE:
-            return Basis(normal, tangents, older.responses)
-        return Basis(normal, tangents, Responses(block, normal, tangents))
-
-    def lean(self, tangential: np.ndarray, friction: float) -> np.ndarray:
-        """Components (k, 2) along the tangents of ``friction`` times the direction of (k, 3); 0 for no vector."""
-        parts = np.einsum("aji,ai->aj", self.tangents, tangential)
-        size = np.hypot(*parts.T)
-        return friction * parts / np.where(size > 0, size, 1)[:, None]
-
-    def in_space(self, parts: np.ndarray) -> np.ndarray:
-        """Vectors (k, 3) from their components (k, 2) along the tangents."""
-        return np.einsum("aji,aj->ai", self.tangents, parts)
-
-    def leaning(self, lean: np.ndarray) -> np.ndarray:
-        """Compliance (k + c, k + c) m/N of the gaps under forces that lean by (k, 2) off their normals."""
-        matrix = self.responses.normal
-        if lean.any():
-            across, k = self.responses.across, len(lean)
-            matrix = matrix.copy()
-            matrix[:, :k] += across[0] * lean[:, 0] + across[1] * lean[:, 1]
-        return matrix
-
-    def in_plane(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (k, 3) without their normal part."""
-        return vectors - np.einsum("ai,ai->a", vectors, self.normal)[:, None] * self.normal
-
-    def hold(
-        self, away: np.ndarray, limit: np.ndarray, tangential: np.ndarray, slips: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Tangential forces (k, 3) N within discs of radii ``limit`` (k,) N, and the nodes (k,) bool that slip.
-
-        away : (k, 3) m, how far nodes stand from their spots under ``tangential``, the first guess, as is ``slips``
-        """
-        at = np.flatnonzero(limit > 0)
-        parts = np.einsum("kaji,kai->kaj", self.tangents[None, at], np.stack([away[at], tangential[at]]))
-        both = (2 * at[:, None] + [0, 1]).ravel()
-        compliance = self.responses.along.take(both, 0).take(both, 1)
-        free = parts[0] - (compliance @ parts[1].ravel()).reshape(-1, 2)
-        force, slipping = hold(compliance, free, limit[at], parts[1], slips[at])
-        answer, slips = np.zeros_like(tangential), np.zeros_like(slips)
-        answer[at], slips[at] = np.einsum("aji,aj->ai", self.tangents[at], force), slipping
-        return answer, slips
+def _across(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Vectors (k, 3) without their part along ``normal`` (k, 3)."""
+    return vectors - _dot(vectors, normal)[:, None] * normal
