@@ -38,14 +38,12 @@ def complement(
     carry: np.ndarray | None = None,
     force: float = 0.0,
     *,
-    symmetric: bool = True,
     factors: dict[bytes, np.ndarray] | None = None,
 ) -> Pressing:
     """Forces p >= 0 with gaps ``matrix p + gap - step along >= 0`` and one of the two zero at every node.
 
     matrix : (k, k) m/N; gap : (k,) m; active : (k,) bool, first guess
     along : (k,) or None; with it, ``step`` is free and ``carry . p`` is ``force`` N, otherwise ``step`` is 0
-    symmetric : whether the matrix is symmetric positive definite; Coulomb's law makes it neither, but nearly
     factors : Cholesky factors of this symmetric matrix by active set, used and added to
     Raises UnsolvedError.
     """
@@ -56,7 +54,7 @@ def complement(
         if along is not None and not (len(index) and (carry[index] > 0).any()):
             raise UnsolvedError("no node can carry the force")
         right = -gap[index] if along is None else np.column_stack([-gap[index], along[index]])
-        factor, answer = _closed(matrix, active, index, right, symmetric, factors)
+        factor, answer = _closed(matrix, active, index, right, factors)
         if along is not None:
             answer, per_step = answer.T
             step = float((force - carry[index] @ answer) / (carry[index] @ per_step))
@@ -80,7 +78,7 @@ def complement(
     raise UnsolvedError(f"the active set did not settle in {_MOST_EXCHANGES} exchanges")
 
 
-def _closed(matrix, active, index, right, symmetric, factors) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN001
+def _closed(matrix, active, index, right, factors) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN001
     """Factor of the block of the ``active`` (k,) nodes, ``index`` (j,), and what solves it for ``right`` (j, ...)."""
     from scipy.linalg import lapack
 
@@ -90,12 +88,9 @@ def _closed(matrix, active, index, right, symmetric, factors) -> tuple[np.ndarra
     if known is not None:
         return known, lapack.dpotrs(known, right, lower=1)[0]
     block = matrix if len(index) == len(active) else matrix.take(index, 0).take(index, 1)
-    if symmetric:
-        factor, answer, failed = lapack.dposv(block, right, lower=1)
-        if factors is not None:
-            factors[active.tobytes()] = factor
-    else:
-        factor, _, answer, failed = lapack.dgesv(block, right)
+    factor, answer, failed = lapack.dposv(block, right, lower=1)
+    if factors is not None:
+        factors[active.tobytes()] = factor
     if failed:
         raise UnsolvedError("the compliance of the touching nodes is not positive definite")
     return factor, answer

@@ -17,7 +17,7 @@ from .candidates import Candidates
 from .compliance import Compliance
 from .frictional import Frictional
 from .frictionless import Frictionless, Try
-from .landing import landing, landing_spots
+from .landing import landing, meeting
 from .near_block import NearBlock
 from .pose_path import between, same_place
 
@@ -164,14 +164,20 @@ class ContactProblem:
         if self.friction == 0:
             solver = Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
         else:
-            moved = before.displacement[self.compliance.touchable[candidates.nodes]]
-            touched = np.isin(candidates.nodes, before.nodes)
-            spots = landing_spots(self.indenter, before.pose, pose, rest + moved, touched)
+            begin.force, begin.slipping = _borne(before, candidates.nodes)
+            spots = self._spots(before, pose, candidates.nodes)
             solver = Frictional(block, rest, core_gap, self.indenter, pose, spots, self.friction)
         try:
             return solver.solve(begin, axial_force)
         except UnsolvedError:
             return None
+
+    def _spots(self, before: Contact, pose: Pose, nodes: np.ndarray) -> np.ndarray:
+        """Where nodes (k,) stick on the indenter, (k, 3) m in its frame: where they were, or where they meet it."""
+        points = self._rest[nodes] + before.displacement[self.compliance.touchable[nodes]]
+        spots, new = before.pose.to_own(points), np.isin(nodes, before.nodes, invert=True)
+        spots[new] = meeting(self.indenter, spots[new], pose.to_own(points[new]))
+        return spots
 
     def _take_in(self, candidates: Candidates, state: Try, contact: Contact) -> bool:
         """Let the nodes enter that the solved contact lets through the indenter or the core; whether there are any."""
@@ -229,6 +235,15 @@ def _way_in(before: Contact, axial_force: float | None) -> float:
     if axial_force is None or before.axial_force <= 0 or before.depth <= 0:
         return 0.0
     return min(before.depth * max((axial_force / before.axial_force) ** (2 / 3) - 1, 0.0), _REACH / 2)
+
+
+def _borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (k, 3) N that nodes (k,) bore in a contact, and which of them slipped (k,)."""
+    force, slipping = np.zeros((len(nodes), 3)), np.zeros(len(nodes), bool)
+    same = np.isin(nodes, before.nodes)
+    at = np.searchsorted(before.nodes, nodes[same])
+    force[same], slipping[same] = before.nodal_force[at], before.slipping[at]
+    return force, slipping
 
 
 def _sideways(force: np.ndarray, normal: np.ndarray) -> float:

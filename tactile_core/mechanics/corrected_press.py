@@ -9,7 +9,7 @@ import numpy as np
 from ..indenters import Indenter, Pose
 from .compliance import Compliance
 from .contact import Contact, ContactProblem, fluid_pressure
-from .correction import Corrected, correct
+from .correction import Corrected, correct, force_factor
 from .pose_path import same_line
 
 FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
@@ -64,31 +64,29 @@ class CorrectedPress:
         contact = self.last or self._first(pose)
         if contact is not None and not same_line(contact.pose, pose):
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
-        before: FastContact | None = None
+        before: tuple[float, float] | None = None  # linear and corrected force, N
         for _ in range(_SEARCH_STEPS):
             if contact is None or not contact.converged:
                 return None
-            found = self._with_correction(contact)
-            close = found.axial_force > 0 and abs(found.axial_force / force - 1) < FORCE_TOLERANCE
-            if contact.depth > self.limit and (close or found.axial_force < force):
+            linear = contact.axial_force
+            found = linear, linear * force_factor(self.compliance, contact)
+            close = found[1] > 0 and abs(found[1] / force - 1) < FORCE_TOLERANCE
+            if contact.depth > self.limit and (close or found[1] < force):
                 return None
             if close:
                 self.last = contact
-                return found
-            growth = np.clip(
-                (force / max(found.axial_force, 1e-12)) ** (1 / self._power(before, found)), 1 / _GROWTH, _GROWTH
-            )
-            before = found
-            contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force * float(growth))
+                return self._with_correction(contact)
+            growth = (force / max(found[1], 1e-12)) ** (1 / self._power(before, found))
+            before, goal = found, linear * float(np.clip(growth, 1 / _GROWTH, _GROWTH))
+            contact = self.problem.at_pose(pose.moved(contact.depth), contact, goal)
         return None
 
-    def _power(self, before: FastContact | None, found: FastContact) -> float:
+    def _power(self, before: tuple[float, float] | None, found: tuple[float, float]) -> float:
         """By which power the corrected force grows with the linear one, between two contacts; kept for the next."""
-        if before is not None and before.axial_force > 0 and found.axial_force > 0:
-            linear = np.log(found.linear.axial_force / before.linear.axial_force)
+        if before is not None and min(*before, *found) > 0:
+            linear, corrected = np.log(found) - np.log(before)
             if abs(linear) > _POWER_FROM:
-                power = np.log(found.axial_force / before.axial_force) / linear
-                self._last_power = float(np.clip(power, *_POWERS))
+                self._last_power = float(np.clip(corrected / linear, *_POWERS))
         return self._last_power
 
     def _first(self, pose: Pose) -> Contact | None:

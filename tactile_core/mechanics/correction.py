@@ -55,11 +55,20 @@ class Learned:
 
     def predict(self, features: np.ndarray) -> tuple[float, np.ndarray]:
         """Factor of the force, and the correction on the grid (g, 3), per metre of depth."""
-        x = (features - self.shift) / self.scale
-        near = kernel(x[None], self.supports, self.width)[0]
-        weights = near @ self.field_weights
-        of_force, of_field = (np.interp(features[0], self.trust[:, 0], self.trust[:, k]) for k in (1, 2))
-        return float(np.exp(of_force * (near @ self.force_weights))), of_field * np.tensordot(weights, self.fields, 1)
+        near = self._near(features)
+        return self.factor(features), self._trusted(features, 2) * np.tensordot(
+            near @ self.field_weights, self.fields, 1
+        )
+
+    def factor(self, features: np.ndarray) -> float:
+        """Factor of the force alone."""
+        return float(np.exp(self._trusted(features, 1) * (self._near(features) @ self.force_weights)))
+
+    def _near(self, features: np.ndarray) -> np.ndarray:
+        return kernel(((features - self.shift) / self.scale)[None], self.supports, self.width)[0]
+
+    def _trusted(self, features: np.ndarray, column: int) -> float:
+        return float(np.interp(features[0], self.trust[:, 0], self.trust[:, column]))
 
 
 def kernel(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
@@ -184,6 +193,13 @@ class Corrected:
     factor: float
     shape_error: float
     force_error: float
+
+
+def force_factor(compliance: Compliance, contact: Contact) -> float:
+    """By how much a fast contact's forces are too small."""
+    if not len(contact.nodes):
+        return 1.0
+    return learned()[compliance.name].factor(features(compliance, contact, frame(compliance, contact)))
 
 
 def correct(compliance: Compliance, contact: Contact, parts: Learned | None = None) -> Corrected:

@@ -39,7 +39,7 @@ class _Guess:
 
 @dataclasses.dataclass(frozen=True)
 class _Seen:
-    """What the guessed forces do, linearised about a place: what ``_Guess`` lets move (k, 3) m and open (k,), (c,) m.
+    """What guessed forces do, linearised about a place (k, 3) m: gaps (k,) m at nodes and (c,) m at the core.
 
     normal, lean : (k, 3), of the indenter and of slipping nodes' friction; slip : (k, 3) m, from the spots
     moves : (k, 3) m, from the place; bend : (k, 3, 3) 1/m, see ``Slipping``
@@ -85,7 +85,7 @@ class Frictional:
                 displacement, guess.force, guess.core, guess.shift, guess.active,
                 iterations=iteration, slipping=guess.slips,
             )  # fmt: skip
-            state.settled = not changed and self._settled(state, gap, slip, turned - normal, axial_force)
+            state.settled = not changed and self._settled(state, gap, slip, turned, normal, axial_force)
             if state.settled:
                 return state
             back = left & active[:k] & ~guess.active[:k]
@@ -163,9 +163,7 @@ class Frictional:
         k = len(gap)
         pressing = _dot(guess.force, seen.normal)
         opening = np.concatenate([gap, core_gap])
-        active = np.where(
-            guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -_GAP_NOISE
-        )
+        active = np.where(guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -_GAP_NOISE)
         held = active[:k] & guess.active[:k]
         over = np.linalg.norm(_across(guess.force, seen.normal), axis=1) > (
             self.friction * pressing * (1 + _BEYOND) + LEAST_FORCE
@@ -181,17 +179,18 @@ class Frictional:
         guess.force[back] = LEAST_FORCE * (normal[back] - self.friction * slip[back] / size[back, None])
         guess.slips = guess.slips | back
 
-    def _settled(self, state: Try, gap, slip, turn, axial_force) -> bool:  # noqa: ANN001
+    def _settled(self, state: Try, gap, slip, turned, normal, axial_force) -> bool:  # noqa: ANN001
         active = state.active[: len(gap)]
         if not active.any():
             return bool((gap > -GAP_TOLERANCE).all()) and axial_force is None
         if gap.min() < -GAP_TOLERANCE or np.abs(gap[active]).max() > GAP_TOLERANCE:
             return False
-        sticks = active & ~state.slipping
-        if np.linalg.norm(slip[sticks], axis=1).max(initial=0.0) > SLIP_TOLERANCE:
+        lean = np.where(state.slipping[:, None], _across(state.force, normal), 0.0)
+        lean /= np.maximum(np.linalg.norm(lean, axis=1, keepdims=True), 1e-30)
+        if np.linalg.norm(slip - _dot(slip, lean)[:, None] * lean, axis=1)[active].max() > SLIP_TOLERANCE:
             return False
         size = np.linalg.norm(state.force.sum(0))
-        if np.linalg.norm(turn * np.linalg.norm(state.force, axis=1)[:, None]) > SIDEWAYS_TOLERANCE * size:
+        if np.linalg.norm((turned - normal) * np.linalg.norm(state.force, axis=1)[:, None]) > SIDEWAYS_TOLERANCE * size:
             return False
         axial = float(state.force.sum(0) @ self.pose.direction)
         return axial_force is None or abs(axial - axial_force) <= FORCE_TOLERANCE * abs(axial_force)

@@ -24,17 +24,6 @@ def landing(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
     return np.maximum(travel, 0)[:, None] * direction
 
 
-def landing_spots(indenter: Indenter, before: Pose, pose: Pose, points: np.ndarray, touched: np.ndarray) -> np.ndarray:
-    """Where on the indenter points (n, 3) m first meet it as it moves from ``before`` to ``pose``: (n, 3) m, own frame.
-
-    touched : (n,) bool, points that it touched before: they stay where they were on it
-    Points that it does not meet are given as they stand at the end. Between the poses they move on straight lines in
-    the indenter's frame.
-    """
-    first, last = before.to_own(points), pose.to_own(points)
-    return np.where(touched[:, None], first, meeting(indenter, first, last))
-
-
 def meeting(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Where points that move straight from ``first`` to ``last`` (n, 3) m first meet an indenter, in its frame (n, 3).
 

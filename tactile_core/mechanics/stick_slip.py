@@ -100,7 +100,7 @@ class Step:
         return float((missing - carried) / per_step)
 
     def change(self, step: float) -> tuple[np.ndarray, np.ndarray]:
-        """Change (m,) N of the forces as the indenter moves by ``step`` m, and new forces (s, 3) N of slipping nodes."""
+        """Change (m,) N of forces as the indenter moves by ``step`` m, and new forces (s, 3) N of slipping nodes."""
         found = self._answer[:, 0] + step * self._answer[:, 1]
         count, change = int(self._kept.sum()), np.zeros(len(self._kept))
         change[self._kept] = found[:count]
@@ -120,7 +120,7 @@ class Step:
         carry[two] = np.einsum("ai,aji->aj", along[three], columns)
         carry = np.concatenate([carry[kept], np.einsum("qi,qij->qj", along[curved], turning).ravel()])
         matrix[:, two] = np.einsum("mai,aji->maj", matrix[:, three], columns)
-        matrix = np.concatenate([matrix[:, kept], felt], axis=1)
+        matrix = np.concatenate([matrix.take(np.flatnonzero(kept), 1), felt], axis=1)
         below = -matrix[curved.ravel()]
         below[np.arange(curved.size), kept.sum() + np.arange(curved.size)] += 1
         moves = np.column_stack([slipping.moves[slipping.curved].ravel(), -along[curved.ravel()]])

@@ -100,6 +100,20 @@ def test_sticking_nodes_do_not_move_on_the_indenter(layer, partial):
         assert np.linalg.norm(spots[1] - spots[0], axis=1).max() < 0.3e-6  # m: the tolerances of gap and slip together
 
 
+def test_friction_opposes_the_slip(layer, partial):
+    ball, contacts = partial
+    for before, after in zip(contacts, contacts[1:], strict=False):
+        both = np.intersect1d(before.nodes, after.nodes[after.slipping])
+        at = np.searchsorted(after.nodes, both)
+        spots = before.pose.to_own(placed(layer, before)[np.searchsorted(before.nodes, both)])
+        slip = placed(layer, after)[at] - after.pose.from_own(spots)
+        _, tangential = forces(layer, ball, after)
+        friction = tangential[at] / np.linalg.norm(tangential[at], axis=1)[:, None]
+        along = np.einsum("ai,ai->a", slip, friction)
+        assert len(both) > 10 and along.max() < 0.1e-6  # m: the tolerance of slip, and normals settled to 1e-4
+        assert np.linalg.norm(slip - along[:, None] * friction, axis=1).max() < 0.3e-6  # m: of gap and slip together
+
+
 def test_all_friction_is_spent_in_a_long_slide(layer):
     punch = Cylinder(0.6e-3, 0.15e-3)
     problem, contact = press(layer, punch, 0.1e-3, FRICTION)
