@@ -10,11 +10,13 @@ from ..indenters import Indenter, Pose
 from .compliance import Compliance
 from .contact import Contact, ContactProblem, fluid_pressure
 from .correction import Corrected, correct, force_factor
+from .first_touch import first_touch
 from .pose_path import same_line
 
 FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
 _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
 _GROWTH = 1.6  # largest change of force in one step of a search, which a warm start follows safely
+_LEAST_DEPTH = 1e-6  # m, of a contact that has slid: friction may hold it where the resting surface is not reached
 _SEARCH_STEPS = 24
 _POWER_FROM, _POWERS = 1e-2, (0.7, 1.5)  # least growth that tells the power; what it may be (assumed)
 
@@ -50,10 +52,11 @@ class CorrectedPress:
 
     def at_depth(self, depth: float, pose: Pose | None = None) -> FastContact:
         """The contact at a depth, m, of the press's pose or of another one; it may not have converged."""
-        contact = self.problem.at_pose((pose or self.pose).moved(depth), self.last)
+        pose = pose or self.pose
+        contact = self.problem.at_pose(pose.moved(depth), self.last)
         if contact.converged:
             self.last = contact
-        return self._with_correction(contact)
+        return self._with_correction(contact, self._fall(pose))
 
     def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
         """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found.
@@ -61,21 +64,21 @@ class CorrectedPress:
         A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
         """
         pose = pose or self.pose
-        contact = self.last or self._first(pose)
+        contact, fall = self.last or self._first(pose), self._fall(pose)
         if contact is not None and not same_line(contact.pose, pose):
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
         before: tuple[float, float] | None = None  # linear and corrected force, N
         for _ in range(_SEARCH_STEPS):
             if contact is None or not contact.converged:
                 return None
-            linear = contact.axial_force
-            found = linear, linear * force_factor(self.compliance, contact)
+            linear, seen = contact.axial_force, _from_touch(contact, fall)
+            found = linear, linear * force_factor(self.compliance, seen)
             close = found[1] > 0 and abs(found[1] / force - 1) < FORCE_TOLERANCE
-            if contact.depth > self.limit and (close or found[1] < force):
+            if seen.depth > self.limit and (close or found[1] < force):
                 return None
             if close:
                 self.last = contact
-                return self._with_correction(contact)
+                return self._with_correction(contact, fall)
             growth = (force / max(found[1], 1e-12)) ** (1 / self._power(before, found))
             before, goal = found, linear * float(np.clip(growth, 1 / _GROWTH, _GROWTH))
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, goal)
@@ -99,7 +102,19 @@ class CorrectedPress:
             depth *= 1.5
         return None
 
-    def _with_correction(self, contact: Contact) -> FastContact:
-        made = correct(self.compliance, contact)
+    def _fall(self, pose: Pose) -> float:
+        """How much farther in, m, than the press's own pose another one first touches: the sensor falls away."""
+        if same_line(self.pose, pose):
+            return 0.0
+        touching = first_touch(self.compliance.surface, self.problem.indenter, pose)
+        return float((touching.apex - self.pose.apex) @ pose.direction)
+
+    def _with_correction(self, contact: Contact, fall: float) -> FastContact:
+        made = correct(self.compliance, _from_touch(contact, fall))
         pressure = made.factor * fluid_pressure(self.compliance, contact)
         return FastContact(contact, made, made.factor * contact.force, made.factor * contact.axial_force, pressure)
+
+
+def _from_touch(contact: Contact, fall: float) -> Contact:
+    """A contact with its depth measured from first touch where the indenter has slid to, as the correction knows it."""
+    return dataclasses.replace(contact, depth=max(contact.depth - fall, _LEAST_DEPTH))

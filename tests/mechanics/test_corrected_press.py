@@ -39,3 +39,15 @@ def test_a_slide_at_the_same_force_drags_the_skin_along(sensor):
     assert slid.axial_force == pytest.approx(0.5, rel=FORCE_TOLERANCE)
     dragged = (slid.force - still.force) @ pose.axes[:, 0]
     assert 0.05 < dragged / 0.5 <= 0.78 * 1.1  # a tenth: forces lean with the surface, by which the cone leans too
+
+
+@pytest.mark.parametrize("sensor", ["biotac", "digit"])
+@pytest.mark.parametrize("across", [-1.5e-3, 1.5e-3])
+def test_a_light_touch_is_held_where_the_sensor_falls_away_or_rises(sensor, across):
+    pose = pose_at(sensor, BALL, Placement(-8e-3, 5e-3))
+    press = CorrectedPress(compliance_of(sensor), BALL, pose, 2.4e-3, 0.78)
+    assert press.at_force(0.03) is not None
+    for share in (0.5, 1.0):
+        slid = press.at_force(0.03, pose.slid(0.0, share * across))
+        assert slid.axial_force == pytest.approx(0.03, rel=FORCE_TOLERANCE)
+        assert np.isfinite(slid.corrected.displacement).all()
