@@ -1,6 +1,6 @@
 """Make the fast tier's correction: solve a sample of presses in the full tier, learn from them, write one small file.
 
-    python3 scripts/make_correction.py --work DIR [--presses 150] [--rubbing 50] [--seed 0] [--workers 2]
+    python3 scripts/make_correction.py --work DIR [--presses 155] [--rubbing 49] [--seed 0] [--workers 2]
 
 Stop it at any time: presses that are solved stay in DIR and are not solved again. Writes
 tactile_core/data/mechanics_correction.npz and prints how far the corrected fast tier is from the full tier on presses
@@ -82,8 +82,8 @@ def main() -> int:
     """Solve, learn, write, report."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
-    parser.add_argument("--presses", type=int, default=150, help="presses a sensor, three contacts each (150)")
-    parser.add_argument("--rubbing", type=int, default=50, help="of them also with friction (50)")
+    parser.add_argument("--presses", type=int, default=155, help="presses a sensor, three contacts each (155)")
+    parser.add_argument("--rubbing", type=int, default=49, help="of them also with friction (49)")
     parser.add_argument("--seed", type=int, default=0, help="of the presses (0)")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     parser.add_argument("--json", type=pathlib.Path, help="write the rows of errors here")
