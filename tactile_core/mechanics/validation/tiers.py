@@ -11,8 +11,9 @@ from ... import digit_shape, metrics
 from ...cubic_spline import EvenSpline
 from ...indenters import Sphere
 from ..finite_strain import FiniteStrainSolid
-from ..placement import FRICTION, Placement
+from ..placement import FRICTION, Placement, pose_at
 from ..solve import TIERS, Sensor, Solution, Step, Tier, solve, solve_path
+from ..thickness import DEPTH_LIMIT, thickness_under
 from .incompressible import quality_rows
 from .rows import Row, row
 
@@ -20,8 +21,8 @@ from .rows import Row, row
 SHAPE_TARGET, FAST_FORCE_TARGET, FULL_FORCE_TARGET = 5.0, 5.0, 1.0
 NORMAL_TARGET = 1.5  # degrees, mean inside the contact, point 2
 TIME_TARGETS = {("fast", "digit"): 2.5, ("fast", "biotac"): 3.5, ("full", "digit"): 1000.0, ("full", "biotac"): 1200.0}
-_THICKNESS = {"digit": 4.06e-3, "biotac": 2.6e-3}  # m, at the places pressed: the measure of per cent
 _BALL, _PLACE = Sphere(3.5e-3), Placement(-8e-3, 2e-3, 0.1, 1.0)
+_DEEPEST = DEPTH_LIMIT - 1e-6  # of the thickness
 _DEPTHS = {"digit": (0.2, 0.4, 0.6, 0.8, 1.2), "biotac": (0.3, 0.6, 0.9, 1.2)}  # mm
 
 
@@ -37,9 +38,13 @@ def rows(quick: bool) -> Iterator[Row]:
 
 def _deepest(sensor: Sensor) -> tuple[FiniteStrainSolid, np.ndarray]:
     """The full tier's solid and displacement under the ball at 60 % of the sensor's thickness."""
-    found = solve(sensor, _BALL, _PLACE, depth=0.59 * _THICKNESS[sensor], tier="full", friction=0.0)
+    found = solve(sensor, _BALL, _PLACE, depth=_DEEPEST * _thickness(sensor), tier="full")
     solid, state = found.volume
     return solid, state.displacement
+
+
+def _thickness(sensor: Sensor) -> float:
+    return thickness_under(sensor, _BALL, pose_at(sensor, _BALL, _PLACE))
 
 
 def _sensor(sensor: Sensor, depths: list[float], friction: float) -> Iterator[Row]:
@@ -53,7 +58,7 @@ def _sensor(sensor: Sensor, depths: list[float], friction: float) -> Iterator[Ro
         for tier in TIERS[:-1]:
             found, took = solved[tier][k]
             where = f"{sensor}_{tier}_{depth * 1e3:.1f}mm{rubbed}"
-            yield from _compare(where, tier, found, exact, depth / _THICKNESS[sensor])
+            yield from _compare(where, tier, found, exact, depth / _thickness(sensor))
             if sensor == "digit":
                 yield from _normal_error(where, found, exact)
             target = TIME_TARGETS[tier, sensor] if not friction else None
