@@ -26,8 +26,8 @@ ONE_STEP, FRICTION_STEP = 5e-3, 0.25e-3
 _FULL = Tolerance(10e-9, 1e-7, 0.15e-6)
 _FIRST_SHARE = {"biotac": 0.7, "digit": 0.5}  # a ball on a half-space touches where it overlaps by half of the depth
 _REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth may come to touch it
-# Nodes wanted across the fine part of a graded mesh. Normals under a 7 mm ball 1.2 mm deep in the gel were off by 1.4 to
-# 1.5 degrees with 10, by 1.2 with 11, by 1.0 with 12 at a fifth more time.
+# Nodes wanted across the fine part of a graded mesh. Normals under a 7 mm ball 1.2 mm deep in the gel were 1.4 to 1.5
+# degrees off with 10, 1.2 with 11, 1.0 with 12 at a fifth more time.
 _ACROSS = 11
 _SPACING = 0.3, 1.5  # lattice lines, least and most between nodes there
 _MARGIN = 0.6  # of its size that the fine part reaches beyond the touching nodes

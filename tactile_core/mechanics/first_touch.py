@@ -15,6 +15,7 @@ _MOST_PLACES = 12
 _FINER = (4, 16, 64, 256)  # of a lattice spacing: 1.4 um at last, which hides less than 1 nm of a ball of 1 mm
 _HIDDEN = 6e-6  # m, more than a quarter of a spacing hides: (0.045 mm)^2 / 2 over the smallest edge radius, 0.2 mm
 _CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no indenter reaches the sensor
+_FARTHEST = 30e-3  # m, past all of a sensor from wherever the motion starts
 _LEAST_RATE = 0.5  # of approach: where the body slides past a point its distance says little about the way to it
 _NEAREST = 16  # nodes with which the motion is tried first
 
@@ -52,6 +53,8 @@ def _on_nodes(rest: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, n
     some = np.argsort(gap, kind="stable")[:_NEAREST]
     while True:
         pose = _advance(indenter, away, rest[some])
+        if pose.distance(indenter, rest[some])[0].min() > _TOUCHES:  # it slides past them
+            pose, some = _advance(indenter, away, rest), np.arange(len(rest))
         travel = np.linalg.norm(pose.apex - away.apex)
         reached = np.flatnonzero(gap < travel + _CLOSE)  # no distance falls faster than the indenter moves
         now, _ = pose.distance(indenter, rest[reached])
@@ -63,10 +66,11 @@ def _on_nodes(rest: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, n
 
 
 def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
-    """Move until the first of the points (n, 3) m is touched.
+    """Move until the first of the points (n, 3) m is touched; at most ``_FARTHEST``, where it slides past them all.
 
     Toward a convex part Newton's steps never go through; where another part lets them, the distance leads back.
     """
+    left = _FARTHEST
     for _ in range(_ADVANCES):
         gap, normal = pose.distance(indenter, points)
         step = smallest = float(gap.min())
@@ -74,6 +78,8 @@ def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
             break
         if smallest > 0:
             step = float((gap / np.maximum(-(normal @ pose.direction), _LEAST_RATE)).min())
+        step = min(step, left)
+        left -= step
         pose = pose.moved(step)
     return pose
 

@@ -41,6 +41,15 @@ def test_first_touch_does_not_depend_on_where_the_motion_starts(lattice):
     np.testing.assert_allclose(places, places[:1] * 3, atol=20e-9)
 
 
+def test_an_edge_that_slides_past_the_nearest_nodes_touches_others():
+    """The sixteen nodes nearest to this leaning cube lie beside it; it once ran past them for ever."""
+    cube, place = Box((14e-3,) * 3, 0.5e-3), Placement(-4.5836989537761e-3, 7.306593692882052e-3, 0.421, 4.7387)
+    pose = digit_pose(cube, place)
+    rest = sensors.digit_surface().rest
+    near = rest[np.argmin(pose.distance(cube, rest)[0])]
+    assert abs(pose.distance(cube, dome(near, 0.4e-3))[0].min()) < 0.5e-6  # m, as above
+
+
 def test_ball_set_on_a_smooth_place_stays_there():
     ball = Sphere(3.5e-3)
     point, outward = digit_shape.dome_point(-8e-3, 1e-3)
