@@ -111,7 +111,7 @@ def contact_center(digit: Contact) -> np.ndarray:
 def _beyond_digit(biotac: Contact) -> bool:
     """Whether the BioTac is touched beside what rolls onto the DIGIT's gel: no contact of the gel is its equal."""
     x, z = surface.unrolled_nodes()[biotac_compliance().touchable[biotac.nodes]].T
-    return bool((digit_shape.outline_distance(x, z) < 0).any())
+    return bool((digit_shape.outline_distance(x, z) <= 0).any())  # it is 0 everywhere outside
 
 
 def _patch(size: int, nodes: np.ndarray) -> np.ndarray:

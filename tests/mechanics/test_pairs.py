@@ -8,9 +8,14 @@ import pytest
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
+from tactile_core.indenters import Sphere
 from tactile_core.mechanics import pair_file
+from tactile_core.mechanics.compliance import compliance_of
+from tactile_core.mechanics.corrected_press import CorrectedPress
 from tactile_core.mechanics.pair_card import card, card_path
+from tactile_core.mechanics.pair_rows import pair_row
 from tactile_core.mechanics.pairs import make_pairs
+from tactile_core.mechanics.placement import Placement, pose_at
 
 SCENE = "scenes/press_sphere"
 
@@ -104,6 +109,17 @@ def test_a_press_may_end_with_a_slide_at_constant_force(scene, tmp_path):
     held = dict(zip(press[before], force[before], strict=True))
     turned = [np.linalg.norm(force[i] - held[press[i]]) / np.linalg.norm(force[i]) for i in slid if far[i] > 0.2e-3]
     assert turned and min(turned) > 0.05
+
+
+@pytest.mark.parametrize(("z", "beyond"), [(0.0, False), (8.1e-3, True)])
+def test_a_contact_that_reaches_beside_the_gel_is_marked(z, beyond):
+    """A 14 mm ball 0.8 mm deep touches the BioTac some 2 mm around; the gel ends at 9.17 mm."""
+    ball, place = Sphere(7e-3), Placement(-8e-3, z)
+    pressed = [
+        CorrectedPress(compliance_of(sensor), ball, pose_at(sensor, ball, place), 2e-3).at_depth(depth)
+        for sensor, depth in (("biotac", 0.8e-3), ("digit", 0.2e-3))
+    ]
+    assert pair_row(*pressed)["beyond_digit"] == beyond
 
 
 def test_an_existing_file_is_kept(made, scene):
