@@ -47,12 +47,12 @@ class Pose:
 
     def distance(self, indenter: Indenter, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance (n,) m and gradient (n, 3) of the placed indenter at sensor points (n, 3) m."""
-        distance, gradient = indenter.distance((points - self.apex) @ self.axes)
+        distance, gradient = indenter.distance(self.to_own(points))
         return distance, gradient @ self.axes.T
 
     def curvature(self, indenter: Indenter, points: np.ndarray) -> np.ndarray:
         """Second derivatives (n, 3, 3) 1/m of the placed indenter's distance at sensor points (n, 3) m."""
-        return self.axes @ indenter.curvature((points - self.apex) @ self.axes) @ self.axes.T
+        return self.axes @ indenter.curvature(self.to_own(points)) @ self.axes.T
 
     def support(self, indenter: Indenter, direction: np.ndarray) -> np.ndarray:
         """The placed indenter's farthest point (3,) m along a unit vector (3,) of the sensor."""

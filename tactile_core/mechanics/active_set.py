@@ -89,8 +89,8 @@ def _closed(matrix, active, index, right, factors) -> tuple[np.ndarray, np.ndarr
         return known, lapack.dpotrs(known, right, lower=1)[0]
     block = matrix if len(index) == len(active) else matrix.take(index, 0).take(index, 1)
     factor, answer, failed = lapack.dposv(block, right, lower=1)
-    if factors is not None:
-        factors[active.tobytes()] = factor
     if failed:
         raise UnsolvedError("the compliance of the touching nodes is not positive definite")
+    if factors is not None:
+        factors[active.tobytes()] = factor
     return factor, answer

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import pathlib
 
 import numpy as np
+
+from ..results import sha256
 
 _DEPTHS_MM = (0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2, 1.6, 2.0, 2.4)
 _FORCES_N = (0, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
@@ -28,7 +29,7 @@ def card(path: str | os.PathLike) -> dict:
     places, _, _ = np.histogram2d(1e3 * x, 1e3 * z, bins=(_X_MM, _Z_MM))
     return {
         **attributes,
-        "sha256": file_hash(path),
+        "sha256": sha256(path),
         "contacts": len(force),
         "presses": len(np.unique(values["press"])),
         "contacts_by_indenter": {name: int((values["indenter"] == i).sum()) for i, name in enumerate(names)},
@@ -46,12 +47,6 @@ def card_path(path: str | os.PathLike) -> pathlib.Path:
     """Where the card of a file of pairs lies: ``<file>.card.json``."""
     path = pathlib.Path(path)
     return path.with_name(path.name + ".card.json")
-
-
-def file_hash(path: str | os.PathLike) -> str:
-    """SHA-256 of a file's bytes."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 _READ = ("force", "place", "slide", "press", "indenter", "depth_biotac", "depth_digit", "beyond_digit")

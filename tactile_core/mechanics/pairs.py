@@ -28,7 +28,7 @@ from .pair_rows import press_rows
 log = logging.getLogger(__name__)
 
 BLOCK = 4  # presses a block: a few seconds of work
-_MOST_BLOCKS = 256  # at a time: whoever waits at their end waits for one block in so many
+_MOST_BLOCKS = 256  # made between two looks at how many contacts there are
 
 
 @dataclasses.dataclass(frozen=True)

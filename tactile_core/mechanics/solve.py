@@ -82,7 +82,7 @@ def solve(
     """Press ``indenter`` into ``sensor`` at ``place`` to a depth, m, or a force along the motion, N.
 
     ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round the
-    contact (about a second; with friction several), ``reference`` the same on cells half as large (a minute).
+    contact (about a second; with friction up to twenty), ``reference`` the same on cells half as large (minutes).
     Raises TactileError for an impossible request, or for one beyond what the tier finds.
     """
     return next(solve_path(sensor, indenter, place, [Step(depth, force)], tier, friction))

@@ -13,9 +13,10 @@ from tactile_core.mechanics import pair_file
 from tactile_core.mechanics.compliance import compliance_of
 from tactile_core.mechanics.corrected_press import CorrectedPress
 from tactile_core.mechanics.pair_card import card, card_path
-from tactile_core.mechanics.pair_rows import pair_row
+from tactile_core.mechanics.pair_rows import pair_row, press_rows
 from tactile_core.mechanics.pairs import make_pairs
 from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.scene import load_scene
 
 SCENE = "scenes/press_sphere"
 
@@ -174,3 +175,11 @@ def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, monkeypatch):
     monkeypatch.undo()
     make_pairs(scene, 5, 7, out)  # goes on from the blocks that are there
     assert out.exists()
+
+
+def test_a_slide_to_where_the_sensor_falls_away_stays_finite(request):
+    """Press 590 is a light touch whose slide ends at a negative depth; its factor of force was once no number."""
+    scene, _ = load_scene(request.config.rootpath / "scenes/training")
+    rows = press_rows(scene, 3, 590)
+    assert any(row["slide"].any() for row in rows)
+    assert all(np.isfinite(row[name]).all() for row in rows for name in ("force", "force_digit", "depth_digit"))
