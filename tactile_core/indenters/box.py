@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 
 from ..errors import TactileError
-from .indenter import NEAREST, Indenter, check_length, sign_of
+from .indenter import NEAREST, Indenter, check_length, lengths, sign_of
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,29 +29,38 @@ class Box(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact (a smaller box inflated by the edge radius), inside to the nearest face."""
-        out, sign = self._out(points)
+        arm = points - self._middle
+        out = np.abs(arm) - self._inner
         beyond = np.maximum(out, 0)
-        corner = np.linalg.norm(beyond, axis=1)
-        nearest_face = np.eye(3)[np.argmax(out, axis=1)]
-        outside = (corner > 0)[:, None]
-        normal = np.where(outside, beyond / np.where(outside, corner[:, None], 1), nearest_face)
-        return corner + np.minimum(out.max(axis=1), 0) - self.edge, normal * sign
+        corner = lengths(beyond)
+        inside = np.flatnonzero(corner == 0)
+        distance, far = corner - self.edge, corner
+        if len(inside):
+            face = np.argmax(out[inside], axis=1)
+            distance[inside] += out[inside, face]
+            beyond[inside, face], far = 1.0, corner.copy()
+            far[inside] = 1.0
+        return distance, np.copysign(beyond, arm) / far[:, None]
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Indenter.curvature``; zero at faces, 1 / arm across round edges, in all tangents at corners."""
-        out, sign = self._out(points)
-        beyond = np.maximum(out, 0) * sign
-        length = np.maximum(np.linalg.norm(beyond, axis=1), NEAREST)[:, None, None]
+        arm = points - self._middle
+        out = np.abs(arm) - self._inner
+        beyond = np.copysign(np.maximum(out, 0), arm)
+        length = np.maximum(lengths(beyond), NEAREST)[:, None, None]
         normal = beyond[:, :, None] / length
         round_axes = np.eye(3) * (out > 0)[:, None, :]
         return np.where((out > 0).sum(1)[:, None, None] > 1, (round_axes - normal * normal.swapaxes(1, 2)) / length, 0)
 
     def support(self, direction: np.ndarray) -> np.ndarray:
         """See ``Indenter.support``."""
-        inner = (np.array(self.sizes) / 2 - self.edge) * sign_of(direction)
-        return np.array([0.0, 0.0, self.sizes[2] / 2]) + inner + self.edge * direction
+        return self._middle + self._inner * sign_of(direction) + self.edge * direction
 
-    def _out(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far each coordinate is beyond the smaller box (n, 3) m, and on which side (n, 3)."""
-        arm = points - [0.0, 0.0, self.sizes[2] / 2]
-        return np.abs(arm) - (np.array(self.sizes) / 2 - self.edge), np.where(arm >= 0, 1.0, -1.0)
+    @functools.cached_property
+    def _middle(self) -> np.ndarray:
+        return np.array([0.0, 0.0, self.sizes[2] / 2])
+
+    @functools.cached_property
+    def _inner(self) -> np.ndarray:
+        """Half the sizes (3,) m of the smaller box."""
+        return np.array(self.sizes) / 2 - self.edge

@@ -52,13 +52,12 @@ class BumpyCube(Indenter):
         Inside the cube above a bump the nearest place is on the bump's cap or on the rim at its foot: both lie below,
         unlike the surface of a whole ball.
         """
-        nearest, distances, gradients, _ = self._branches(points)
-        row = np.arange(len(points))
-        return distances[nearest, row], gradients[nearest, row]
+        _, distance, gradient, _ = self._nearest(points)
+        return distance, gradient
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Indenter.curvature``."""
-        nearest, _, _, at_bump = self._branches(points)
+        nearest, _, _, at_bump = self._nearest(points)
         curvature = np.empty((len(points), 3, 3))
         for branch, (indenter, pose) in ((_CUBE, self._parts[0]), (_SHAFT, self._shaft)):
             curvature[nearest == branch] = pose.curvature(indenter, points[nearest == branch])
@@ -94,20 +93,35 @@ class BumpyCube(Indenter):
         apex = np.array([0.0, 0.0, self.bump_height - self.size])
         return Box((self.size, self.size, 2 * self.size), self.edge), Pose(apex, np.eye(3))
 
-    def _branches(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """What is nearest (n,); distances (4, n) and gradients (4, n, 3) of all; points in the nearest bump's frame."""
-        across = points[:, None, :2] - self._tips
-        nearest = np.argmin((across**2).sum(axis=2), axis=1)
-        at_bump = np.column_stack([across[np.arange(len(points)), nearest], points[:, 2]])
+    def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """What is nearest (n,), its distance (n,) m and gradient (n, 3); points in the nearest bump's frame (n, 3)."""
+        outer = np.copysign(self.spacing, points[:, :2])
+        outer[np.abs(points[:, 0]) + np.abs(points[:, 1]) <= self.spacing] = 0.0
+        at_bump = points.copy()
+        at_bump[:, :2] -= outer
+        (cube, pose), ball = self._parts[0], self._parts[1][0]
+        distance, gradient = cube.distance(points - pose.apex)
+        of_ball, from_ball = ball.distance(at_bump)
+        branch = np.where(distance <= of_ball, _CUBE, _BALL)
+        distance = np.minimum(distance, of_ball)
+        gradient = np.where((branch == _CUBE)[:, None], gradient, from_ball)
+        above = (points[:, 2] >= self.bump_height) & (np.hypot(at_bump[:, 0], at_bump[:, 1]) < self._foot)
+        if above.any():
+            branch[above], distance[above], gradient[above] = self._above(
+                points[above], at_bump[above], of_ball[above], from_ball[above]
+            )
+        return branch, distance, gradient, at_bump
+
+    def _above(self, points, at_bump, of_ball, from_ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # noqa: ANN001
+        """What is nearest to points in the cube above a bump, its distance and gradient."""
         reach, toward = circle_distance(at_bump - [0.0, 0.0, self.bump_height], self._foot)
-        cube, shaft = (pose.distance(indenter, points) for indenter, pose in (self._parts[0], self._shaft))
-        ball = Sphere(self.bump_radius).distance(at_bump)
-        distances, gradients = (np.stack(values) for values in zip(cube, ball, (-reach, -toward), shaft, strict=True))
+        shaft, pose = self._shaft
+        of_shaft, from_shaft = shaft.distance(points - pose.apex)
         out, up = np.hypot(at_bump[:, 0], at_bump[:, 1]), points[:, 2]
-        above = (out < self._foot) & (up >= self.bump_height)
         over_cap = out * (self.bump_radius - self.bump_height) <= self._foot * (self.bump_radius - up)
-        below = np.where(over_cap & (up < self.bump_radius - NEAREST), _BALL, _RIM)
-        row = np.arange(len(points))
-        branch = np.where(distances[_CUBE] <= distances[_BALL], _CUBE, _BALL)
-        inside = np.where(distances[_SHAFT] > distances[below, row], _SHAFT, below)
-        return np.where(above, inside, branch), distances, gradients, at_bump
+        capped = over_cap & (up < self.bump_radius - NEAREST)
+        below = np.where(capped, of_ball, -reach)
+        toward = np.where(capped[:, None], from_ball, -toward)
+        beside = of_shaft > below
+        branch = np.where(beside, _SHAFT, np.where(capped, _BALL, _RIM))
+        return branch, np.where(beside, of_shaft, below), np.where(beside[:, None], from_shaft, toward)

@@ -10,7 +10,10 @@ from .indenter import NEAREST
 def circle_distance(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Distance (n,) m of points (n, 3) m from a circle of ``radius`` m, and its gradient (n, 3)."""
     _, radial, arm, length = _arms(points, radius)
-    return length, np.column_stack([arm[:, :1] * radial, arm[:, 1]]) / length[:, None]
+    gradient = np.empty((len(points), 3))
+    gradient[:, :2], gradient[:, 2] = arm[:, :1] * radial, arm[:, 1]
+    gradient /= length[:, None]
+    return length, gradient
 
 
 def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
@@ -24,13 +27,17 @@ def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
 
 def _arms(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Distance (n,) m from the axis, direction from it (n, 2), arm from the circle (n, 2) m, its length (n,) m."""
-    around = np.hypot(points[:, 0], points[:, 1])
+    around = np.sqrt(np.einsum("ni,ni->n", points[:, :2], points[:, :2]))
     radial = points[:, :2] / np.maximum(around, NEAREST)[:, None]
-    radial[around < NEAREST] = [1.0, 0.0]
-    arm = np.column_stack([around - radius, points[:, 2]])
-    length = np.hypot(arm[:, 0], arm[:, 1])
-    arm[length < NEAREST] = [0.0, -NEAREST]
-    return around, radial, arm, np.maximum(length, NEAREST)
+    if around.min(initial=np.inf) < NEAREST:
+        radial[around < NEAREST] = [1.0, 0.0]
+    arm = np.empty((len(points), 2))
+    arm[:, 0], arm[:, 1] = around - radius, points[:, 2]
+    length = np.sqrt(np.einsum("ni,ni->n", arm, arm))
+    if length.min(initial=np.inf) < NEAREST:
+        arm[length < NEAREST] = [0.0, -NEAREST]
+        length = np.maximum(length, NEAREST)
+    return around, radial, arm, length
 
 
 def _square(vectors: np.ndarray) -> np.ndarray:

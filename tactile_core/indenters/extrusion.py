@@ -15,7 +15,10 @@ from .indenter import NEAREST
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """A two-dimensional signed distance at n places: ``value`` (n,) m, ``slope`` (n, 2), ``bend`` (n, 2, 2) 1/m."""
+    """A two-dimensional signed distance at n places: ``value`` (n,) m, ``slope`` (n, 2), ``bend`` (n,) 1/m.
+
+    bend : curvature of the lines of equal distance
+    """
 
     value: np.ndarray
     slope: np.ndarray
@@ -24,13 +27,12 @@ class Outline:
 
 def disc(across: np.ndarray, radius: float) -> Outline:
     """The outline of a disc about the origin at places (n, 2) m; radius 0 is a point."""
-    length = np.hypot(across[:, 0], across[:, 1])
+    length = np.sqrt(np.einsum("ni,ni->n", across, across))
     centre = length < NEAREST
     length = np.maximum(length, NEAREST)
     slope = across / length[:, None]
     slope[centre] = [0.0, -1.0]
-    bend = (np.eye(2) - slope[:, :, None] * slope[:, None, :]) / length[:, None, None]
-    return Outline(length - radius, slope, bend)
+    return Outline(length - radius, slope, 1 / length)
 
 
 def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float) -> tuple[np.ndarray, np.ndarray]:
@@ -40,12 +42,18 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
     """
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
-    inner = np.minimum(np.maximum(side, end), 0)
-    outward = np.where(along >= 0, 1.0, -1.0)
-    on_side = np.where(corner > 0, across / np.maximum(corner, NEAREST**2), side > end)
-    on_end = np.where(corner > 0, beyond / np.maximum(corner, NEAREST**2), side <= end)
-    gradient = np.column_stack([on_side[:, None] * outline.slope, on_end * outward])
-    return corner + inner - edge, gradient
+    inside = np.flatnonzero(corner == 0)
+    found, far = corner - edge, corner
+    if len(inside):
+        found[inside] += np.maximum(side[inside], end[inside])
+        far = corner.copy()
+        far[inside] = 1.0
+        across[inside] = side[inside] > end[inside]
+        beyond[inside] = side[inside] <= end[inside]
+    gradient = np.empty((len(along), 3))
+    np.multiply((across / far)[:, None], outline.slope, out=gradient[:, :2])
+    np.copysign(beyond / far, along, out=gradient[:, 2])
+    return found, gradient
 
 
 def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarray:
@@ -54,14 +62,15 @@ def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarr
     across, beyond, corner = _corner(side, end)
     # On a round corner the normal turns in the plane of the outline's normal and the axis.
     turn = np.column_stack([-beyond[:, None] * outline.slope, np.where(along >= 0, across, -across)])
-    length = np.maximum(corner, NEAREST)[:, None, None]
-    round_corner = ((across > 0) & (beyond > 0))[:, None, None]
-    hessian = np.where(round_corner, turn[:, :, None] * turn[:, None, :] / length**3, 0.0)
+    length = np.maximum(corner, NEAREST)
+    round_corner = (across > 0) & (beyond > 0)
+    hessian = (round_corner / length**3)[:, None, None] * (turn[:, :, None] * turn[:, None, :])
     on_side = np.where(corner > 0, across / np.maximum(corner, NEAREST**2), side > end)
-    hessian[:, :2, :2] += on_side[:, None, None] * outline.bend
+    turn = np.column_stack([-outline.slope[:, 1], outline.slope[:, 0]])
+    hessian[:, :2, :2] += (on_side * outline.bend)[:, None, None] * (turn[:, :, None] * turn[:, None, :])
     return hessian
 
 
 def _corner(side: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     across, beyond = np.maximum(side, 0), np.maximum(end, 0)
-    return across, beyond, np.hypot(across, beyond)
+    return across, beyond, np.sqrt(across * across + beyond * beyond)

@@ -39,6 +39,11 @@ class Indenter(Protocol):
         return np.array(lower), np.array(upper)
 
 
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """Lengths (n,) of vectors (n, 3): ``np.linalg.norm`` takes twice as long for the few that a contact has."""
+    return np.sqrt(np.einsum("ai,ai->a", vectors, vectors))
+
+
 def check_length(kind: str, name: str, value: float) -> None:
     """Raise TactileError for a length that is no number between 0.001 mm and 1 m."""
     if not (np.isfinite(value) and 1e-6 < value < 1.0):

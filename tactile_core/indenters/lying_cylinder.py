@@ -34,7 +34,7 @@ class LyingCylinder(Indenter):
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
         distance, gradient = extrusion.distance(*self._prism(points), self.edge)
-        return distance, gradient[:, _OWN]
+        return distance, gradient.take(_OWN, axis=1)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Indenter.curvature``."""

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from .indenter import NEAREST, Indenter, check_length
+from .indenter import NEAREST, Indenter, check_length, lengths
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +35,8 @@ class Sphere(Indenter):
     def _polar(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance (n,) m from the centre, and the direction away from it (n, 3)."""
         arm = points - [0.0, 0.0, self.radius]
-        length = np.linalg.norm(arm, axis=1)
-        arm[length < NEAREST] = [0.0, 0.0, -NEAREST]
-        length = np.maximum(length, NEAREST)
+        length = lengths(arm)
+        if length.min(initial=np.inf) < NEAREST:
+            arm[length < NEAREST] = [0.0, 0.0, -NEAREST]
+            length = np.maximum(length, NEAREST)
         return length, arm / length[:, None]

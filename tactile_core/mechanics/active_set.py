@@ -87,8 +87,10 @@ def _closed(matrix, active, index, right, factors) -> tuple[np.ndarray, np.ndarr
         return matrix[:0, :0], right
     if known is not None:
         return known, lapack.dpotrs(known, right, lower=1)[0]
-    block = matrix if len(index) == len(active) else matrix.take(index, 0).take(index, 1)
-    factor, answer, failed = lapack.dposv(block, right, lower=1)
+    every = len(index) == len(active)
+    block = matrix if every else matrix.take(index, 0).take(index, 1)
+    # LAPACK stores by columns: what it takes for the transposed matrix needs no copy.
+    factor, answer, failed = lapack.dposv(block.T, right, lower=1, overwrite_a=not every)
     if failed:
         raise UnsolvedError("the compliance of the touching nodes is not positive definite")
     if factors is not None:

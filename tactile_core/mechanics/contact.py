@@ -1,12 +1,13 @@
 """Contact of a rigid indenter with a sensor's surface, solved on its compliance; every result is checked.
 
-Only nodes that the indenter may touch enter a solve; the whole surface is then displaced and looked at, and nodes that
-would go through the indenter, or inner skin that would go through the core, are taken in and the solve goes on.
+Only nodes that the indenter may touch enter a solve; all nodes near it are then displaced and looked at, and those that
+would go through it, or inner skin that would go through the core, are taken in and the solve goes on.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,10 +20,15 @@ from .frictional import Frictional
 from .frictionless import Frictionless, Try
 from .landing import landing, meeting
 from .near_block import NearBlock
+from .near_nodes import NearNodes
+from .near_rows import NearRows
 from .pose_path import between, same_place
+from .solved_contact import Contact
 
 PENETRATION = 1e-6  # m, what MECHANICS allows at any node
 _REACH = 0.8e-3  # m, nodes this far outside the indenter at the end of a solve may come to touch it
+_SPARE = 0.15e-3  # m, by which more nodes are followed than that, so that a deeper contact needs no others (assumed)
+_LARGE = 2.5  # times what is wanted: so many nodes followed cost more than a fresh start (assumed)
 _TAKE_IN = 20e-6  # m: where some nodes go through the indenter, those this close to it are taken in with them
 _CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps vary more
 _CLOSED = 0.3e-6  # m: gaps closed to this need no further look
@@ -31,35 +37,12 @@ _DETOURS = (4, 8)  # steps from the start to the goal, where one does not settle
 _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest overlap are first taken to touch
 
 
-@dataclasses.dataclass(frozen=True)
-class Contact:
-    """One solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
+class _Around(NamedTuple):
+    """What a contact does to the nodes near it: displacement (n, 3) m, gaps (n,) m; gaps (g,) m of skin and core."""
 
-    pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
-    force : (3,); axial_force : its part along the motion
-    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3)
-    slipping : (k,) bool, nodes whose friction is spent; without friction all
-    converged : whether it may be used; iterations : linearised problems solved for it
-    displacement : (n, 3) float32, of the whole surface
-    core_nodes : (c,) watched inner points that press on the core; core_force : (c,), on the skin, away from the core
-    penetration : m, deepest place of a node in the indenter or of the inner skin in the core
-    sideways : nodal forces across the indenter's normals over the whole force: 0 without friction
-    """
-
-    pose: Pose
-    depth: float
-    force: np.ndarray
-    axial_force: float
-    nodes: np.ndarray
-    nodal_force: np.ndarray
-    slipping: np.ndarray
-    converged: bool
-    iterations: int
-    displacement: np.ndarray
-    core_nodes: np.ndarray
-    core_force: np.ndarray
-    penetration: float
-    sideways: float
+    moved: np.ndarray
+    gap: np.ndarray
+    core_gap: np.ndarray
 
 
 class ContactProblem:
@@ -75,6 +58,8 @@ class ContactProblem:
         self.compliance, self.indenter, self.pose, self.friction = compliance, indenter, pose, friction
         self._rest = compliance.surface.rest[compliance.touchable]
         self._block: NearBlock | None = None
+        self._nodes = NearNodes(indenter, self._rest)
+        self._rows = NearRows(compliance, np.empty(0, int))
         self._look_near(pose.moved(reach))
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
@@ -90,12 +75,23 @@ class ContactProblem:
 
         axial_force : N; with it the indenter then moves along its own direction until it bears that force
         """
-        self._look_near(pose)
+        self._look_near(pose, start)
         return self._walk(pose, axial_force, start)
 
-    def _look_near(self, pose: Pose) -> None:
-        gap, _ = pose.distance(self.indenter, self._rest)
-        self.near = np.flatnonzero(gap < _REACH)
+    def _look_near(self, pose: Pose, start: Contact | None = None) -> None:
+        """Follow the nodes that the indenter may reach at a pose, and those that ``start`` touched."""
+        wanted = self._nodes.within(pose, _REACH)
+        touched = np.empty(0, int) if start is None else start.nodes
+        if len(self.near) > _LARGE * len(wanted) or not (
+            _among(wanted, self.near).all() and _among(touched, self.near).all()
+        ):
+            near = wanted if start is None else np.union1d(self._nodes.within(pose, _REACH + _SPARE), touched)
+            self._rows = NearRows(self.compliance, near)
+
+    @property
+    def near(self) -> np.ndarray:
+        """(n,) sorted touchable indices of the nodes that are followed."""
+        return self._rows.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
         """Solve in one step, or where that does not settle by a detour."""
@@ -119,25 +115,33 @@ class ContactProblem:
 
     def _solve(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
         before = start or self._nothing(self.pose)
-        moved = before.displacement[self.compliance.touchable[self.near]].astype(float)
+        moved = self._moved(before)
         gap, _ = pose.distance(self.indenter, self._rest[self.near] + moved)
-        touched = np.isin(self.near, before.nodes)
+        touched = np.zeros(len(gap), bool)
+        touched[np.searchsorted(self.near, before.nodes)] = True
+        touched &= gap < _REACH
         take = (gap < _way_in(before, axial_force)) | touched
         if not take.any():
             return self._nothing(pose, converged=axial_force is None)
         active = touched[take] | (gap[take] < min(_LIKELY * gap.min(), 0))
         far = 0.1e-3 + float(np.linalg.norm(pose.apex - before.pose.apex))
-        landed = moved[take] + landing(self.indenter, pose, self._rest[self.near[take]] + moved[take], far)
+        landed, inside = moved[take], gap[take] < -_CLOSED
+        if inside.any():
+            landed[inside] += landing(self.indenter, pose, self._rest[self.near[take][inside]] + landed[inside], far)
         candidates = Candidates(
             self.near[take], landed, np.zeros_like(landed), active, before.core_nodes, np.zeros(len(active), bool)
         )
-        return self._rounds(pose, axial_force, before, candidates)
+        return self._rounds(pose, axial_force, before, moved, candidates)
 
-    def _rounds(self, pose: Pose, axial_force: float | None, before: Contact, candidates: Candidates) -> Contact:
+    def _moved(self, contact: Contact) -> np.ndarray:
+        """Displacement (n, 3) m of the near nodes in a contact."""
+        return self._rows.moved(contact.nodes, contact.nodal_force, contact.core_nodes, contact.core_force)
+
+    def _rounds(self, pose: Pose, axial_force: float | None, before: Contact, moved, candidates: Candidates) -> Contact:  # noqa: ANN001
         """Solve, look at the whole surface, take in what it shows, until nothing more is found."""
         iterations, shift, contact = 0, 0.0, None
         for _ in range(_MOST_ROUNDS):
-            state = self._iterate(pose, axial_force, before, candidates, shift)
+            state = self._iterate(pose, axial_force, before, moved, candidates, shift)
             if state is None:
                 return self._nothing(pose, iterations=iterations + 1, converged=False)
             iterations, shift = iterations + state.iterations, state.shift
@@ -146,17 +150,17 @@ class ContactProblem:
             if state.creases is not None:
                 candidates.split(*state.creases, self.indenter, there, rest)
                 continue
-            contact = self._result(there, state, candidates, iterations)
-            if not state.settled or not self._take_in(candidates, state, contact):
+            contact, around = self._result(there, state, candidates, iterations)
+            if not state.settled or not self._take_in(candidates, around):
                 return contact
         return dataclasses.replace(contact, converged=False)
 
-    def _iterate(self, pose, axial_force, before, candidates, shift) -> Try | None:  # noqa: ANN001
+    def _iterate(self, pose, axial_force, before, moved, candidates, shift) -> Try | None:  # noqa: ANN001
         block = self._block
         if block is None or not (
             np.array_equal(block.nodes, candidates.nodes) and np.array_equal(block.inner, candidates.inner)
         ):
-            block = self._block = NearBlock(self.compliance, candidates.nodes, candidates.inner)
+            block = self._block = NearBlock(self.compliance, candidates.nodes, candidates.inner, self._rows)
         rest = self._rest[candidates.nodes]
         active = np.r_[candidates.active, np.ones(block.c, bool)]
         begin = Try(candidates.displacement, np.zeros_like(rest), np.zeros(block.c), shift, active)
@@ -165,69 +169,69 @@ class ContactProblem:
             solver = Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
         else:
             begin.force, begin.slipping = _borne(before, candidates.nodes)
-            spots = self._spots(before, pose, candidates.nodes)
+            spots = self._spots(before, moved, pose, candidates.nodes)
             solver = Frictional(block, rest, core_gap, self.indenter, pose, spots, self.friction)
         try:
             return solver.solve(begin, axial_force)
         except UnsolvedError:
             return None
 
-    def _spots(self, before: Contact, pose: Pose, nodes: np.ndarray) -> np.ndarray:
+    def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
         """Where nodes (k,) stick on the indenter, (k, 3) m in its frame: where they were, or where they meet it."""
-        points = self._rest[nodes] + before.displacement[self.compliance.touchable[nodes]]
-        spots, new = before.pose.to_own(points), np.isin(nodes, before.nodes, invert=True)
-        spots[new] = meeting(self.indenter, spots[new], pose.to_own(points[new]))
+        points = self._rest[nodes] + moved[np.searchsorted(self.near, nodes)]
+        spots, new = before.pose.to_own(points), ~_among(nodes, before.nodes)
+        if pose is not before.pose:
+            spots[new] = meeting(self.indenter, spots[new], pose.to_own(points[new]))
         return spots
 
-    def _take_in(self, candidates: Candidates, state: Try, contact: Contact) -> bool:
+    def _take_in(self, candidates: Candidates, around: _Around) -> bool:
         """Let the nodes enter that the solved contact lets through the indenter or the core; whether there are any."""
-        outside = np.setdiff1d(self.near, candidates.nodes, assume_unique=False)
-        moved = contact.displacement[self.compliance.touchable[outside]].astype(float)
-        gap, _ = contact.pose.distance(self.indenter, self._rest[outside] + moved)
-        found = gap.min(initial=0.0) < -_CLOSED
+        outside = np.ones(len(self.near), bool)
+        outside[np.searchsorted(self.near, candidates.nodes)] = False
+        found = bool(around.gap[outside].min(initial=0.0) < -_CLOSED)
         if found:
-            new = gap < _TAKE_IN
-            candidates.add(outside[new], moved[new], np.zeros_like(moved[new]))
-        if len(self.compliance.watch_gap):
-            core = watched_gaps(self.compliance, contact)[self.compliance.feet :]
-            if core.min() < -_CLOSED:
-                close = self.compliance.feet + np.flatnonzero(core < _CORE_TAKE_IN)
-                inner = np.union1d(candidates.inner, close)
-                found |= len(inner) > len(candidates.inner)
-                candidates.inner = inner
-        return bool(found)
+            new = outside & (around.gap < _TAKE_IN)
+            candidates.add(self.near[new], around.moved[new], np.zeros((int(new.sum()), 3)))
+        if around.core_gap.min(initial=0.0) < -_CLOSED:
+            close = self.compliance.feet + np.flatnonzero(around.core_gap < _CORE_TAKE_IN)
+            inner = np.union1d(candidates.inner, close)
+            found |= len(inner) > len(candidates.inner)
+            candidates.inner = inner
+        return found
 
     def _nothing(self, pose: Pose, *, converged: bool = True, iterations: int = 0) -> Contact:
         """No contact, or one that was not found."""
-        still = np.zeros((len(self.compliance.surface.rest), 3), np.float32)
         none, depth = np.empty(0, int), float((pose.apex - self.pose.apex) @ pose.direction)
         return Contact(
-            pose, depth, np.zeros(3), 0.0, none, np.zeros((0, 3)), np.zeros(0, bool), converged, iterations, still,
-            none, np.zeros(0), 0.0, 0.0,
+            self.compliance, pose, depth, np.zeros(3), 0.0, none, np.zeros((0, 3)), np.zeros(0, bool), converged,
+            iterations, none, np.zeros(0), 0.0, 0.0,
         )  # fmt: skip
 
-    def _result(self, pose: Pose, state: Try, candidates: Candidates, iterations: int) -> Contact:
-        nodes, first, merged = np.unique(candidates.nodes, return_index=True, return_inverse=True)
-        force, slipping = np.zeros((len(nodes), 3)), state.slipping[first]
-        np.add.at(force, merged, state.force)
-        carries, presses = force.any(axis=1), state.core_force > 0
-        nodes, force, slipping = nodes[carries], force[carries], slipping[carries]
+    def _result(self, pose: Pose, state: Try, candidates: Candidates, iterations: int) -> tuple[Contact, _Around]:
+        nodes, force, slipping = _single(candidates.nodes, state)
+        presses = state.core_force > 0
         inner, inner_force = candidates.inner[presses], state.core_force[presses]
-        displacement = surface_answer.displacement(self.compliance, nodes, force, inner, inner_force)
+        moved = self._rows.moved(nodes, force, inner, inner_force)
+        gap, normal = pose.distance(self.indenter, self._rest[self.near] + moved)
+        core = surface_answer.watched_gaps(self.compliance, nodes, force, inner, inner_force)[self.compliance.feet :]
+        penetration = max(-float(gap.min(initial=0.0)), -float(core.min(initial=0.0)))
         total = force.sum(axis=0)
-        placed = self._rest[self.near] + displacement[self.compliance.touchable[self.near]]
-        gap, normal = pose.distance(self.indenter, placed)
-        at = np.searchsorted(self.near, nodes)
         contact = Contact(
-            pose, float((pose.apex - self.pose.apex) @ pose.direction), total, float(total @ pose.direction),
-            nodes, force, slipping, state.settled, iterations, displacement, inner, inner_force,
-            0.0, _sideways(force, normal[at]),
+            self.compliance, pose, float((pose.apex - self.pose.apex) @ pose.direction), total,
+            float(total @ pose.direction), nodes, force, slipping, state.settled and penetration <= PENETRATION,
+            iterations, inner, inner_force, penetration, _sideways(force, normal[np.searchsorted(self.near, nodes)]),
         )  # fmt: skip
-        core = watched_gaps(self.compliance, contact)[self.compliance.feet :]
-        penetration = max(-gap.min(initial=0.0), -core.min(initial=0.0))
-        return dataclasses.replace(
-            contact, penetration=float(penetration), converged=bool(state.settled and penetration <= PENETRATION)
-        )
+        return contact, _Around(moved, gap, core)
+
+
+def _single(nodes: np.ndarray, state: Try) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes (k,) that carry force, each once, their forces (k, 3) N, and whether they slip (k,)."""
+    force, slipping = state.force, state.slipping
+    first = np.flatnonzero(np.diff(nodes, prepend=-1))
+    if len(first) < len(nodes):
+        nodes, force, slipping = nodes[first], np.add.reduceat(force, first), slipping[first]
+    carries = force.any(axis=1)
+    return nodes[carries], force[carries], slipping[carries]
 
 
 def _way_in(before: Contact, axial_force: float | None) -> float:
@@ -240,10 +244,17 @@ def _way_in(before: Contact, axial_force: float | None) -> float:
 def _borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces (k, 3) N that nodes (k,) bore in a contact, and which of them slipped (k,)."""
     force, slipping = np.zeros((len(nodes), 3)), np.zeros(len(nodes), bool)
-    same = np.isin(nodes, before.nodes)
+    same = _among(nodes, before.nodes)
     at = np.searchsorted(before.nodes, nodes[same])
     force[same], slipping[same] = before.nodal_force[at], before.slipping[at]
     return force, slipping
+
+
+def _among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Which of the nodes (k,) are among sorted others (j,): (k,) bool; a few times quicker than ``np.isin``."""
+    if not len(others):
+        return np.zeros(len(nodes), bool)
+    return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes
 
 
 def _sideways(force: np.ndarray, normal: np.ndarray) -> float:

@@ -151,15 +151,15 @@ def grid_places() -> np.ndarray:
 
 def spread_field(sensor: str, at: Frame, field: np.ndarray) -> np.ndarray:
     """A field on the grid (g, 3), at all nodes of a sensor (n, 3), in the sensor's axes: bilinear, 0 beyond."""
-    place = np.arcsinh((plane(sensor) - at.centre) / at.radius) / np.arcsinh(REACH)
-    inside = np.flatnonzero((np.abs(place) < 1).all(axis=1))
-    position = (place[inside] + 1) * ((LINES - 1) / 2)
+    place = (plane(sensor) - at.centre) / at.radius
+    inside = np.flatnonzero((np.abs(place) < REACH).all(axis=1))
+    position = (np.arcsinh(place[inside]) / np.arcsinh(REACH) + 1) * ((LINES - 1) / 2)
     cell = np.minimum(position.astype(int), LINES - 2)
-    u, v = (position - cell).T
-    grid = field.reshape(LINES, LINES, 3)
-    i, j = cell.T
-    local = ((1 - u) * (1 - v))[:, None] * grid[i, j] + (u * (1 - v))[:, None] * grid[i + 1, j]
-    local += ((1 - u) * v)[:, None] * grid[i, j + 1] + (u * v)[:, None] * grid[i + 1, j + 1]
+    u, v = (position - cell).T[:, :, None]
+    corner = cell[:, 0] * LINES + cell[:, 1]
+    grid = field.reshape(-1, 3)
+    local = (1 - v) * ((1 - u) * grid.take(corner, axis=0) + u * grid.take(corner + LINES, axis=0))
+    local += v * ((1 - u) * grid.take(corner + 1, axis=0) + u * grid.take(corner + LINES + 1, axis=0))
     moved = np.zeros((len(place), 3))
     moved[inside] = np.einsum("kij,kj->ki", node_frames(sensor)[inside], local)
     return moved

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..indenters import Indenter, Pose
 from .frictionless import FORCE_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pace, Try
-from .mirrored_halves import axes_of
 from .near_block import NearBlock
+from .node_vectors import dot, size
 from .stick_slip import LEAST_FORCE, Slipping, Step
 
 SLIP_TOLERANCE = 0.05e-6  # m, motion of a sticking node that counts as none: a quarter of the gaps' tolerance
@@ -42,7 +42,7 @@ class _Seen:
     """What guessed forces do, linearised about a place (k, 3) m: gaps (k,) m at nodes and (c,) m at the core.
 
     normal, lean : (k, 3), of the indenter and of slipping nodes' friction; slip : (k, 3) m, from the spots
-    moves : (k, 3) m, from the place; bend : (k, 3, 3) 1/m, see ``Slipping``
+    moves : (k, 3) m, from the place; bend : (s, 3, 3) 1/m, of the slipping nodes, see ``Slipping``
     """
 
     normal: np.ndarray
@@ -72,14 +72,17 @@ class Frictional:
         guess = _Guess(begin.force, begin.core_force, begin.active, begin.slipping, begin.shift)
         state, place, pace, k = begin, begin.displacement, Pace(), self.block.k
         there, calm, left = self.pose.moved(guess.shift), False, np.zeros(k, bool)
-        gap, normal = there.distance(self.indenter, self.rest + place)
+        points = self.rest + place
+        (gap, normal), off = there.distance(self.indenter, points), self._off(points, there)
         for iteration in range(1, MAX_ITERATIONS + 1):
-            seen = self._seen(guess, place, there, gap, normal, curved=calm)
+            seen = self._seen(guess, place, off, there, gap, normal, curved=calm)
             guess = self._step(guess, seen, axial_force)
-            there = self.pose.moved(guess.shift)
+            if axial_force is not None:
+                there = self.pose.moved(guess.shift)
             displacement, core_moved = self.block.respond(guess.force, guess.core)
-            gap, turned = there.distance(self.indenter, self.rest + displacement)
-            slip = self._slip(displacement, there, normal)
+            points = self.rest + displacement
+            (gap, turned), off = there.distance(self.indenter, points), self._off(points, there)
+            slip = _across(off, normal)
             active, slips, changed = self._sort(guess, seen, slip, gap, self.core_gap + core_moved)
             state = Try(
                 displacement, guess.force, guess.core, guess.shift, guess.active,
@@ -94,89 +97,97 @@ class Frictional:
             self._come_back(guess, back, slip, turned)
             calm = not changed and bool(np.abs(gap[active[:k]]).max(initial=0.0) < _NEARLY_CLOSED)
             trust = pace.after(gap, active[:k])
+            if trust == 1:
+                place, normal = displacement, turned
+                continue
             place = place + trust * (displacement - place)
-            gap, normal = (gap, turned) if trust == 1 else there.distance(self.indenter, self.rest + place)
+            points = self.rest + place
+            (gap, normal), off = there.distance(self.indenter, points), self._off(points, there)
         return state
 
-    def _seen(self, guess: _Guess, place, there: Pose, gap, normal, *, curved: bool) -> _Seen:  # noqa: ANN001
+    def _seen(self, guess: _Guess, place, off, there: Pose, gap, normal, *, curved: bool) -> _Seen:  # noqa: ANN001
         """What the forces do once brought within Coulomb's law at the normals (k, 3) of the place (k, 3) m."""
         k = self.block.k
         guess.force = np.where(guess.active[:k, None], guess.force, 0.0)
         guess.core = np.where(guess.active[k:], np.maximum(guess.core, 0), 0.0)
-        lean = _across(guess.force, normal)
-        size = np.linalg.norm(lean, axis=1)
-        guess.slips = guess.slips & (size > 0)
-        lean = np.where(guess.slips, 1 / np.where(size > 0, size, 1), 0.0)[:, None] * lean
-        pressing = np.maximum(_dot(guess.force, normal), 0.0)[:, None]
-        guess.force = np.where(guess.slips[:, None], pressing * (normal + self.friction * lean), guess.force)
+        lean = np.zeros((k, 3))
+        if guess.slips.any():
+            s = np.flatnonzero(guess.slips)
+            pressing = dot(guess.force[s], normal[s])
+            leans = guess.force[s] - pressing[:, None] * normal[s]
+            long = size(leans)
+            guess.slips[s[long == 0]] = False
+            s, leans = s[long > 0], leans[long > 0] / long[long > 0, None]
+            lean[s] = leans
+            guess.force[s] = np.maximum(pressing[long > 0], 0.0)[:, None] * (normal[s] + self.friction * leans)
         moved, core_moved = self.block.respond(guess.force, guess.core)
         moves = moved - place
-        slip = self._slip(place, there, normal) + _across(moves, normal)
-        bend = self._bend(guess, place, there) if curved else np.zeros((k, 3, 3))
-        return _Seen(normal, lean, slip, gap + _dot(normal, moves), self.core_gap + core_moved, moves, bend)
+        onto = dot(normal, moves)
+        slip = _across(off, normal) + moves - onto[:, None] * normal
+        bend = self._bend(guess, place, there, curved=curved)
+        return _Seen(normal, lean, slip, gap + onto, self.core_gap + core_moved, moves, bend)
 
-    def _slip(self, place: np.ndarray, there: Pose, normal: np.ndarray) -> np.ndarray:
-        """How far nodes at ``place`` (k, 3) m stand from their spots, across ``normal`` (k, 3)."""
-        return _across(self.rest + place - there.from_own(self.spots), normal)
+    def _off(self, points: np.ndarray, there: Pose) -> np.ndarray:
+        """How far points (k, 3) m stand from their spots."""
+        return points - there.from_own(self.spots)
 
-    def _bend(self, guess: _Guess, place: np.ndarray, there: Pose) -> np.ndarray:
-        """Curvatures (k, 3, 3) 1/m of the indenter at the slipping nodes that feel them most, 0 elsewhere."""
-        bend, at = np.zeros((len(place), 3, 3)), np.flatnonzero(guess.slips)
-        if not len(at):
+    def _bend(self, guess: _Guess, place: np.ndarray, there: Pose, *, curved: bool) -> np.ndarray:
+        """Curvatures (s, 3, 3) 1/m of the indenter at the slipping nodes; 0 but for those that feel them most."""
+        at = np.flatnonzero(guess.slips)
+        bend = np.zeros((len(at), 3, 3))
+        if not (curved and len(at)):
             return bend
         found = there.curvature(self.indenter, self.rest[at] + place[at])
-        compliance = self.block.matrix.diagonal()[3 * at]
-        feels = np.linalg.norm(guess.force[at], axis=1) * compliance * np.linalg.norm(found, axis=(1, 2))
+        feels = size(guess.force[at]) * self.block.matrix.diagonal()[3 * at] * size(found.reshape(-1, 9))
         felt = np.argsort(-feels, kind="stable")[:_MOST_CURVED]
         felt = felt[feels[felt] > _FEELS_CURVATURE]
-        bend[at[felt]] = found[felt]
+        bend[felt] = found[felt]
         return bend
 
     def _step(self, guess: _Guess, seen: _Seen, axial_force: float | None) -> _Guess:
         """The forces with which linearised gaps close and sticking nodes stay, among what touches and slips now."""
         k, direction = self.block.k, self.pose.direction
         at, core_at = np.flatnonzero(guess.active[:k]), np.flatnonzero(guess.active[k:])
-        away = (seen.slip + seen.gap[:, None] * seen.normal)[at]
         number = np.flatnonzero(guess.slips[at])
         s = at[number]
         slipping = Slipping(
-            number, seen.normal[s], seen.lean[s], _dot(guess.force[s], seen.normal[s]), seen.slip[s], seen.moves[s],
-            seen.bend[s], self.friction,
+            number, seen.normal[s], seen.lean[s], dot(guess.force[s], seen.normal[s]), seen.slip[s], seen.moves[s],
+            seen.bend, self.friction,
         )  # fmt: skip
-        solved, step = Step(
-            self.block.matrix, np.concatenate([axes_of(at), 3 * k + core_at]),
-            np.concatenate([away.ravel(), seen.core_gap[core_at]]),
-            np.concatenate([np.tile(direction, len(at)), np.zeros(len(core_at))]), slipping,
-        ), 0.0  # fmt: skip
+        away = seen.slip[at] + seen.gap[at, None] * seen.normal[at]
+        solved = Step(self.block.matrix, at, 3 * k + core_at, away, seen.core_gap[core_at], direction, slipping)
+        step = 0.0
         if axial_force is not None:
-            step = solved.step_for(axial_force - float((guess.force @ direction).sum()))
-            step = float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
-        change, of_slipping = solved.change(step)
+            step = solved.step_for(axial_force - float(guess.force.sum(axis=0) @ direction))
+            step = min(max(step, -_LARGEST_STEP), _LARGEST_STEP)
+        change, core_change, of_slipping = solved.change(step)
         force, core = guess.force.copy(), guess.core.copy()
-        force[at] += change[: 3 * len(at)].reshape(-1, 3)
+        force[at[solved.sticks]] += change
         force[s] = of_slipping
-        core[core_at] += change[3 * len(at) :]
+        core[core_at] += core_change
         return _Guess(force, core, guess.active, guess.slips, guess.shift + step)
 
     def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap):  # noqa: ANN001, ANN202
         """Which points (k + c,) touch and which nodes (k,) slip after a step, and whether that is another answer."""
         k = len(gap)
-        pressing = _dot(guess.force, seen.normal)
+        pressing = dot(guess.force, seen.normal)
         opening = np.concatenate([gap, core_gap])
         active = np.where(guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -_GAP_NOISE)
         held = active[:k] & guess.active[:k]
-        over = np.linalg.norm(_across(guess.force, seen.normal), axis=1) > (
+        over = size(guess.force - pressing[:, None] * seen.normal) > (
             self.friction * pressing * (1 + _BEYOND) + LEAST_FORCE
         )
-        slips = held & np.where(guess.slips, _dot(slip, seen.lean) <= SLIP_TOLERANCE, over)
+        slips = held & np.where(guess.slips, dot(slip, seen.lean) <= SLIP_TOLERANCE, over)
         wrong = (guess.active & ~active).any() or (opening[~guess.active] < -GAP_TOLERANCE).any()
         return active, slips, bool(wrong or (slips != guess.slips)[held].any())
 
     def _come_back(self, guess: _Guess, back: np.ndarray, slip: np.ndarray, normal: np.ndarray) -> None:
         """Let nodes (k,) bool that touch again slip: sticking drew them off the indenter before."""
-        size = np.linalg.norm(slip, axis=1)
-        back = back & (size > 0)
-        guess.force[back] = LEAST_FORCE * (normal[back] - self.friction * slip[back] / size[back, None])
+        if not back.any():
+            return
+        far = size(slip)
+        back = back & (far > 0)
+        guess.force[back] = LEAST_FORCE * (normal[back] - self.friction * slip[back] / far[back, None])
         guess.slips = guess.slips | back
 
     def _settled(self, state: Try, gap, slip, turned, normal, axial_force) -> bool:  # noqa: ANN001
@@ -186,20 +197,16 @@ class Frictional:
         if gap.min() < -GAP_TOLERANCE or np.abs(gap[active]).max() > GAP_TOLERANCE:
             return False
         lean = np.where(state.slipping[:, None], _across(state.force, normal), 0.0)
-        lean /= np.maximum(np.linalg.norm(lean, axis=1, keepdims=True), 1e-30)
-        if np.linalg.norm(slip - _dot(slip, lean)[:, None] * lean, axis=1)[active].max() > SLIP_TOLERANCE:
+        lean /= np.maximum(size(lean), 1e-30)[:, None]
+        if size(slip - dot(slip, lean)[:, None] * lean)[active].max() > SLIP_TOLERANCE:
             return False
-        size = np.linalg.norm(state.force.sum(0))
-        if np.linalg.norm((turned - normal) * np.linalg.norm(state.force, axis=1)[:, None]) > SIDEWAYS_TOLERANCE * size:
+        whole = np.linalg.norm(state.force.sum(axis=0))
+        if np.linalg.norm((turned - normal) * size(state.force)[:, None]) > SIDEWAYS_TOLERANCE * whole:
             return False
         axial = float(state.force.sum(0) @ self.pose.direction)
         return axial_force is None or abs(axial - axial_force) <= FORCE_TOLERANCE * abs(axial_force)
 
 
-def _dot(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    return np.einsum("ai,ai->a", left, right)
-
-
 def _across(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Vectors (k, 3) without their part along ``normal`` (k, 3)."""
-    return vectors - _dot(vectors, normal)[:, None] * normal
+    return vectors - dot(vectors, normal)[:, None] * normal

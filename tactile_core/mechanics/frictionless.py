@@ -15,6 +15,7 @@ import numpy as np
 from ..indenters import Indenter, Pose
 from .active_set import Pressing, complement
 from .near_block import NearBlock
+from .node_vectors import size, weighted
 
 GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that MECHANICS allows
 SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up
@@ -98,11 +99,15 @@ class Frictionless:
     ) -> None:  # fmt: skip
         self.block, self.rest, self.core_gap = block, rest, core_gap
         self.indenter, self.pose, self.probe, self.faced = indenter, pose, probe, faced
+        self._probes = bool(probe.any())
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
         """Gaps (k,) m and normals (k, 3); at a crease's second face measured a little toward it."""
-        points = self.rest + displacement + self.probe
-        gap, normal = self.pose.moved(shift).distance(self.indenter, points)
+        points = self.rest + displacement
+        there = self.pose.moved(shift) if shift else self.pose
+        if not self._probes:
+            return there.distance(self.indenter, points)
+        gap, normal = there.distance(self.indenter, points + self.probe)
         return gap - np.einsum("ai,ai->a", self.probe, normal), normal
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
@@ -148,17 +153,17 @@ class Frictionless:
     def _offset(self, gap, normal, place, model, solved) -> np.ndarray:  # noqa: ANN001
         """Gaps without any forces; with a model of older normals only the change of the forces is left to it."""
         if solved is None or model.normal is normal:
-            return np.r_[gap - np.einsum("ai,ai->a", normal, place), self.core_gap]
+            return np.concatenate([gap - np.einsum("ai,ai->a", normal, place), self.core_gap])
         k = self.block.k
         moved, core = self.block.respond(solved.pressing[:k, None] * normal, solved.pressing[k:])
-        now = np.r_[gap + np.einsum("ai,ai->a", normal, moved - place), self.core_gap + core]
+        now = np.concatenate([gap + np.einsum("ai,ai->a", normal, moved - place), self.core_gap + core])
         return now - model.matrix @ solved.pressing
 
     def _complement(self, model, offset, normal, active, axial_force) -> Pressing:  # noqa: ANN001
         matrix = model.matrix
         if axial_force is None:
             return complement(matrix, offset, active, factors=model.factors)
-        along = np.r_[normal @ self.pose.direction, np.zeros(self.block.c)]
+        along = np.concatenate([normal @ self.pose.direction, np.zeros(self.block.c)])
         solved = complement(matrix, offset, active, along, along, axial_force, factors=model.factors)
         if abs(solved.step) <= _LARGEST_STEP:
             return solved
@@ -193,7 +198,7 @@ class Frictionless:
         touching = active[active < self.block.k]
         bend = self.pose.moved(shift).curvature(self.indenter, place[touching])
         feels = solved.pressing[touching] * matrix.diagonal()[touching]
-        most = feels * np.linalg.norm(bend, axis=(1, 2))
+        most = feels * size(bend.reshape(-1, 9))
         if most.max(initial=0.0) < threshold:
             return None
         felt = np.sort(np.argsort(-most, kind="stable")[:_MOST_CURVED])
@@ -206,16 +211,12 @@ class Frictionless:
             return None
         nodes, root = touching[felt[chosen // 3]], np.sqrt(weight[chosen])
         tangent = axes[chosen // 3, :, chosen % 3] * root[:, None]
-        rows = self.block.matrix[(3 * nodes[:, None] + np.arange(3)).ravel()].reshape(len(nodes), 3, -1)
-        moved = (tangent.astype(np.float32)[:, None, :] @ rows)[:, 0]
+        three = 3 * nodes + np.arange(3)[:, None]
+        moved = weighted(self.block.matrix.take(three, axis=0), tangent.T[:, :, None])
         on_surface = moved[:, : 3 * self.block.k].reshape(len(nodes), self.block.k, 3)
-        onto_gaps = np.concatenate(
-            [
-                np.einsum("qbi,bi->qb", on_surface[:, touching], normal[touching]),
-                moved[:, 3 * self.block.k :][:, active[len(touching) :] - self.block.k],
-            ],
-            axis=1,
-        )
+        onto_gaps = np.einsum("qbi,bi->qb", on_surface, normal).take(touching, axis=1)
+        if self.block.c:
+            onto_gaps = np.concatenate([onto_gaps, moved[:, active[len(touching) :] + 2 * self.block.k]], axis=1)
         relief, _ = lapack.dpotrs(solved.factor, onto_gaps.T, lower=1)
         among = np.einsum("qri,ri->qr", on_surface[:, nodes], tangent) - onto_gaps @ relief
         mode, shape = np.linalg.eigh((among + among.T) / 2)
@@ -236,8 +237,8 @@ class Frictionless:
         if gap.min() < -GAP_TOLERANCE or np.abs(gap[active]).max() > GAP_TOLERANCE:
             return False
         pressing = np.einsum("ai,ai->a", state.force, normal)
-        size = np.linalg.norm(state.force.sum(0))
-        if np.linalg.norm(state.force - pressing[:, None] * normal) > SIDEWAYS_TOLERANCE * size:
+        whole = np.linalg.norm(state.force.sum(0))
+        if np.linalg.norm(state.force - pressing[:, None] * normal) > SIDEWAYS_TOLERANCE * whole:
             return False
         if pressing.min() < 0 or state.core_force.min(initial=0.0) < 0:
             return False

@@ -6,7 +6,9 @@ import numpy as np
 
 from ..indenters import Indenter, Pose
 
+_LANDED = 1e-8  # m, at which a point has landed
 _TRACE_STEPS = 6  # of sphere tracing: the start of an iteration needs no more
+_MET = 1e-10  # m, at which a point has met the indenter
 _SPOT_STEPS = 20  # where a node sticks matters, so its spot is found to well below a micrometre
 
 
@@ -17,10 +19,13 @@ def landing(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
     far : m, how deep points may lie in the indenter. Points that lie in front of it already stay.
     """
     direction = pose.direction
-    travel = np.full(len(points), far)
+    travel, on_way = np.full(len(points), far), np.arange(len(points))
     for _ in range(_TRACE_STEPS):
-        gap, _ = pose.distance(indenter, points + travel[:, None] * direction)
-        travel -= np.maximum(gap, 0)
+        gap, _ = pose.distance(indenter, points[on_way] + travel[on_way, None] * direction)
+        travel[on_way] -= np.maximum(gap, 0)
+        on_way = on_way[(gap > _LANDED) & (travel[on_way] > 0)]
+        if not len(on_way):
+            break
     return np.maximum(travel, 0)[:, None] * direction
 
 
@@ -31,8 +36,11 @@ def meeting(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarr
     """
     way = last - first
     length = np.maximum(np.linalg.norm(way, axis=1), 1e-12)
-    share = np.zeros(len(first))
+    share, on_way = np.zeros(len(first)), np.arange(len(first))
     for _ in range(_SPOT_STEPS):
-        gap, _ = indenter.distance(first + share[:, None] * way)
-        share = np.minimum(share + np.maximum(gap, 0) / length, 1)
+        gap, _ = indenter.distance(first[on_way] + share[on_way, None] * way[on_way])
+        share[on_way] = np.minimum(share[on_way] + np.maximum(gap, 0) / length[on_way], 1)
+        on_way = on_way[(gap > _MET) & (share[on_way] < 1)]
+        if not len(on_way):
+            break
     return first + share[:, None] * way

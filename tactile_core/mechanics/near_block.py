@@ -1,4 +1,4 @@
-"""The compliance among the nodes near an indenter, gathered once from the large matrix of a whole sensor."""
+"""The compliance among the nodes that enter a contact's solve."""
 
 from __future__ import annotations
 
@@ -6,37 +6,32 @@ import numpy as np
 
 from .compliance import Compliance
 from .mirrored_halves import axes_of
+from .near_rows import NearRows
 
 # Relative stiffness added to each node: 1e-6 moves a gap by nanometres and keeps single precision definite, also where
 # one node presses two faces of a concave corner.
 _RIDGE = 1e-6
 
 
-def runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """Stretches of consecutive numbers in sorted ``indices``: (start, stop) there, and first and last + 1 number."""
-    cuts = np.flatnonzero(np.diff(indices) != 1) + 1
-    starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
-    return list(
-        zip(starts.tolist(), stops.tolist(), indices[starts].tolist(), (indices[stops - 1] + 1).tolist(), strict=True)
-    )
-
-
 class NearBlock:
     """Compliance of k surface nodes (three axes) and c points of the inner skin that may press on the core.
 
     nodes : (k,) sorted touchable indices, twice where a node touches two faces; inner : (c,) sorted watched points
+    rows : the entries of nodes near them, where they are already at hand
     matrix : (3 k + c, 3 k + c) float32, m/N: surface axes first
     """
 
-    def __init__(self, compliance: Compliance, nodes: np.ndarray, inner: np.ndarray) -> None:
+    def __init__(
+        self, compliance: Compliance, nodes: np.ndarray, inner: np.ndarray, rows: NearRows | None = None
+    ) -> None:
         self.nodes, self.inner = nodes, inner
         self.k, self.c = len(nodes), len(inner)
         size = 3 * self.k
-        self.matrix = np.empty((size + self.c, size + self.c), np.float32)
-        self.matrix[:size, :size] = _surface_block(compliance, nodes)
+        surface = (rows or NearRows(compliance, np.unique(nodes))).block(nodes)
+        self.matrix = surface if not self.c else np.empty((size + self.c, size + self.c), np.float32)
         if self.c:
-            rows = axes_of(nodes)
-            self.matrix[:size, size:] = compliance.watch[rows].take(inner, axis=1)
+            self.matrix[:size, :size] = surface
+            self.matrix[:size, size:] = compliance.watch[axes_of(nodes)].take(inner, axis=1)
             self.matrix[size:, :size] = self.matrix[:size, size:].T
             self.matrix[size:, size:] = compliance.inner_watch[np.ix_(inner, inner)]
 
@@ -75,33 +70,6 @@ class NearBlock:
             side = np.einsum("aic,ai->ac", rows[:, size:].reshape(len(at), 3, self.c), normals[at])
             matrix[at, k:], matrix[k:, at] = side, side.T
         return matrix
-
-
-def _surface_block(compliance: Compliance, nodes: np.ndarray) -> np.ndarray:
-    """Compliance (3 k, 3 k) float32 m/N among touchable nodes; half of them by mirror images."""
-    rows, mirror, image = compliance.answers
-    row, mirrored = rows[nodes], mirror[nodes]
-    at = compliance.touchable[nodes]
-    if not mirrored.any():
-        return _rows(compliance.move, row, axes_of(at))
-    there = image[at]
-    block = np.empty((3 * len(nodes), 3 * len(nodes)), np.float32)
-    direct, turned = np.flatnonzero(~mirrored), np.flatnonzero(mirrored)
-    turned = turned[np.argsort(row[turned], kind="stable")]
-    block[axes_of(direct)] = _rows(compliance.move, row[direct], axes_of(at))
-    answer = _rows(compliance.move, row[turned], axes_of(there))
-    answer[:, 2::3] *= -1
-    answer[2::3] *= -1
-    block[axes_of(turned)] = answer
-    return block
-
-
-def _rows(move: np.ndarray, row: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Entries of three rows each for sorted ``row`` (k,) in ``columns`` (j,): (3 k, j)."""
-    answer = np.empty((3 * len(row), len(columns)), np.float32)
-    for start, stop, first, last in runs(row) if len(row) else ():
-        move[3 * first : 3 * last].take(columns, axis=1, out=answer[3 * start : 3 * stop], mode="clip")
-    return answer
 
 
 def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -13,6 +13,8 @@ import functools
 import numpy as np
 
 from .active_set import UnsolvedError
+from .mirrored_halves import axes_of
+from .node_vectors import cross, dot, size, weighted
 
 _RIDGE = 1e-6  # relative, of the compliance: keeps single precision definite
 _LARGEST_TURN = 1.0  # rad, of a slipping node's friction in one step
@@ -41,7 +43,7 @@ class Slipping:
     @functools.cached_property
     def across(self) -> np.ndarray:
         """(s, 3), unit vectors across the normal and friction."""
-        return np.cross(self.normal, self.lean)
+        return cross(self.normal, self.lean)
 
     @functools.cached_property
     def limit(self) -> np.ndarray:
@@ -61,36 +63,51 @@ class Slipping:
 
     def forces(self, pressing: np.ndarray, turn: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Forces (s, 3) N after a turn (s,) of friction and motion (c, 3) m of the curved nodes."""
-        turn = np.clip(turn, -_LARGEST_TURN, _LARGEST_TURN)[:, None]
-        normal, lean = self.normal.copy(), np.cos(turn) * self.lean + np.sin(turn) * self.across
-        tilt = np.einsum("aij,aj->ai", self.bend[self.curved], motion)
-        size = np.linalg.norm(tilt, axis=1, keepdims=True)
-        normal[self.curved] += tilt * np.minimum(1, _LARGEST_TILT / np.maximum(size, 1e-12))
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        lean -= np.einsum("ai,ai->a", lean, normal)[:, None] * normal
-        lean /= np.linalg.norm(lean, axis=1, keepdims=True)
+        turn = np.minimum(np.maximum(turn, -_LARGEST_TURN), _LARGEST_TURN)[:, None]
+        normal, lean = self.normal, np.cos(turn) * self.lean + np.sin(turn) * self.across
+        if len(self.curved):
+            tilt = (self.bend[self.curved] @ motion[:, :, None])[:, :, 0]
+            normal = normal.copy()
+            normal[self.curved] += tilt * np.minimum(1, _LARGEST_TILT / np.maximum(size(tilt), 1e-12))[:, None]
+            normal /= size(normal)[:, None]
+            lean -= dot(lean, normal)[:, None] * normal
+            lean /= size(lean)[:, None]
         return pressing[:, None] * (normal + self.friction * lean)
 
 
 class Step:
-    """The solved system of points ``index`` (m,) of a compliance: three axes of each touching node, then the core.
+    """The solved system of a block's touching points: ``at`` (a,) nodes, and ``core`` (d,) rows of its matrix.
 
-    away : (m,) m, by which nodes stand off their spots and gaps are open; along : (m,), how the indenter moves
-    Raises UnsolvedError.
+    compliance : (m, m) float32 m/N, of the block
+    away : (a, 3) m, by which nodes stand off their spots and gaps are open; core_gap : (d,) m
+    direction : (3,), in which the indenter moves
+    sticks : (a,) bool, the nodes that do not slip
+    Unknown are the forces of the t sticking nodes (3 t), those of the core (d), the normal forces of slipping nodes (s)
+    and the turn of their friction (s), and the motion of curved ones. Raises UnsolvedError.
     """
 
     def __init__(
-        self, compliance: np.ndarray, index: np.ndarray, away: np.ndarray, along: np.ndarray, slipping: Slipping
-    ) -> None:
-        self._slipping, self._three = slipping, 3 * slipping.at[:, None] + np.arange(3)
-        self._kept = np.ones(len(index), bool)
-        self._kept[self._three[:, 2]] = False
+        self, compliance: np.ndarray, at: np.ndarray, core: np.ndarray, away: np.ndarray, core_gap: np.ndarray,
+        direction: np.ndarray, slipping: Slipping,
+    ) -> None:  # fmt: skip
+        self._slipping, self._direction = slipping, direction
+        self.sticks = np.ones(len(at), bool)
+        self.sticks[slipping.at] = False
+        stuck, slips = at[self.sticks], 3 * at[slipping.at]
+        self._stuck, self._whole, s = 3 * len(stuck), 3 * len(stuck) + len(core), len(slips)
+        index = np.concatenate([axes_of(stuck), core, slips, slips + 1, slips + 2])
         matrix = compliance.take(index, 0).take(index, 1)
-        matrix.flat[:: len(index) + 1] *= 1 + _RIDGE
-        right, self._carry = np.column_stack([-away, along]), along
-        if len(slipping.at):
-            matrix, right, self._carry = self._reduced(matrix, right, along)
-        self._answer = _solved(matrix, right, symmetric=not len(slipping.at))
+        matrix.reshape(-1)[:: len(index) + 1] *= 1 + _RIDGE
+        right = np.zeros((len(index), 2))
+        right[: self._stuck, 0] = -away[self.sticks].ravel()
+        right[: self._stuck, 1].reshape(-1, 3)[:] = direction
+        right[self._stuck : self._whole, 0] = -core_gap
+        right[self._whole :, 0].reshape(3, s)[:] = -away[slipping.at].T
+        right[self._whole :, 1].reshape(3, s)[:] = direction[:, None]
+        self._carry = right[:, 1]
+        if s:
+            matrix, right, self._carry = self._reduced(matrix, right)
+        self._answer = _solved(matrix, right, symmetric=not s)
 
     def step_for(self, missing: float) -> float:
         """By how far, m, the indenter moves for ``missing`` N more along its motion. Raises UnsolvedError."""
@@ -99,47 +116,63 @@ class Step:
             raise UnsolvedError("no node can carry the force")
         return float((missing - carried) / per_step)
 
-    def change(self, step: float) -> tuple[np.ndarray, np.ndarray]:
-        """Change (m,) N of forces as the indenter moves by ``step`` m, and new forces (s, 3) N of slipping nodes."""
+    def change(self, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Changes of the forces of sticking nodes (t, 3) N and of the core (d,) N as the indenter moves by ``step`` m,
+        and new forces (s, 3) N of slipping nodes."""
         found = self._answer[:, 0] + step * self._answer[:, 1]
-        count, change = int(self._kept.sum()), np.zeros(len(self._kept))
-        change[self._kept] = found[:count]
-        slipping, parts = self._slipping, change[self._three[:, :2]]
-        pressing = slipping.pressing + parts[:, 0]
-        return change, slipping.forces(pressing, parts[:, 1] / slipping.limit, found[count:].reshape(-1, 3))
+        slipping = self._slipping
+        pressing, turn, motion = np.split(found[self._whole :], [len(slipping.at), 2 * len(slipping.at)])
+        forces = slipping.forces(slipping.pressing + pressing, turn / slipping.limit, motion.reshape(-1, 3))
+        return found[: self._stuck].reshape(-1, 3), found[self._stuck : self._whole], forces
 
-    def _reduced(self, matrix, right, along):  # noqa: ANN001, ANN202
+    def _reduced(self, matrix: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The system in the unknowns of slipping nodes, and how these carry force along the motion."""
-        slipping, three, kept = self._slipping, self._three, self._kept
-        two, curved = three[:, :2], three[slipping.curved]
-        rows = np.stack([slipping.normal, slipping.across], axis=1)
-        columns = np.stack([slipping.normal + slipping.friction * slipping.lean, slipping.across], axis=1)
-        turning = slipping.turning()
-        felt = np.einsum("mqi,qij->mqj", matrix[:, curved], turning).reshape(len(matrix), curved.size)
-        carry = along.copy()
-        carry[two] = np.einsum("ai,aji->aj", along[three], columns)
-        carry = np.concatenate([carry[kept], np.einsum("qi,qij->qj", along[curved], turning).ravel()])
-        matrix[:, two] = np.einsum("mai,aji->maj", matrix[:, three], columns)
-        matrix = np.concatenate([matrix.take(np.flatnonzero(kept), 1), felt], axis=1)
-        below = -matrix[curved.ravel()]
-        below[np.arange(curved.size), kept.sum() + np.arange(curved.size)] += 1
-        moves = np.column_stack([slipping.moves[slipping.curved].ravel(), -along[curved.ravel()]])
-        matrix[two], right[two] = rows @ matrix[three], rows @ right[three]
-        opposing = np.maximum(-np.einsum("ai,ai->a", slipping.slip, slipping.lean), 0)
-        matrix[two[:, 1], np.cumsum(kept)[two[:, 1]] - 1] += opposing / slipping.limit
-        return np.concatenate([matrix[kept], below]), np.concatenate([right[kept], moves]), carry
+        slipping, n, s, m = self._slipping, self._whole, len(self._slipping.at), len(matrix)
+        rows, columns = np.empty((2, 3, 2, s))
+        rows[:, 0], columns[:, 0] = slipping.normal.T, (slipping.normal + slipping.friction * slipping.lean).T
+        rows[:, 1] = columns[:, 1] = slipping.across.T
+        q = 3 * len(slipping.curved)
+        total = n + 2 * s + q
+        among = np.empty((m + q, total), np.float32)  # its last rows are those of the motion
+        among[:m, :n] = matrix[:, :n]
+        on_slips = matrix[:, n:].reshape(m, 3, s).swapaxes(0, 1)
+        among[:m, n : n + 2 * s].reshape(m, 2, s)[:] = weighted(on_slips[:, :, None], columns)
+        carry = np.concatenate([right[:n, 1], self._direction @ columns.reshape(3, -1)])
+        if q:
+            self._add_motion(among, on_slips)
+            carry = np.concatenate([carry, (self._direction @ slipping.turning()).ravel()])
+        below = -among[(n + slipping.curved[:, None] + s * np.arange(3)).ravel()]
+        below.reshape(-1)[n + 2 * s :: total + 1] += 1
+        among[n : n + 2 * s].reshape(2, s, total)[:] = weighted(among[n:m].reshape(3, 1, s, total), rows[..., None])
+        among[n + 2 * s : total] = below
+        turns = n + s + np.arange(s)
+        among[turns, turns] += np.maximum(-dot(slipping.slip, slipping.lean), 0) / slipping.limit
+        reduced = np.empty((total, 2))
+        reduced[:n] = right[:n]
+        reduced[n : n + 2 * s] = (rows[..., None] * right[n:].reshape(3, 1, s, 2)).sum(axis=0).reshape(-1, 2)
+        reduced[n + 2 * s :, 0] = slipping.moves[slipping.curved].ravel()
+        reduced[n + 2 * s :, 1].reshape(-1, 3)[:] = -self._direction
+        return among[:total], reduced, carry
+
+    def _add_motion(self, among: np.ndarray, on_slips: np.ndarray) -> None:
+        """What the motion of curved nodes does, by the turn of their forces, as the last columns of ``among``."""
+        at, turning = self._slipping.curved, self._slipping.turning()
+        felt = weighted(on_slips[:, :, at, None], turning.swapaxes(0, 1)[:, None])
+        among[: on_slips.shape[1], -3 * len(at) :].reshape(-1, len(at), 3)[:] = felt
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray, *, symmetric: bool) -> np.ndarray:
-    """What solves (j, j) for ``right`` (j, 2)."""
+    """What solves (j, j) for ``right`` (j, 2); overwrites the matrix."""
     from scipy.linalg import lapack
 
     if not len(matrix):
         return right
+    # LAPACK stores by columns: what it takes for the transposed matrix needs no copy.
     if symmetric:
-        _, answer, failed = lapack.sposv(matrix, right, lower=1)
+        _, answer, failed = lapack.sposv(matrix.T, right, lower=1, overwrite_a=1)
     else:
-        _, _, answer, failed = lapack.sgesv(matrix, right)
+        factor, pivots, failed = lapack.sgetrf(matrix.T, overwrite_a=1)
+        answer = right if failed else lapack.sgetrs(factor, pivots, right, trans=1)[0]
     if failed:
         raise UnsolvedError("the compliance of the touching nodes is not positive definite")
     return answer.astype(float)

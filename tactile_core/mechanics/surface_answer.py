@@ -5,9 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from .compliance import Compliance
-from .near_block import runs
 
 _MIRROR = np.array([1.0, 1.0, -1.0])
+
+
+def runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
+    """Stretches of consecutive numbers in sorted ``indices``: (start, stop) there, and first and last + 1 number."""
+    cuts = np.flatnonzero(np.diff(indices) != 1) + 1
+    starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
+    return list(
+        zip(starts.tolist(), stops.tolist(), indices[starts].tolist(), (indices[stops - 1] + 1).tolist(), strict=True)
+    )
 
 
 def displacement(

@@ -1,0 +1,31 @@
+"""Sums over the axes of a few nodes' vectors, several times quicker than numpy's general functions on so few."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+
+
+def dot(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Products (n,) of vectors (n, 3)."""
+    return np.einsum("ai,ai->a", left, right)
+
+
+def size(vectors: np.ndarray) -> np.ndarray:
+    """Lengths (n,) of vectors (n, d)."""
+    return np.sqrt(np.einsum("ai,ai->a", vectors, vectors))
+
+
+def cross(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Cross products (n, 3)."""
+    return left[:, _NEXT] * right[:, _LAST] - left[:, _LAST] * right[:, _NEXT]
+
+
+def weighted(parts: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Sum of three ``parts`` (3, ...) by ``weights`` (3, ...) in single precision."""
+    weights = weights.astype(np.float32)
+    total = parts[0] * weights[0]
+    total += parts[1] * weights[1]
+    total += parts[2] * weights[2]
+    return total

@@ -1,0 +1,49 @@
+"""One solved contact of an indenter with a sensor's surface."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ..indenters import Pose
+from . import surface_answer
+from .compliance import Compliance
+
+
+@dataclasses.dataclass(frozen=True)
+class Contact:
+    """One solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
+
+    pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
+    force : (3,); axial_force : its part along the motion
+    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3)
+    slipping : (k,) bool, nodes whose friction is spent; without friction all
+    converged : whether it may be used; iterations : linearised problems solved for it
+    core_nodes : (c,) watched inner points that press on the core; core_force : (c,), on the skin, away from the core
+    penetration : m, deepest place of a node in the indenter or of the inner skin in the core
+    sideways : nodal forces across the indenter's normals over the whole force: 0 without friction
+    """
+
+    compliance: Compliance = dataclasses.field(repr=False)
+    pose: Pose
+    depth: float
+    force: np.ndarray
+    axial_force: float
+    nodes: np.ndarray
+    nodal_force: np.ndarray
+    slipping: np.ndarray
+    converged: bool
+    iterations: int
+    core_nodes: np.ndarray
+    core_force: np.ndarray
+    penetration: float
+    sideways: float
+
+    @functools.cached_property
+    def displacement(self) -> np.ndarray:
+        """(n, 3) float32, of the whole surface; computed where it is first asked for."""
+        return surface_answer.displacement(
+            self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
+        )
