@@ -1,0 +1,106 @@
+"""Make the test set of the translation networks: paired contacts solved by the full tier on both sensors.
+
+    python3 scripts/make_test_set.py --work DIR --out FILE [--presses 220] [--seed 1] [--workers 1]
+
+Stop it at any time: presses that are solved stay in DIR and are not solved again. At its end all presses in DIR are
+merged into FILE, replacing it, with its card beside it; ``--presses 0`` solves none and merges what there is so far.
+About half a minute a press on one core.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import io
+import os
+import pathlib
+import sys
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+SCENE = ROOT / "scenes" / "training"
+
+from tactile_core import atomic  # noqa: E402
+from tactile_core.mechanics import full_pairs, pair_file  # noqa: E402
+from tactile_core.mechanics.pair_card import card, card_path  # noqa: E402
+from tactile_core.scene import load_scene  # noqa: E402
+
+Job = tuple[pathlib.Path, int, int]  # folder, seed, number
+
+
+def file_of(folder: pathlib.Path, seed: int, number: int) -> pathlib.Path:
+    """Where a press's contacts are kept."""
+    return folder / f"press_{seed}_{number:05d}.npz"
+
+
+def solve_one(job: Job) -> str:
+    """Solve one press, unless its file is there; returns a line to print."""
+    path = file_of(*job)
+    if path.exists():
+        return f"{path.name}: was there"
+    scene, _ = load_scene(SCENE)
+    press = full_pairs.draw_press(scene, *job[1:])
+    rows, told = full_pairs.full_rows(scene, press)
+    columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
+    content = io.BytesIO()
+    np.savez_compressed(content, count=len(rows), **columns, **told)
+    atomic.write_bytes(path, content.getvalue())
+    what = f"{scene.indenters[press.which].name} {press.depth * 1e3:.2f} mm, {len(rows)} of {told['wanted']} contacts"
+    return f"{path.name}: {what}, {told['seconds']:.1f} s {told['lost']}"
+
+
+def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
+    """All solved presses of a folder as one file of pairs of the full tier, and its card; returns the card."""
+    files = sorted(folder.glob(f"press_{seed}_*.npz"))
+    counts, wanted, lost = [], 0, {}
+    for path in files:
+        with np.load(path, allow_pickle=False) as file:
+            counts.append(int(file["count"]))
+            wanted += int(file["wanted"])
+            if str(file["lost"]):
+                lost[path.stem] = str(file["lost"])
+    scene, text = load_scene(SCENE)
+    with atomic.new_file(out) as partial:
+        pair_file.merge(files, sum(counts), partial, text, seed, [spec.name for spec in scene.indenters])
+        _mark(partial)
+    told = {**card(out), "tier": "full", "contacts_wanted": wanted, "presses_solved": len(files), "lost": lost}
+    atomic.write_json(card_path(out), told)
+    return told
+
+
+def _mark(path: pathlib.Path) -> None:
+    import h5py
+
+    with h5py.File(path, "r+") as file:
+        file.attrs["tier"] = "full"
+        file.attrs["unseen_region_x"] = full_pairs.REGION_X
+
+
+def main() -> int:
+    """Solve, merge, report."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
+    parser.add_argument("--out", type=pathlib.Path, required=True, help="the HDF5 file to write")
+    parser.add_argument("--presses", type=int, default=220, help="presses to solve, three or four contacts each (220)")
+    parser.add_argument("--seed", type=int, default=1, help="of the presses (1; the training pairs have 0)")
+    parser.add_argument("--workers", type=int, default=1, help="processes (1)")
+    arguments = parser.parse_args()
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
+    jobs = [(arguments.work, arguments.seed, number) for number in range(arguments.presses)]
+    with concurrent.futures.ProcessPoolExecutor(arguments.workers) as pool:
+        for done, line in enumerate(pool.map(solve_one, jobs), 1):
+            print(f"{done}/{len(jobs)} {line}", flush=True)
+    told = merge(arguments.work, arguments.seed, arguments.out)
+    print(
+        f"{arguments.out}: {told['contacts']} of {told['contacts_wanted']} contacts, {told['presses_solved']} presses"
+    )
+    for name, why in told["lost"].items():
+        print(f"{name}: {why}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
