@@ -15,7 +15,7 @@ from pathlib import Path
 from tactile_core import atomic
 from tactile_core.errors import TactileError
 from tactile_core.mechanics.validation.comsol import comsol
-from tactile_core.mechanics.validation.rows import failed
+from tactile_core.rows import failed
 
 
 def main() -> int:

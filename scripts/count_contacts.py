@@ -26,7 +26,7 @@ from tactile_core.mechanics.placement import pose_at  # noqa: E402
 from tactile_core.mechanics.random_contacts import RandomContact, random_contacts  # noqa: E402
 from tactile_core.mechanics.solve import TIERS, Solution, solve  # noqa: E402
 from tactile_core.mechanics.thickness import depth_at  # noqa: E402
-from tactile_core.mechanics.validation.rows import failed, row  # noqa: E402
+from tactile_core.rows import failed, row  # noqa: E402
 
 TARGET, PENETRATION = 99.0, 1e-6  # per cent, m: issue MECHANICS
 

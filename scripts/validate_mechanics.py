@@ -34,9 +34,9 @@ from tactile_core.mechanics.validation import (
     tiers,
     work,
 )
-from tactile_core.mechanics.validation.report import HEADER, line, write
-from tactile_core.mechanics.validation.rows import Row, failed
-from tactile_core.mechanics.validation.rows import row as make_row
+from tactile_core.mechanics.validation.report import write
+from tactile_core.rows import HEADER, Row, failed, line
+from tactile_core.rows import row as make_row
 
 ROOT = Path(__file__).resolve().parent.parent
 REPORT = ROOT / "docs" / "mechanics.md"

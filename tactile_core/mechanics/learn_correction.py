@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from ..errors import TactileError
+from ..rows import Row, row
 from . import correction
 from .compliance import compliance_of
 from .contact import ContactProblem
@@ -20,7 +21,6 @@ from .finite_strain_tier import ONE_STEP, Sensor, graded_body
 from .placement import pose_at
 from .random_contacts import RandomContact
 from .thickness import depth_at
-from .validation.rows import Row, row
 
 log = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from tactile_core.mechanics.validation import (
     work,
 )
 from tactile_core.mechanics.validation.golden import disc
-from tactile_core.mechanics.validation.rows import failed, order
+from tactile_core.rows import failed, order
 
 
 @pytest.mark.parametrize("check", [patch, manufactured, fluid, symmetry], ids=lambda check: check.__name__[-12:])

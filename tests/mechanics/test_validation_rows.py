@@ -8,7 +8,7 @@ import pytest
 
 from tactile_core.mechanics.validation import report
 from tactile_core.mechanics.validation.golden import GOLDEN_FORCE
-from tactile_core.mechanics.validation.rows import failed, order, row
+from tactile_core.rows import failed, order, row
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "validate_mechanics.py"
 

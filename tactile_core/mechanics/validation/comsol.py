@@ -16,8 +16,8 @@ import numpy as np
 
 from ... import biotac_sp
 from ...errors import TactileError
+from ...rows import Row, row
 from ..sp_press import INTERVALS, Pressed, SpPress
-from .rows import Row, row
 
 GAP, VOLUME, FORCE = 0.05, 0.2, 5.0  # mm, %, %: targets of issue MECHANICS
 SQUEEZED = 1e-3  # mm, within which electrodes count as squeezed alike: mirrored twins differ by our interpolation

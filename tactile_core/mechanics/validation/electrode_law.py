@@ -9,6 +9,7 @@ import numpy as np
 
 from ... import digit_shape, sensors
 from ...indenters import Cylinder, Indenter, Sphere
+from ...rows import Row, row
 from ..biotac_sheet import CONDUCTIVITY, BiotacSheet, biotac_sheet, divider_counts
 from ..compliance import biotac_compliance
 from ..contact import Contact, ContactProblem
@@ -20,7 +21,6 @@ from ..placement import Placement, biotac_pose, on_gel
 from ..quadratic_cavity import QuadraticCavity
 from ..thickness import DEPTH_LIMIT, thickness_under
 from ..thin_sheet import ThinSheet, resistances
-from .rows import Row, row
 
 DEPTHS = (0.15e-3, 0.4e-3, 0.7e-3, 1.0e-3, 1.2e-3)  # m, of every press
 INDENTERS = (Sphere(2e-3), Sphere(3.5e-3), Sphere(6e-3), Cylinder(3e-3, 0.5e-3))

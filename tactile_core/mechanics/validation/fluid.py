@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...indenters import Sphere, pose_on
+from ...rows import Row, row
 from ...sensors import Material
 from ..finite_strain import FiniteStrainSolid
 from ..hex_mesh import HexMesh
 from ..newton import FiniteStrainContact, Touch
 from ..quadratic_cavity import QuadraticCavity
 from .block import block
-from .rows import Row, row
 
 TARGET = 1e-12  # issue MECHANICS
 _SIDE, _DEPTH = 4.5e-3, 0.6e-3  # m

@@ -9,12 +9,12 @@ import numpy as np
 
 from ... import metrics
 from ...indenters import Sphere, pose_on
+from ...rows import Row, order, row
 from ...sensors import Material
 from ..bonded_layer import GOLDEN_BALL, GOLDEN_FORCE, GOLDEN_RADIUS, GOLDEN_THICKNESS, quarter_disc
 from ..finite_strain import FiniteStrainSolid
 from ..newton import FiniteStrainContact, Touch
 from .pressed_disc import disc_mesh, pressed
-from .rows import Row, order, row
 
 TARGET = 0.5  # percent, issue MECHANICS
 MATERIAL = Material(1e6, 0.49)

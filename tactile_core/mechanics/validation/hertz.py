@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...indenters import Sphere
+from ...rows import Row, row
 from ...sensors import Material
 from ..newton import FiniteStrainContact, Touch
 from .pressed_disc import contact_radius, disc_mesh, pressed
-from .rows import Row, row
 
 TARGET = 1.0  # percent, issue MECHANICS
 BALL, YOUNGS = 10e-3, 1e6  # m, Pa

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ...indenters import Sphere, pose_on
+from ...rows import Row, row
 from ...sensors import Material
 from ..bonded_layer import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN_THICKNESS
 from ..finite_strain import FiniteStrainSolid
@@ -14,7 +15,6 @@ from ..hex_mesh import HexMesh
 from ..newton import FiniteStrainContact
 from .block import block
 from .pressed_disc import disc_mesh, pressed
-from .rows import Row, row
 
 ITERATIONS = 10  # prototypes took 3 to 7 (mechanics.md); more than this says that the tangent does not belong
 _DEPTHS = np.arange(1, 10) * 0.2e-3  # m, to 60 % of the disc

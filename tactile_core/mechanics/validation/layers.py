@@ -9,10 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...indenters import Sphere
+from ...rows import Row, row
 from ...sensors import Material
 from ..bonded_layer import dimitriadis, exact_layer
 from .pressed_disc import disc_mesh, pressed
-from .rows import Row, row
 
 TARGET, THIN_TARGET = 1.0, 3.0  # percent, issue MECHANICS
 THICKNESS, YOUNGS = 3e-3, 1e6  # m, Pa

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...rows import Row, order, row
 from ...sensors import Material
 from ..elasticity import quadratic, reference_gradients
 from ..finite_strain import FiniteStrainSolid, State
 from .block import block, equilibrium, inside
-from .rows import Row, order, row
 
 # The orders that theory gives are 3 and 2; a line through coarse meshes comes to within a tenth.
 DISPLACEMENT_ORDER, STRAIN_ORDER = 2.8, 1.9

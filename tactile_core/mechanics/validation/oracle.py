@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...rows import Row, row
 from ...sensors import Material
 from ..finite_strain import FiniteStrainSolid, State
 from ..hex_mesh import HexMesh
 from .block import block
-from .rows import Row, row
 
 TARGET = 1e-12  # relative; rounding of sums of a hundred products
 _H = 1e-30  # complex step

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...rows import Row, row
 from ...sensors import Material
 from ..finite_strain import FiniteStrainSolid
 from .block import block, equilibrium, inside
-from .rows import Row, row
 
 SIDE = 2e-3  # m
 # Rounding of a Newton step: 1e-16 of the displacement times the matrix's condition, about 1e3 here.

@@ -16,6 +16,7 @@ import numpy as np
 from ... import sensors, surface
 from ...indenters import Pose, Sphere
 from ...lattice import Lattice
+from ...rows import Row, row
 from ...sensors import Material
 from ...tet_file import TetMesh, checked, read_tet
 from .. import isaac_like
@@ -23,7 +24,6 @@ from ..finite_strain import FiniteStrainSolid
 from ..finite_strain_tier import ONE_STEP, Body, graded_body
 from ..newton import FiniteStrainContact
 from ..placement import Placement, biotac_pose, digit_pose
-from .rows import Row, row
 
 _BALL, _PLACE = Sphere(3.5e-3), Placement(-8e-3, 0.0)
 _MOVES = 10e-6  # m, nodes that move more count, as in metrics

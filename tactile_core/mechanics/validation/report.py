@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from ... import atomic
+from ...rows import HEADER, Row, line
 from ..bonded_layer import GOLDEN_FORCE
-from .rows import Row
 
-HEADER = "| name | value | unit | target | null | set | |\n|---|---|---|---|---|---|---|"
 _INTRODUCTION = """# Contact mechanics against known answers
 
 Made by `python scripts/validate_mechanics.py`. `null` is the answer of doing nothing; shape errors are vector rms over
@@ -27,13 +26,6 @@ at 0.6 (nu = .5). The solver follows the exact solution, so the formula is asked
 The contact's edge falls between nodes: a force at a small depth scatters with the spacing (0.2 % at 0.1 mm), the shape
 does not.
 """
-
-
-def line(row: Row) -> str:
-    """A row as a line of the table."""
-    mark = {None: "", True: "ok", False: "MISSED"}[row["ok"]]
-    cells = [row["name"], row["value"], row["unit"], row["target"], row["null"], row["set"], mark]
-    return "| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |"
 
 
 def write(report: Path, parts: dict[str, list[Row]]) -> None:

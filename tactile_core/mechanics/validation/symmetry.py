@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...indenters import Pose, Sphere, pose_on
+from ...rows import Row, row
 from ...sensors import Material
 from ..finite_strain import FiniteStrainSolid
 from ..newton import FiniteStrainContact, Touch
 from .block import block
-from .rows import Row, row
 
 TARGET = 1e-8  # of the depth: Newton's method stops at a balance of 1e-8 and is quadratic, so that this is generous
 FRICTION_TARGET = 1e-5  # with friction it stops at a balance of 1e-6 and converges linearly

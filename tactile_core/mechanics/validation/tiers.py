@@ -10,12 +10,12 @@ import numpy as np
 from ... import digit_shape, metrics
 from ...cubic_spline import EvenSpline
 from ...indenters import Sphere
+from ...rows import Row, row
 from ..finite_strain import FiniteStrainSolid
 from ..placement import FRICTION, Placement, pose_at
 from ..solve import TIERS, Sensor, Solution, Step, Tier, solve, solve_path
 from ..thickness import DEPTH_LIMIT, thickness_under
 from .incompressible import quality_rows
-from .rows import Row, row
 
 # Issue MECHANICS, point 8: um rms and percent; the fast tier's shape up to 20 % depth, its force up to 40 %.
 SHAPE_TARGET, FAST_FORCE_TARGET, FULL_FORCE_TARGET = 5.0, 5.0, 1.0

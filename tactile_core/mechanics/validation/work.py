@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...rows import Row, order, row
 from ..newton import FiniteStrainContact
 from .golden import disc
-from .rows import Row, order, row
 
 ORDER, REST = 1.9, 1e-8  # issue MECHANICS
 _SPACING, _DEPTH = 0.1e-3, 0.8e-3  # m

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 Row = dict[str, Any]
+HEADER = "| name | value | unit | target | null | set | |\n|---|---|---|---|---|---|---|"
 COSTS = ("s", "ms", "MB")  # units of time and memory: their rows may miss a target without failing a run
 
 
 def row(
     name: str,
-    value: float,
+    value: float | None,
     unit: str,
     target: float | None = None,
     *,
@@ -27,6 +28,13 @@ def row(
     ok = None if target is None else bool(value >= target if at_least else abs(value) <= target)
     value, target, null = (None if number is None else float(f"{number:.4g}") for number in (value, target, null))
     return {"name": name, "value": value, "unit": unit, "target": target, "ok": ok, "null": null, "set": of}
+
+
+def line(row: Row) -> str:
+    """A row as a line of the table."""
+    mark = {None: "", True: "ok", False: "MISSED"}[row["ok"]]
+    cells = [row["name"], row["value"], row["unit"], row["target"], row["null"], row["set"], mark]
+    return "| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |"
 
 
 def failed(rows: list[Row]) -> list[Row]:
