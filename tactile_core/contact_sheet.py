@@ -25,7 +25,7 @@ LOW_CONFIDENCE = 0.5  # assumed: below this in every column, the sheet warns
 DPI = 100
 WIDTH, LEFT, RIGHT, GAP = 16.0, 0.95, 1.05, 0.12
 TITLE, WARNING_LINE, NUMBERS, ELECTRODES, TIME_AXIS, HEADING, Z_AXIS = 0.62, 0.21, 0.16, 1.4, 0.45, 0.26, 0.36
-CAPTION, FOOT = 0.6, 0.25
+CAPTION, FOOT = 0.75, 0.25
 WARNING_LINES, WARNING_WIDTH = 5, 200
 
 UNROLLED_X, UNROLLED_Z = (-24e-3, 8e-3), (-11.2e-3, 11.2e-3)  # m, what the unrolled rows show
@@ -65,6 +65,7 @@ def contact_sheet(
     pictures: np.ndarray,
     force: np.ndarray,
     confidence: np.ndarray,
+    expected_error_digit: np.ndarray,
     contact_center: np.ndarray | None = None,
     true_displacement_biotac: np.ndarray | None = None,
     simulated: bool = False,
@@ -75,13 +76,15 @@ def contact_sheet(
 
     time : (T,) s; electrodes : (T, 19) counts, change from rest; frames : (k,) which of the T frames are the columns
     displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
-    force : (k, 3) N; confidence : (k,) 0..1; contact_center : (k, 2) m = (x, z), NaN without contact
+    force : (k, 3) N; confidence : (k,) 0..1; expected_error_digit : (k,) m, of the largest node
+    contact_center : (k, 2) m = (x, z), NaN without contact
     true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
     Raises ValueError where the arrays of the columns do not count alike.
     """
     columns: dict[str, Any] = {
         "displacement_biotac": displacement_biotac, "displacement_digit": displacement_digit, "pictures": pictures,
-        "force": force, "confidence": confidence, "contact_center": contact_center,
+        "force": force, "confidence": confidence, "expected_error_digit": expected_error_digit,
+        "contact_center": contact_center,
         "true_displacement_biotac": true_displacement_biotac,
     }  # fmt: skip
     for what, values in columns.items():
@@ -106,7 +109,7 @@ def contact_sheet(
             sheet.biotac_row("BioTac, unrolled\ntrue (simulated)", true_displacement_biotac, largest, None)
         sheet.digit_row("DIGIT gel\ndisplacement", displacement_digit, contact_center)
         sheet.picture_row("DIGIT picture", pictures)
-        sheet.captions(force, confidence)
+        sheet.captions(force, confidence, expected_error_digit)
         content = io.BytesIO()
         FigureCanvasAgg(sheet.figure).print_png(content, metadata={"Software": None})
     atomic.write_bytes(path, content.getvalue())
@@ -267,9 +270,10 @@ class _Sheet:
                 axes.set_ylabel(label)
         self.top += height
 
-    def captions(self, force: np.ndarray, confidence: np.ndarray) -> None:
+    def captions(self, force: np.ndarray, confidence: np.ndarray, expected_error: np.ndarray) -> None:
         for k in range(self.columns):
             text = f"force {np.linalg.norm(force[k]):.2f} N\nconfidence {confidence[k]:.2f}"
+            text += f"\nexpected error {1e3 * expected_error[k]:.2f} mm"
             color = MARK if confidence[k] < LOW_CONFIDENCE else "black"
             self._text(self._middle(k), 0.08, text, size=10, ha="center", va="top", color=color)
         self.top += CAPTION

@@ -18,6 +18,7 @@ from .stopwatch import Stopwatch
 
 if TYPE_CHECKING:
     from .recordings import PrepareOptions, Recording
+    from .recordings.sensor_file import Sensor
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,12 +27,14 @@ class Options:
 
     frames : part of it, the same for every recording; keep : words of results.KEEPABLE
     prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
+    sensor : gains and offsets to take off, as `tactile adapt` finds them
     """
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
     keep: tuple[str, ...] = results.DEFAULT_KEEP
     prepare: PrepareOptions | None = None
     overwrite: bool = False
+    sensor: Sensor | None = None
 
 
 def load_tools(weights: str | os.PathLike | None = None) -> Tools:
@@ -91,6 +94,7 @@ def convert(
     Raises TactileError for a recording that cannot be read, a selection without frames, a disk that cannot be written.
     """
     from . import recordings
+    from .recordings import sensor_file
 
     clock = Stopwatch()
     with clock.stage("read"):
@@ -98,6 +102,8 @@ def convert(
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
         signals = recordings.prepare(recording, options.prepare)
+        if options.sensor is not None:
+            signals = sensor_file.apply(signals, options.sensor)
     try:
         with atomic.new_folder(folder, overwrite=options.overwrite) as partial:
             made = FramePass(recording, signals, frames, options.keep, tools, clock)

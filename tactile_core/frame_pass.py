@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 CHUNK = 64  # frames in memory at a time: about 5 MB of displacements and 20 MB of heights
 PNG_LEVEL = 4  # of zlib; measured on the simulated recording: 5 ms and 28 kB a picture, 10 ms and 24 kB at level 6
-SHEET_ARRAYS = ("displacement_biotac", "displacement_digit", "force", "confidence", "contact_center")
+SHEET_ARRAYS = (
+    "displacement_biotac", "displacement_digit", "force", "confidence", "expected_error_digit", "contact_center"
+)  # fmt: skip
 # Flags that the translation sets, so that no warning of the recording tells of them.
 REMARKABLE = {
     "out_of_range": "signals unlike those the networks were trained on",

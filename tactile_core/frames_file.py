@@ -25,6 +25,10 @@ ALWAYS = {
     "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame; 0 without contact"),
     "contact_center": ("m", "(T, 2) = (x, z) on the DIGIT after unrolling; NaN without contact"),
     "confidence": ("1", "0 (a guess) to 1"),
+    "expected_error_biotac": ("m", "expected largest node error: half of such frames have less"),
+    "expected_error_digit": ("m", "as much of the DIGIT's gel"),
+    "error_bound_biotac": ("m", "largest node error that 95 of 100 such frames stay below"),
+    "error_bound_digit": ("m", "as much of the DIGIT's gel"),
     "flags": ("bits", "what is remarkable about a frame; attribute names: JSON, name -> bit"),
 }
 KEPT = {

@@ -6,12 +6,10 @@ All displacements are (C, n, 3) m, one contact a row; every function works conta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 
-Batches = Iterable[tuple[np.ndarray, np.ndarray]]  # predicted and true displacement (C, n, 3) m
-Row = dict[str, object]
 Depth = Callable[[np.ndarray], np.ndarray]  # (C, n, 3) m -> (C, n) m
 MOVING = 10e-6  # m: nodes that move less do not belong to a contact (networks.md)
 CORE = 0.3  # share of the peak height above which a node belongs to the core of a contact (networks.md)
@@ -81,18 +79,6 @@ def mean(values: np.ndarray) -> float | None:
     return float(values.mean()) if len(values) else None
 
 
-def median(values: np.ndarray) -> float | None:
-    """Median over contacts without the NaN ones; None if none is left."""
-    values = np.asarray(values)[np.isfinite(values)]
-    return float(np.median(values)) if len(values) else None
-
-
-def row(name: str, value: float | None, null: float | None, unit: str) -> Row:
-    """One figure of a report, with the figure of doing nothing; four digits, so that reports can be compared by eye."""
-    rounded = [None if number is None else float(f"{number:.4g}") for number in (value, null)]
-    return {"name": name, "value": rounded[0], "null": rounded[1], "unit": unit}
-
-
 def mesh_figures(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
     """The four figures of a mesh for each contact: micrometres, and per cent for the peak."""
     return {
@@ -101,33 +87,3 @@ def mesh_figures(predicted: np.ndarray, true: np.ndarray, depth: Depth = height)
         "core_height_um": 1e6 * core_height_error(predicted, true, depth),
         "peak_depth_percent": 1e2 * peak_depth_error(predicted, true, depth),
     }
-
-
-def mesh_rows(name: str, batches: Batches, depth: Depth = height) -> list[Row]:
-    """Rows of the mean figures over batches of (predicted, true) displacement (C, n, 3) m; null: no displacement."""
-    values, nulls = [], []
-    for predicted, true in batches:
-        values.append(mesh_figures(predicted, true, depth))
-        nulls.append(mesh_figures(np.zeros_like(true), true, depth))
-    rows = []
-    for figure in values[0]:
-        value, null = (mean(np.concatenate([part[figure] for part in parts])) for parts in (values, nulls))
-        quantity, unit = figure.rsplit("_", 1)
-        rows.append(row(f"{name}_{quantity}", value, null, unit))
-    return rows
-
-
-def center_row(name: str, predicted: np.ndarray, true: np.ndarray, null_center: np.ndarray) -> Row:
-    """Median distance of contact centres (C, 2) m in mm; null: always the same place, `null_center` (2,) m."""
-    # Where no dent is found, the null answer counts: to skip the contact would flatter the network.
-    found = np.where(np.isfinite(predicted), predicted, null_center)
-    return row(name, median(1e3 * lengths(found - true)), median(1e3 * lengths(null_center - true)), "mm")
-
-
-def force_rows(name: str, predicted: np.ndarray, true: np.ndarray) -> list[Row]:
-    """Force (C, 3) N: rms of the vector error, and its share of the true force averaged over contacts above 0.1 N."""
-    error, load = lengths(predicted - true), lengths(true)
-    loaded = load > 0.1  # N: below, the share says nothing (assumed)
-    share = mean(100.0 * error[loaded] / load[loaded])
-    rms = [mean(square) ** 0.5 if len(square) else None for square in (error**2, load**2)]
-    return [row(f"{name}_rms", *rms, "N"), row(f"{name}_share", share, 100.0 if share is not None else None, "percent")]

@@ -3,10 +3,13 @@
 Every network of `training/modules.py` has its forward pass here, with the same tensor names; float32 throughout.
 SVB  signal autoencoder       MVB  BioTac mesh autoencoder       MVD  DIGIT mesh autoencoder
 S2MPN  signal latent -> BioTac latent       M2MPN  BioTac latent -> DIGIT latent
+D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
+force and error  heads: force from the BioTac's latent, expected error from the signal
 
-Results are computed in blocks of `BLOCK` frames, padded with zeros, so that the same frame gives the same numbers alone
-and in a recording: the matrix products then always have the same shape (equal bits with OpenBLAS as measured by the
-tests' machines; where a BLAS splits work otherwise, equal to a relative 1e-5).
+Results are computed in blocks of `BLOCK` frames, padded with zeros, so that a frame gives the same numbers whatever
+part of a recording it is asked for with: the matrix products then have the same shape (equal bits with OpenBLAS as
+measured by the tests' machines; where a BLAS splits work otherwise, equal to a relative 1e-5). A frame alone goes by
+itself, in a fortieth of the time, and is equal to a relative 1e-5.
 """
 
 from __future__ import annotations
@@ -20,18 +23,24 @@ import numpy as np
 
 from .errors import TactileError
 from .layers import Tensors, plain, plain_shapes, residual, residual_shapes
+from .moving_frame import MovingFrame
 from .weights import ADVICE, CARD_NAME, read_card, read_verified
 
 Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network
 ELECTRODES = 19
 SIGNAL_HIDDEN = (256, 128, 64)  # SVB of the authors' later code (sensors.md)
-BLOCK = 16  # frames a block: small enough for single frames in Blender, large enough to use the cache
+BLOCK = 64  # frames a block: enough for matrix products at full speed
 COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
+PLACE = 2  # numbers of a mesh's latent that are the place of its dent
+FORCE_SCALE = 0.1  # N: the force is 0.1 N sinh(head), which spans light touches and firm presses alike (assumed)
 COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
-NETS = ("SVB", "MVB", "S2MPN", "MVD", "M2MPN", "force")
+SURFACES = ("biotac", "digit")
+ERROR_FEATURES = 3  # beside the latent: what SVB leaves, how large the signal is, whether it is rectified
+ERROR_UNIT = 10e-6  # m, of the error head's logarithm
+NETS = ("SVB", "MVB", "S2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "error")
 WEIGHTS_FOLDER = Path(__file__).parent / "weights"
 # The card names the hash of every file of weights; this names the card that ships.
-SHIPPED_CARD_SHA256 = "996b98a35af216b0c2aee2244ffbd06ff200bcfa33a55ef023d5e4354b4fca10"
+SHIPPED_CARD_SHA256 = "4023dacc122222c403773f00a3129ba47acabd4a416210319f83aadc91cfc310"
 MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small enough to refuse a damaged number
 
 
@@ -67,30 +76,23 @@ def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]
     """Tensor names and shapes of one network from the sizes in its card."""
     if net == "SVB":
         latent, hidden = sizes["latent"], SIGNAL_HIDDEN
-        shapes = plain_shapes("encoder", (ELECTRODES, *hidden, 2 * latent))
+        shapes = plain_shapes("encoder", (ELECTRODES + 1, *hidden, 2 * latent))
         shapes |= plain_shapes("decoder", (latent, *hidden[::-1], ELECTRODES))
         shapes |= {"distance.mean": (latent,), "distance.whitening": (latent, latent)}
         return shapes | {"distance.residual": (ELECTRODES,)}
     width, blocks = sizes["width"], sizes["blocks"]
     if net in ("MVB", "MVD"):
-        modes, latent = sizes["modes"], sizes["latent"]
-        shapes = residual_shapes("encoder", modes, 2 * latent, width, blocks)
-        shapes |= residual_shapes("decoder", latent, modes, width, blocks)
-        return shapes | {"basis": (modes, 3 * sizes["nodes"]), "scale": (1,)}
-    if net == "force" and sizes["compliance"]:
-        return {"compliance": (sizes["inputs"], 3)}
-    shapes = residual_shapes("map", sizes["inputs"], sizes["outputs"], width, blocks)
-    return shapes | ({"scale": (1,)} if net == "force" else {})
+        wide, near, latent, window = sizes["wide"], sizes["near"], sizes["latent"], (2 * sizes["half"] + 1) ** 2
+        shapes = residual_shapes("encoder", wide + near + 2 * PLACE, 2 * (latent - PLACE), width, blocks)
+        shapes |= residual_shapes("decoder", latent + PLACE, wide + near, width, blocks)
+        shapes |= {"wide": (wide, 3 * sizes["nodes"]), "near": (near, 3 * window)}
+        return shapes | {"scale": (wide + near,), "turn": (sizes["nodes"],)}
+    return residual_shapes("map", sizes["inputs"], sizes["outputs"], width, blocks)
 
 
-SIZE_NAMES = {
-    "SVB": ("latent",),
-    "MVB": ("blocks", "latent", "modes", "nodes", "width"),
-    "MVD": ("blocks", "latent", "modes", "nodes", "width"),
-    "S2MPN": ("blocks", "inputs", "outputs", "width"),
-    "M2MPN": ("blocks", "inputs", "outputs", "width"),
-    "force": ("blocks", "compliance", "inputs", "outputs", "width"),
-}
+_MESH = ("blocks", "columns", "half", "latent", "near", "nodes", "rows", "wide", "width")
+_MAP = ("blocks", "inputs", "outputs", "width")
+SIZE_NAMES = {net: {"SVB": ("latent",), "MVB": _MESH, "MVD": _MESH}.get(net, _MAP) for net in NETS}
 
 
 class Networks:
@@ -107,10 +109,15 @@ class Networks:
         self.tensors = {
             net: {name: np.ascontiguousarray(array, np.float32) for name, array in tensors[net].items()} for net in NETS
         }
+        self.frames = {net: self._frame(net) for net in ("MVB", "MVD")}
 
-    def encode_signal(self, change: np.ndarray) -> np.ndarray:
-        """change (T, 19) counts against rest -> latent_signal (T, 8), the mean of SVB's posterior."""
-        return self._blocks(self._encode_signal, change, (ELECTRODES,), "encode_signal")
+    def _frame(self, net: str) -> MovingFrame:
+        sizes = self.sizes[net]
+        return MovingFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"])
+
+    def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """change (T, 19) counts against rest, rectified (T,) or one -> latent_signal (T, 8), SVB's mean."""
+        return self._blocks(self._encode_signal, *_signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
         """latent_signal (T, 8) -> change (T, 19) counts as SVB understood them."""
@@ -123,7 +130,19 @@ class Networks:
 
     def m2m(self, latent_biotac: np.ndarray) -> np.ndarray:
         """latent_biotac (T, L) -> latent_digit (T, L')."""
-        return self._map("M2MPN", latent_biotac)
+        return self._map_placed("M2MPN", "MVB", latent_biotac)
+
+    def m2m_back(self, latent_digit: np.ndarray) -> np.ndarray:
+        """latent_digit (T, L') -> latent_biotac (T, L)."""
+        return self._map_placed("D2BPN", "MVD", latent_digit)
+
+    def m2s(self, latent_biotac: np.ndarray) -> np.ndarray:
+        """latent_biotac (T, L) -> latent_signal (T, 8)."""
+        return self._map_placed("B2SPN", "MVB", latent_biotac)
+
+    def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """change (T, 19) counts, rectified (T,) or one -> (T, 2) m, expected largest node error on BioTac and DIGIT."""
+        return self._blocks(self._expected_error, *_signal(change, rectified), "expected_error")
 
     def encode_biotac(self, displacement: np.ndarray) -> np.ndarray:
         """displacement (T, N, 3) m of the BioTac's outer skin -> latent_biotac (T, L)."""
@@ -142,72 +161,112 @@ class Networks:
         return self._decode_mesh("MVD", latent_digit)
 
     def force(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """latent_biotac (T, L) -> force (T, 3) N exerted by the object, sensor frame (the estimate the card names)."""
+        """latent_biotac (T, L) -> force (T, 3) N exerted by the object, sensor frame."""
         return self._blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
 
-    def signal_distance(self, change: np.ndarray) -> SignalDistance:
-        """change (T, 19) counts -> how far each frame lies from the training signals."""
-        distances = self._blocks(self._distance, change, (ELECTRODES,), "signal_distance")
+    def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
+        """change (T, 19) counts, rectified (T,) or one -> how far each frame lies from the training signals."""
+        distances = self._blocks(self._distance, *_signal(change, rectified), "signal_distance")
         return SignalDistance(*np.ascontiguousarray(distances.T))
 
-    def _encode_signal(self, change: np.ndarray) -> np.ndarray:
-        hidden = plain(compress(change), self.tensors["SVB"], "encoder", len(SIGNAL_HIDDEN) + 1)
+    def _encode_signal(self, signal: np.ndarray) -> np.ndarray:
+        seen = np.concatenate([compress(signal[:, :ELECTRODES]), signal[:, ELECTRODES:]], -1)
+        hidden = plain(seen, self.tensors["SVB"], "encoder", len(SIGNAL_HIDDEN) + 1)
         return hidden[:, : self.sizes["SVB"]["latent"]]
 
     def _decode_signal(self, latent: np.ndarray) -> np.ndarray:
         return plain(latent, self.tensors["SVB"], "decoder", len(SIGNAL_HIDDEN) + 1)
 
-    def _distance(self, change: np.ndarray) -> np.ndarray:
-        tensors, latent = self.tensors["SVB"], self._encode_signal(change)
+    def _distance(self, signal: np.ndarray) -> np.ndarray:
+        tensors, latent, change = self.tensors["SVB"], self._encode_signal(signal), signal[:, :ELECTRODES]
         steps = (latent - tensors["distance.mean"]) @ tensors["distance.whitening"]
         left = (self._decode_signal(latent) - compress(change)) / tensors["distance.residual"]
         largest = np.abs(change).max(-1)
         return np.stack([np.sqrt(np.square(steps).sum(-1)), np.sqrt(np.square(left).mean(-1)), largest], -1)
 
+    def _expected_error(self, signal: np.ndarray) -> np.ndarray:
+        latent, change = self._encode_signal(signal), compress(signal[:, :ELECTRODES])
+        rest = self._decode_signal(latent) - change
+        features = [np.sqrt(np.square(each).mean(-1, keepdims=True)) for each in (rest, change)]
+        seen = np.concatenate([latent, *features, signal[:, ELECTRODES:]], -1)
+        head = residual(seen, self.tensors["error"], "map", self.sizes["error"]["blocks"])
+        return np.float32(ERROR_UNIT) * np.exp(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
+
     def _force(self, latent: np.ndarray) -> np.ndarray:
-        tensors, sizes = self.tensors["force"], self.sizes["force"]
-        if sizes["compliance"]:
-            return residual(latent, self.tensors["MVB"], "decoder", self.sizes["MVB"]["blocks"]) @ tensors["compliance"]
-        return residual(latent, tensors, "map", sizes["blocks"]) * tensors["scale"]
+        head = residual(latent, self.tensors["force"], "map", self.sizes["force"]["blocks"])
+        return np.float32(FORCE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
     def _map(self, net: str, latent: np.ndarray) -> np.ndarray:
         tensors, sizes = self.tensors[net], self.sizes[net]
         return self._blocks(lambda z: residual(z, tensors, "map", sizes["blocks"]), latent, (sizes["inputs"],), net)
 
+    def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
+        """Through a map that is told, beside the latent, what the whole cell leaves of its place."""
+        tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
+        size = self.sizes[vae]["latent"]
+        return self._blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
+
+    def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Latent (B, L) with what the whole cell leaves of its place (B, L + 2), and the cells (B, 2)."""
+        cells, left = self.frames[net].cells(latent[:, :PLACE])
+        return np.concatenate([latent, left], -1), cells
+
     def _encode_mesh(self, net: str, displacement: np.ndarray) -> np.ndarray:
-        tensors, sizes = self.tensors[net], self.sizes[net]
+        tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
 
         def encode(block: np.ndarray) -> np.ndarray:
-            modes = block.reshape(len(block), -1) @ tensors["basis"].T / tensors["scale"]
-            return residual(modes, tensors, "encoder", sizes["blocks"])[:, : sizes["latent"]]
+            local = frame.to_local(block)
+            place = frame.place(local)
+            cells, left = frame.cells(place)
+            wide = local.reshape(len(local), -1) @ tensors["wide"].T
+            rest = local - (wide @ tensors["wide"]).reshape(local.shape)
+            near = frame.windows(rest, cells).reshape(len(local), -1) @ tensors["near"].T
+            seen = np.concatenate([np.concatenate([wide, near], -1) / tensors["scale"], place, left], -1)
+            code = residual(seen, tensors, "encoder", sizes["blocks"])[:, : sizes["latent"] - PLACE]
+            return np.concatenate([place, code], -1)
 
         return self._blocks(encode, displacement, (sizes["nodes"], 3), f"{net} encoder")
 
     def _decode_mesh(self, net: str, latent: np.ndarray) -> np.ndarray:
-        tensors, sizes = self.tensors[net], self.sizes[net]
+        tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
 
         def decode(block: np.ndarray) -> np.ndarray:
-            modes = residual(block, tensors, "decoder", sizes["blocks"]) * tensors["scale"]
-            return (modes @ tensors["basis"]).reshape(len(block), -1, 3)
+            placed, cells = self._placed(net, block)
+            modes = residual(placed, tensors, "decoder", sizes["blocks"]) * tensors["scale"]
+            wide, near = modes[:, : sizes["wide"]], modes[:, sizes["wide"] :]
+            local = (wide @ tensors["wide"]).reshape(len(block), -1, 3)
+            windows = (near @ tensors["near"]).reshape(len(block), frame.width, frame.width, 3)
+            return frame.to_shared(frame.add(local, windows, cells))
 
         return self._blocks(decode, latent, (sizes["latent"],), f"{net} decoder")
 
     def _blocks(self, function: Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-        """Apply a function in padded blocks of `BLOCK` frames; raises TactileError if x is not (T, *shape)."""
+        """Apply a function in padded blocks, or to one frame alone; raises TactileError if x is not (T, *shape)."""
         x = np.asarray(x, np.float32)
         if x.shape[1:] != shape:
             expected = "(T, " + ", ".join(map(str, shape)) + ")"
             raise TactileError(f"networks, {name}", f"array of shape {x.shape}", expected, "Give frames first")
+        if len(x) == 1:
+            return function(x)
         out: np.ndarray | None = None
         for start in range(0, max(len(x), 1), BLOCK):  # an empty recording still tells the shape of its result
             part = x[start : start + BLOCK]
-            padded = np.zeros((BLOCK, *shape), np.float32)
-            padded[: len(part)] = part
-            result = function(padded)[: len(part)]
+            if len(part) < BLOCK:
+                part = np.concatenate([part, np.zeros((BLOCK - len(part), *shape), np.float32)])
+            result = function(part)[: len(x) - start]
             if out is None:
                 out = np.empty((len(x), *result.shape[1:]), np.float32)
             out[start : start + BLOCK] = result
         return out
+
+
+def _signal(change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarray, tuple[int]]:
+    """What SVB reads (T, 20) and the shape of a frame of it; wrong shapes are told by `_blocks`."""
+    change = np.asarray(change, np.float32)
+    if change.shape[1:] != (ELECTRODES,):
+        return change, (ELECTRODES,)
+    told = np.broadcast_to(np.asarray(rectified, np.float32), len(change))[:, None]
+    return np.concatenate([change, told], -1), (ELECTRODES + 1,)
 
 
 def load(folder: str | os.PathLike | None = None) -> Networks:
@@ -239,18 +298,26 @@ def _card_entry(card: dict, net: str, path: Path) -> dict:
     if not whole or not isinstance(entry.get("sha256"), str):
         expected = f"sha256 and the sizes {', '.join(names)} as whole numbers"
         raise TactileError(f"{path}, nets.{net}", "an incomplete entry", expected, ADVICE)
+    if "rows" in sizes and not 0 < sizes["rows"] * sizes["columns"] <= sizes["nodes"]:
+        found = f"a lattice of {sizes['rows']} x {sizes['columns']} in {sizes['nodes']} nodes"
+        raise TactileError(f"{path}, nets.{net}", found, "a lattice among the nodes", ADVICE)
     return entry
 
 
 def _check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
     """The networks fit together: the latent one writes is the latent the next one reads."""
-    force = "modes" if sizes["force"]["compliance"] else "latent"
     links = [
         ("S2MPN", "inputs", sizes["SVB"]["latent"]),
         ("S2MPN", "outputs", sizes["MVB"]["latent"]),
-        ("M2MPN", "inputs", sizes["MVB"]["latent"]),
+        ("M2MPN", "inputs", sizes["MVB"]["latent"] + PLACE),
         ("M2MPN", "outputs", sizes["MVD"]["latent"]),
-        ("force", "inputs", sizes["MVB"][force]),
+        ("D2BPN", "inputs", sizes["MVD"]["latent"] + PLACE),
+        ("D2BPN", "outputs", sizes["MVB"]["latent"]),
+        ("B2SPN", "inputs", sizes["MVB"]["latent"] + PLACE),
+        ("B2SPN", "outputs", sizes["SVB"]["latent"]),
+        ("error", "inputs", sizes["SVB"]["latent"] + ERROR_FEATURES),
+        ("error", "outputs", len(SURFACES)),
+        ("force", "inputs", sizes["MVB"]["latent"]),
         ("force", "outputs", 3),
     ]
     for net, size, expected in links:

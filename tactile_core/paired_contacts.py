@@ -1,28 +1,34 @@
-"""The pairs file (HDF5, written by `mechanics/pair_file.py`) as training reads it, and its split by presses."""
+"""The file of paired contacts (HDF5, written by `mechanics/pair_file.py`) as training and evaluation read it."""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import json
 import os
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import TactileError
+from .errors import TactileError
 
 FORMAT = "tactile-pairs-1"
 ELECTRODES = 19
 ADVICE = "Make the file again with `tactile pairs`"
 ATTRIBUTES = ("biotac_nodes_sha256", "digit_nodes_sha256", "indenters", "scene", "seed", "version")
 MIN_PRESSES = 5  # at least three to train on, one to validate, one to test
-# dataset -> trailing shape and kind of numbers (i whole, f real); None: as many nodes as the surface has
+# dataset -> trailing shape and kind of numbers (i whole, f real, b yes or no); None: as many nodes as the surface has
 DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
     "displacement_biotac": ((None, 3), "i"),
     "displacement_digit": ((None, 3), "i"),
     "signal": ((ELECTRODES,), "f"),
     "force": ((3,), "f"),
     "contact_center": ((2,), "f"),
+    "contact_patch_digit": ((None,), "b"),
+    "depth_biotac": ((), "f"),
     "depth_digit": ((), "f"),
+    "place": ((4,), "f"),
+    "slide": ((2,), "f"),
     "press": ((), "i"),
     "indenter": ((), "i"),
 }
@@ -36,7 +42,9 @@ class Pairs:
     displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
     scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change against rest
     force : (C, 3) float32 N                         contact_center : (C, 2) float32 m, (x, z) on the DIGIT
-    depth_digit : (C,) float32 m                     press : (C,) int32
+    depth_biotac, depth_digit : (C,) float32 m       press : (C,) int32
+    contact_patch_digit : (C, M) bool                place : (C, 4) float32, (x, z) m, tilt and heading rad
+    slide : (C, 2) float32 m
     indenter : (C,) int16                            attributes : of the file, as text
     sha256 : of the content, whatever the HDF5 layout
     """
@@ -48,11 +56,24 @@ class Pairs:
     signal: np.ndarray
     force: np.ndarray
     contact_center: np.ndarray
+    contact_patch_digit: np.ndarray
+    depth_biotac: np.ndarray
     depth_digit: np.ndarray
+    place: np.ndarray
+    slide: np.ndarray
     press: np.ndarray
     indenter: np.ndarray
     attributes: dict[str, str]
     sha256: str
+
+    def some(self, rows: np.ndarray) -> Pairs:
+        """The contacts of these rows alone."""
+        return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in DATASETS})
+
+    @property
+    def indenter_names(self) -> list[str]:
+        """By number, as in ``indenter``."""
+        return [str(name) for name in json.loads(self.attributes["indenters"])]
 
 
 @dataclass(frozen=True)
@@ -109,9 +130,10 @@ def _dataset(file: object, name: str, path: str | os.PathLike) -> np.ndarray:
     if not fits:
         raise TactileError(place, f"shape {data.shape}", expected, ADVICE)
     if data.dtype.kind != kind or (shape == (None, 3) and data.dtype != np.int16):
-        raise TactileError(place, f"dtype {data.dtype}", "int16" if kind == "i" else "float32", ADVICE)
+        expected = {"i": "int16", "f": "float32", "b": "bool"}[kind]
+        raise TactileError(place, f"dtype {data.dtype}", expected, ADVICE)
     values = data[:]
-    return values if kind == "i" else values.astype(np.float32)
+    return values.astype(np.float32) if kind == "f" else values
 
 
 def _scale(data: object, place: str) -> float:

@@ -14,7 +14,7 @@ from .networks import Networks
 from .recordings import Signals
 from .weights import ADVICE
 
-# Frames that differ from training in kind, not in degree, are worth little until networks know them (TRANSLATION).
+# Frames that differ from training in kind, not in degree, are worth little.
 UNTRAINED_CONFIDENCE = 0.2  # assumed
 FAR = 2.0  # times validation's outermost quantile: there confidence is gone, the frame out of range (assumed)
 
@@ -28,6 +28,8 @@ class Translation:
     force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
     confidence : (T,), 1 as in training, 0 far from it
+    expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
+        below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals and OUT_OF_RANGE, BEYOND_DIGIT
     """
 
@@ -39,6 +41,10 @@ class Translation:
     force: np.ndarray
     contact_center: np.ndarray
     confidence: np.ndarray
+    expected_error_biotac: np.ndarray
+    expected_error_digit: np.ndarray
+    error_bound_biotac: np.ndarray
+    error_bound_digit: np.ndarray
     flags: np.ndarray
 
 
@@ -54,13 +60,15 @@ class Translator:
     def __call__(self, signals: Signals) -> Translation:
         """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours."""
         nets = self.nets
+        rectified = (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
         change = np.asarray(signals.change, np.float32)
-        latent_signal = nets.encode_signal(change)
+        change = np.where(rectified[:, None], np.abs(change), change)  # less its level at rest it may fall below zero
+        latent_signal = nets.encode_signal(change, rectified)
         latent_biotac = nets.s2m(latent_signal)
         latent_digit = nets.m2m(latent_biotac)
         biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
         center = self._contact_center(digit)
-        confidence, out_of_range = self._trust(change, signals.flags)
+        confidence, out_of_range = self._trust(change, signals.flags, rectified)
         flags = signals.flags.copy()
         flags[out_of_range] |= np.uint16(Flag.OUT_OF_RANGE)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
@@ -68,7 +76,7 @@ class Translator:
             latent_signal, latent_biotac, latent_digit, biotac, digit,
             force=np.where(np.isnan(center[:, :1]), np.float32(0), nets.force(latent_biotac)),
             contact_center=center,
-            confidence=confidence, flags=flags,
+            confidence=confidence, **self._errors(change, rectified), flags=flags,
         )  # fmt: skip
 
     def _contact_center(self, displacement: np.ndarray) -> np.ndarray:
@@ -81,22 +89,41 @@ class Translator:
         """The most that 99 of 100 frames of noise without contact make of a quantity of the card."""
         return float(np.interp(0.99, self.card["silence"]["levels"], self.card["silence"][quantity]))
 
-    def _trust(self, change: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Confidence (T,) and whether a frame is out of range (T,).
+    def _errors(self, change: np.ndarray, rectified: np.ndarray) -> dict[str, np.ndarray]:
+        """Expected largest errors and their bounds by the names of `Translation`."""
+        expected, bounds = self.nets.expected_error(change, rectified), self.card["error_bounds"]
+        found = {}
+        for index, name in enumerate(networks.SURFACES):
+            factor = np.where(rectified, bounds["rectified"][name], bounds["signed"][name])
+            found[f"expected_error_{name}"] = expected[:, index]
+            found[f"error_bound_{name}"] = (factor * expected[:, index]).astype(np.float32)
+        return found
 
-        Each distance to the training signals counts against its quantiles in validation: full confidence up to the
-        95 % quantile, none at ``FAR`` times the outermost. Not a calibrated probability.
+    def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """(T,) bool, whether changes (T, 19) counts lie far from those of the training."""
+        return self._nearness(np.asarray(change, np.float32), rectified) <= 0
+
+    def _trust(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Confidence (T,) and whether a frame is out of range (T,)."""
+        confidence = self._nearness(change, rectified)
+        out_of_range = confidence <= 0
+        untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
+        confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
+        return confidence.astype(np.float32), out_of_range
+
+    def _nearness(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
+        """(T,), 1 for signals like those of the training, 0 far from them.
+
+        Each distance to the training signals counts against its quantiles in validation: all is well up to the 95 %
+        quantile, nothing at ``FAR`` times the outermost. Not a calibrated probability: that is what bounds are for.
         """
-        distance = self.nets.signal_distance(change)
+        distance = self.nets.signal_distance(change, rectified)
         levels = self.card["distance"]["levels"]
         confidence = np.ones(len(change), np.float32)
         for name, limits in self._limits.items():
             usual, far = np.interp(0.95, levels, limits), FAR * limits[-1]
             confidence = np.minimum(confidence, np.clip((far - getattr(distance, name)) / (far - usual), 0, 1))
-        out_of_range = confidence <= 0
-        untrained = flags & np.uint16(Flag.RECTIFIED | Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
-        confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
-        return confidence.astype(np.float32), out_of_range
+        return confidence
 
     def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
         """Whether the BioTac is touched (T,) where the gel has no counterpart: the dent's centre rolls off the gel."""
@@ -125,6 +152,18 @@ def _check_quantiles(card: dict, where: str) -> None:
                 raise TactileError(f"{where}, {table}.{name}", f"{values!r:.80}", expected, ADVICE)
 
 
+def _check_bounds(card: dict, where: str) -> None:
+    """What expected errors are multiplied by: positive numbers for signed and rectified signals and both surfaces."""
+    bounds = card.get("error_bounds")
+    for kind in ("signed", "rectified"):
+        for name in networks.SURFACES:
+            kinds = bounds.get(kind) if isinstance(bounds, dict) else None
+            value = kinds.get(name) if isinstance(kinds, dict) else None
+            if type(value) not in (int, float) or not 0 < value < 1e6:
+                entry = f"{where}, error_bounds.{kind}.{name}"
+                raise TactileError(entry, f"{value!r:.80}", "a factor above 0", ADVICE)
+
+
 def _grows(values: object) -> bool:
     numbers = isinstance(values, list) and len(values) > 0 and all(type(v) in (int, float) for v in values)
     return numbers and bool(np.isfinite(values).all()) and values == sorted(values) and values[0] >= 0
@@ -138,6 +177,7 @@ def load_translator(folder: str | os.PathLike | None = None) -> Translator:
     nets = networks.load(folder)
     card_file = f"{folder or networks.WEIGHTS_FOLDER}, card.json"
     _check_quantiles(nets.card, card_file)
+    _check_bounds(nets.card, card_file)
     for key, here in (
         ("biotac_nodes_sha256", sensors.biotac_surface().sha256),
         ("digit_nodes_sha256", sensors.digit_surface().sha256),

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
-import pytest
 
-h5py = pytest.importorskip("h5py", reason="pairs files need h5py")
+from tactile_core.evaluation.translation import Bodies
+from tactile_core.lattice import Lattice, grid_faces
+from tactile_core.moving_frame import MovingFrame
+
+SHAPES = {"biotac": (9, 7), "digit": (11, 8)}
 
 
 def grid(rows: int, columns: int) -> np.ndarray:
@@ -35,8 +38,8 @@ def write_pairs(
     seed: int = 0,
 ) -> Path:
     """Write a pairs file: each press is a path of growing depth; signals follow the gap law s = k / gap."""
-    biotac = grid(9, 7) if biotac is None else biotac
-    digit = grid(11, 8) if digit is None else digit
+    biotac = grid(*SHAPES["biotac"]) if biotac is None else biotac
+    digit = grid(*SHAPES["digit"]) if digit is None else digit
     rng = np.random.default_rng(seed)
     press = np.repeat(np.arange(presses), steps)
     share = np.tile((np.arange(steps) + 1) / steps, presses)
@@ -63,6 +66,9 @@ def write_pairs(
         reals = {"signal": signal, "gap": gap, "force": force, "contact_center": center, "pressure": 1e4 * depth}
         for name, values in reals.items():
             file[name] = values.astype(np.float32)
+        file["contact_patch_digit"] = gel[..., 1] > 0.5 * gel[..., 1].max(1, keepdims=True)
+        file["place"] = np.concatenate([center, np.zeros_like(center)], 1).astype(np.float32)
+        file["slide"] = np.zeros_like(center, np.float32)
         file["press"], file["indenter"] = press.astype(np.int32), np.zeros(len(press), np.int16)
         file.attrs.update(
             {
@@ -76,13 +82,14 @@ def write_pairs(
     return path
 
 
-@pytest.fixture(scope="session")
-def make_pairs() -> Callable[..., Path]:
-    """The writer of small pairs files."""
-    return write_pairs
+def frame(sensor: str, half: int) -> MovingFrame:
+    """The frame that moves over one of the small surfaces; the BioTac's nodes are turned, as on the sensor."""
+    rows, columns = SHAPES[sensor]
+    turn = np.linspace(-1, 1, rows * columns) if sensor == "biotac" else np.zeros(rows * columns)
+    return MovingFrame(rows, columns, half, turn.astype(np.float32))
 
 
-@pytest.fixture(scope="session")
-def rest_digit() -> np.ndarray:
-    """(M, 3) m, the DIGIT nodes of the small pairs file."""
-    return grid(11, 8)
+def bodies() -> Bodies:
+    """The small surfaces."""
+    gel = Lattice(grid(*SHAPES["digit"]), grid_faces(*SHAPES["digit"], closed=False), SHAPES["digit"])
+    return Bodies(gel, grid(*SHAPES["biotac"])[:, [0, 2]])

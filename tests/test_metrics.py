@@ -48,7 +48,6 @@ def test_no_contact_is_no_figure():
     assert np.isnan(metrics.peak_depth_error(still, still)).all()
     assert np.isnan(metrics.dent_center(still, REST)).all()
     assert metrics.mean(np.array([np.nan])) is None
-    assert metrics.median(np.array([])) is None
 
 
 def test_depth_on_a_curved_pad_is_the_length():
@@ -60,27 +59,3 @@ def test_depth_on_a_curved_pad_is_the_length():
 def test_center_of_a_dent():
     displacement = dent(1e-3, 0) + dent(1e-3, 1) + dent(0.2e-3, 19)  # the last is below 30 % of the peak
     assert metrics.dent_center(displacement, REST)[0] == pytest.approx([0.0, 0.5e-3])
-
-
-def test_center_row_counts_a_missed_contact_as_the_null_answer():
-    true = np.array([[0.0, 0.0], [0.0, 4e-3], [3e-3, 0.0]])
-    found = np.array([[np.nan, np.nan], [0.0, 4e-3], [3e-3, 1e-3]])
-    row = metrics.center_row("center", found, true, np.array([0.0, 2e-3]))
-    assert row == {"name": "center", "value": 1.0, "null": 2.0, "unit": "mm"}
-
-
-def test_rows_carry_the_null_answer():
-    rows = metrics.mesh_rows("net", [(dent(60e-6, 3), dent(100e-6, 3)), (dent(0.0, 3), dent(200e-6, 3))])
-    assert [row["name"] for row in rows] == ["net_rms", "net_max", "net_core_height", "net_peak_depth"]
-    assert rows[0]["value"] == pytest.approx(120.0)
-    assert rows[0]["null"] == pytest.approx(150.0)
-    assert rows[3] == {"name": "net_peak_depth", "value": 70.0, "null": 100.0, "unit": "percent"}
-
-
-def test_force_rows():
-    true = np.array([[0.0, 3.0, 4.0], [0.0, 0.05, 0.0]])
-    rms, share = metrics.force_rows("force", np.array([[0.0, 3.0, 3.0], [0.0, 0.05, 0.0]]), true)
-    assert rms["value"] == pytest.approx(np.sqrt(0.5), rel=1e-3)
-    assert rms["null"] == pytest.approx(np.sqrt(25.0025 / 2), rel=1e-3)
-    assert share["value"] == pytest.approx(20.0)
-    assert share["null"] == 100.0

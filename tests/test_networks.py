@@ -12,14 +12,17 @@ from tactile_core import layers, networks, weights
 from tactile_core.errors import TactileError
 
 NODES = {"biotac": 30, "digit": 24}
-MESH = {"width": 16, "blocks": 2}
+MLP = {"width": 16, "blocks": 2}
 SIZES = {
     "SVB": {"latent": 8},
-    "MVB": {"latent": 6, "modes": 12, "nodes": NODES["biotac"], **MESH},
-    "S2MPN": {"inputs": 8, "outputs": 6, **MESH},
-    "MVD": {"latent": 7, "modes": 13, "nodes": NODES["digit"], **MESH},
-    "M2MPN": {"inputs": 6, "outputs": 7, **MESH},
-    "force": {"inputs": 6, "outputs": 3, "compliance": 0, "width": 8, "blocks": 1},
+    "MVB": {"latent": 6, "wide": 5, "near": 7, "nodes": NODES["biotac"], "rows": 7, "columns": 4, "half": 1, **MLP},
+    "S2MPN": {"inputs": 8, "outputs": 6, **MLP},
+    "MVD": {"latent": 7, "wide": 4, "near": 9, "nodes": NODES["digit"], "rows": 6, "columns": 4, "half": 2, **MLP},
+    "M2MPN": {"inputs": 8, "outputs": 7, **MLP},
+    "D2BPN": {"inputs": 9, "outputs": 6, **MLP},
+    "B2SPN": {"inputs": 8, "outputs": 8, **MLP},
+    "force": {"inputs": 6, "outputs": 3, "width": 8, "blocks": 1},
+    "error": {"inputs": 11, "outputs": 2, "width": 8, "blocks": 1},
 }
 
 
@@ -74,7 +77,10 @@ def calls(nets, count):
         "decode_digit": (nets.decode_digit, latents[7], (NODES["digit"], 3)),
         "encode_biotac": (nets.encode_biotac, meshes["biotac"], (6,)),
         "encode_digit": (nets.encode_digit, meshes["digit"], (7,)),
+        "m2m_back": (nets.m2m_back, latents[7], (6,)),
+        "m2s": (nets.m2s, latents[6], (8,)),
         "force": (nets.force, latents[6], (3,)),
+        "expected_error": (nets.expected_error, change, (2,)),
     }
 
 
@@ -127,15 +133,13 @@ def test_distance_grows_with_distance(nets):
     assert (np.diff(distance.residual) > 0).all()
 
 
-def test_compliance_is_linear_in_the_displacement(tmp_path):
-    sizes = SIZES | {"force": {"compliance": 1, "inputs": 12, "outputs": 3, "width": 0, "blocks": 0}}
-    linear = networks.load(write_folder(tmp_path / "w", sizes))
-    latent = np.random.default_rng(0).standard_normal((4, 6)).astype(np.float32)
-    basis, scale = (linear.tensors["MVB"][name].astype(np.float64) for name in ("basis", "scale"))
-    modes = np.linalg.lstsq(basis.T, linear.decode_biotac(latent).reshape(4, -1).T, rcond=None)[0].T / scale
-    expected = modes @ linear.tensors["force"]["compliance"]
-    # float32 displacements, and a random basis whose condition is about 3
-    np.testing.assert_allclose(linear.force(latent), expected, atol=1e-4 * np.abs(expected).max())
+def test_rectified_signals_are_read_as_such(nets):
+    change = np.abs(calls(nets, 8)["encode_signal"][1])
+    told = np.arange(8) % 2 == 1
+    mixed, signed, folded = (nets.encode_signal(change, each) for each in (told, False, True))
+    np.testing.assert_array_equal(mixed[told], folded[told])
+    np.testing.assert_array_equal(mixed[~told], signed[~told])
+    assert np.abs(folded - signed).max() > 0.01
 
 
 def test_flipped_byte_is_found_in_every_file(folder, tmp_path):
@@ -156,9 +160,7 @@ def test_file_of_another_shape_names_the_tensor(folder, tmp_path):
     copy = shutil.copytree(folder, tmp_path / "w")
     other = random_tensors(SIZES | {"MVD": SIZES["MVD"] | {"nodes": 25}})
     weights.write_bytes(copy / "MVD.safetensors", weights.to_safetensors(other["MVD"]))
-    with pytest.raises(
-        TactileError, match=r"MVD.safetensors, tensor basis: shape \(13, 75\); expected shape \(13, 72\)"
-    ):
+    with pytest.raises(TactileError, match=r"MVD.safetensors, tensor turn: shape \(25,\); expected shape \(24,\)"):
         networks.load(copy)
 
 
@@ -167,8 +169,9 @@ def test_file_of_another_shape_names_the_tensor(folder, tmp_path):
     [
         (lambda card: card.pop("nets"), "nets.SVB"),
         (lambda card: card["nets"].pop("M2MPN"), "nets.M2MPN"),
-        (lambda card: card["nets"]["MVB"]["sizes"].pop("modes"), "nets.MVB"),
-        (lambda card: card["nets"]["MVB"]["sizes"].update(modes="12"), "nets.MVB"),
+        (lambda card: card["nets"]["MVB"]["sizes"].pop("wide"), "nets.MVB"),
+        (lambda card: card["nets"]["MVB"]["sizes"].update(wide="12"), "nets.MVB"),
+        (lambda card: card["nets"]["MVB"]["sizes"].update(rows=8), "nets.MVB: a lattice of 8 x 4"),
         (lambda card: card["nets"]["SVB"].pop("sha256"), "nets.SVB"),
         (lambda card: card.update(format="tactile-weights-9"), "tactile-weights-9"),
     ],
@@ -184,7 +187,7 @@ def test_wrong_cards_are_refused(folder, tmp_path, change, message):
 
 def test_networks_that_do_not_fit_together_are_refused(tmp_path):
     sizes = SIZES | {"M2MPN": SIZES["M2MPN"] | {"inputs": 5}}
-    with pytest.raises(TactileError, match=r"nets\.M2MPN: inputs 5; expected 6"):
+    with pytest.raises(TactileError, match=r"nets\.M2MPN: inputs 5; expected 8"):
         networks.load(write_folder(tmp_path / "w", sizes))
 
 

@@ -6,21 +6,22 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.training.pairs import read_pairs, split_presses
+from tactile_core.paired_contacts import read_pairs, split_presses
 
 h5py = pytest.importorskip("h5py", reason="pairs files need h5py")
+from small_pairs import write_pairs  # noqa: E402
 
 
-def test_whole_file(make_pairs, tmp_path):
-    pairs = read_pairs(make_pairs(tmp_path / "pairs.h5", presses=5, steps=3))
+def test_whole_file(tmp_path):
+    pairs = read_pairs(write_pairs(tmp_path / "pairs.h5", presses=5, steps=3))
     assert pairs.displacement_biotac.shape == (15, 63, 3)
     assert pairs.displacement_biotac.dtype == np.int16
     assert pairs.signal.shape == (15, 19)
     assert pairs.scale_digit == 1e-7
 
 
-def test_hash_is_of_the_content(make_pairs, tmp_path):
-    first = make_pairs(tmp_path / "a.h5", presses=5, steps=3)
+def test_hash_is_of_the_content(tmp_path):
+    first = write_pairs(tmp_path / "a.h5", presses=5, steps=3)
     second = tmp_path / "b.h5"
     with h5py.File(first) as source, h5py.File(second, "w") as copy:  # the same, chunked and compressed
         for name, data in source.items():
@@ -73,8 +74,8 @@ def poison(file):
         (poison, "signal, contact 4: NaN"),
     ],
 )
-def test_wrong_files(make_pairs, tmp_path, change, message):
-    path = make_pairs(tmp_path / "pairs.h5", presses=5, steps=3)
+def test_wrong_files(tmp_path, change, message):
+    path = write_pairs(tmp_path / "pairs.h5", presses=5, steps=3)
     with h5py.File(path, "r+") as file:
         change(file)
     with pytest.raises(TactileError, match=message) as caught:
@@ -82,8 +83,8 @@ def test_wrong_files(make_pairs, tmp_path, change, message):
     assert str(path) in str(caught.value)
 
 
-def test_truncated_missing_and_foreign_files(make_pairs, tmp_path):
-    path = make_pairs(tmp_path / "pairs.h5", presses=5, steps=3)
+def test_truncated_missing_and_foreign_files(tmp_path):
+    path = write_pairs(tmp_path / "pairs.h5", presses=5, steps=3)
     whole = path.read_bytes()
     for data in (whole[: len(whole) // 2], b"", b"timestamp,tdc\n"):
         path.write_bytes(data)

@@ -99,8 +99,33 @@ def test_confidence_is_high_where_trained_and_low_elsewhere(translator, shipped,
     odd = translator(strange)
     assert np.median(odd.confidence[touched(shipped)]) == 0
     assert (odd.flags[touched(shipped)] & Flag.OUT_OF_RANGE).mean() > 0.9
-    rectified = dataclasses.replace(signals, flags=signals.flags | np.uint16(Flag.RECTIFIED))
-    assert translator(rectified).confidence.max() <= np.float32(translate.UNTRAINED_CONFIDENCE)
+    restless = dataclasses.replace(signals, flags=signals.flags | np.uint16(Flag.NO_QUIET_PART))
+    assert translator(restless).confidence.max() <= np.float32(translate.UNTRAINED_CONFIDENCE)
+
+
+def test_rectified_signals_are_read_as_such(translator, shipped, signals, translation):
+    """Without their sign the translation is worse than with it, as expected, and far better than taken for signed."""
+    here = touched(shipped)
+    folded = dataclasses.replace(signals, change=np.abs(signals.change))
+    told = translator(dataclasses.replace(folded, flags=signals.flags | np.uint16(Flag.RECTIFIED)))
+    fooled = translator(folded)
+    true = shipped.truth.displacement_biotac[here]
+    signed, rectified, wrong = (
+        np.nanmean(metrics.rms_in_contact(each.displacement_biotac[here], true)) for each in (translation, told, fooled)
+    )
+    assert signed < rectified < wrong
+    assert np.median(told.expected_error_biotac[here]) > np.median(translation.expected_error_biotac[here])
+
+
+def test_errors_are_expected_where_they_are(shipped, translation):
+    here = touched(shipped)
+    for name in networks.SURFACES:
+        found, true = (getattr(each, f"displacement_{name}")[here] for each in (translation, shipped.truth))
+        error = metrics.max_error(found, true)
+        bound, expected = (getattr(translation, f"{what}_{name}")[here] for what in ("error_bound", "expected_error"))
+        assert (bound > expected).all() and (expected > 0).all()
+        # one recording of one ball is no random draw of contacts: the stated 95 % cannot be asked of it
+        assert (error <= bound).mean() > 0.7
 
 
 def test_a_contact_beyond_the_gel_is_flagged(translator):

@@ -80,7 +80,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     readings = fill(readings, glitches | ~np.isfinite(recording.electrodes))
     if kind == "rectified":
         flags |= np.uint16(Flag.RECTIFIED)
-        warnings.append("the recording holds absolute changes (rectified): their sign is lost, expect low confidence")
+        warnings.append("the recording holds absolute changes (rectified): their sign is lost, and much of the place")
     quiet = _quiet(recording, readings, kind, options)
     rest = _rest(recording, readings, kind, quiet, options, warnings)
     if not quiet.parts:

@@ -8,17 +8,19 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .. import __version__
-from ..networks import NETS, Networks, compress, load
+from .. import __version__, typical_signals
+from ..evaluation.translation import Bodies
+from ..networks import ELECTRODES, ERROR_FEATURES, NETS, PLACE, SURFACES, Networks, load
 from ..weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
-from .report import QUANTILES, Measure, distance_quantiles, error_rows, silence_quantiles, validation_force
+from .modules import compress
+from .report import QUANTILES, Measure, distance_quantiles, error_bounds, error_rows, silence_quantiles
 from .stages import FORCE_BLOCKS, FORCE_WIDTH, Model
+from .surface import Surface
 
 DRAWS = 4  # noisy readings of each training contact for the distance's statistics
 COLLAPSED = 1e-3  # share of the largest variance: latents that vary less are unused, their noise is no distance
 RESIDUAL_FLOOR = 0.01  # compressed units, 0.15 counts: below the rounding of the readings
-RIDGE = tuple(10.0**power for power in range(-8, 1))  # tried on validation, in mean eigenvalues of the Gram matrix
 UNITS = {
     "change": "counts, reading minus rest",
     "displacement": "m",
@@ -26,7 +28,7 @@ UNITS = {
 }
 
 
-def export(model: Model, contacts: Contacts, rest_digit: np.ndarray, seed: int, folder: Path) -> dict:
+def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: Path) -> dict:
     """Write one safetensors file a network and the card; returns the card.
 
     The errors in the card are those of the files: they are computed by `networks.py` from the rounded weights.
@@ -36,12 +38,13 @@ def export(model: Model, contacts: Contacts, rest_digit: np.ndarray, seed: int, 
             parameter.copy_(parameter.half().float())
     tensors = {net: net_tensors(net, model, contacts) for net in NETS}
     tensors["SVB"] |= signal_statistics(model, contacts, seed)
-    sizes = net_sizes(model, contacts)
-    choice = choose_force(tensors, sizes, contacts, seed)
-    measure = Measure(assemble(tensors, sizes), contacts, rest_digit, seed)
+    sizes = net_sizes(contacts)
+    typical = typical_signals.make(contacts.pairs.signal[contacts.split.train], seed)
+    measure = Measure(assemble(tensors, sizes), contacts, bodies, seed)
     card = {
         "format": CARD_FORMAT,
         "nets": write_nets(folder, tensors, sizes),
+        "signals": typical_signals.write(folder, typical),
         "units": UNITS,
         "seed": seed,
         "options": contacts.options.settings(),
@@ -49,9 +52,9 @@ def export(model: Model, contacts: Contacts, rest_digit: np.ndarray, seed: int, 
         "pairs": pairs_entry(contacts),
         "biotac_nodes_sha256": contacts.pairs.attributes["biotac_nodes_sha256"],
         "digit_nodes_sha256": contacts.pairs.attributes["digit_nodes_sha256"],
-        "force": choice,
         "distance": {"levels": list(QUANTILES), **distance_quantiles(measure)},
         "silence": {"levels": list(QUANTILES), **silence_quantiles(measure)},
+        "error_bounds": error_bounds(measure),
         "errors": error_rows(measure, model),
     }
     write_bytes(folder / CARD_NAME, card_bytes(card))
@@ -60,31 +63,41 @@ def export(model: Model, contacts: Contacts, rest_digit: np.ndarray, seed: int, 
 
 
 def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndarray]:
-    """The tensors of one network under the names of `networks.py`, in float16; scales in float32."""
+    """The tensors of one network under the names of `networks.py`, in float16; scales and turns in float32."""
     state = {name: tensor.numpy().astype(np.float16) for name, tensor in getattr(model, net).state_dict().items()}
     if net == "SVB":
         return state
     if net in ("MVB", "MVD"):
-        surface = contacts.biotac if net == "MVB" else contacts.digit
-        basis = surface.basis.numpy().astype(np.float16)
-        return state | {"basis": basis, "scale": np.array([surface.unit], np.float32)}
-    tensors = {f"map.{name}": tensor for name, tensor in state.items()}
-    return tensors | ({"scale": np.array([contacts.force_unit], np.float32)} if net == "force" else {})
+        surface = getattr(model, net).surface
+        bases = {name: getattr(surface, name).numpy().astype(np.float16) for name in ("wide", "near")}
+        return state | bases | {"scale": surface.scale.numpy(), "turn": np.asarray(surface.frame.turn, np.float32)}
+    return {f"map.{name}": tensor for name, tensor in state.items()}
 
 
-def net_sizes(model: Model, contacts: Contacts) -> dict[str, dict[str, int]]:
+def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
     """The sizes in the card, from which `networks.tensor_shapes` knows every shape."""
     options = contacts.options
+    head = {"width": FORCE_WIDTH, "blocks": FORCE_BLOCKS}
     common = {"width": options.width, "blocks": options.blocks}
     signal, biotac, digit = options.latent_signal, options.latent_biotac, options.latent_digit
     return {
         "SVB": {"latent": signal},
-        "MVB": {"latent": biotac, "modes": contacts.biotac.modes.shape[1], "nodes": contacts.biotac.nodes, **common},
-        "MVD": {"latent": digit, "modes": contacts.digit.modes.shape[1], "nodes": contacts.digit.nodes, **common},
+        "MVB": {"latent": biotac, **surface_sizes(contacts.biotac), **common},
+        "MVD": {"latent": digit, **surface_sizes(contacts.digit), **common},
         "S2MPN": {"inputs": signal, "outputs": biotac, **common},
-        "M2MPN": {"inputs": biotac, "outputs": digit, **common},
-        "force": {"compliance": 0, "inputs": biotac, "outputs": 3, "width": FORCE_WIDTH, "blocks": FORCE_BLOCKS},
+        "M2MPN": {"inputs": biotac + PLACE, "outputs": digit, **common},
+        "D2BPN": {"inputs": digit + PLACE, "outputs": biotac, **common},
+        "B2SPN": {"inputs": biotac + PLACE, "outputs": signal, **common},
+        "force": {"inputs": biotac, "outputs": 3, **head},
+        "error": {"inputs": signal + ERROR_FEATURES, "outputs": len(SURFACES), **head},
     }
+
+
+def surface_sizes(surface: Surface) -> dict[str, int]:
+    """Sizes of a surface's lattice, window and bases."""
+    frame, wide, near = surface.frame, len(surface.wide), len(surface.near)
+    lattice = {"rows": frame.rows, "columns": frame.columns, "half": frame.half, "nodes": surface.nodes}
+    return {**lattice, "wide": wide, "near": near}
 
 
 def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, np.ndarray]:
@@ -92,46 +105,16 @@ def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, 
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)
+    share = contacts.options.rectified
     with torch.no_grad():
-        latent = model.SVB.mean(torch.from_numpy(compress(contacts.read(rows, rng)))).double().numpy()
-        signal = torch.from_numpy(compress(contacts.read(left, rng)))
-        residual = (model.SVB.decoder(model.SVB.mean(signal)) - signal).double().square().mean(0).sqrt().numpy()
+        latent = model.SVB.mean(compress(torch.from_numpy(contacts.read(rows, rng, share)))).double().numpy()
+        signal = compress(torch.from_numpy(contacts.read(left, rng, share)))
+        error = model.SVB.decoder(model.SVB.mean(signal)) - signal[:, :ELECTRODES]
+        residual = error.double().square().mean(0).sqrt().numpy()
     variances, axes = np.linalg.eigh(np.atleast_2d(np.cov(latent.T)))
     spread = np.sqrt(np.maximum(variances, COLLAPSED * variances.max()))
     tensors = {"mean": latent.mean(0), "whitening": axes / spread, "residual": np.maximum(residual, RESIDUAL_FLOOR)}
     return {f"distance.{name}": array.astype(np.float32) for name, array in tensors.items()}
-
-
-def compliance(contacts: Contacts) -> np.ndarray:
-    """(K, 3) N: force as a linear functional of the BioTac's coefficients, ridge regression on the training contacts.
-
-    Without an offset: no displacement, no force. The regularisation is the best on the validation presses.
-    """
-    modes, force = contacts.biotac.modes.double().numpy(), contacts.pairs.force.astype(np.float64)
-    train, validation = contacts.split.train, contacts.split.validation
-    gram, moment = modes[train].T @ modes[train], modes[train].T @ force[train]
-    size = np.trace(gram) / len(gram) * np.eye(len(gram))
-    fits = [np.linalg.solve(gram + share * size, moment) for share in RIDGE]
-    errors = [np.square(modes[validation] @ fit - force[validation]).sum() for fit in fits]
-    return fits[int(np.argmin(errors))]
-
-
-def choose_force(tensors: dict, sizes: dict, contacts: Contacts, seed: int) -> dict[str, object]:
-    """Keep the better force estimate on validation presses, from signals as read; puts it into tensors and sizes.
-
-    Returns the card's entry: both errors (N, rms of the vector error), the estimate kept.
-    """
-    fit = compliance(contacts)
-    linear = {"compliance": fit.astype(np.float32)}
-    linear_sizes = {"compliance": 1, "inputs": len(fit), "outputs": 3, "width": 0, "blocks": 0}
-    choices = {"head": (tensors["force"], sizes["force"]), "compliance": (linear, linear_sizes)}
-    errors = {}
-    for name, (estimate, estimate_sizes) in choices.items():
-        networks = assemble(tensors | {"force": estimate}, sizes | {"force": estimate_sizes})
-        errors[name] = validation_force(networks, contacts, seed)
-    kept = min(errors, key=lambda name: errors[name])
-    tensors["force"], sizes["force"] = choices[kept]
-    return {"kept": kept, "validation_rms_N": {name: float(f"{error:.4g}") for name, error in errors.items()}}
 
 
 def assemble(tensors: dict, sizes: dict) -> Networks:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from ..layers import NORM_EPSILON
-from ..networks import COUNT_SCALE, ELECTRODES, SIGNAL_HIDDEN
+from ..networks import COUNT_SCALE, ELECTRODES, PLACE, SIGNAL_HIDDEN
+from .surface import Surface
 
 
 class Plain(nn.ModuleList):
@@ -84,20 +86,57 @@ class Vae(nn.Module):
         return mean + noise * (0.5 * logvar).exp(), divergence
 
 
+class MeshVae(Vae):
+    """MVB or MVD: a latent is the place of the dent and a code of its shape in the frame that moves with it.
+
+    The place is read off the mesh, not learned; the decoder and the networks that start from a latent are told, beside
+    it, what the whole cell of the place leaves (`placed`), without which a shape on a lattice is not known.
+    surface : what ties places to cells, coefficients to fields
+    """
+
+    def __init__(self, surface: Surface, latent: int, width: int, blocks: int) -> None:
+        modes = surface.modes.shape[1]
+        encoder = Residual(modes + 2 * PLACE, 2 * (latent - PLACE), width, blocks)
+        super().__init__(encoder, Residual(latent + PLACE, modes, width, blocks))
+        self.surface, self.modes = surface, modes
+
+    def mean(self, x: Tensor) -> Tensor:
+        """What the encoder reads (B, K + 4) -> latent (B, L)."""
+        return torch.cat([x[:, self.modes : self.modes + PLACE], super().mean(x)], -1)
+
+    def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+        """As `Vae.sample`; the place is not noisy."""
+        code, divergence = super().sample(x, generator)
+        return torch.cat([x[:, self.modes : self.modes + PLACE], code], -1), divergence
+
+    def placed(self, latent: Tensor) -> Tensor:
+        """Latent (B, L) -> (B, L + 2), with what the whole cell leaves of the place."""
+        return torch.cat([latent, self.surface.cells(latent[:, :PLACE])[1]], -1)
+
+    def loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
+        """Error of what the latent (B, L) decodes to against the contacts of these rows: see `Surface.loss`."""
+        cell, left = self.surface.cells(latent[:, :PLACE])
+        return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
+
+    def field(self, latent: Tensor) -> Tensor:
+        """Latent (B, L) -> displacement (B, n, 3) m in the nodes' own frames; carries no gradient."""
+        cell, left = self.surface.cells(latent[:, :PLACE])
+        with torch.no_grad():
+            return self.surface.field(self.decoder(torch.cat([latent, left], -1)), cell)
+
+
 def signal_vae(latent: int) -> Vae:
-    """SVB: 19-256-128-64 to the latent, mirrored, on compressed signals (sensors.md, later code of the authors)."""
-    encoder = Plain((ELECTRODES, *SIGNAL_HIDDEN, 2 * latent))
+    """SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (sensors.md, later code of the authors).
+
+    The twentieth input says whether the signals are rectified.
+    """
+    encoder = Plain((ELECTRODES + 1, *SIGNAL_HIDDEN, 2 * latent))
     return Vae(encoder, Plain((latent, *SIGNAL_HIDDEN[::-1], ELECTRODES)))
 
 
-def mesh_vae(modes: int, latent: int, width: int, blocks: int) -> Vae:
-    """MVB or MVD on the coefficients of a linear basis."""
-    return Vae(Residual(modes, 2 * latent, width, blocks), Residual(latent, modes, width, blocks))
-
-
-def compress(change: Tensor) -> Tensor:
-    """Counts -> the scale the networks see; see `networks.compress`."""
-    return torch.asinh(change / COUNT_SCALE)
+def compress(signal: Tensor) -> Tensor:
+    """Changes in counts and whether they are rectified, (B, 20) -> what SVB sees; see `networks.compress`."""
+    return torch.cat([torch.asinh(signal[:, :ELECTRODES] / COUNT_SCALE), signal[:, ELECTRODES:]], -1)
 
 
 def initialise(module: nn.Module, generator: torch.Generator) -> None:

@@ -7,47 +7,75 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class Options:
-    """Sizes and lengths of a training. The defaults take about ten minutes for 6,000 contacts on one core.
+    """Sizes and lengths of a training. The defaults take about twenty minutes for 50,000 contacts on one core.
 
+    latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
+    wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
+    half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
     epochs : stage -> passes over the training contacts; `effort` multiplies all of them
     beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: networks.md)
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (networks.md)
+    rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
+        rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
+        from the simulated ones by), rectified_bulge, the same of all falling signals of a sample together,
+        rectified_offset, counts, of the tare before the fold, rectified_missing, share of channels that read nothing.
+        Each was seen to let strength follow fluid pressure better on real recordings; none was fitted to them
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
-    weight_decay : of AdamW; rate : its largest learning rate
+    without : names of indenters that are kept from the training; without_below_x : m, as much of the pad beyond x
+    weight_decay : of AdamW; signal_decay : where signals come in (else rectified ones are over-fitted)
+    rate : largest learning rate
     checkpoint_seconds : least time between two checkpoints; does not change the result
     """
 
     latent_signal: int = 8
-    latent_biotac: int = 32
-    latent_digit: int = 64
-    modes_biotac: int = 64
-    modes_digit: int = 256
+    latent_biotac: int = 64
+    latent_digit: int = 96
+    wide_biotac: int = 80
+    near_biotac: int = 176
+    half_biotac: int = 12
+    wide_digit: int = 32
+    near_digit: int = 224
+    half_digit: int = 16
     width: int = 256
     blocks: int = 2
-    batch: int = 64
-    rate: float = 1e-3
+    batch: int = 128
+    rate: float = 1.5e-3
     weight_decay: float = 1e-2
+    signal_decay: float = 0.03
     beta: float = 1e-4
     noise: float = 1.5
     gain: float = 0.1
+    rectified: float = 0.2
+    rectified_gain: float = 0.5
+    rectified_bulge: float = 0.5
+    rectified_offset: float = 3.0
+    rectified_missing: float = 0.2
     silence: float = 0.05
+    without: tuple[str, ...] = ()
+    without_below_x: float | None = None
     effort: float = 1.0
-    svb_epochs: int = 60
-    mvb_epochs: int = 40
-    mvd_epochs: int = 60
-    s2mpn_epochs: int = 30
-    m2mpn_epochs: int = 30
-    chain_epochs: int = 60
-    direct_epochs: int = 60
-    force_epochs: int = 20
+    svb_epochs: int = 15
+    mvb_epochs: int = 18
+    mvd_epochs: int = 18
+    s2mpn_epochs: int = 15
+    m2mpn_epochs: int = 10
+    chain_epochs: int = 36
+    direct_epochs: int = 24
+    force_epochs: int = 6
+    error_epochs: int = 3
+    back_epochs: int = 8
     checkpoint_seconds: float = 30.0
 
     def epochs(self, stage: str) -> int:
         """Passes over the data in a stage, at least one."""
         return max(1, round(self.effort * getattr(self, f"{stage.lower()}_epochs")))
 
-    def settings(self) -> dict[str, float]:
-        """All options that change the result."""
-        settings = asdict(self)
+    def decay(self, net: str) -> float:
+        """Weight decay of a network."""
+        return self.signal_decay if net in ("SVB", "S2MPN") else self.weight_decay
+
+    def settings(self) -> dict[str, object]:
+        """All options that change the result, as JSON gives them back."""
+        settings = asdict(self) | {"without": list(self.without)}
         settings.pop("checkpoint_seconds")
         return settings

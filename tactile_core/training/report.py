@@ -4,114 +4,81 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from .. import metrics
-from ..networks import Networks
+from ..evaluation.summary import figure_row, figure_rows
+from ..evaluation.translation import (
+    Bodies,
+    Columns,
+    error_columns,
+    joined,
+    mesh_columns,
+    parts,
+    translation_figures,
+    true_displacement,
+)
+from ..networks import SURFACES, Networks
+from ..rows import Row
 from ..weights import write_bytes
-from .data import SILENT, Contacts
-from .modules import compress
+from .data import Contacts
 from .stages import Model
+from .surface import SILENT
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 0.999)
-ROWS = 128  # contacts at a time, to bound memory
-SURFACES = ("biotac", "digit")
+COVER = 0.95  # share of validation contacts whose largest error stays below the bound
 SILENT_FRAMES = 2048  # two of them lie above the outermost quantile
 
 
 class Measure:
-    """The exported networks on the test presses: signals read once with noise, once without.
+    """The exported networks on the test presses, their signals read with the training's noise."""
 
-    Every answer is given lazily in batches of (predicted, true) displacement, as meshes of all contacts are large.
-    """
-
-    def __init__(self, networks: Networks, contacts: Contacts, rest_digit: np.ndarray, seed: int) -> None:
-        self.networks, self.contacts, self.rest, self.seed = networks, contacts, rest_digit, seed
+    def __init__(self, networks: Networks, contacts: Contacts, bodies: Bodies, seed: int) -> None:
+        self.networks, self.contacts, self.bodies, self.seed = networks, contacts, bodies, seed
         self.rows = contacts.split.test
-        self.change = contacts.read(self.rows, np.random.default_rng([seed, 2]))
-        self.clean = contacts.pairs.signal[self.rows]
+        self.change = self.read(self.rows, 2)
 
-    def true(self, surface: str, rows: np.ndarray) -> np.ndarray:
-        """(B, n, 3) m of the contacts in these rows."""
-        source = getattr(self.contacts, surface)
-        return source.data[rows].astype(np.float32) * np.float32(source.scale)
-
-    def batches(self, surface: str, latent: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Displacement decoded from latents of the test contacts, and the true one."""
-        decode = getattr(self.networks, f"decode_{surface}")
-        for start in range(0, len(self.rows), ROWS):
-            part = slice(start, start + ROWS)
-            yield decode(latent[part]), self.true(surface, self.rows[part])
-
-    def encoded(self, surface: str) -> np.ndarray:
-        """Latents of the true meshes of the test contacts."""
-        encode = getattr(self.networks, f"encode_{surface}")
-        parts = [self.rows[start : start + ROWS] for start in range(0, len(self.rows), ROWS)]
-        return np.concatenate([encode(self.true(surface, part)) for part in parts])
-
-    def from_modes(self, surface: str, modes: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Displacement from coefficients of the linear basis, and the true one."""
-        source = getattr(self.contacts, surface)
-        for start in range(0, len(self.rows), ROWS):
-            true = self.true(surface, self.rows[start : start + ROWS])
-            found = modes[start : start + ROWS] * np.float32(source.unit) @ source.basis.numpy()
-            yield found.reshape(true.shape), true
+    def read(self, rows: np.ndarray, stream: int) -> np.ndarray:
+        """(C, 19) counts as read, signed."""
+        return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
 
-def error_rows(measure: Measure, model: Model) -> list[metrics.Row]:
+def error_rows(measure: Measure, model: Model) -> list[Row]:
     """All rows of the card: each step of the chain, the chain, the direct network, each beside its null answer."""
-    networks, contacts, rows = measure.networks, measure.contacts, measure.rows
-    latent_signal = networks.encode_signal(measure.change)
-    biotac, clean = networks.s2m(latent_signal), networks.s2m(networks.encode_signal(measure.clean))
-    mesh = measure.encoded("biotac")
-    with torch.no_grad():
-        direct = model.direct(compress(torch.from_numpy(measure.change))).numpy()
-    depth = metrics.lengths
-    return [
-        *signal_rows(measure, latent_signal),
-        *metrics.mesh_rows("biotac_basis", measure.from_modes("biotac", contacts.biotac.modes[rows].numpy()), depth),
-        *metrics.mesh_rows("digit_basis", measure.from_modes("digit", contacts.digit.modes[rows].numpy())),
-        *metrics.mesh_rows("MVB", measure.batches("biotac", mesh), depth),
-        *metrics.mesh_rows("MVD", measure.batches("digit", measure.encoded("digit"))),
-        *metrics.mesh_rows("S2MPN", measure.batches("biotac", biotac), depth),
-        *metrics.mesh_rows("S2MPN_no_noise", measure.batches("biotac", clean), depth),
-        *metrics.mesh_rows("M2MPN", measure.batches("digit", networks.m2m(mesh))),
-        *metrics.mesh_rows("chain", measure.batches("digit", networks.m2m(biotac))),
-        *metrics.mesh_rows("chain_no_noise", measure.batches("digit", networks.m2m(clean))),
-        *metrics.mesh_rows("direct", measure.from_modes("digit", direct)),
-        *center_rows(measure, networks.m2m(biotac)),
-        *metrics.force_rows("force_from_mesh", networks.force(mesh), contacts.pairs.force[rows]),
-        *metrics.force_rows("force", networks.force(biotac), contacts.pairs.force[rows]),
-        *silence_rows(measure),
-    ]
+    pairs, rows = measure.contacts.pairs, measure.rows
+    columns = translation_figures(measure.networks, pairs, rows, measure.change, measure.bodies)
+    columns |= direct_columns(model, measure)
+    return [*signal_rows(measure), *figure_rows(columns, pairs, rows, "test presses", {}), *silence_rows(measure)]
 
 
-def signal_rows(measure: Measure, latent: np.ndarray) -> list[metrics.Row]:
+def direct_columns(model: Model, measure: Measure) -> Columns:
+    """Errors of the direct network, the bar that the chain must reach."""
+    pairs = measure.contacts.pairs
+
+    def answer(part: slice) -> Columns:
+        change = torch.from_numpy(measure.change[part])
+        with torch.no_grad():
+            latent = model.directly(torch.cat([change, torch.zeros(len(change), 1)], -1))
+            found = model.MVD.surface.frame.to_shared(model.direct_decoder.field(latent).numpy())
+        return mesh_columns("direct", found, true_displacement(pairs, "digit", measure.rows[part]))
+
+    return joined(answer(part) for part in parts(len(measure.rows)))
+
+
+def signal_rows(measure: Measure) -> list[Row]:
     """SVB: rms over electrodes of the reconstruction against the signal as read, averaged over contacts."""
-    error = measure.networks.decode_signal(latent) - measure.change
+    nets = measure.networks
+    error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
     value, null = (metrics.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
-    return [metrics.row("SVB_rms", value, null, "counts")]
-
-
-def center_rows(measure: Measure, latent_digit: np.ndarray) -> list[metrics.Row]:
-    """Contact centre from the translated DIGIT mesh: against the true mesh's dent, and against the known place."""
-    train, test = measure.contacts.split.train, measure.contacts.pairs.contact_center[measure.rows]
-    null = np.nanmean(measure.contacts.pairs.contact_center[train], 0)
-    parts = [
-        [metrics.dent_center(mesh, measure.rest) for mesh in batch] for batch in measure.batches("digit", latent_digit)
-    ]
-    found, dent = (np.concatenate(centers) for centers in zip(*parts, strict=True))
-    return [metrics.center_row("center_of_dent", found, dent, null), metrics.center_row("center", found, test, null)]
+    return [figure_row("SVB_rms_counts", value, null, None, "test presses")]
 
 
 def silence(measure: Measure) -> dict[str, np.ndarray]:
     """What signals of noise alone are translated to, frame by frame: largest displacements (m) and the force (N)."""
-    nets, rows = measure.networks, np.full(SILENT_FRAMES, SILENT)
-    change = measure.contacts.read(rows, np.random.default_rng([measure.seed, 3]))
+    nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
     biotac = nets.s2m(nets.encode_signal(change))
     return {
         "biotac_m": metrics.lengths(nets.decode_biotac(biotac)).max(-1),
@@ -120,11 +87,12 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
     }
 
 
-def silence_rows(measure: Measure) -> list[metrics.Row]:
+def silence_rows(measure: Measure) -> list[Row]:
     """Means of `silence`; doing nothing gives zero."""
     values = silence(measure)
-    rows = [metrics.row(f"silence_{name}_max", metrics.mean(1e6 * values[f"{name}_m"]), 0.0, "um") for name in SURFACES]
-    return [*rows, metrics.row("silence_force", metrics.mean(values["force_N"]), 0.0, "N")]
+    largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
+    named = [*largest, ("silence_force_N", values["force_N"])]
+    return [figure_row(name, metrics.mean(value), 0.0, None, "noise alone") for name, value in named]
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
@@ -137,21 +105,31 @@ def quantiles(values: np.ndarray) -> list[float]:
     return [float(f"{quantile:.6g}") for quantile in np.quantile(values, QUANTILES)]
 
 
-def validation_force(networks: Networks, contacts: Contacts, seed: int) -> float:
-    """N, rms of the force's vector error on the validation presses, from signals as read."""
-    rows = contacts.split.validation
-    change = contacts.read(rows, np.random.default_rng([seed, 4]))
-    force = networks.force(networks.s2m(networks.encode_signal(change)))
-    return float(np.sqrt(np.square(metrics.lengths(force - contacts.pairs.force[rows])).mean()))
-
-
 def distance_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Quantiles at QUANTILES of `Networks.signal_distance` on the validation presses, read with noise."""
-    rows = measure.contacts.split.validation
-    change = measure.contacts.read(rows, np.random.default_rng([measure.seed, 5]))
-    distance = measure.networks.signal_distance(change)
+    """Quantiles at QUANTILES of `Networks.signal_distance` on validation presses, half rectified."""
+    contacts = measure.contacts
+    signal = contacts.read(contacts.split.validation, np.random.default_rng([measure.seed, 5]), 0.5)
+    distance = measure.networks.signal_distance(signal[:, :-1], signal[:, -1])
     values = {name: getattr(distance, name) for name in ("mahalanobis", "residual", "largest")}
     return {name: quantiles(value) for name, value in values.items()}
+
+
+def error_bounds(measure: Measure) -> dict[str, dict[str, float]]:
+    """What the expected error is multiplied by to bound the largest error in COVER of validation's contacts.
+
+    Split conformal prediction with the ratio as score (Lei et al. 2018, section 5.2); signed and rectified apart.
+    """
+    nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
+    bounds = {}
+    for kind, share in (("signed", 0.0), ("rectified", 1.0)):
+        signal = contacts.read(rows, np.random.default_rng([measure.seed, 6]), share)
+        columns = joined(
+            error_columns(nets, contacts.pairs, rows[part], signal[part, :-1], bool(share)) for part in parts(len(rows))
+        )
+        level = min(1.0, COVER * (1 + 1 / len(rows)))
+        ratios = {name: columns[f"{name}_max_m"] / columns[f"{name}_expected_m"] for name in SURFACES}
+        bounds[kind] = {name: float(f"{np.quantile(ratio, level):.4g}") for name, ratio in ratios.items()}
+    return bounds
 
 
 def write_log(path: Path, history: list[list]) -> None:

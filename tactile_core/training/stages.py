@@ -1,39 +1,74 @@
-"""The stages of a training, in order: what each one trains and the loss it lowers."""
+"""The networks together, and the stages they are trained in."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
+from ..networks import ELECTRODES, ERROR_FEATURES, ERROR_UNIT, FORCE_SCALE, PLACE, SURFACES
 from .data import Batch, Contacts
-from .modules import Residual, compress, initialise, mesh_vae, signal_vae
+from .modules import MeshVae, Residual, compress, initialise, signal_vae
 from .options import Options
 
 FORCE_WIDTH, FORCE_BLOCKS = 64, 1  # a small head: three numbers out of a latent
+FORCE_FLOOR = 0.1  # N: an error counts against the force plus this, so that light touches do not rule (assumed)
+ERROR_FLOOR = 0.1e-6  # m, a step of the stored displacements: no error is known better
+LEAST_SIZE = 1e-2  # of a latent's mean square: silent samples alone have none
+CELL_WEIGHT = 4.0  # of an error of the place among those of the code, in the latents' own scales (assumed)
 
 
 class Model(nn.Module):
     """The five networks, the force head, and the direct network that the chain is compared with (not shipped)."""
 
-    def __init__(self, options: Options, modes_biotac: int, modes_digit: int, generator: torch.Generator) -> None:
+    def __init__(self, options: Options, contacts: Contacts, generator: torch.Generator) -> None:
         super().__init__()
         width, blocks = options.width, options.blocks
-        self.SVB = signal_vae(options.latent_signal)
-        self.MVB = mesh_vae(modes_biotac, options.latent_biotac, width, blocks)
-        self.MVD = mesh_vae(modes_digit, options.latent_digit, width, blocks)
-        self.S2MPN = Residual(options.latent_signal, options.latent_biotac, width, blocks)
-        self.M2MPN = Residual(options.latent_biotac, options.latent_digit, width, blocks)
-        self.force = Residual(options.latent_biotac, 3, FORCE_WIDTH, FORCE_BLOCKS)
-        self.direct = Residual(19, modes_digit, width, blocks)
+        signal, biotac, digit = options.latent_signal, options.latent_biotac, options.latent_digit
+        self.SVB = signal_vae(signal)
+        self.MVB = MeshVae(contacts.biotac, biotac, width, blocks)
+        self.MVD = MeshVae(contacts.digit, digit, width, blocks)
+        self.S2MPN = Residual(signal, biotac, width, blocks)
+        self.M2MPN = Residual(biotac + PLACE, digit, width, blocks)
+        self.force = Residual(biotac, 3, FORCE_WIDTH, FORCE_BLOCKS)
+        self.error = Residual(signal + ERROR_FEATURES, len(SURFACES), FORCE_WIDTH, FORCE_BLOCKS)
+        self.D2BPN = Residual(digit + PLACE, biotac, width, blocks)
+        self.B2SPN = Residual(biotac + PLACE, signal, width, blocks)
+        self.direct = Residual(ELECTRODES + 1, digit, width, blocks)
+        self.direct_decoder = MeshVae(contacts.digit, digit, width, blocks)
         initialise(self, generator)
 
-    def latents(self, change: Tensor) -> tuple[Tensor, Tensor]:
-        """change (B, 19) counts -> latent_biotac, latent_digit along the chain."""
-        biotac = self.S2MPN(self.SVB.mean(compress(change)))
-        return biotac, self.M2MPN(biotac)
+    def from_signal(self, signal: Tensor) -> Tensor:
+        """signal (B, 20) -> latent_biotac."""
+        return self.S2MPN(self.SVB.mean(compress(signal)))
+
+    def across(self, latent_biotac: Tensor) -> Tensor:
+        """latent_biotac -> latent_digit."""
+        return self.M2MPN(self.MVB.placed(latent_biotac))
+
+    def back(self, latent_digit: Tensor) -> Tensor:
+        """latent_digit -> latent_biotac."""
+        return self.D2BPN(self.MVD.placed(latent_digit))
+
+    def to_signal(self, latent_biotac: Tensor) -> Tensor:
+        """latent_biotac -> compressed changes (B, 19)."""
+        return self.SVB.decoder(self.B2SPN(self.MVB.placed(latent_biotac)))
+
+    def expected_error(self, signal: Tensor) -> Tensor:
+        """signal (B, 20) -> (B, 2) logarithm of the largest node error on BioTac and DIGIT, over ERROR_UNIT."""
+        seen = compress(signal)
+        latent = self.SVB.mean(seen)
+        change = seen[:, :ELECTRODES]
+        left = (self.SVB.decoder(latent) - change).square().mean(-1, keepdim=True).sqrt()
+        size = change.square().mean(-1, keepdim=True).sqrt()
+        return self.error(torch.cat([latent, left, size, seen[:, ELECTRODES:]], -1))
+
+    def directly(self, signal: Tensor) -> Tensor:
+        """signal (B, 20) -> latent of `direct_decoder`, past all latents that mean anything."""
+        return self.direct(compress(signal))
 
 
 Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
@@ -51,36 +86,47 @@ class Stage:
 
 def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Reconstruction of the signal as read, over its mean square, and KL."""
-    signal = compress(batch.change)
+    signal = compress(batch.signal)
     latent, divergence = model.SVB.sample(signal, generator)
-    error = (model.SVB.decoder(latent) - signal).square().mean()
-    return error / signal.square().mean() + options.beta * divergence
+    change = signal[:, :ELECTRODES]
+    error = (model.SVB.decoder(latent) - change).square().mean()
+    return error / change.square().mean() + options.beta * divergence
 
 
 def mvb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Reconstruction of the BioTac's displacement, and KL."""
     latent, divergence = model.MVB.sample(batch.biotac, generator)
-    return contacts.biotac.loss(model.MVB.decoder(latent), batch.rows, batch.part) + options.beta * divergence
+    return model.MVB.loss(latent, batch.rows) + options.beta * divergence
 
 
 def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Reconstruction of the DIGIT's displacement, and KL."""
     latent, divergence = model.MVD.sample(batch.digit, generator)
-    return contacts.digit.loss(model.MVD.decoder(latent), batch.rows, batch.part) + options.beta * divergence
+    return model.MVD.loss(latent, batch.rows) + options.beta * divergence
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Latent of the signal -> latent of the BioTac, both means of frozen autoencoders."""
     with torch.no_grad():
-        signal, target = model.SVB.mean(compress(batch.change)), model.MVB.mean(batch.biotac)
-    return (model.S2MPN(signal) - target).square().mean() / target.square().mean()
+        signal, target = model.SVB.mean(compress(batch.signal)), model.MVB.mean(batch.biotac)
+    return latent_loss(model.S2MPN(signal), target)
 
 
 def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Latent of the BioTac -> latent of the DIGIT, both means of frozen autoencoders."""
     with torch.no_grad():
         biotac, target = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
-    return (model.M2MPN(biotac) - target).square().mean() / target.square().mean()
+    return latent_loss(model.across(biotac), target)
+
+
+def latent_loss(found: Tensor, target: Tensor) -> Tensor:
+    """Mean square errors of place and code, each over its mean square."""
+    error, size = (found - target).square(), target.square()
+    place, code = (
+        error[:, part].mean() / size[:, part].mean().clamp(min=LEAST_SIZE)
+        for part in (slice(PLACE), slice(PLACE, None))
+    )
+    return (code + CELL_WEIGHT * place) / (1 + CELL_WEIGHT)
 
 
 def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
@@ -88,28 +134,60 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
     The autoencoders' own losses stay in at a quarter, so that latents keep their meaning and meshes can be encoded.
     """
-    biotac, digit = model.latents(batch.change)
-    across = model.M2MPN(model.MVB.mean(batch.biotac))
+    biotac = model.from_signal(batch.signal)
+    across = model.across(model.MVB.mean(batch.biotac))
     given = (model, contacts, batch, options, generator)
     return (
-        contacts.biotac.loss(model.MVB.decoder(biotac), batch.rows, batch.part)
-        + contacts.digit.loss(model.MVD.decoder(digit), batch.rows, batch.part)
-        + 0.5 * contacts.digit.loss(model.MVD.decoder(across), batch.rows, batch.part)
-        + 0.25 * (svb_loss(*given) + mvb_loss(*given) + mvd_loss(*given))
+        model.MVB.loss(biotac, batch.rows)
+        + model.MVD.loss(model.across(biotac), batch.rows)
+        + model.MVD.loss(across, batch.rows)
+        + 0.25 * svb_loss(*given)
+        + 0.5 * (mvb_loss(*given) + mvd_loss(*given))
     )
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Force from the BioTac's latent, be it encoded from a mesh or translated from a signal."""
     with torch.no_grad():
-        latent = torch.cat([model.MVB.mean(batch.biotac), model.latents(batch.change)[0]])
-    true = batch.force.repeat(2, 1) / contacts.force_unit
-    return (model.force(latent) - true).square().sum(-1).mean()
+        latent = torch.cat([model.MVB.mean(batch.biotac), model.from_signal(batch.signal)])
+    true = batch.force.repeat(2, 1)
+    error = FORCE_SCALE * torch.sinh(model.force(latent).clamp(-8.0, 8.0)) - true
+    return (length(error) / (length(true) + FORCE_FLOOR)).mean()
+
+
+def length(vectors: Tensor) -> Tensor:
+    """(B, 3) -> (B,), with a gradient at zero."""
+    return (vectors.square().sum(-1) + 1e-12).sqrt()
+
+
+def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
+    """Largest node error of the chain, in its logarithm: the mean absolute deviation is least at the median."""
+    with torch.no_grad():
+        biotac = model.from_signal(batch.signal)
+        answers = ((model.MVB, biotac), (model.MVD, model.across(biotac)))
+        true = torch.stack([largest_error(vae, latent, batch.rows) for vae, latent in answers], -1)
+    return (model.expected_error(batch.signal) - (true / ERROR_UNIT).log()).abs().mean()
+
+
+def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
+    """(B,) m, largest node error of what a latent decodes to, at least ERROR_FLOOR."""
+    error = vae.field(latent) - vae.surface.true(rows)
+    return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR)
+
+
+def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
+    """The other way round: DIGIT mesh to BioTac mesh, BioTac mesh to the signal as read."""
+    with torch.no_grad():
+        biotac, digit = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
+    signed = batch.signal[:, ELECTRODES:] == 0
+    change = compress(batch.signal)[:, :ELECTRODES]
+    error = ((model.to_signal(biotac) - change).square() * signed).mean()
+    return model.MVB.loss(model.back(digit), batch.rows) + error / (change.square() * signed).mean()
 
 
 def direct_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Signal -> DIGIT in one network, the bar the chain must reach."""
-    return contacts.digit.loss(model.direct(compress(batch.change)), batch.rows, batch.part)
+    return model.direct_decoder.loss(model.directly(batch.signal), batch.rows)
 
 
 STAGES = (
@@ -118,7 +196,9 @@ STAGES = (
     Stage("MVD", ("MVD",), mvd_loss),
     Stage("S2MPN", ("S2MPN",), s2mpn_loss),
     Stage("M2MPN", ("M2MPN",), m2mpn_loss),
-    Stage("chain", ("SVB", "MVB", "MVD", "S2MPN", "M2MPN"), chain_loss, rate=0.5),
+    Stage("chain", ("SVB", "MVB", "MVD", "S2MPN", "M2MPN"), chain_loss),
     Stage("force", ("force",), force_loss),
-    Stage("direct", ("direct",), direct_loss),
+    Stage("error", ("error",), error_loss),
+    Stage("back", ("D2BPN", "B2SPN"), back_loss),
+    Stage("direct", ("direct", "direct_decoder"), direct_loss),
 )

@@ -18,11 +18,14 @@ import numpy as np
 import torch
 
 from ..errors import TactileError
+from ..evaluation.translation import Bodies, our_bodies
+from ..moving_frame import MovingFrame, frame_of
+from ..paired_contacts import Pairs, Split, read_pairs, split_presses
+from ..sensors import sensor_surface
 from . import checkpoint
 from .data import Contacts
 from .export import export, versions
 from .options import Options
-from .pairs import Pairs, read_pairs, split_presses
 from .report import draw_losses, write_log
 from .stages import STAGES, Model, Stage
 
@@ -38,7 +41,8 @@ def train(
     seed: int = 0,
     options: Options | None = None,
     progress: Progress | None = None,
-    rest_digit: np.ndarray | None = None,
+    bodies: Bodies | None = None,
+    frame: Callable[[str, int], MovingFrame] = frame_of,
     overwrite: bool = False,
 ) -> dict:
     """Train the five networks and the force estimate; returns the card.
@@ -46,20 +50,24 @@ def train(
     Writes out_folder/weights/<net>.safetensors and card.json (what `networks.load` reads), log.csv, loss.png; while it
     runs, checkpoint.npz, from which the next call with the same arguments goes on.
     progress : called with the share done (0..1) and a line of text
-    rest_digit : (M, 3) m, rest nodes of the DIGIT in the pairs; None: those of `sensors.digit_surface()`
+    bodies : the surfaces of the pairs; None: those of this version's sensors
+    frame : sensor, half a window's cells -> the frame that moves over its surface
     raises: TactileError if the pairs, the folder or a checkpoint in it cannot be used
     """
     options, out = options or Options(), Path(out_folder)
     pairs = read_pairs(pairs_path)
-    split = split_presses(pairs.press, seed, pairs_path)
-    rest = digit_rest(pairs, pairs_path) if rest_digit is None else np.asarray(rest_digit, np.float64)
+    split = without(split_presses(pairs.press, seed, pairs_path), pairs, options, pairs_path)
+    if bodies is None:
+        check_surfaces(pairs, pairs_path)
+        bodies = our_bodies()
     prepare_folder(out, overwrite)
     with deterministic():
         generator = torch.Generator().manual_seed(seed)
-        contacts = Contacts(pairs, split, options, generator)
-        model = Model(options, contacts.biotac.modes.shape[1], contacts.digit.modes.shape[1], generator)
+        frames = {name: frame(name, getattr(options, f"half_{name}")) for name in ("biotac", "digit")}
+        contacts = Contacts(pairs, split, options, frames, generator)
+        model = Model(options, contacts, generator)
         history = run_stages(model, contacts, seed, out / "checkpoint.npz", progress or quiet)
-        card = export(model, contacts, rest, seed, out / "weights")
+        card = export(model, contacts, bodies, seed, out / "weights")
     write_log(out / "log.csv", history)
     draw_losses(out / "loss.png", history)
     (out / "checkpoint.npz").unlink()
@@ -71,16 +79,30 @@ def quiet(share: float, text: str) -> None:
     log.info("%3.0f %% %s", 100 * share, text)
 
 
-def digit_rest(pairs: Pairs, path: str | os.PathLike) -> np.ndarray:
-    """(M, 3) m, our DIGIT surface; raises TactileError if the pairs were made on another one."""
-    from ..sensors import digit_surface
+def without(split: Split, pairs: Pairs, options: Options, path: str | os.PathLike) -> Split:
+    """The split less what is kept from the training; raises TactileError for an indenter that the pairs do not know."""
+    names = pairs.indenter_names
+    for name in options.without:
+        if name not in names:
+            raise TactileError(f"{os.fspath(path)}, indenters", f"no {name!r}", ", ".join(names))
+    apart = np.isin(pairs.indenter, [names.index(name) for name in options.without])
+    if options.without_below_x is not None:
+        apart |= pairs.place[:, 0] < options.without_below_x
+    parts = {name: rows[~apart[rows]] for name, rows in vars(split).items()}
+    for name, rows in parts.items():
+        if not len(rows):
+            raise TactileError(path, f"nothing is left for {name}", "contacts to train on", "Keep less apart")
+    return Split(**parts)
 
-    surface = digit_surface()
-    found = pairs.attributes["digit_nodes_sha256"]
-    if found != surface.sha256 or len(surface.rest) != pairs.displacement_digit.shape[1]:
-        advice = "Make the pairs again with this version"
-        raise TactileError(f"{os.fspath(path)}, digit_nodes_sha256", found, surface.sha256, advice)
-    return np.asarray(surface.rest)
+
+def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
+    """Raises TactileError if the pairs were made on other surfaces than this version's."""
+    for sensor in ("biotac", "digit"):
+        surface, key = sensor_surface(sensor), f"{sensor}_nodes_sha256"
+        found = pairs.attributes[key]
+        if found != surface.sha256 or len(surface.rest) != getattr(pairs, f"displacement_{sensor}").shape[1]:
+            advice = "Make the pairs again with this version"
+            raise TactileError(f"{os.fspath(path)}, {key}", found, surface.sha256, advice)
 
 
 def prepare_folder(out: Path, overwrite: bool) -> None:
@@ -131,8 +153,10 @@ def run_stage(
 ) -> None:
     """Train the networks of one stage for its epochs."""
     options = contacts.options
-    parameters = [parameter for net in stage.nets for parameter in getattr(model, net).parameters()]
-    optimiser = torch.optim.AdamW(parameters, lr=options.rate, weight_decay=options.weight_decay)
+    groups = [
+        {"params": list(getattr(model, net).parameters()), "weight_decay": options.decay(net)} for net in stage.nets
+    ]
+    optimiser = torch.optim.AdamW(groups, lr=options.rate, fused=True)
     checkpoint.restore_optimiser(state, optimiser)
     epochs, saved = options.epochs(stage.name), time.monotonic()
     while state.epoch < epochs:
@@ -162,11 +186,11 @@ def epoch_losses(
     rng = np.random.default_rng([seed, index, epoch])
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     rows = rng.permutation(contacts.with_silence(contacts.split.train))
-    change = contacts.read(rows, rng)
+    signal = contacts.read(rows, rng, options.rectified)
 
     def loss(step: int) -> torch.Tensor:
         part = slice(step * options.batch, (step + 1) * options.batch)
-        batch = contacts.batch(rows[part], change[part], epoch + step)
+        batch = contacts.batch(rows[part], signal[part])
         return stage.loss(model, contacts, batch, options, generator)
 
     return [lambda step=step: loss(step) for step in range(math.ceil(len(rows) / options.batch))]
@@ -184,7 +208,7 @@ def train_epoch(
         optimiser.zero_grad()
         value = loss()
         value.backward()
-        torch.nn.utils.clip_grad_norm_(optimiser.param_groups[0]["params"], 1.0)
+        torch.nn.utils.clip_grad_norm_([each for group in optimiser.param_groups for each in group["params"]], 1.0)
         optimiser.step()
         total += float(value.detach())
     if not math.isfinite(total):
@@ -197,10 +221,10 @@ def validate(stage: Stage, model: Model, contacts: Contacts, seed: int, index: i
     rng = np.random.default_rng([seed, index, VALIDATION_SEED])
     generator = torch.Generator().manual_seed(seed)
     rows = contacts.with_silence(contacts.split.validation)
-    change, size = contacts.read(rows, rng), 256
+    signal, size = contacts.read(rows, rng), 256
     total = 0.0
     with torch.no_grad():
-        for part, start in enumerate(range(0, len(rows), size)):
-            batch = contacts.batch(rows[start : start + size], change[start : start + size], part)
+        for start in range(0, len(rows), size):
+            batch = contacts.batch(rows[start : start + size], signal[start : start + size])
             total += float(stage.loss(model, contacts, batch, contacts.options, generator)) * len(batch.rows)
     return total / len(rows)

@@ -63,6 +63,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor to counts, for a scaled recording")
     verb.add_argument("--no-drift", action="store_true", help="do not remove drift")
+    verb.add_argument("--sensor", metavar="FILE", help="gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
     progress_argument(verb)
 
@@ -70,7 +71,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Convert; one bad recording does not stop the others."""
     from .. import convert, results
-    from ..recordings import PrepareOptions
+    from ..recordings import PrepareOptions, sensor_file
 
     prepare = PrepareOptions(
         kind=options.kind,
@@ -79,7 +80,8 @@ def run(options: argparse.Namespace) -> int:
         counts_per_unit=options.counts_per_unit,
     )
     keep, frames = results.parse_keep(options.keep), convert.parse_frames(options.frames)
-    job = convert.Options(frames=frames, keep=keep, prepare=prepare, overwrite=options.overwrite)
+    sensor = None if options.sensor is None else sensor_file.read(options.sensor)
+    job = convert.Options(frames=frames, keep=keep, prepare=prepare, overwrite=options.overwrite, sensor=sensor)
     folders = results.result_folders(options.recordings, options.out, options.overwrite)
     tools = convert.load_tools(options.weights)
     failed = 0

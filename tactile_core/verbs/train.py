@@ -26,6 +26,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--out", required=True, metavar="DIR", help="folder to write")
     seed_argument(verb, "weights")
     verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="times the usual epochs (default: 1)")
+    verb.add_argument("--without", action="append", default=[], metavar="NAME", help="an indenter to keep apart")
+    verb.add_argument("--without-below-x", type=float, metavar="MM", help="keep apart what touches the pad below x")
     verb.add_argument("--overwrite", action="store_true", help="train anew over older weights in DIR")
     progress_argument(verb)
 
@@ -38,12 +40,14 @@ def run(options: argparse.Namespace) -> int:
     from ..training.options import Options
     from ..training.train import train
 
+    region = None if options.without_below_x is None else 1e-3 * options.without_below_x
+    chosen = Options(effort=options.effort, without=tuple(options.without), without_below_x=region)
     with bar("training", "%", options.progress) as shown:
         train(
             options.pairs,
             options.out,
             options.seed,
-            Options(effort=options.effort),
+            chosen,
             lambda share, text: shown(round(100 * share), 100),
             overwrite=options.overwrite,
         )

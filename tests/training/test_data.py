@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from small_pairs import frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from tactile_core.training.basis import coefficients, principal_basis  # noqa: E402
-from tactile_core.training.data import PARTS, SILENT, Contacts, measured  # noqa: E402
+from tactile_core.paired_contacts import read_pairs, split_presses  # noqa: E402
+from tactile_core.training.basis import principal_basis  # noqa: E402
+from tactile_core.training.data import Contacts  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
-from tactile_core.training.pairs import read_pairs, split_presses  # noqa: E402
+from tactile_core.training.readings import measured  # noqa: E402
+from tactile_core.training.surface import SILENT  # noqa: E402
 
-OPTIONS = Options(modes_biotac=20, modes_digit=20)
+OPTIONS = Options(wide_biotac=10, near_biotac=10, half_biotac=3, wide_digit=10, near_digit=10, half_digit=3)
+FRAMES = {"biotac": frame("biotac", 3), "digit": frame("digit", 3)}
 
 
 def generator():
@@ -20,71 +24,106 @@ def generator():
 
 
 @pytest.fixture(scope="module")
-def contacts(make_pairs, tmp_path_factory):
-    path = make_pairs(tmp_path_factory.mktemp("pairs") / "pairs.h5")
+def contacts(tmp_path_factory):
+    path = write_pairs(tmp_path_factory.mktemp("pairs") / "pairs.h5")
     pairs = read_pairs(path)
-    return Contacts(pairs, split_presses(pairs.press, 0, path), OPTIONS, generator())
+    return Contacts(pairs, split_presses(pairs.press, 0, path), OPTIONS, FRAMES, generator())
 
 
 def test_basis_is_that_of_a_singular_value_decomposition():
     rng = np.random.default_rng(0)
-    data = rng.standard_normal((60, 8)) @ np.diag(0.5 ** np.arange(8)) @ rng.standard_normal((8, 90)) * 3000
-    data = np.round(data).astype(np.int16).reshape(60, 30, 3)
-    basis = principal_basis(data, 1e-7, np.arange(60), 4, generator()).double().numpy()
+    data = rng.standard_normal((60, 8)) @ np.diag(0.5 ** np.arange(8)) @ rng.standard_normal((8, 90))
+    fields = torch.from_numpy(data.astype(np.float32))
+    basis = principal_basis(lambda rows: fields[rows], np.arange(60), 4, generator()).double().numpy()
     # float16 rounding: 2^-11 of each entry
     np.testing.assert_allclose(basis @ basis.T, np.eye(4), atol=1e-3)
-    expected = np.linalg.svd(data.reshape(60, -1).astype(float), full_matrices=False)[2][:4]
+    expected = np.linalg.svd(data, full_matrices=False)[2][:4]
     np.testing.assert_allclose(np.abs(basis @ expected.T), np.eye(4), atol=2e-3)
 
 
 def test_basis_of_few_contacts_is_as_large_as_they_allow():
-    data = np.random.default_rng(0).integers(-100, 100, (5, 30, 3)).astype(np.int16)
-    basis = principal_basis(data, 1e-7, np.arange(5), 64, generator())
+    fields = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (5, 90)).astype(np.float32))
+    basis = principal_basis(lambda rows: fields[rows], np.arange(5), 64, generator())
     assert basis.shape == (5, 90)
-    back = coefficients(data, 1e-7, basis) @ basis
-    np.testing.assert_allclose(back, data.reshape(5, -1) * 1e-7, atol=1e-3 * 1e-5)  # float16 of at most 1e-5 m
+    torch.testing.assert_close(fields @ basis.T @ basis, fields, atol=1e-3, rtol=0)  # float16 of at most 1
+
+
+def readings(true, seed):
+    """(B, 19), signed."""
+    return measured(true, np.random.default_rng(seed), OPTIONS)[:, :-1]
 
 
 def test_readings_have_the_errors_they_should():
     true = np.zeros((4000, 19), np.float32)
-    quiet = measured(true, np.random.default_rng(0), OPTIONS)
+    quiet = readings(true, 0)
     assert quiet.std() == pytest.approx(np.sqrt(1.5**2 + 1 / 12), rel=0.02)  # noise and rounding; 76,000 draws
-    firm = measured(true + 400, np.random.default_rng(1), OPTIONS)
+    firm = readings(true + 400, 1)
     assert firm.mean() == pytest.approx(400, abs=1.0)
     assert firm.std() == pytest.approx(40, rel=0.02)
-    far = measured(true + 2000, np.random.default_rng(2), OPTIONS)
+    far = readings(true + 2000, 2)
     assert far.max() <= 4095 - 3300  # the sensor's 12 bits end here
-    assert measured(true - 9000, np.random.default_rng(2), OPTIONS).min() >= -3301
+    assert readings(true - 9000, 2).min() >= -3301
+
+
+def test_rectified_readings_lose_their_sign_and_some_channels():
+    true = np.full((4000, 19), -400, np.float32)
+    read = measured(true, np.random.default_rng(0), OPTIONS, 0.5)
+    folded = read[:, -1] == 1
+    assert folded.mean() == pytest.approx(0.5, abs=0.04)  # 4,000 draws: five standard errors
+    assert (read[folded, :-1] >= 0).all() and (read[~folded, :-1] < 0).all()
+    missing = read[folded, :-1] < 6 * OPTIONS.rectified_offset
+    assert missing.mean() == pytest.approx(OPTIONS.rectified_missing, abs=0.01)  # 38,000 draws; whose true is 400
+    size = np.log(read[folded, :-1][~missing] / 400)
+    # a frame's bulge and a channel's gain, independent; five standard errors of 2,000 frames' bulges
+    expected = np.hypot(OPTIONS.rectified_gain, OPTIONS.rectified_bulge)
+    assert size.std() == pytest.approx(expected, abs=0.04)
 
 
 def test_silence_is_no_displacement_and_noise_alone(contacts):
     rows = contacts.with_silence(np.arange(40))
     assert (rows[-2:] == SILENT).all()
     assert len(rows) == 42
-    change = contacts.read(rows, np.random.default_rng(0))
-    batch = contacts.batch(rows, change, 1)
-    assert np.abs(change[-2:]).max() < 10
-    assert np.abs(change[:-2]).max() > 10
-    for values in (batch.biotac, batch.digit, batch.force, contacts.digit.true(rows, 1).flatten(1)):
+    signal = contacts.read(rows, np.random.default_rng(0))
+    batch = contacts.batch(rows, signal)
+    assert np.abs(signal[-2:]).max() < 10
+    assert np.abs(signal[:-2]).max() > 10
+    for values in (batch.biotac, batch.digit, batch.force, contacts.digit.true(rows).flatten(1)):
         assert not values[-2:].any()
         assert values[:-2].abs().amax(-1).min() > 0
 
 
+def own(surface, rows):
+    """Coefficients of contacts and the cells they are round."""
+    return surface.modes[rows], torch.from_numpy(surface.cell[rows])
+
+
 def test_loss_is_zero_for_the_truth_and_one_for_nothing(contacts):
     surface, rows = contacts.digit, contacts.split.train
-    nothing = [float(surface.loss(torch.zeros_like(surface.inputs(rows)), rows, part)) for part in range(PARTS)]
-    assert np.mean(nothing) == pytest.approx(1.0, rel=1e-4)  # float32
-    # what is left is what 20 modes cannot hold, see the card's basis rows
-    assert float(surface.loss(surface.inputs(rows), rows, 0)) < 0.1
+    modes, cell = own(surface, rows)
+    assert float(surface.loss(torch.zeros_like(modes), cell, rows)) == pytest.approx(1.0, rel=1e-3)  # 1 um floor
+    # what is left is what 20 fields cannot hold
+    assert float(surface.loss(modes, cell, rows)) < 0.1
 
 
-def test_statistics_come_from_the_training_presses_alone(contacts, make_pairs, tmp_path):
+@pytest.mark.parametrize("name", ["biotac", "digit"])
+def test_loss_is_that_of_the_nodes(contacts, name):
+    """Against the nodes themselves, round the contacts' own cells and round others."""
+    surface, rows = getattr(contacts, name), contacts.split.train[:50]
+    modes, cell = own(surface, rows)
+    for shift, tolerance in ((0, 0.02), (2, 0.05)):  # the product of errors in both bases is left out
+        there = (cell + shift).clamp(max=6)
+        answer = 0.8 * modes
+        squares = (surface.field(answer, there) - surface.true(rows)).square().sum((-1, -2))
+        expected = (squares / surface.moving[rows] + 1e-12).sqrt().mean() / surface.null
+        assert float(surface.loss(answer, there, rows)) == pytest.approx(float(expected), rel=tolerance)
+
+
+def test_statistics_come_from_the_training_presses_alone(contacts):
     pairs = contacts.pairs
     changed = pairs.displacement_digit.copy()
     changed[contacts.split.test] = 12345
-    again = Contacts(
-        type(pairs)(**{**vars(pairs), "displacement_digit": changed}), contacts.split, OPTIONS, generator()
-    )
-    torch.testing.assert_close(again.digit.basis, contacts.digit.basis, rtol=0, atol=0)
-    assert again.digit.unit == contacts.digit.unit
+    other = type(pairs)(**{**vars(pairs), "displacement_digit": changed})
+    again = Contacts(other, contacts.split, OPTIONS, FRAMES, generator())
+    for what in ("wide", "near", "scale"):
+        torch.testing.assert_close(getattr(again.digit, what), getattr(contacts.digit, what), rtol=0, atol=0)
     assert again.digit.null == contacts.digit.null

@@ -7,52 +7,61 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from tactile_core.networks import NETS, Networks, compress  # noqa: E402
+from tactile_core.moving_frame import MovingFrame  # noqa: E402
+from tactile_core.networks import FORCE_SCALE, NETS, SURFACES, Networks, compress  # noqa: E402
 from tactile_core.training import modules  # noqa: E402
+from tactile_core.training.data import Contacts  # noqa: E402
+from tactile_core.training.export import net_sizes, net_tensors  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
-from tactile_core.training.stages import FORCE_BLOCKS, FORCE_WIDTH, Model  # noqa: E402
+from tactile_core.training.stages import Model  # noqa: E402
+from tactile_core.training.surface import Surface  # noqa: E402
 
 OPTIONS = Options()
-BIOTAC, DIGIT = 400, 300  # nodes: the basis is a plain product, its length does not matter
-# float32 sums of up to 1,200 terms through eight layers; measured below 2e-6 of the largest value
+SHAPES = {"biotac": (30, 28), "digit": (36, 34)}  # smaller lattices: how long a basis is does not matter
+# float32 sums of up to 3,700 terms through eight layers; measured below 3e-6 of the largest value
 TOLERANCE = 1e-5
 
 
+def random_surface(name, rng):
+    """A surface with random bases of the shipped sizes, as far as networks look at it."""
+    rows, columns = SHAPES[name]
+    surface = Surface.__new__(Surface)
+    wide, near, half = (getattr(OPTIONS, f"{what}_{name}") for what in ("wide", "near", "half"))
+    turn = rng.uniform(-1, 1, rows * columns).astype(np.float32)
+    surface.frame = MovingFrame(rows, columns, half, turn)
+    surface.data = np.zeros((1, rows * columns, 3), np.int16)
+    sizes = {"wide": (wide, 3 * rows * columns), "near": (near, 3 * surface.frame.width**2)}
+    for basis, size in sizes.items():  # float16, as they ship
+        random = rng.standard_normal(size) / np.sqrt(size[1])
+        setattr(surface, basis, torch.from_numpy(random.astype(np.float16).astype(np.float32)))
+    surface.scale = torch.from_numpy(rng.uniform(1e-4, 1e-3, wide + near).astype(np.float32))
+    surface.modes = torch.zeros(1, wide + near)
+    return surface
+
+
 @pytest.fixture(scope="module")
-def model():
+def contacts():
+    rng = np.random.default_rng(5)
+    contacts = Contacts.__new__(Contacts)
+    contacts.options = OPTIONS
+    contacts.biotac, contacts.digit = (random_surface(name, rng) for name in SURFACES)
+    return contacts
+
+
+@pytest.fixture(scope="module")
+def model(contacts):
     generator = torch.Generator().manual_seed(5)
-    model = Model(OPTIONS, OPTIONS.modes_biotac, OPTIONS.modes_digit, generator)
+    model = Model(OPTIONS, contacts, generator)
     for parameter in model.parameters():  # no zero layers and no unit norms: every term must count
         parameter.data.normal_(0.0, 1.0 / parameter.shape[-1] ** 0.5, generator=generator)
-    return model
+        parameter.data = parameter.data.half().float()
+    return model.requires_grad_(False)
 
 
 @pytest.fixture(scope="module")
-def bases():
-    rng = np.random.default_rng(5)
-    shapes = {"MVB": (OPTIONS.modes_biotac, 3 * BIOTAC), "MVD": (OPTIONS.modes_digit, 3 * DIGIT)}
-    return {net: (rng.standard_normal(shape) / np.sqrt(shape[1])).astype(np.float32) for net, shape in shapes.items()}
-
-
-@pytest.fixture(scope="module")
-def nets(model, bases):
-    common = {"width": OPTIONS.width, "blocks": OPTIONS.blocks}
-    signal, biotac, digit = OPTIONS.latent_signal, OPTIONS.latent_biotac, OPTIONS.latent_digit
-    sizes = {
-        "SVB": {"latent": signal},
-        "MVB": {"latent": biotac, "modes": OPTIONS.modes_biotac, "nodes": BIOTAC, **common},
-        "MVD": {"latent": digit, "modes": OPTIONS.modes_digit, "nodes": DIGIT, **common},
-        "S2MPN": {"inputs": signal, "outputs": biotac, **common},
-        "M2MPN": {"inputs": biotac, "outputs": digit, **common},
-        "force": {"inputs": biotac, "outputs": 3, "compliance": 0, "width": FORCE_WIDTH, "blocks": FORCE_BLOCKS},
-    }
-    tensors = {}
-    for net in NETS:
-        prefix = "map." if net in ("S2MPN", "M2MPN", "force") else ""
-        tensors[net] = {prefix + name: value.numpy() for name, value in getattr(model, net).state_dict().items()}
-    for net, basis in bases.items():
-        tensors[net] |= {"basis": basis, "scale": np.float32([2e-3])}
-    tensors["force"]["scale"] = np.float32([3.0])
+def nets(model, contacts):
+    sizes = net_sizes(contacts)
+    tensors = {net: net_tensors(net, model, contacts) for net in NETS}
     return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in NETS}})
 
 
@@ -67,28 +76,51 @@ def latent(size):
     return np.random.default_rng(size).standard_normal((40, size)).astype(np.float32)
 
 
-def test_svb(model, nets):
+def signals():
+    """Changes (40, 19) from light to firm, whether they are rectified (40,), and both as torch sees them."""
     change = (np.random.default_rng(0).standard_normal((40, 19)) * np.logspace(0, 3, 40)[:, None]).astype(np.float32)
-    same(nets.encode_signal(change), model.SVB.mean(modules.compress(torch.from_numpy(change))))
+    rectified = np.arange(40) % 3 == 0
+    both = np.concatenate([change, rectified[:, None]], -1).astype(np.float32)
+    return change, rectified, torch.from_numpy(both)
+
+
+def test_svb(model, nets):
+    change, rectified, both = signals()
+    same(nets.encode_signal(change, rectified), model.SVB.mean(modules.compress(both)))
     same(compress(nets.decode_signal(latent(8))), model.SVB.decoder(torch.from_numpy(latent(8))))
 
 
-@pytest.mark.parametrize(("net", "name"), [("MVB", "biotac"), ("MVD", "digit")])
-def test_mesh_autoencoders(model, nets, bases, net, name):
-    vae, basis = getattr(model, net), torch.from_numpy(bases[net])
-    displacement = 1e-3 * np.random.default_rng(1).standard_normal((40, basis.shape[1] // 3, 3)).astype(np.float32)
-    modes = torch.from_numpy(displacement).flatten(1) @ basis.T / 2e-3
-    same(getattr(nets, f"encode_{name}")(displacement), vae.mean(modes))
+@pytest.mark.parametrize("name", SURFACES)
+def test_mesh_autoencoders(model, nets, contacts, name):
+    net, surface = {"biotac": "MVB", "digit": "MVD"}[name], getattr(contacts, name)
+    vae, frame = getattr(model, net), surface.frame
     z = latent(nets.sizes[net]["latent"])
-    same(getattr(nets, f"decode_{name}")(z), vae.decoder(torch.from_numpy(z)) * 2e-3 @ basis)
+    displacement = getattr(nets, f"decode_{name}")(z)
+    same(frame.to_local(displacement), vae.field(torch.from_numpy(z)))
+    local = frame.to_local(displacement)
+    place = frame.place(local)
+    cells, left = frame.cells(place)
+    wide = torch.from_numpy(local).flatten(1) @ surface.wide.T
+    rest = torch.from_numpy(local).flatten(1) - wide @ surface.wide
+    windows = torch.from_numpy(frame.windows(rest.view(local.shape).numpy(), cells)).flatten(1)
+    seen = torch.cat([wide, windows @ surface.near.T], -1) / surface.scale
+    x = torch.cat([seen, torch.from_numpy(np.concatenate([place, left], -1))], -1)
+    same(getattr(nets, f"encode_{name}")(displacement), vae.mean(x))
 
 
-@pytest.mark.parametrize(
-    ("net", "method", "scale"), [("S2MPN", "s2m", 1.0), ("M2MPN", "m2m", 1.0), ("force", "force", 3.0)]
-)
-def test_maps(model, nets, net, method, scale):
-    z = latent(nets.sizes[net]["inputs"])
-    same(getattr(nets, method)(z), getattr(model, net)(torch.from_numpy(z)) * scale)
+def test_maps(model, nets):
+    biotac, digit = (torch.from_numpy(latent(nets.sizes[net]["latent"])) for net in ("MVB", "MVD"))
+    same(nets.s2m(latent(8)), model.S2MPN(torch.from_numpy(latent(8))))
+    same(nets.m2m(biotac.numpy()), model.across(biotac))
+    same(nets.m2m_back(digit.numpy()), model.back(digit))
+    same(compress(nets.decode_signal(nets.m2s(biotac.numpy()))), model.to_signal(biotac))
+    same(nets.force(biotac.numpy()), FORCE_SCALE * torch.sinh(model.force(biotac)))
+
+
+def test_expected_error(model, nets):
+    change, rectified, both = signals()
+    found = np.log(nets.expected_error(change, rectified) / 10e-6)
+    same(found, model.expected_error(both).clamp(-8, 8))
 
 
 def test_sampled_latent_has_the_posterior_it_says():

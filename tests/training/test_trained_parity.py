@@ -34,16 +34,22 @@ def filled(module, nets, net, prefix=""):
     return module.requires_grad_(False)
 
 
-def mesh_vae(nets, net):
-    sizes = nets.sizes[net]
-    return filled(modules.mesh_vae(sizes["modes"], sizes["latent"], sizes["width"], sizes["blocks"]), nets, net)
-
-
 def residual(nets, net):
     sizes = nets.sizes[net]
-    return filled(
-        modules.Residual(sizes["inputs"], sizes["outputs"], sizes["width"], sizes["blocks"]), nets, net, "map."
-    )
+    size = (sizes["inputs"], sizes["outputs"], sizes["width"], sizes["blocks"])
+    return filled(modules.Residual(*size), nets, net, "map.")
+
+
+def decoder(nets, net):
+    """The decoder of a mesh autoencoder, without its frame."""
+    sizes = nets.sizes[net]
+    size = (sizes["latent"] + networks.PLACE, sizes["wide"] + sizes["near"], sizes["width"], sizes["blocks"])
+    return filled(modules.Residual(*size), nets, net, "decoder.")
+
+
+def placed(nets, net, latent):
+    left = nets.frames[net].cells(latent[:, : networks.PLACE])[1]
+    return torch.from_numpy(np.concatenate([latent, left], -1))
 
 
 def same(found, expected):
@@ -52,31 +58,23 @@ def same(found, expected):
     assert np.abs(found - expected).max() <= TOLERANCE * np.abs(expected).max()
 
 
-def test_every_network_alone(nets, change):
+@pytest.mark.parametrize("rectified", [False, True])
+def test_the_chain(nets, change, rectified):
     svb = filled(modules.signal_vae(nets.sizes["SVB"]["latent"]), nets, "SVB")
-    latent = nets.encode_signal(change)
-    same(latent, svb.mean(modules.compress(torch.from_numpy(change))))
-    same(networks.compress(nets.decode_signal(latent)), svb.decoder(torch.from_numpy(latent)))
+    told = np.full((len(change), 1), rectified, np.float32)
+    change = np.abs(change) if rectified else change
+    latent = nets.encode_signal(change, rectified)
+    same(latent, svb.mean(modules.compress(torch.from_numpy(np.concatenate([change, told], -1)))))
     biotac = nets.s2m(latent)
     same(biotac, residual(nets, "S2MPN")(torch.from_numpy(latent)))
     digit = nets.m2m(biotac)
-    same(digit, residual(nets, "M2MPN")(torch.from_numpy(biotac)))
-    if not nets.sizes["force"]["compliance"]:
-        scale = torch.tensor(nets.tensors["force"]["scale"])
-        same(nets.force(biotac), residual(nets, "force")(torch.from_numpy(biotac)) * scale)
-    for net, name, z in (("MVB", "biotac", biotac), ("MVD", "digit", digit)):
-        vae = mesh_vae(nets, net)
-        basis, scale = (torch.tensor(nets.tensors[net][part]) for part in ("basis", "scale"))
-        displacement = getattr(nets, f"decode_{name}")(z)
-        same(displacement, vae.decoder(torch.from_numpy(z)) * scale @ basis)
-        modes = torch.from_numpy(displacement).flatten(1) @ basis.T / scale
-        same(getattr(nets, f"encode_{name}")(displacement), vae.mean(modes))
-
-
-def test_the_chain(nets, change):
-    svb = filled(modules.signal_vae(nets.sizes["SVB"]["latent"]), nets, "SVB")
-    z = residual(nets, "M2MPN")(residual(nets, "S2MPN")(svb.mean(modules.compress(torch.from_numpy(change)))))
-    basis, scale = (torch.from_numpy(nets.tensors["MVD"][part]) for part in ("basis", "scale"))
-    expected = mesh_vae(nets, "MVD").decoder(z) * scale @ basis
-    found = nets.decode_digit(nets.m2m(nets.s2m(nets.encode_signal(change))))
-    same(found, expected)
+    same(digit, residual(nets, "M2MPN")(placed(nets, "MVB", biotac)))
+    for net, z, decode in (("MVB", biotac, nets.decode_biotac), ("MVD", digit, nets.decode_digit)):
+        modes = decoder(nets, net)(placed(nets, net, z)) * torch.tensor(nets.tensors[net]["scale"])
+        wide = nets.sizes[net]["wide"]
+        whole = modes[:, :wide] @ torch.tensor(nets.tensors[net]["wide"])
+        frame, near = nets.frames[net], modes[:, wide:] @ torch.tensor(nets.tensors[net]["near"])
+        cells = frame.cells(z[:, : networks.PLACE])[0]
+        windows = near.view(len(z), frame.width, frame.width, 3).numpy()
+        expected = frame.to_shared(frame.add(whole.view(len(z), -1, 3).numpy(), windows, cells))
+        same(decode(z), torch.from_numpy(expected))

@@ -1,0 +1,15 @@
+"""Simulated signals as a sensor reads them, for tests: noise and gains that differ."""
+
+from __future__ import annotations
+
+import numpy as np
+
+NOISE = 1.5  # counts (issue 4; 0.7 to 1.5 in real recordings, data README)
+GAIN = 0.1  # standard deviation a channel (issue 4)
+
+
+def as_read(change: np.ndarray, seed: int) -> np.ndarray:
+    """True changes (C, 19) counts -> as read, float32; the same for the same seed."""
+    random = np.random.default_rng(seed)
+    gain = 1 + GAIN * random.standard_normal(change.shape)
+    return (gain * change + NOISE * random.standard_normal(change.shape)).astype(np.float32)

@@ -1,0 +1,105 @@
+"""Gains and offsets of an unknown sensor: what lies between its signals and the simulated ones that are most like them.
+
+In turn, every frame is given the typical signal nearest to it, and every electrode the gain that brings its readings
+to those of the typical signals, until nothing changes (as in k-means and iterated closest points). Frames are matched
+as wholes, so that a recording may hold any mixture of contacts: to match the distribution of one electrode alone would
+take a finger that is touched in one place for a finger with wrong gains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .networks import compress
+
+ROUNDS = 30  # most turns; 10 to 20 are usual
+SETTLED = 0.01  # largest change of a log gain in a turn that counts as none
+FLOOR = 2.0  # counts added before a ratio is taken: whole counts and noise of 0.7 to 1.5 (data README) say no more
+SURE = 10.0  # counts: from there on a reading says more of the gain than of noise and of the match (measured)
+PRIOR = (
+    5.0  # contacts' worth of belief in gain 1 and offset 0 (measured: helps from 10 % scatter on, costs little at 50)
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """log_gain : (19,) natural logarithm; offset : (19,) counts; contacts : (19,) how many of them told the gain.
+
+    alike : how many different typical signals were met; settled : whether the last turn changed nothing
+    """
+
+    log_gain: np.ndarray
+    offset: np.ndarray
+    contacts: np.ndarray
+    alike: int
+    settled: bool
+
+
+def match(change: np.ndarray, typical: np.ndarray, rectified: bool, prior: float = PRIOR) -> Match:
+    """Match frames in contact to typical signals.
+
+    change : (n, 19) counts, absolute where `rectified`; typical : (P, 19) counts, signed
+    Rectified signals give no offset: it is folded away with the sign.
+    """
+    typical = np.abs(typical) if rectified else np.asarray(typical, np.float64)
+    compressed = compress(typical).astype(np.float64)
+    log_gain, offset = np.zeros(change.shape[1]), np.zeros(change.shape[1])
+    settled = False
+    for _ in range(ROUNDS):
+        near = _nearest(compress((change - offset) / np.exp(log_gain)).astype(np.float64), compressed)
+        before = log_gain
+        log_gain, contacts = _log_gain(change - offset, typical, near, before, rectified, prior)
+        if not rectified:
+            offset = _offset(change, typical * np.exp(log_gain), near, prior)
+        settled = bool(np.abs(log_gain - before).max() < SETTLED)
+        if settled:
+            break
+    return Match(log_gain, offset, contacts, len(np.unique(near)), settled)
+
+
+def _nearest(frames: np.ndarray, typical: np.ndarray) -> np.ndarray:
+    """(n,) index of the nearest row of typical (P, 19) for each of frames (n, 19)."""
+    return (np.square(typical).sum(axis=1) - 2 * frames @ typical.T).argmin(axis=1)
+
+
+def _log_gain(
+    change: np.ndarray, typical: np.ndarray, near: np.ndarray, before: np.ndarray, rectified: bool, prior: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(19,) log gains, and of how many contacts each comes.
+
+    A mean of log ratios, which noise on both sides leaves alone, where least squares would shrink the gain.
+    """
+    wanted = typical[near]
+    size = np.square(wanted * np.exp(before))
+    weight = size / (size + SURE**2)
+    if not rectified:
+        weight = weight * (np.sign(change) == np.sign(wanted))
+    ratio = np.log((np.abs(change) + FLOOR) / (np.abs(wanted) + FLOOR))
+    return _over_contacts(ratio, weight, near, prior)
+
+
+def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: float) -> np.ndarray:
+    """(19,) counts, of the readings that should be small: there the gain says little."""
+    wanted = typical[near]
+    weight = SURE**2 / (np.square(wanted) + SURE**2)
+    return _over_contacts(change - wanted, weight, near, prior)[0]
+
+
+def _over_contacts(
+    values: np.ndarray, weight: np.ndarray, near: np.ndarray, prior: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(19,) weighted means of (n, 19), shrunk towards 0 by `prior`, and the weights' sums.
+
+    All frames with the same match count as one contact: a finger that rests on a table for a minute tells as much
+    about its gains as one that does so for a second.
+    """
+    groups, index, count = np.unique(near, return_inverse=True, return_counts=True)
+    weights, sums = (np.zeros((len(groups), values.shape[1])) for _ in range(2))
+    np.add.at(weights, index, weight)
+    np.add.at(sums, index, weight * values)
+    share = weights / count[:, None]
+    means = sums / np.maximum(weights, 1e-12)
+    contacts = share.sum(axis=0)
+    return (share * means).sum(axis=0) / (contacts + prior), contacts

@@ -1,0 +1,135 @@
+"""One sensor's displacements as training sees them: in the nodes' own frames, in coefficients, with a loss."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..metrics import MOVING
+from ..moving_frame import PLACE_UNIT, MovingFrame
+from .basis import ROWS, principal_basis
+
+SILENT = -1  # row number of a sample without contact
+FEWEST = 100  # nodes that an error is shared by at least: light touches move few (assumed)
+ROOT_FLOOR = 1e-6  # m, rounds the root of the loss at zero error
+BASIS_ROWS = 12_000  # contacts that the bases are drawn from: more change them by less than their rounding
+SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, but none is blown up without end (assumed)
+
+
+class Surface:
+    """One sensor's displacements, the frame that moves over them and their linear bases.
+
+    data : (C, n, 3) int16 in the nodes' own frames, times ``unit`` m
+    wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
+    place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
+    total : (C,) m2, sum of squared displacements; moving : (C,) nodes that move, at least FEWEST
+    null : m, loss of no displacement, mean over training contacts
+    """
+
+    def __init__(
+        self, data: np.ndarray, unit: float, rows: np.ndarray, frame: MovingFrame, wide: int, near: int,
+        generator: torch.Generator,
+    ) -> None:  # fmt: skip
+        self.frame, self.unit = frame, unit
+        self.data = np.empty_like(data)
+        self.place = np.empty((len(data), 2), np.float32)
+        for part in _parts(len(data)):
+            local = frame.to_local(data[part])
+            self.data[part], self.place[part] = np.rint(local), frame.place(local)
+        self.cell, self.left = frame.cells(self.place)
+        some = rows[:: max(1, len(rows) // BASIS_ROWS)]
+        self.wide = principal_basis(self._whole, some, wide, generator)
+        self.near = principal_basis(self._rest_in_window, some, near, generator)
+        metres = 1e-3 * torch.cat([self._coefficients(np.arange(len(data))[part]) for part in _parts(len(data))])
+        spread = metres[rows].square().mean(0).sqrt()
+        self.scale = spread.clamp(min=max(SMALLEST_SCALE * float(spread.max()), 1e-9))
+        self.modes = metres / self.scale
+        sizes = [self._sizes(np.arange(len(data))[part]) for part in _parts(len(data))]
+        self.total, self.moving = (torch.cat(each) for each in zip(*sizes, strict=True))
+        self.null = max(float((self.total[rows] / self.moving[rows]).sqrt().mean()), 1e-9)
+
+    @property
+    def nodes(self) -> int:
+        """n."""
+        return self.data.shape[1]
+
+    def _millimetres(self, rows: np.ndarray) -> Tensor:
+        return torch.from_numpy(self.data[rows].astype(np.float32)) * (1e3 * self.unit)
+
+    def _whole(self, rows: np.ndarray) -> Tensor:
+        return self._millimetres(rows).flatten(1)
+
+    def _rest_in_window(self, rows: np.ndarray) -> Tensor:
+        whole = self._whole(rows)
+        rest = whole - whole @ self.wide.T @ self.wide
+        fields = rest.view(len(rows), -1, 3).numpy()
+        return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
+
+    def _coefficients(self, rows: np.ndarray) -> Tensor:
+        return torch.cat([self._whole(rows) @ self.wide.T, self._rest_in_window(rows) @ self.near.T], -1)
+
+    def _sizes(self, rows: np.ndarray) -> tuple[Tensor, Tensor]:
+        squares = 1e-6 * self._millimetres(rows).square().sum(-1)
+        return squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()
+
+    def inputs(self, rows: np.ndarray) -> Tensor:
+        """(B, K + K' + 4) what the encoder reads: coefficients, place, what is left of it; zero for silent ones."""
+        at = np.maximum(rows, 0)
+        place = torch.from_numpy(np.concatenate([self.place[at], self.left[at]], -1))
+        return torch.cat([self.modes[at], place], -1) * touching(rows)
+
+    def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
+        """As `MovingFrame.cells`: whole cells (B, 2) and what is left, through which gradients flow to the place."""
+        middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0]) / 2
+        at = place * PLACE_UNIT + middle
+        cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
+        return cell.long(), (at - cell).clamp(-1.0, 1.0)
+
+    def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
+        """Mean over contacts of the rms error over moving nodes, for coefficients (B, K + K') round cells (B, 2).
+
+        1 for no displacement. The root is taken contact by contact, as in the figure we report: deep contacts do not
+        drown shallow ones. The bases being orthonormal, an error in coefficients is one of nodes; what no coefficients
+        reach is added, and only the product of errors in both bases is left out (near fields hold next to nothing of
+        the wide ones, from which they are what is left).
+        """
+        at, touched = np.maximum(rows, 0), touching(rows)
+        with torch.no_grad():
+            true = self._at_cells(at, cell.numpy()) * touched
+            beyond = (self.total[at] - true.square().sum(-1)).clamp(min=0.0) * touched[:, 0]
+        squares = (modes * self.scale - true).square().sum(-1) + beyond
+        return (squares / self.moving[at] + ROOT_FLOOR**2).sqrt().mean() / self.null
+
+    def field(self, modes: Tensor, cell: Tensor) -> Tensor:
+        """Coefficients (B, K + K') round cells (B, 2) -> displacement (B, n, 3) m in the nodes' own frames."""
+        metres, wide, width = modes * self.scale, len(self.wide), self.frame.width
+        whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
+        near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()
+        return torch.from_numpy(self.frame.add(whole, near, cell.numpy()))
+
+    def true(self, rows: np.ndarray) -> Tensor:
+        """(B, n, 3) m, in the nodes' own frames."""
+        values = torch.from_numpy(self.data[np.maximum(rows, 0)].astype(np.float32))
+        return values * (self.unit * touching(rows)[:, :, None])
+
+    def _at_cells(self, rows: np.ndarray, cell: np.ndarray) -> Tensor:
+        """(B, K + K') m, the coefficients of contacts in windows round other cells than their own."""
+        metres = self.modes[rows] * self.scale
+        moved = (cell != self.cell[rows]).any(-1)
+        if moved.any():
+            wide = len(self.wide)
+            rest = self._whole(rows[moved]) - 1e3 * metres[moved, :wide] @ self.wide
+            fields = rest.view(len(rest), -1, 3).numpy()
+            windows = torch.from_numpy(self.frame.windows(fields, cell[moved])).flatten(1)
+            metres[moved, wide:] = 1e-3 * windows @ self.near.T
+        return metres
+
+
+def _parts(count: int) -> list[slice]:
+    return [slice(start, min(start + ROWS, count)) for start in range(0, count, ROWS)]
+
+
+def touching(rows: np.ndarray) -> Tensor:
+    """(B, 1): 1 for contacts, 0 for silent samples."""
+    return torch.from_numpy((rows != SILENT).astype(np.float32))[:, None]
