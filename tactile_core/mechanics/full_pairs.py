@@ -21,7 +21,7 @@ from .corrected_press import CorrectedPress
 from .electrodes import signal_of_gaps
 from .full_press import FullContact, FullPress
 from .pair_file import quantise
-from .pair_rows import _draw_place
+from .pair_rows import draw_place
 from .placement import Placement, pose_at
 from .thickness import DEPTH_LIMIT, depth_at
 
@@ -61,7 +61,7 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
     which = _turn(scene, number)
     indenter = scene.indenters[which].build()
     while True:
-        place = _draw_place(random, scene.pairs)
+        place = draw_place(random, scene.pairs)
         if number % 2 == 0 or place.x < REGION_X:
             break
     drawn = random.uniform(_SHALLOWEST, _DEEPEST)

@@ -33,7 +33,7 @@ def press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which = int(random.integers(len(scene.indenters)))
     indenter = scene.indenters[which].build()
-    place = _draw_place(random, spec)
+    place = draw_place(random, spec)
     on_both = [_press(sensor, indenter, place, spec) for sensor in ("biotac", "digit")]
     rows, stood = [], np.array(dataclasses.astuple(place), np.float32)
     for force, slide in _path(random, spec):
@@ -70,7 +70,8 @@ def _press(sensor: str, indenter: Indenter, place: Placement, spec: PairSpec) ->
     return CorrectedPress(compliance_of(sensor), indenter, pose, limit, spec.friction)
 
 
-def _draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
+def draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
+    """Where and how a press stands: evenly over the gel inside its rim, leaning evenly over directions."""
     while True:
         x = random.uniform(digit_shape.X_TIP, digit_shape.X_BASE)
         z = random.uniform(-digit_shape.HALF_WIDTH, digit_shape.HALF_WIDTH)
