@@ -185,4 +185,9 @@ def test_solved_presses_are_kept_and_merge_to_the_same_bytes(script, tmp_path):
         assert file.attrs["tier"] == "full" and file.attrs["format"] == pair_file.FORMAT
         assert file.attrs["digit_nodes_sha256"] == sensors.digit_surface().sha256
         assert file.attrs["unseen_region_x"] == REGION_X
-        assert file["displacement_digit"][0].any() and file["displacement_biotac"].attrs["scale"] == pair_file.SCALE
+        stored, scale = file["displacement_digit"][0], file["displacement_digit"].attrs["scale"]
+    (solved,) = (tmp_path / "one").glob("*.npz")
+    with np.load(solved) as press:
+        found = press["displacement_digit"][0] * pair_file.SCALE
+    assert scale == script.STEP and stored.any()
+    np.testing.assert_allclose(stored * scale, found, atol=0.5 * scale * (1 + 1e-6))  # rounded to the nearest step
