@@ -8,7 +8,7 @@ import numpy as np
 
 from ..networks import SURFACES
 from ..paired_contacts import Pairs
-from ..rows import Row
+from ..rows import Row, row
 from ..translate import Translator
 from .readings import as_read
 from .summary import figure_row, figure_rows, slices
@@ -41,16 +41,17 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
     for number, name in enumerate(pairs.indenter_names):
         at = pairs.indenter == number
         each = {figure: np.where(at, columns[figure], np.nan) for figure in (*EACH_INDENTER, *NULLS)}
-        found += [row for row in figure_rows(each, pairs, rows, name, {}) if row["value"] is not None]
+        found += [one for one in figure_rows(each, pairs, rows, name, {}) if one["value"] is not None]
     return [*found, *expected_error_rows(translator, pairs, rows, change, "seen indenters")]
 
 
 def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
     """Networks that some indenters and a region of the pad were kept from, as their card says, on just those."""
     options, names = translator.card["options"], np.array(pairs.indenter_names)
-    sets = {f"unseen {name}": names[pairs.indenter] == name for name in options["without"]}
-    if options["without_below_x"] is not None:
-        sets["unseen region"] = pairs.place[:, 0] < options["without_below_x"]
+    there = pairs.place[:, 0] < (-np.inf if options["without_below_x"] is None else options["without_below_x"])
+    known = ~np.isin(names[pairs.indenter], options["without"])
+    sets = {f"unseen {name}": ~there & (names[pairs.indenter] == name) for name in options["without"]}
+    sets |= {"unseen region": there & known, "unseen region and indenter": there & ~known}
     found = []
     for name, mask in sets.items():
         rows = np.flatnonzero(mask)
@@ -77,7 +78,7 @@ def expected_error_rows(
         expected, true = columns[f"{surface}_expected_m"], columns[f"{surface}_max_m"]
         covered = true <= translator.card["error_bounds"]["signed"][surface] * expected
         rank = rank_correlation(expected, true)
-        found.append(_share_row(f"{surface}_error_rank", rank, 0.6 if seen else None, 1.0, name))
+        found.append(_share_row(f"{surface}_error_rank", rank, 0.6 if seen else None, None, name))
         low, high = (0.9, 0.98) if seen else (None, None)
         found.append(_share_row(f"{surface}_error_covered", float(covered.mean()), low, high, name))
         if not seen:
@@ -88,10 +89,9 @@ def expected_error_rows(
 
 
 def _share_row(name: str, value: float, low: float | None, high: float | None, set_name: str) -> Row:
-    ok = (low is None or value >= low) and (high is None or value <= high)
-    target = low if low is not None else high
-    return {"name": name, "value": float(f"{value:.4g}"), "unit": "1", "target": target, "ok": bool(ok), "null": None,
-            "set": set_name}  # fmt: skip
+    """A row with a target from below, from above, or both."""
+    found = row(name, value, "1", high if low is None else low, of=set_name, at_least=low is not None)
+    return found if None in (low, high) else found | {"ok": bool(low <= value <= high)}
 
 
 def rank_correlation(first: np.ndarray, second: np.ndarray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import runpy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -163,3 +164,26 @@ def test_a_file_that_is_no_test_set_is_refused(request, tmp_path, capsys):
     (tmp_path / "a.h5").write_bytes(b"nothing")
     assert script["main"](["--test-set", str(tmp_path / "a.h5")]) == 2
     assert "a.h5" in capsys.readouterr().err
+
+
+def test_what_was_kept_apart_is_measured_alone(pairs):
+    """The one indenter that is unseen where the pad is seen, and both where it is not, each contact in one set."""
+    nets = Answers(pairs, 1.0)
+    bounds = {"error_bounds": {"signed": {"biotac": 2.0, "digit": 2.0}}}
+
+    def apart(without, below):
+        card = {**bounds, "options": {"without": without, "without_below_x": below}}
+        fake = SimpleNamespace(nets=nets, card=card, out_of_range=lambda change: np.zeros(len(change), bool))
+        return {row["set"] for row in test_set.unseen_rows(fake, pairs, bodies())}
+
+    assert apart(["sphere"], None) == {"unseen sphere"}
+    assert apart(["sphere"], -5e-3) == {"unseen sphere", "unseen region and indenter"}
+    assert apart([], -5e-3) == {"unseen region"}
+    assert apart([], None) == set()
+
+
+def test_a_share_may_have_a_target_on_both_sides():
+    assert test_set._share_row("a", 0.99, 0.9, 0.98, "s")["ok"] is False
+    assert test_set._share_row("a", 0.95, 0.9, 0.98, "s")["ok"] is True
+    assert test_set._share_row("a", 0.05, None, 0.1, "s")["ok"] is True
+    assert test_set._share_row("a", 0.05, None, None, "s")["ok"] is None
