@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class Options:
-    """Sizes and lengths of a training. The defaults take about twenty minutes for 50,000 contacts on one core.
+    """Sizes and lengths of a training. The defaults take about a quarter of an hour for 50,000 contacts on one core.
 
     latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
@@ -28,10 +28,10 @@ class Options:
     """
 
     latent_signal: int = 8
-    latent_biotac: int = 64
+    latent_biotac: int = 48
     latent_digit: int = 96
-    wide_biotac: int = 80
-    near_biotac: int = 176
+    wide_biotac: int = 48
+    near_biotac: int = 96
     half_biotac: int = 12
     wide_digit: int = 32
     near_digit: int = 224
@@ -41,11 +41,11 @@ class Options:
     batch: int = 128
     rate: float = 1.5e-3
     weight_decay: float = 1e-2
-    signal_decay: float = 0.03
+    signal_decay: float = 0.2
     beta: float = 1e-4
     noise: float = 1.5
     gain: float = 0.1
-    rectified: float = 0.2
+    rectified: float = 0.25
     rectified_gain: float = 0.5
     rectified_bulge: float = 0.5
     rectified_offset: float = 3.0
@@ -54,13 +54,13 @@ class Options:
     without: tuple[str, ...] = ()
     without_below_x: float | None = None
     effort: float = 1.0
-    svb_epochs: int = 15
-    mvb_epochs: int = 18
-    mvd_epochs: int = 18
-    s2mpn_epochs: int = 15
-    m2mpn_epochs: int = 10
-    chain_epochs: int = 36
-    direct_epochs: int = 24
+    svb_epochs: int = 10
+    mvb_epochs: int = 10
+    mvd_epochs: int = 14
+    s2mpn_epochs: int = 4
+    m2mpn_epochs: int = 4
+    chain_epochs: int = 20
+    direct_epochs: int = 20
     force_epochs: int = 6
     error_epochs: int = 3
     back_epochs: int = 8
