@@ -15,9 +15,14 @@ def linear(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
 
 def layer_norm(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
     """Ba et al. 2016 over the last axis, biased variance as torch."""
-    centred = x - x.mean(-1, keepdims=True)
-    spread = np.sqrt(np.square(centred).mean(-1, keepdims=True) + np.float32(NORM_EPSILON))
+    centred = x - _mean(x)
+    spread = np.sqrt(_mean(np.square(centred)) + np.float32(NORM_EPSILON))
     return centred / spread * tensors[f"{name}.weight"] + tensors[f"{name}.bias"]
+
+
+def _mean(x: np.ndarray) -> np.ndarray:
+    """Over the last axis; `np.mean` without its checks, which cost a single frame more than the sum does."""
+    return np.add.reduce(x, axis=-1, keepdims=True) / np.float32(x.shape[-1])
 
 
 def silu(x: np.ndarray) -> np.ndarray:

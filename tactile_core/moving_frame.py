@@ -77,12 +77,12 @@ class MovingFrame:
 
     def cells(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places (T, 2) -> the cell (T, 2) int of each, inside the lattice, and what is left of the place, in cells."""
-        at = np.nan_to_num(place) * np.float32(PLACE_UNIT) + self._middle
-        cell = np.rint(np.clip(at, 0, [self.rows - 1, self.columns - 1]))
-        left = np.clip(at - cell, -1, 1)  # a place off the lattice counts as its edge
+        at = np.where(np.isfinite(place), place, 0) * np.float32(PLACE_UNIT) + self._middle
+        cell = np.rint(np.minimum(np.maximum(at, 0), 2 * self._middle))
+        left = np.minimum(np.maximum(at - cell, -1), 1)  # a place off the lattice counts as its edge
         return cell.astype(np.int64), left.astype(np.float32)
 
-    @property
+    @functools.cached_property
     def _middle(self) -> np.ndarray:
         return np.array([self.rows - 1, self.columns - 1], np.float32) / 2
 
