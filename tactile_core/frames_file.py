@@ -22,7 +22,7 @@ ALWAYS = {
     "frame": ("1", "index of the frame in the recording, from 0; names its picture"),
     "time": ("s", "from the recording's first frame; attribute start_time: unix time of that frame, 0 if unknown"),
     "electrodes": ("count", "(T, 19) E1..E19 as read, bad samples repaired; attribute rest: reading without contact"),
-    "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame; 0 without contact"),
+    "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame; 0 without contact (not where rectified)"),
     "contact_center": ("m", "(T, 2) = (x, z) on the DIGIT after unrolling; NaN without contact"),
     "confidence": ("1", "0 (a guess) to 1"),
     "expected_error_biotac": ("m", "expected largest node error: half of such frames have less"),

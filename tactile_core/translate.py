@@ -25,7 +25,7 @@ class Translation:
 
     latent_signal (T, 8), latent_biotac, latent_digit : means of the networks' latents
     displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
-    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact
+    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, but for rectified signals
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
     confidence : (T,), 1 as in training, 0 far from it
     expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
@@ -68,13 +68,15 @@ class Translator:
         latent_digit = nets.m2m(latent_biotac)
         biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
         center = self._contact_center(digit)
+        # Without its sign a weak signal leaves the dent undecided, but not the force: strength would stutter.
+        silent = np.isnan(center[:, 0]) & ~rectified
         confidence, out_of_range = self._trust(change, signals.flags, rectified)
         flags = signals.flags.copy()
         flags[out_of_range] |= np.uint16(Flag.OUT_OF_RANGE)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
         return Translation(
             latent_signal, latent_biotac, latent_digit, biotac, digit,
-            force=np.where(np.isnan(center[:, :1]), np.float32(0), nets.force(latent_biotac)),
+            force=np.where(silent[:, None], np.float32(0), nets.force(latent_biotac)),
             contact_center=center,
             confidence=confidence, **self._errors(change, rectified), flags=flags,
         )  # fmt: skip

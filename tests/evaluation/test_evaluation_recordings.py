@@ -71,8 +71,8 @@ def test_a_translation_that_follows_the_pressure_meets_the_targets(tmp_path):
     for k in range(3):
         write_slide(tmp_path, f"mat1_{k}", seed=k)
     rows = by_name(recordings.rows(tmp_path, network, tmp_path / "out"))
-    assert rows["volume_rank_median"]["value"] > 0.98 and rows["volume_rank_median"]["ok"]
-    assert abs(rows["volume_silence"]["value"]) < 0.05 and rows["volume_silence"]["ok"]
+    assert rows["force_rank_median"]["value"] > 0.98 and rows["force_rank_median"]["ok"]
+    assert abs(rows["force_silence"]["value"]) < 0.05 and rows["force_silence"]["ok"]
     assert rows["not_finite"]["value"] == 0 and rows["not_finite"]["ok"]
     assert rows["contact_missed"]["value"] == 0
     assert "step_at_repaired" not in rows  # nothing had to be repaired
@@ -83,7 +83,7 @@ def test_a_translation_of_noise_misses_them(tmp_path):
     write_slide(tmp_path, "mat1_1", electrodes=np.random.default_rng(1).normal(30, 5, (FRAMES, 19)))
     rows = by_name(recordings.rows(tmp_path, network))
     for name in ("rank_median", "rank_quartile", "silence", "roughness"):
-        assert rows[f"volume_{name}"]["ok"] is False
+        assert rows[f"force_{name}"]["ok"] is False
 
 
 def test_what_is_written_is_what_was_measured(tmp_path):
