@@ -129,7 +129,7 @@ def judge(path: Path, network: Translate, out: Path | None = None, sensor: Senso
     step = largest_step(found.force, found.repaired)
     unrepaired = np.nan
     if found.repaired.any():
-        untouched = translate(path, network, PrepareOptions(repair=False), sensor)
+        untouched = translate(path, network, PrepareOptions(repair=False, smooth=1), sensor)
         unrepaired = largest_step(untouched.force, found.repaired)
     if not slide.is_whole(path):
         return Judged(None, np.nan, step, unrepaired, found.not_finite)

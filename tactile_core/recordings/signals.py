@@ -14,6 +14,7 @@ from .kinds import KINDS, detect
 from .quiet import Quiet, baseline, calmest, find_quiet, level, window_frames
 from .recording import Recording
 from .repair import fill, find_glitches, is_time_series
+from .smoothing import LONGEST, RECTIFIED, SIGNED, smooth
 
 FULL_SCALE = 4095.0  # counts of the 12-bit converter
 SCALED_PEAK = (
@@ -32,6 +33,7 @@ class PrepareOptions:
     drift : remove drift between quiet parts
     repair : remove glitches (unreadable samples are always interpolated)
     counts_per_unit : factor from a scaled recording's unit to counts
+    smooth : frames, odd, that the changes are averaged over round each; None: 3 of a rectified recording, else 1
     """
 
     kind: str | None = None
@@ -39,13 +41,15 @@ class PrepareOptions:
     drift: bool = True
     repair: bool = True
     counts_per_unit: float | None = None
+    smooth: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Signals:
     """Signals ready for the networks.
 
-    change : (T, 19) float, counts, plain reading minus rest, drift removed. Rectified: |change| minus its quiet level
+    change : (T, 19) float, counts, plain reading minus rest, drift removed, smoothed as told. Rectified: |change| minus
+        its quiet level
     rest : (19,) float, counts, what the electrodes read without contact at the first frame
     drift : (19,) float, counts/s, mean slope of the rest level over the recording
     electrodes : (T, 19) float, counts: the readings after repair, before the tare
@@ -87,9 +91,10 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
         flags |= np.uint16(Flag.NO_QUIET_PART)
     flags |= _saturated(recording, readings, kind, warnings) | _dead(recording, readings, warnings)
     slope = (rest[-1] - rest[0]) / recording.duration if recording.duration > 0 else np.zeros(rest.shape[1])
-    report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope)
+    frames = _smoothed_over(options, kind)
+    report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope) | {"smoothed_frames": frames}
     return Signals(
-        change=readings - rest,
+        change=smooth(readings - rest, frames),
         rest=rest[0].copy(),
         drift=slope,
         electrodes=readings,
@@ -107,6 +112,14 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
     if options.kind not in KINDS:
         raise TactileError("option kind", repr(options.kind), ", ".join(KINDS))
     return options.kind, f"told by the user (the samples look {detect(readings)[0]})"
+
+
+def _smoothed_over(options: PrepareOptions, kind: str) -> int:
+    if options.smooth is None:
+        return RECTIFIED if kind == "rectified" else SIGNED
+    if not 1 <= options.smooth <= LONGEST or options.smooth % 2 == 0:
+        raise TactileError("option smooth", f"{options.smooth} frames", f"an odd number from 1 to {LONGEST}")
+    return options.smooth
 
 
 def _counts_per_unit(

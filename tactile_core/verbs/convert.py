@@ -62,6 +62,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         help="what the file holds, where the automatic answer is wrong",
     )
     verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor to counts, for a scaled recording")
+    verb.add_argument(
+        "--smooth", type=int, metavar="N", help="average over N frames, odd (default: 3 if rectified, else 1)"
+    )
     verb.add_argument("--no-drift", action="store_true", help="do not remove drift")
     verb.add_argument("--sensor", metavar="FILE", help="gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
@@ -78,6 +81,7 @@ def run(options: argparse.Namespace) -> int:
         tare=None if options.tare == "auto" else options.tare,
         drift=not options.no_drift,
         counts_per_unit=options.counts_per_unit,
+        smooth=options.smooth,
     )
     keep, frames = results.parse_keep(options.keep), convert.parse_frames(options.frames)
     sensor = None if options.sensor is None else sensor_file.read(options.sensor)
