@@ -71,11 +71,11 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
     if options.quick:
         pairs = pairs.some(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
     found = [*test_set.seen_rows(network, pairs, bodies), *test_set.speed_rows(network, pairs)]
-    if options.kept_apart:
-        apart = translate.load_translator(options.kept_apart)
+    apart = translate.load_translator(options.kept_apart) if options.kept_apart else None
+    if apart:
         found += test_set.unseen_rows(apart, pairs, bodies)
     if options.card:
-        write_model_card(Path(options.card), found, network, pairs)
+        write_model_card(Path(options.card), found, network, pairs, apart)
     return found
 
 

@@ -30,8 +30,10 @@ LIMITS = """\
 """
 
 
-def write_model_card(path: Path, rows: list[Row], translator: Translator, pairs: Pairs) -> None:
-    """Write the card as Markdown, and the picture of cases beside it."""
+def write_model_card(
+    path: Path, rows: list[Row], translator: Translator, pairs: Pairs, apart: Translator | None = None
+) -> None:
+    """Write the card as Markdown, and the picture of cases beside it; ``apart``: the networks of the unseen rows."""
     card = translator.card
     text = [
         "# Model card: the networks that translate touch",
@@ -45,6 +47,7 @@ def write_model_card(path: Path, rows: list[Row], translator: Translator, pairs:
         " mechanics on both sensors; signals read with 1.5 counts of noise and gains 10 % off. Depth bins (0.1-0.3,"
         " 0.3-0.6, 0.6-0.9, 0.9-1.2 mm on the BioTac) and indenters count alike, without slides; null: no deformation.",
         "",
+        *([] if apart is None else [_apart(apart.card["options"]), ""]),
         HEADER,
         *map(line, rows),
         "",
@@ -71,6 +74,15 @@ def _training(card: dict) -> str:
         f"Latents: signal {options['latent_signal']}, BioTac {options['latent_biotac']},"
         f" DIGIT {options['latent_digit']};"
         f" KL weight {options['beta']:g}; seed {card['seed']}; torch {card['versions']['torch']}.\n"
+    )
+
+
+def _apart(options: dict) -> str:
+    names, below = " and ".join(options["without"]), options["without_below_x"]
+    region = "" if below is None else f", and without the pad beyond x = {1e3 * below:g} mm"
+    return (
+        f"Rows of unseen sets are of networks of their own, trained without {names}{region}, for"
+        f" {options['effort']:g} of the usual epochs; the weights that ship have seen all of it."
     )
 
 
