@@ -8,8 +8,8 @@ NOISE = 1.5  # counts (issue 4; 0.7 to 1.5 in real recordings, data README)
 GAIN = 0.1  # standard deviation a channel (issue 4)
 
 
-def as_read(change: np.ndarray, seed: int) -> np.ndarray:
-    """True changes (C, 19) counts -> as read, float32; the same for the same seed."""
+def as_read(change: np.ndarray, seed: int, frames: int = 1) -> np.ndarray:
+    """True changes (C, 19) counts -> as read, the mean over ``frames`` of a contact at rest, float32; seeded."""
     random = np.random.default_rng(seed)
     gain = 1 + GAIN * random.standard_normal(change.shape)
-    return (gain * change + NOISE * random.standard_normal(change.shape)).astype(np.float32)
+    return (gain * change + NOISE / np.sqrt(frames) * random.standard_normal(change.shape)).astype(np.float32)

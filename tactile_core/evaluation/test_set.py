@@ -23,6 +23,8 @@ TARGETS = {
 UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter that was kept from the training
 EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
 NULLS = ("null_biotac_rms_um", "null_digit_rms_um", "null_digit_core_height_um")
+FROM_SIGNALS = ("S2MPN_rms_um", "S2MPN_position_mm", "force_percent", "chain_rms_um")
+WINDOW, RATE = 3, 100.0  # frames; Hz, of the electrodes (sensors.md)
 BATCHES = {1: 0.8, 500: 0.25}  # frames a call -> target, ms a frame
 ROUNDS = 7  # calls, of which the fastest counts: what else runs only ever slows
 SEED = 7  # of the readings' noise
@@ -42,7 +44,16 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
         at = pairs.indenter == number
         each = {figure: np.where(at, columns[figure], np.nan) for figure in (*EACH_INDENTER, *NULLS)}
         found += [one for one in figure_rows(each, pairs, rows, name, {}) if one["value"] is not None]
+    found += window_rows(translator, pairs, bodies)
     return [*found, *expected_error_rows(translator, pairs, rows, change, "seen indenters")]
+
+
+def window_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
+    """What a short causal window gains over single frames, and how much later its answer comes."""
+    rows, name = np.arange(len(pairs.press)), f"causal mean over {WINDOW} frames"
+    columns = translation_figures(translator.nets, pairs, rows, as_read(pairs.signal, SEED, WINDOW), bodies)
+    found = figure_rows({figure: columns[figure] for figure in (*FROM_SIGNALS, *NULLS)}, pairs, rows, name, {})
+    return [*found, row("window_delay_ms", 1e3 * (WINDOW - 1) / 2 / RATE, "ms", of=name)]
 
 
 def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
