@@ -4,7 +4,7 @@
     python scripts/evaluate_translation.py --kept-apart FOLDER      and networks that some of it was kept from
     python scripts/evaluate_translation.py --recordings DIR         on recordings, matM_K_{bio,cw,cp}.csv; --quick: six
 
-Prints a table; exits 1 when an error row misses its target. Recordings need scipy, of the extra [fem]. Their
+Prints a table; exits 1 when an error row misses its target. Needs scipy, of the extra [fem]. The recordings'
 translations are left in --out, in the form that judge_recordings.py, the tool beside the recordings, reads.
 """
 
@@ -27,7 +27,7 @@ from tactile_core.rows import HEADER, Row, failed, line
 
 QUICK = 6  # recordings
 QUICK_PRESSES = 7  # of as many one is looked at; prime to how box, ring and others take turns
-TEST_SET = "scenes/training/test_contacts.h5"
+TEST_SET = Path(__file__).resolve().parent.parent / "scenes" / "training" / "test_contacts.h5"
 
 
 def main(arguments: list[str] | None = None) -> int:

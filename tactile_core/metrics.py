@@ -66,11 +66,15 @@ def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
     displacement : (C, n, 3) m
     rest : (n, 3) m
     """
-    depth = height(displacement)
+    return core_center(height(displacement), np.asarray(rest, np.float64)[:, [0, 2]])
+
+
+def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) -> np.ndarray:
+    """(C, 2), mean of the places (n, 2) of a dent's core, weighted with depth (C, n) m; NaN if none is above least."""
     peak = depth.max(-1, keepdims=True)
-    weight = np.where((depth > CORE * peak) & (peak > MOVING), depth, 0.0)
+    weight = np.where((depth > CORE * peak) & (peak > least), depth, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return weight @ np.asarray(rest, np.float64)[:, [0, 2]] / weight.sum(-1, keepdims=True)
+        return weight @ places / weight.sum(-1, keepdims=True)
 
 
 def mean(values: np.ndarray) -> float | None:

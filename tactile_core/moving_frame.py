@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import biotac_shape, sensors
+from .metrics import CORE
 
-CORE = 0.3  # share of the largest displacement above which a node belongs to the dent (networks.md)
 STILL = 1e-9  # m: below, there is no dent to follow and the frame stays in the middle
 PLACE_UNIT = 10.0  # cells a unit of the networks' inputs: places then are of the order of one (assumed)
 

@@ -9,7 +9,7 @@ force and error  heads: force from the BioTac's latent, expected error from the 
 Results are computed in blocks of `BLOCK` frames, padded with zeros, so that a frame gives the same numbers whatever
 part of a recording it is asked for with: the matrix products then have the same shape (equal bits with OpenBLAS as
 measured by the tests' machines; where a BLAS splits work otherwise, equal to a relative 1e-5). A frame alone goes by
-itself, in a fortieth of the time, and is equal to a relative 1e-5.
+itself, in a twentieth of the time, and is equal to a relative 1e-5.
 """
 
 from __future__ import annotations
@@ -22,26 +22,20 @@ from pathlib import Path
 import numpy as np
 
 from .errors import TactileError
-from .layers import Tensors, plain, plain_shapes, residual, residual_shapes
+from .layers import Tensors, plain, residual
 from .moving_frame import MovingFrame
+from .network_sizes import ELECTRODES, NETS, PLACE, SIGNAL_HIDDEN, card_entry, check_chain, tensor_shapes
 from .weights import ADVICE, CARD_NAME, read_card, read_verified
 
 Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network
-ELECTRODES = 19
-SIGNAL_HIDDEN = (256, 128, 64)  # SVB of the authors' later code (sensors.md)
 BLOCK = 64  # frames a block: enough for matrix products at full speed
 COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
-PLACE = 2  # numbers of a mesh's latent that are the place of its dent
 FORCE_SCALE = 0.1  # N: the force is 0.1 N sinh(head), which spans light touches and firm presses alike (assumed)
 COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
-SURFACES = ("biotac", "digit")
-ERROR_FEATURES = 3  # beside the latent: what SVB leaves, how large the signal is, whether it is rectified
 ERROR_UNIT = 10e-6  # m, of the error head's logarithm
-NETS = ("SVB", "MVB", "S2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "error")
 WEIGHTS_FOLDER = Path(__file__).parent / "weights"
 # The card names the hash of every file of weights; this names the card that ships.
 SHIPPED_CARD_SHA256 = "90211e92657865db02987f64dfc21ae9645f3634764f9e742e4be7ac5a790e70"
-MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small enough to refuse a damaged number
 
 
 @dataclass(frozen=True)
@@ -70,29 +64,6 @@ def compress(change: np.ndarray) -> np.ndarray:
 def expand(compressed: np.ndarray) -> np.ndarray:
     """Inverse of `compress`, in counts."""
     return np.sinh(np.clip(compressed, -COMPRESSED_LIMIT, COMPRESSED_LIMIT)) * np.float32(COUNT_SCALE)
-
-
-def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]:
-    """Tensor names and shapes of one network from the sizes in its card."""
-    if net == "SVB":
-        latent, hidden = sizes["latent"], SIGNAL_HIDDEN
-        shapes = plain_shapes("encoder", (ELECTRODES + 1, *hidden, 2 * latent))
-        shapes |= plain_shapes("decoder", (latent, *hidden[::-1], ELECTRODES))
-        shapes |= {"distance.mean": (latent,), "distance.whitening": (latent, latent)}
-        return shapes | {"distance.residual": (ELECTRODES,)}
-    width, blocks = sizes["width"], sizes["blocks"]
-    if net in ("MVB", "MVD"):
-        wide, near, latent, window = sizes["wide"], sizes["near"], sizes["latent"], (2 * sizes["half"] + 1) ** 2
-        shapes = residual_shapes("encoder", wide + near + 2 * PLACE, 2 * (latent - PLACE), width, blocks)
-        shapes |= residual_shapes("decoder", latent + PLACE, wide + near, width, blocks)
-        shapes |= {"wide": (wide, 3 * sizes["nodes"]), "near": (near, 3 * window)}
-        return shapes | {"scale": (wide + near,), "turn": (sizes["nodes"],)}
-    return residual_shapes("map", sizes["inputs"], sizes["outputs"], width, blocks)
-
-
-_MESH = ("blocks", "columns", "half", "latent", "near", "nodes", "rows", "wide", "width")
-_MAP = ("blocks", "inputs", "outputs", "width")
-SIZE_NAMES = {net: {"SVB": ("latent",), "MVB": _MESH, "MVD": _MESH}.get(net, _MAP) for net in NETS}
 
 
 class Networks:
@@ -281,45 +252,7 @@ def load(folder: str | os.PathLike | None = None) -> Networks:
         raise TactileError(folder / CARD_NAME, f"sha256 {digest}", SHIPPED_CARD_SHA256, ADVICE)
     tensors = {}
     for net in NETS:
-        entry = _card_entry(card, net, folder / CARD_NAME)
+        entry = card_entry(card, net, folder / CARD_NAME)
         tensors[net] = read_verified(folder / f"{net}.safetensors", entry["sha256"], tensor_shapes(net, entry["sizes"]))
-    _check_chain({net: card["nets"][net]["sizes"] for net in NETS}, folder / CARD_NAME)
+    check_chain({net: card["nets"][net]["sizes"] for net in NETS}, folder / CARD_NAME)
     return Networks(tensors, card, digest)
-
-
-def _card_entry(card: dict, net: str, path: Path) -> dict:
-    """The card's entry for one network: its sha256 and sizes."""
-    nets = card.get("nets")
-    entry = nets.get(net) if isinstance(nets, dict) else None
-    sizes = entry.get("sizes") if isinstance(entry, dict) else None
-    names = SIZE_NAMES[net]
-    whole = isinstance(sizes, dict) and sorted(sizes) == sorted(names)
-    whole = whole and all(type(size) is int and 0 <= size <= MAX_SIZE for size in sizes.values())
-    if not whole or not isinstance(entry.get("sha256"), str):
-        expected = f"sha256 and the sizes {', '.join(names)} as whole numbers"
-        raise TactileError(f"{path}, nets.{net}", "an incomplete entry", expected, ADVICE)
-    if "rows" in sizes and not 0 < sizes["rows"] * sizes["columns"] <= sizes["nodes"]:
-        found = f"a lattice of {sizes['rows']} x {sizes['columns']} in {sizes['nodes']} nodes"
-        raise TactileError(f"{path}, nets.{net}", found, "a lattice among the nodes", ADVICE)
-    return entry
-
-
-def _check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
-    """The networks fit together: the latent one writes is the latent the next one reads."""
-    links = [
-        ("S2MPN", "inputs", sizes["SVB"]["latent"]),
-        ("S2MPN", "outputs", sizes["MVB"]["latent"]),
-        ("M2MPN", "inputs", sizes["MVB"]["latent"] + PLACE),
-        ("M2MPN", "outputs", sizes["MVD"]["latent"]),
-        ("D2BPN", "inputs", sizes["MVD"]["latent"] + PLACE),
-        ("D2BPN", "outputs", sizes["MVB"]["latent"]),
-        ("B2SPN", "inputs", sizes["MVB"]["latent"] + PLACE),
-        ("B2SPN", "outputs", sizes["SVB"]["latent"]),
-        ("error", "inputs", sizes["SVB"]["latent"] + ERROR_FEATURES),
-        ("error", "outputs", len(SURFACES)),
-        ("force", "inputs", sizes["MVB"]["latent"]),
-        ("force", "outputs", 3),
-    ]
-    for net, size, expected in links:
-        if sizes[net][size] != expected:
-            raise TactileError(f"{path}, nets.{net}", f"{size} {sizes[net][size]}", f"{expected}", ADVICE)

@@ -7,7 +7,7 @@ import os
 
 import numpy as np
 
-from . import digit_shape, metrics, networks, sensors, surface
+from . import digit_shape, metrics, network_sizes, networks, sensors, surface
 from .errors import TactileError
 from .flags import Flag
 from .networks import Networks
@@ -95,7 +95,7 @@ class Translator:
         """Expected largest errors and their bounds by the names of `Translation`."""
         expected, bounds = self.nets.expected_error(change, rectified), self.card["error_bounds"]
         found = {}
-        for index, name in enumerate(networks.SURFACES):
+        for index, name in enumerate(network_sizes.SURFACES):
             factor = np.where(rectified, bounds["rectified"][name], bounds["signed"][name])
             found[f"expected_error_{name}"] = expected[:, index]
             found[f"error_bound_{name}"] = (factor * expected[:, index]).astype(np.float32)
@@ -158,7 +158,7 @@ def _check_bounds(card: dict, where: str) -> None:
     """What expected errors are multiplied by: positive numbers for signed and rectified signals and both surfaces."""
     bounds = card.get("error_bounds")
     for kind in ("signed", "rectified"):
-        for name in networks.SURFACES:
+        for name in network_sizes.SURFACES:
             kinds = bounds.get(kind) if isinstance(bounds, dict) else None
             value = kinds.get(name) if isinstance(kinds, dict) else None
             if type(value) not in (int, float) or not 0 < value < 1e6:

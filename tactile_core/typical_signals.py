@@ -13,7 +13,8 @@ import numpy as np
 
 from . import weights
 from .errors import TactileError
-from .networks import ELECTRODES, compress, expand
+from .network_sizes import ELECTRODES
+from .networks import compress, expand
 from .signal_match import match
 
 FILE = "signals.safetensors"

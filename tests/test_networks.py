@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
-from tactile_core import layers, networks, weights
+from tactile_core import layers, network_sizes, networks, weights
 from tactile_core.errors import TactileError
 
 NODES = {"biotac": 30, "digit": 24}
@@ -30,9 +30,9 @@ def random_tensors(sizes):
     """Weights of the size of trained ones, float16 as they ship."""
     rng = np.random.default_rng(0)
     tensors = {}
-    for net in networks.NETS:
+    for net in network_sizes.NETS:
         tensors[net] = {}
-        for name, shape in networks.tensor_shapes(net, sizes[net]).items():
+        for name, shape in network_sizes.tensor_shapes(net, sizes[net]).items():
             values = rng.standard_normal(shape) / np.sqrt(shape[-1])
             if name in ("scale", "distance.residual"):
                 values = np.full(shape, 1e-3 if name == "scale" else 0.1)
@@ -143,7 +143,7 @@ def test_rectified_signals_are_read_as_such(nets):
 
 
 def test_flipped_byte_is_found_in_every_file(folder, tmp_path):
-    for net in networks.NETS:
+    for net in network_sizes.NETS:
         copy = shutil.copytree(folder, tmp_path / net)
         path = copy / f"{net}.safetensors"
         data = bytearray(path.read_bytes())

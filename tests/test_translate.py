@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from tactile_core import metrics, networks, recordings, sensors, translate
+from tactile_core import metrics, network_sizes, networks, recordings, sensors, translate
 from tactile_core.errors import TactileError
 from tactile_core.flags import Flag
 
@@ -119,7 +119,7 @@ def test_rectified_signals_are_read_as_such(translator, shipped, signals, transl
 
 def test_errors_are_expected_where_they_are(shipped, translation):
     here = touched(shipped)
-    for name in networks.SURFACES:
+    for name in network_sizes.SURFACES:
         found, true = (getattr(each, f"displacement_{name}")[here] for each in (translation, shipped.truth))
         error = metrics.max_error(found, true)
         bound, expected = (getattr(translation, f"{what}_{name}")[here] for what in ("error_bound", "expected_error"))

@@ -25,7 +25,7 @@ LIMITS = """\
 - The sign of electrode counts, the gap law and the BioTac's stiffness and filling are assumed (see `docs/mechanics.md`
   and `tactile_core/sensors.py`). A real unit's gains differ from the simulated ones by half: `tactile adapt` fits them.
 - Rectified recordings are read by networks that know they are; expect larger errors, as their bounds say.
-- Light touches, below about 0.2 mm, drown in the electrodes' noise: their place is a guess.
+- Light touches drown in the electrodes' noise: see the places in the rows of shallow contacts.
 - Contacts beyond the DIGIT's gel, deeper than trained, or with shapes far from the nine indenters are not learned.
 """
 

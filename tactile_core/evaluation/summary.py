@@ -39,7 +39,7 @@ def figure_rows(
         if not name.startswith("null_"):
             at = np.where(still, values, np.nan)
             value = in_bins(at, depth, indenter, is_median(name))
-            null = in_bins(np.where(still, _null(columns, name), np.nan), depth, indenter)
+            null = in_bins(np.where(still, _null(columns, name), np.nan), depth, indenter, is_median(name))
             found.append(figure_row(name, value, null, targets.get(name), set_name))
     return found
 
@@ -63,7 +63,7 @@ def figure_row(name: str, value: float | None, null: float | None, target: float
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
-    """Contacts in rows of their own: deeper than the bins, sliding, tilted, light ones; name and mask over ``rows``."""
+    """Contacts in rows of their own: light ones, each depth bin, deeper and sliding ones; name, mask over ``rows``."""
     depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
     yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

@@ -9,7 +9,8 @@ import numpy as np
 
 from .. import metrics, sensors, surface
 from ..lattice import Lattice
-from ..networks import SURFACES, Networks
+from ..network_sizes import SURFACES
+from ..networks import Networks
 from ..paired_contacts import Pairs
 from ..patch_of_dent import contact_patch
 
@@ -130,9 +131,6 @@ def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodie
 def _skin_offset(found: np.ndarray, true: np.ndarray, bodies: Bodies) -> np.ndarray:
     """(C,) m between the middles of two dents of the BioTac on the unrolled pad."""
     on_pad = np.isfinite(bodies.unrolled[:, 0])
-    centers = []
-    for moved in (metrics.lengths(found[:, on_pad]), metrics.lengths(true[:, on_pad])):
-        weight = np.where(moved > metrics.CORE * moved.max(-1, keepdims=True), moved, 0)
-        total = weight.sum(-1, keepdims=True)
-        centers.append(weight @ bodies.unrolled[on_pad] / np.where(total > 0, total, np.nan))
-    return metrics.lengths(centers[0] - centers[1])
+    places = bodies.unrolled[on_pad]
+    first, second = (metrics.core_center(metrics.lengths(each[:, on_pad]), places, 0.0) for each in (found, true))
+    return metrics.lengths(first - second)

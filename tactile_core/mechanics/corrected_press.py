@@ -10,7 +10,7 @@ from ..indenters import Indenter, Pose
 from .compliance import Compliance
 from .contact import Contact, ContactProblem, fluid_pressure
 from .correction import Corrected, correct, force_factor
-from .first_touch import first_touch
+from .first_touch import fall
 from .pose_path import same_line
 
 FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
@@ -56,7 +56,7 @@ class CorrectedPress:
         contact = self.problem.at_pose(pose.moved(depth), self.last)
         if contact.converged:
             self.last = contact
-        return self._with_correction(contact, self._fall(pose))
+        return self._with_correction(contact, self._fall_to(pose))
 
     def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
         """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found.
@@ -64,7 +64,7 @@ class CorrectedPress:
         A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
         """
         pose = pose or self.pose
-        contact, fall = self.last or self._first(pose), self._fall(pose)
+        contact, fall = self.last or self._first(pose), self._fall_to(pose)
         if contact is not None and not same_line(contact.pose, pose):
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
         before: tuple[float, float] | None = None  # linear and corrected force, N
@@ -102,12 +102,8 @@ class CorrectedPress:
             depth *= 1.5
         return None
 
-    def _fall(self, pose: Pose) -> float:
-        """How much farther in, m, than the press's own pose another one first touches: the sensor falls away."""
-        if same_line(self.pose, pose):
-            return 0.0
-        touching = first_touch(self.compliance.surface, self.problem.indenter, pose)
-        return float((touching.apex - self.pose.apex) @ pose.direction)
+    def _fall_to(self, pose: Pose) -> float:
+        return fall(self.compliance.surface, self.problem.indenter, self.pose, pose)
 
     def _with_correction(self, contact: Contact, fall: float) -> FastContact:
         made = correct(self.compliance, _from_touch(contact, fall))

@@ -7,6 +7,7 @@ import numpy as np
 from .. import biotac_shape
 from ..indenters import Indenter, Pose
 from ..lattice import Lattice
+from .pose_path import same_line
 
 _ADVANCES = 60  # of a body by its smallest distance: more than any shape needs
 _TOUCHES = 1e-9  # m, smallest distance at which the body is taken to touch
@@ -18,6 +19,13 @@ _CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no in
 _FARTHEST = 30e-3  # m, past all of a sensor from wherever the motion starts
 _LEAST_RATE = 0.5  # of approach: where the body slides past a point its distance says little about the way to it
 _NEAREST = 16  # nodes with which the motion is tried first
+
+
+def fall(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
+    """How much farther in, m, than at ``pose``, itself at first touch, an indenter touches where it has slid."""
+    if same_line(pose, slid):
+        return 0.0
+    return float((first_touch(lattice, indenter, slid).apex - pose.apex) @ slid.direction)
 
 
 def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:

@@ -12,9 +12,10 @@ import dataclasses
 import numpy as np
 
 from ..indenters import Indenter, Pose
+from ..indenters.indenter import lengths
 from .frictionless import FORCE_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pace, Try
 from .near_block import NearBlock
-from .node_vectors import dot, size
+from .node_vectors import dot
 from .stick_slip import LEAST_FORCE, Slipping, Step
 
 SLIP_TOLERANCE = 0.05e-6  # m, motion of a sticking node that counts as none: a quarter of the gaps' tolerance
@@ -115,7 +116,7 @@ class Frictional:
             s = np.flatnonzero(guess.slips)
             pressing = dot(guess.force[s], normal[s])
             leans = guess.force[s] - pressing[:, None] * normal[s]
-            long = size(leans)
+            long = lengths(leans)
             guess.slips[s[long == 0]] = False
             s, leans = s[long > 0], leans[long > 0] / long[long > 0, None]
             lean[s] = leans
@@ -138,7 +139,7 @@ class Frictional:
         if not (curved and len(at)):
             return bend
         found = there.curvature(self.indenter, self.rest[at] + place[at])
-        feels = size(guess.force[at]) * self.block.matrix.diagonal()[3 * at] * size(found.reshape(-1, 9))
+        feels = lengths(guess.force[at]) * self.block.matrix.diagonal()[3 * at] * lengths(found.reshape(-1, 9))
         felt = np.argsort(-feels, kind="stable")[:_MOST_CURVED]
         felt = felt[feels[felt] > _FEELS_CURVATURE]
         bend[felt] = found[felt]
@@ -174,7 +175,7 @@ class Frictional:
         opening = np.concatenate([gap, core_gap])
         active = np.where(guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -_GAP_NOISE)
         held = active[:k] & guess.active[:k]
-        over = size(guess.force - pressing[:, None] * seen.normal) > (
+        over = lengths(guess.force - pressing[:, None] * seen.normal) > (
             self.friction * pressing * (1 + _BEYOND) + LEAST_FORCE
         )
         slips = held & np.where(guess.slips, dot(slip, seen.lean) <= SLIP_TOLERANCE, over)
@@ -185,7 +186,7 @@ class Frictional:
         """Let nodes (k,) bool that touch again slip: sticking drew them off the indenter before."""
         if not back.any():
             return
-        far = size(slip)
+        far = lengths(slip)
         back = back & (far > 0)
         guess.force[back] = LEAST_FORCE * (normal[back] - self.friction * slip[back] / far[back, None])
         guess.slips = guess.slips | back
@@ -197,11 +198,11 @@ class Frictional:
         if gap.min() < -GAP_TOLERANCE or np.abs(gap[active]).max() > GAP_TOLERANCE:
             return False
         lean = np.where(state.slipping[:, None], _across(state.force, normal), 0.0)
-        lean /= np.maximum(size(lean), 1e-30)[:, None]
-        if size(slip - dot(slip, lean)[:, None] * lean)[active].max() > SLIP_TOLERANCE:
+        lean /= np.maximum(lengths(lean), 1e-30)[:, None]
+        if lengths(slip - dot(slip, lean)[:, None] * lean)[active].max() > SLIP_TOLERANCE:
             return False
         whole = np.linalg.norm(state.force.sum(axis=0))
-        if np.linalg.norm((turned - normal) * size(state.force)[:, None]) > SIDEWAYS_TOLERANCE * whole:
+        if np.linalg.norm((turned - normal) * lengths(state.force)[:, None]) > SIDEWAYS_TOLERANCE * whole:
             return False
         axial = float(state.force.sum(0) @ self.pose.direction)
         return axial_force is None or abs(axial - axial_force) <= FORCE_TOLERANCE * abs(axial_force)

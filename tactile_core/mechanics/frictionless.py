@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..indenters import Indenter, Pose
+from ..indenters.indenter import lengths
 from .active_set import Pressing, complement
 from .near_block import NearBlock
-from .node_vectors import size, weighted
+from .node_vectors import weighted
 
 GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that MECHANICS allows
 SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up
@@ -198,7 +199,7 @@ class Frictionless:
         touching = active[active < self.block.k]
         bend = self.pose.moved(shift).curvature(self.indenter, place[touching])
         feels = solved.pressing[touching] * matrix.diagonal()[touching]
-        most = feels * size(bend.reshape(-1, 9))
+        most = feels * lengths(bend.reshape(-1, 9))
         if most.max(initial=0.0) < threshold:
             return None
         felt = np.sort(np.argsort(-most, kind="stable")[:_MOST_CURVED])

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .. import digit_shape, surface
 from ..errors import TactileError
 from ..indenters import Box, Indenter, Pose, Ring
 from ..scene import Scene
@@ -21,7 +20,7 @@ from .corrected_press import CorrectedPress
 from .electrodes import signal_of_gaps
 from .full_press import FullContact, FullPress
 from .pair_file import quantise
-from .pair_rows import draw_place
+from .pair_rows import beyond_digit, draw_place
 from .placement import Placement, pose_at
 from .thickness import DEPTH_LIMIT, depth_at
 
@@ -163,7 +162,6 @@ def _guesses(
 
 
 def _row(biotac: FullContact, digit: FullContact) -> dict[str, np.ndarray]:
-    x, z = surface.unrolled_nodes()[biotac.patch].T
     return {
         "displacement_biotac": quantise(biotac.displacement),
         "displacement_digit": quantise(digit.displacement),
@@ -175,7 +173,7 @@ def _row(biotac: FullContact, digit: FullContact) -> dict[str, np.ndarray]:
         "depth_biotac": np.float32(biotac.depth),
         "depth_digit": np.float32(digit.depth),
         "contact_center": digit.centre.astype(np.float32),
-        "beyond_digit": np.bool_((digit_shape.outline_distance(x, z) <= 0).any()),  # it is 0 everywhere outside
+        "beyond_digit": beyond_digit(biotac.patch),
         "contact_patch_biotac": biotac.patch,
         "contact_patch_digit": digit.patch,
     }

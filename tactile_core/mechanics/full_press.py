@@ -11,7 +11,7 @@ from ..errors import TactileError
 from ..indenters import Indenter, Pose
 from .compliance import electrode_feet
 from .finite_strain_tier import Body, Sensor, graded_body
-from .first_touch import first_touch
+from .first_touch import fall
 from .newton import Tolerance, Touch
 from .pose_path import same_line
 
@@ -91,10 +91,7 @@ class FullPress:
 
     def fall(self, pose: Pose) -> float:
         """How much farther in, m, than at the press's own pose the resting surface lies under a slid one."""
-        if same_line(self.pose, pose):
-            return 0.0
-        touching = first_touch(sensors.sensor_surface(self.sensor), self.indenter, pose)
-        return float((touching.apex - self.pose.apex) @ pose.direction)
+        return fall(sensors.sensor_surface(self.sensor), self.indenter, self.pose, pose)
 
 
 def full_contact(body: Body, touch: Touch) -> FullContact:

@@ -96,7 +96,7 @@ def pair_row(biotac: FastContact, digit: FastContact) -> dict[str, np.ndarray]:
         "depth_biotac": np.float32(biotac.linear.depth),
         "depth_digit": np.float32(digit.linear.depth),
         "contact_center": contact_center(digit.linear).astype(np.float32),
-        "beyond_digit": np.bool_(_beyond_digit(biotac.linear)),
+        "beyond_digit": beyond_digit(skin.touchable[biotac.linear.nodes]),
         "contact_patch_biotac": _patch(len(skin.surface.rest), skin.touchable[biotac.linear.nodes]),
         "contact_patch_digit": _patch(len(gel.surface.rest), gel.touchable[digit.linear.nodes]),
     }
@@ -109,10 +109,13 @@ def contact_center(digit: Contact) -> np.ndarray:
     return weight @ gel.surface.rest[gel.touchable[digit.nodes]][:, [0, 2]] / weight.sum()
 
 
-def _beyond_digit(biotac: Contact) -> bool:
-    """Whether the BioTac is touched beside what rolls onto the DIGIT's gel: no contact of the gel is its equal."""
-    x, z = surface.unrolled_nodes()[biotac_compliance().touchable[biotac.nodes]].T
-    return bool((digit_shape.outline_distance(x, z) <= 0).any())  # it is 0 everywhere outside
+def beyond_digit(touched: np.ndarray) -> np.bool_:
+    """Whether these nodes of the BioTac (indices or a mask) reach beside what rolls onto the DIGIT's gel.
+
+    No contact of the gel is their equal.
+    """
+    x, z = surface.unrolled_nodes()[touched].T
+    return (digit_shape.outline_distance(x, z) <= 0).any()  # it is 0 everywhere outside
 
 
 def _patch(size: int, nodes: np.ndarray) -> np.ndarray:

@@ -12,9 +12,10 @@ import functools
 
 import numpy as np
 
+from ..indenters.indenter import lengths
 from .active_set import UnsolvedError
 from .mirrored_halves import axes_of
-from .node_vectors import cross, dot, size, weighted
+from .node_vectors import cross, dot, weighted
 
 _RIDGE = 1e-6  # relative, of the compliance: keeps single precision definite
 _LARGEST_TURN = 1.0  # rad, of a slipping node's friction in one step
@@ -68,10 +69,10 @@ class Slipping:
         if len(self.curved):
             tilt = (self.bend[self.curved] @ motion[:, :, None])[:, :, 0]
             normal = normal.copy()
-            normal[self.curved] += tilt * np.minimum(1, _LARGEST_TILT / np.maximum(size(tilt), 1e-12))[:, None]
-            normal /= size(normal)[:, None]
+            normal[self.curved] += tilt * np.minimum(1, _LARGEST_TILT / np.maximum(lengths(tilt), 1e-12))[:, None]
+            normal /= lengths(normal)[:, None]
             lean -= dot(lean, normal)[:, None] * normal
-            lean /= size(lean)[:, None]
+            lean /= lengths(lean)[:, None]
         return pressing[:, None] * (normal + self.friction * lean)
 
 

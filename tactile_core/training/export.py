@@ -10,7 +10,8 @@ import torch
 
 from .. import __version__, typical_signals
 from ..evaluation.translation import Bodies
-from ..networks import ELECTRODES, ERROR_FEATURES, NETS, PLACE, SURFACES, Networks, load
+from ..network_sizes import ELECTRODES, ERROR_FEATURES, NETS, PLACE, SURFACES
+from ..networks import Networks, load
 from ..weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
 from .modules import compress
@@ -75,7 +76,7 @@ def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndar
 
 
 def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
-    """The sizes in the card, from which `networks.tensor_shapes` knows every shape."""
+    """The sizes in the card, from which `network_sizes.tensor_shapes` knows every shape."""
     options = contacts.options
     head = {"width": FORCE_WIDTH, "blocks": FORCE_BLOCKS}
     common = {"width": options.width, "blocks": options.blocks}

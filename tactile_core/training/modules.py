@@ -9,7 +9,8 @@ import torch
 from torch import Tensor, nn
 
 from ..layers import NORM_EPSILON
-from ..networks import COUNT_SCALE, ELECTRODES, PLACE, SIGNAL_HIDDEN
+from ..network_sizes import ELECTRODES, PLACE, SIGNAL_HIDDEN
+from ..networks import COUNT_SCALE
 from .surface import Surface
 
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class Options:
-    """Sizes and lengths of a training. The defaults take about a quarter of an hour for 50,000 contacts on one core.
+    """Sizes and lengths of a training. The defaults took 26 minutes for 50,000 contacts on one busy core.
 
     latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
@@ -19,7 +19,7 @@ class Options:
         rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
         from the simulated ones by), rectified_bulge, the same of all falling signals of a sample together,
         rectified_offset, counts, of the tare before the fold, rectified_missing, share of channels that read nothing.
-        Each was seen to let strength follow fluid pressure better on real recordings; none was fitted to them
+        Each was chosen among a few values as it let strength follow fluid pressure better on the sample recordings
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
     without : names of indenters that are kept from the training; without_below_x : m, as much of the pad beyond x
     weight_decay : of AdamW; signal_decay : where signals come in (else rectified ones are over-fitted)

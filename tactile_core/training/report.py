@@ -21,7 +21,8 @@ from ..evaluation.translation import (
     translation_figures,
     true_displacement,
 )
-from ..networks import SURFACES, Networks
+from ..network_sizes import SURFACES
+from ..networks import Networks
 from ..rows import Row
 from ..weights import write_bytes
 from .data import Contacts

@@ -9,7 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..networks import ELECTRODES, ERROR_FEATURES, ERROR_UNIT, FORCE_SCALE, PLACE, SURFACES
+from ..network_sizes import ELECTRODES, ERROR_FEATURES, PLACE, SURFACES
+from ..networks import ERROR_UNIT, FORCE_SCALE
 from .data import Batch, Contacts
 from .modules import MeshVae, Residual, compress, initialise, signal_vae
 from .options import Options
@@ -76,12 +77,11 @@ Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage: the networks it changes and its loss; `rate` multiplies the learning rate."""
+    """One stage: the networks it changes and its loss."""
 
     name: str
     nets: tuple[str, ...]
     loss: Loss
-    rate: float = 1.0
 
 
 def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:

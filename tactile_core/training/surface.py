@@ -13,7 +13,7 @@ from .basis import ROWS, principal_basis
 SILENT = -1  # row number of a sample without contact
 FEWEST = 100  # nodes that an error is shared by at least: light touches move few (assumed)
 ROOT_FLOOR = 1e-6  # m, rounds the root of the loss at zero error
-BASIS_ROWS = 12_000  # contacts that the bases are drawn from: more change them by less than their rounding
+BASIS_ROWS = 12_000  # contacts that the bases are drawn from, fifty times as many as fields are taken (assumed)
 SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, but none is blown up without end (assumed)
 
 

@@ -161,7 +161,7 @@ def run_stage(
     epochs, saved = options.epochs(stage.name), time.monotonic()
     while state.epoch < epochs:
         steps = epoch_losses(stage, model, contacts, seed, state.stage, state.epoch)
-        training = train_epoch(steps, optimiser, state.epoch, epochs, stage.rate * options.rate)
+        training = train_epoch(steps, optimiser, state.epoch, epochs, options.rate)
         validation = validate(stage, model, contacts, seed, state.stage)
         state.log.append([stage.name, state.epoch, training, validation])
         state.epoch += 1

@@ -8,7 +8,8 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from tactile_core.moving_frame import MovingFrame  # noqa: E402
-from tactile_core.networks import FORCE_SCALE, NETS, SURFACES, Networks, compress  # noqa: E402
+from tactile_core.network_sizes import NETS, SURFACES  # noqa: E402
+from tactile_core.networks import FORCE_SCALE, Networks, compress  # noqa: E402
 from tactile_core.training import modules  # noqa: E402
 from tactile_core.training.data import Contacts  # noqa: E402
 from tactile_core.training.export import net_sizes, net_tensors  # noqa: E402

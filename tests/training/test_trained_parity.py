@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from tactile_core import networks  # noqa: E402
+from tactile_core import network_sizes, networks  # noqa: E402
 from tactile_core.training import modules  # noqa: E402
 
 # float32 sums of up to 11,000 terms through eight layers; measured 1e-7 to 2e-6 of the largest value
@@ -43,12 +43,12 @@ def residual(nets, net):
 def decoder(nets, net):
     """The decoder of a mesh autoencoder, without its frame."""
     sizes = nets.sizes[net]
-    size = (sizes["latent"] + networks.PLACE, sizes["wide"] + sizes["near"], sizes["width"], sizes["blocks"])
+    size = (sizes["latent"] + network_sizes.PLACE, sizes["wide"] + sizes["near"], sizes["width"], sizes["blocks"])
     return filled(modules.Residual(*size), nets, net, "decoder.")
 
 
 def placed(nets, net, latent):
-    left = nets.frames[net].cells(latent[:, : networks.PLACE])[1]
+    left = nets.frames[net].cells(latent[:, : network_sizes.PLACE])[1]
     return torch.from_numpy(np.concatenate([latent, left], -1))
 
 
@@ -74,7 +74,7 @@ def test_the_chain(nets, change, rectified):
         wide = nets.sizes[net]["wide"]
         whole = modes[:, :wide] @ torch.tensor(nets.tensors[net]["wide"])
         frame, near = nets.frames[net], modes[:, wide:] @ torch.tensor(nets.tensors[net]["near"])
-        cells = frame.cells(z[:, : networks.PLACE])[0]
+        cells = frame.cells(z[:, : network_sizes.PLACE])[0]
         windows = near.view(len(z), frame.width, frame.width, 3).numpy()
         expected = frame.to_shared(frame.add(whole.view(len(z), -1, 3).numpy(), windows, cells))
         same(decode(z), torch.from_numpy(expected))
