@@ -10,42 +10,36 @@ from __future__ import annotations
 
 import numpy as np
 
-from .background import synthetic_background
-from .camera import DIGIT_CAMERA, DIGIT_LEDS, Camera, Led
+from .background import background_picture
+from .calibration import Calibration
+from .calibration_file import load_calibration
+from .camera import Camera, Led
 from .cast_shadows import FREE, MIN_RISE, ShadowCaster, bounding_box, disc_share
 from .errors import TactileError
 from .height_map import rest_height_map
-
-# Grey levels a unit of radiance, red, green, blue. Assumed: presses of a 6 mm ball then change pictures by up to
-# about 100 levels, as those of a real unit do; not fitted to them, which is a calibration's task.
-DIGIT_GAIN = (150.0, 150.0, 150.0)
 
 
 class Shader:
     """Pictures of height maps; what only the resting gel decides is computed once.
 
-    gain : grey levels a unit of radiance, one a colour
-    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the synthetic one
+    calibration : None for the one that ships
+    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the calibration's
     rest : (H, W) heights of the undeformed gel, m; None for the DIGIT's
-    Raises TactileError for arrays of another shape, values that are not finite, or no LEDs.
+    Raises TactileError for arrays of another shape, or values that are not finite.
     """
 
     def __init__(
         self,
-        camera: Camera = DIGIT_CAMERA,
-        leds: tuple[Led, ...] = DIGIT_LEDS,
-        gain: tuple[float, float, float] = DIGIT_GAIN,
+        calibration: Calibration | None = None,
         background: np.ndarray | None = None,
         rest: np.ndarray | None = None,
     ) -> None:
-        self.camera, self.leds = camera, tuple(leds)
-        if not self.leds:
-            raise TactileError("leds", "none", "one or more")
-        self.gain = np.asarray(gain, np.float32)
-        if self.gain.shape != (3,) or not np.isfinite(self.gain).all():
-            raise TactileError("gain", repr(gain), "three finite grey levels a unit of radiance")
+        self.calibration = calibration = calibration or load_calibration()
+        camera = self.camera = calibration.camera
+        self.leds = calibration.leds
+        self.gain = calibration.gain.matrices(camera).astype(np.float32)
         rest = rest_height_map(camera) if rest is None else rest
-        background = synthetic_background(camera, self.leds) if background is None else background
+        background = background_picture(calibration) if background is None else background
         self.rest = _checked(rest, camera.shape, "rest height map")
         self.background = _checked(background, (*camera.shape, 3), "background")
         self._casters = [ShadowCaster(camera, led) for led in self.leds]
@@ -57,7 +51,7 @@ class Shader:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
         change = self.radiance(height_map)
         change -= self._rest_radiance
-        change *= self.gain
+        change = np.einsum("hwcl,hwl->hwc", self.gain, change)
         change += self.background
         np.rint(change, out=change)
         return np.clip(change, 0, 255, out=change).astype(np.uint8)
