@@ -18,7 +18,7 @@ SMALLEST_PRESS = 300  # px at 240 x 320 changed by more than CHANGE; less is dus
 LARGEST_SHARE = 0.6  # of the picture changed: another lighting, not a press
 OVER_EXPOSED = 0.05  # share of the region with a channel at 255 from which on a press is flagged
 FEWEST_FOR_MEDIAN = 3  # photographs; of two, the median is their mean, which shows both presses
-CROWDED = 0.5  # share of the photographs that change a pixel: from there on its median shows a press
+NOISE_LIMIT = 12  # grey levels, of the difference of four pixels
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,15 +124,16 @@ def median_background(pictures: np.ndarray) -> np.ndarray:
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
     """Standard deviation (3,) of a pixel, grey levels, from differences of neighbours outside the presses.
 
-    Neighbours in a row less those in the next (sd of four pixels' noise: twice that of one) cancel what is smooth;
-    1.4826 times the median of absolute values is the standard deviation of normal noise, whatever edges remain.
+    Neighbours in a row less those in the next (four pixels' noise: twice the deviation of one) cancel what is smooth;
+    what is left of edges and dust is cut off at NOISE_LIMIT. A background that is no median carries noise of its own.
     """
     found = []
     for press in presses:
         quiet = ~(press.region[:-1, :-1] | press.region[1:, 1:])
         mixed = press.change[1:, 1:] - press.change[1:, :-1] - press.change[:-1, 1:] + press.change[:-1, :-1]
-        found.append(1.4826 * np.median(np.abs(mixed[quiet]), axis=0) / 2)
-    levels = np.median(found, axis=0)
+        if quiet.any():
+            found.append([channel[np.abs(channel) < NOISE_LIMIT].std() / 2 for channel in mixed[quiet].T])
+    levels = np.median(found, axis=0) if found else np.zeros(3)
     return tuple(float(level) for level in levels)
 
 
