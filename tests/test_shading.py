@@ -52,7 +52,7 @@ def seen_by_pixels(press: Press, right: np.ndarray, down: np.ndarray) -> tuple[n
     return right * near, down * near
 
 
-def brute_force(press: Press, right: np.ndarray, down: np.ndarray, led: Led, points: int = 149) -> np.ndarray:
+def brute_force(press: Press, right: np.ndarray, down: np.ndarray, led: Led, points: int = 97) -> np.ndarray:
     """Radiance (n,) seen at places (n,) m of height zero: hard shadows of many points of the LED, exact heights."""
     right, down = seen_by_pixels(press, right, down)
     place = np.stack([right, down, press.height(right, down)], -1)

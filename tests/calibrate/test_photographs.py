@@ -43,11 +43,11 @@ def test_untouched_photograph_among_presses_is_named(folder: Path, tmp_path: Pat
 
 
 def test_crowded_presses_still_give_a_background(tmp_path: Path) -> None:
-    # Three of five presses overlap: the plain median would show a press over 8 % of the picture.
+    # Three of five presses overlap: the plain median would show a press over 2.4 % of the picture.
     places = (PLACES[0], (1.2, 0.8, 0.8), (-0.9, 1.0, 1.0), PLACES[1], PLACES[2])
     folder = write_photographs(tmp_path / "presses", UNIT, places)
     background = read_photographs(folder).background
-    assert (np.abs(background - 128).max(-1) > 18).mean() < 0.02
+    assert (np.abs(background - 128).max(-1) > 18).mean() < 0.012
 
 
 def test_some_are_chosen_by_name(folder: Path) -> None:
