@@ -59,7 +59,8 @@ def report() -> Iterator[str]:
     for library in LIBRARIES:
         version, trouble = try_library(library)
         found[library.module] = not trouble
-        yield f"  {library.package:<11} {trouble or version or 'works':<10}  {library.use}"
+        state = "missing" if trouble.startswith("missing") else "broken" if trouble else version or "works"
+        yield f"  {library.package:<11} {state:<12} {library.use}" + (f": {trouble}" if trouble else "")
     yield from _mitsuba(found["mitsuba"])
 
 
@@ -68,9 +69,9 @@ def try_library(library: Library) -> tuple[str, str]:
     install = f'pip install "tactile-core[{library.extra}]"' if library.extra else f"pip install {library.package}"
     try:
         if importlib.util.find_spec(library.module) is None:
-            return "", f"missing; {install}"
+            return "", f"missing, {install}"
     except (ImportError, ValueError, AttributeError):
-        return "", f"missing; {install}"
+        return "", f"missing, {install}"
     command = [sys.executable, "-c", _TRY, library.module, library.package]
     try:
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TRY_SECONDS)
@@ -78,7 +79,7 @@ def try_library(library: Library) -> tuple[str, str]:
         return "", f"could not be tried ({type(error).__name__})"
     if done.returncode:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-        return "", f"broken ({last[:100]}); {install}"
+        return "", f"{last[:100]}"
     return (done.stdout.split() or [""])[-1], ""
 
 

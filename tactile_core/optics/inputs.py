@@ -6,6 +6,7 @@ import dataclasses
 import os
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 EXPECTED = "frames.h5, a simulated recording (.h5), a height map (.npz, .exr), or a scene's folder"
 HEIGHT_ARRAY = "height_map"
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,8 +50,8 @@ class Frames:
                 yield self.displacement[row] * self.scale
 
 
-def read_frames(path: str | os.PathLike, progress: Progress | None = None) -> Frames:
-    """What is in a file or folder; a scene is simulated, of which `progress` is told (frames done, in all).
+def read_frames(path: str | os.PathLike, progress: Progress = nullcontext) -> Frames:
+    """What is in a file or folder; a scene is simulated, under `progress`, which yields a callback (done, in all).
 
     Raises TactileError for anything else, or what cannot be read.
     """
@@ -110,10 +111,10 @@ def _of_npz(path: Path) -> Frames:
     return Frames("height map", np.arange(len(heights)), heights=heights)
 
 
-def _of_scene(path: Path, progress: Progress | None) -> Frames:
+def _of_scene(path: Path, progress: Progress) -> Frames:
     from ..mechanics.recording import simulate_recording
 
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, progress() as shown:
         simulated = Path(folder) / "scene.h5"
-        simulate_recording(path, simulated, progress=progress)
+        simulate_recording(path, simulated, progress=shown)
         return dataclasses.replace(_of_hdf5(simulated), kind="scene")

@@ -73,8 +73,8 @@ def render(path: str | os.PathLike, out: str | os.PathLike, options: Options, pr
     atomic.sweep(out.parent)
     calibration = load_calibration(options.calibration)
     preset = choose_preset(options)
-    with clock.stage("read"), progress("simulate") as shown:
-        frames = read_frames(path, shown)
+    with clock.stage("read"):
+        frames = read_frames(path, lambda: progress("simulate"))
     calibration = _at_size(calibration, frames, options.size)
     rows = select(options.frames, len(frames.numbers))
     with clock.stage("prepare"):
