@@ -86,7 +86,8 @@ def irradiance(
 ) -> np.ndarray:
     """Irradiance (h - 2 margin, w - 2 margin, 3) by the gel itself, in the unit of radiance.
 
-    height : (h, w) m; radiance : (h, w, 3); spacing : (right, down) m
+    height : (h, w) m; radiance : (h, w, 3); margin : places on each side that only give light, as far as is looked
+    spacing : (right, down) m
     """
     field = np.concatenate([height[..., None], radiance], -1).astype(np.float32)
     inside = slice(margin, -margin), slice(margin, -margin)
@@ -94,6 +95,7 @@ def irradiance(
     level = (1 / np.sqrt(1 + slopes[0] ** 2 + slopes[1] ** 2)).astype(np.float32)
     own, here = height[inside], radiance[inside]
     received = np.zeros_like(here)
+    distances = _distances(min(spacing), (margin - 2) * min(spacing), gather.growth)
     for k in range(gather.azimuths):
         angle = 2 * np.pi * (k + 0.5) / gather.azimuths
         toward = np.cos(angle), np.sin(angle)
@@ -101,7 +103,7 @@ def irradiance(
         tangent = (toward[0] * slopes[1] + toward[1] * slopes[0]).astype(np.float32)
         aside, before = -tangent * level, here
         weight = _weight(tangent, aside, level)
-        for distance in _distances(min(spacing), gather.growth):
+        for distance in distances:
             at = _shifted(field, toward[0] * distance / spacing[0], toward[1] * distance / spacing[1], margin)
             tangent = np.maximum(tangent, (at[..., 0] - own) * np.float32(1 / distance))
             higher = _weight(tangent, aside, level)
@@ -120,9 +122,9 @@ def _weight(tangent: np.ndarray, aside: np.ndarray, level: np.ndarray) -> np.nda
     return 0.5 * (aside * (np.arctan(tangent) + share) + level * (tangent * share))
 
 
-def _distances(step: float, growth: float) -> list[float]:
+def _distances(step: float, reach: float, growth: float) -> list[float]:
     distances, at = [], step
-    while at <= REACH:
+    while at <= reach:
         distances.append(at)
         at += max(step, growth * at)
     return distances

@@ -61,7 +61,7 @@ class Renderer:
         background = background_picture(calibration) if background is None else background
         check_heights(rest, calibration, "rest height map")
         self.background = _checked(background, (*self.camera.shape, 3), "background")
-        self.gain = calibration.gain.matrices(self.camera).astype(np.float32)
+        self._gain = np.ascontiguousarray(calibration.gain.matrices(self.camera).transpose(2, 3, 0, 1), np.float32)
         if preset == FAST:
             self.variant = None
             self._light: Light = Shader(calibration, background, rest)
@@ -88,7 +88,10 @@ class Renderer:
 
     def in_levels(self, radiance: np.ndarray) -> np.ndarray:
         """C times radiance (H, W, 3), grey levels float32: what the camera's channels make of it."""
-        return np.einsum("hwcl,hwl->hwc", self.gain, radiance)
+        levels = np.empty_like(radiance)
+        for channel, gains in enumerate(self._gain):
+            levels[..., channel] = sum(gain * radiance[..., led] for led, gain in enumerate(gains))
+        return levels
 
 
 class MitsubaLight:
@@ -104,13 +107,13 @@ class MitsubaLight:
         height = np.asarray(height_map, np.float32)
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
-        total = np.zeros((*self.unit.camera.shape, 3))
+        total = np.zeros((*self.unit.camera.shape, 3), np.float32)
         for number in range(self.preset.passes):
             light, hits = self._one_pass(number, tilt)
             if number == 0:
                 first = hits
             total += light
-        radiance = (total / self.preset.passes).astype(np.float32)
+        radiance = total / np.float32(self.preset.passes)
         if self.preset.gather and self.unit.albedo:
             radiance += interreflection(height, radiance, first, self.unit, self.preset.gather)
         return through_window(radiance, first.height, self.unit.camera) if self.preset.window else radiance
