@@ -18,7 +18,9 @@ SMALLEST_PRESS = 300  # px at 240 x 320 changed by more than CHANGE; less is dus
 LARGEST_SHARE = 0.6  # of the picture changed: another lighting, not a press
 OVER_EXPOSED = 0.05  # share of the region with a channel at 255 from which on a press is flagged
 FEWEST_FOR_MEDIAN = 3  # photographs; of two, the median is their mean, which shows both presses
-CROWDED = 0.5  # share of the photographs that change a pixel: from there on its median shows a press
+MOST_FOR_MEDIAN = 25  # photographs, spread evenly over the set; their pairs are compared
+AGREEMENT = 8  # grey levels in every channel, of untouched gel in two photographs: noise of 1 level, drift of some 5
+NOISE_LIMIT = 12  # grey levels, of the difference of four pixels
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Press:
 
 @dataclasses.dataclass(frozen=True)
 class Photographs:
-    """background : (H, W, 3) float32, grey levels; estimated : whether it is the set's median
+    """background : (H, W, 3) float32, grey levels; estimated : whether it was made from the set
     untouched : names of photographs that show no press; noise : (3,) grey levels, standard deviation of a pixel
     """
 
@@ -63,10 +65,10 @@ class Photographs:
 
 
 def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | None = None) -> Photographs:
-    """All pictures of a folder, by name; without a background photograph their per-pixel median takes its place.
+    """All pictures of a folder, by name; without a background photograph it is estimated.
 
     Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
-    pictures for a median.
+    pictures to tell the background.
     """
     files = _files(Path(folder))
     pictures = {file.name: read_photograph(file) for file in files}
@@ -86,7 +88,7 @@ def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | 
         advice = "Give a photograph of the untouched gel: --background FILE"
         raise TactileError(folder, found, f"{FEWEST_FOR_MEDIAN} or more", advice)
     else:
-        rest = median_background(np.stack(list(pictures.values())))
+        rest = estimated_background(np.stack(list(pictures.values())))
     found = {name: _press(name, picture, rest) for name, picture in pictures.items()}
     presses = tuple(press for press in found.values() if press is not None)
     if not presses:
@@ -107,32 +109,38 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
     return dataclasses.replace(photographs, presses=tuple(by_name[name] for name in names))
 
 
-def median_background(pictures: np.ndarray) -> np.ndarray:
-    """Untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3): the median of those that agree at a pixel.
+def estimated_background(pictures: np.ndarray) -> np.ndarray:
+    """Untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3): at each pixel the median of those that agree.
 
-    Where presses crowd, the plain median shows one. Pictures that differ from a first median by more than CHANGE are
-    left out at that pixel, as long as two or more remain.
+    Where presses crowd, the plain median shows one; but untouched gel looks alike in all pictures, and presses do not.
+    So each pixel follows the picture that most others agree with, and takes the median of these.
     """
-    first = np.median(pictures, axis=0)
-    touched = np.abs(pictures - first).max(-1) > CHANGE
-    kept = np.where(touched[..., None], np.nan, pictures.astype(np.float32))
-    few = (~touched).sum(0) < 2
-    kept[:, few] = pictures[:, few]
-    return np.nanmedian(kept, axis=0).astype(np.float32)
+    pictures = pictures[np.linspace(0, len(pictures) - 1, min(len(pictures), MOST_FOR_MEDIAN)).astype(int)]
+    pictures = pictures.astype(np.int16)
+    votes = np.zeros(pictures.shape[:3], np.int16)
+    for i, one in enumerate(pictures):
+        for j in range(i):
+            agrees = np.abs(one - pictures[j]).max(-1) <= AGREEMENT
+            votes[i] += agrees
+            votes[j] += agrees
+    most = np.take_along_axis(pictures, votes.argmax(0)[None, ..., None], axis=0)
+    kept = np.abs(pictures - most).max(-1, keepdims=True) <= AGREEMENT
+    return np.nanmedian(np.where(kept, pictures.astype(np.float32), np.nan), axis=0).astype(np.float32)
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
     """Standard deviation (3,) of a pixel, grey levels, from differences of neighbours outside the presses.
 
-    Neighbours in a row less those in the next (sd of four pixels' noise: twice that of one) cancel what is smooth;
-    1.4826 times the median of absolute values is the standard deviation of normal noise, whatever edges remain.
+    Neighbours in a row less those in the next (four pixels' noise: twice the deviation of one) cancel what is smooth;
+    what is left of edges and dust is cut off at NOISE_LIMIT. A background that is no median carries noise of its own.
     """
     found = []
     for press in presses:
         quiet = ~(press.region[:-1, :-1] | press.region[1:, 1:])
         mixed = press.change[1:, 1:] - press.change[1:, :-1] - press.change[:-1, 1:] + press.change[:-1, :-1]
-        found.append(1.4826 * np.median(np.abs(mixed[quiet]), axis=0) / 2)
-    levels = np.median(found, axis=0)
+        if quiet.any():
+            found.append([channel[np.abs(channel) < NOISE_LIMIT].std() / 2 for channel in mixed[quiet].T])
+    levels = np.median(found, axis=0) if found else np.zeros(3)
     return tuple(float(level) for level in levels)
 
 
