@@ -162,7 +162,7 @@ def test_light_is_never_made(any_variant, small, press):
 
 
 def test_noise_falls_with_the_order_of_monte_carlo_or_faster(any_variant, small, press):
-    """Half an order for numbers drawn one by one; places and points are spread evenly here, which gains up to as much."""
+    """Half an order for numbers drawn one by one; these are spread evenly, which gains up to as much again."""
     height, rest = press.on(small.camera), rest_height_map(small.camera)
     passes, seeds = [2, 4, 8, 16], range(4)
     truth = MitsubaLight(small, dataclasses.replace(DIRECT, passes=96), any_variant, rest, 99).radiance(height)
