@@ -28,3 +28,8 @@ def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.I
     picture, heights = fast_picture(digit_objects.displacement_of(gel, depsgraph))
     images.show_heights(heights)
     return images.show_picture(picture)
+
+
+def update_picture(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """The picture alone: 2 ms less, which count while scrubbing."""
+    images.show_picture(fast_picture(digit_objects.displacement_of(gel, depsgraph))[0])

@@ -27,7 +27,7 @@ def _draw(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) 
     if gel is None or depsgraph is None:
         return
     try:
-        pictures.update(gel, depsgraph)
+        pictures.update_picture(gel, depsgraph)
         _failed = ""
     except TactileError as error:  # a handler has no report: the panel shows it
         _failed = str(error)
