@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 from . import (
+    add_menu,
     import_recording,
     panels,
     preferences,
     preview,
     properties,
+    scene_files,
+    simulate,
     translate_recording,
 )
 
 # In the order of registration: properties before what uses them.
-PARTS = (properties, preferences, import_recording, translate_recording, preview, panels)
+PARTS = (
+    properties,
+    preferences,
+    import_recording,
+    translate_recording,
+    preview,
+    add_menu,
+    simulate,
+    scene_files,
+    panels,
+)
 
 
 def register() -> None:

@@ -10,7 +10,7 @@ from ..tactile_core.errors import TactileError
 from . import axes, properties, surfaces
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
-_BESIDE = 7.1e-3 + digit_shape.HALF_WIDTH + 6e-3  # m: half widths of BioTac (sensors.md) and DIGIT, and a gap
+BESIDE = 7.1e-3 + digit_shape.HALF_WIDTH + 6e-3  # m: half widths of BioTac (sensors.md) and DIGIT, and a gap
 
 
 def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None) -> bpy.types.Object:
@@ -22,7 +22,7 @@ def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Obj
     surfaces.paint(gel, GEL_COLOUR)
     if beside is not None:
         gel.location = beside.location
-        gel.location.y += _BESIDE * per_metre
+        gel.location.y += BESIDE * per_metre
     return gel
 
 

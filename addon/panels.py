@@ -3,8 +3,11 @@
 import bpy
 
 from . import preview, properties, timeline
+from .add_menu import TACTILE_MT_add
 from .import_recording import TACTILE_OT_import_recording
 from .preview import TACTILE_OT_live_picture
+from .scene_files import TACTILE_OT_export_scene, TACTILE_OT_import_scene
+from .simulate import TACTILE_OT_simulate
 from .translate_recording import TACTILE_OT_translate
 
 
@@ -61,7 +64,32 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
             layout.label(text=preview.failure(), icon="ERROR")
 
 
-CLASSES = (TACTILE_PT_recording, TACTILE_PT_picture)
+class TACTILE_PT_author(_Panel, bpy.types.Panel):
+    """Author and simulate a contact"""
+
+    bl_idname = "TACTILE_PT_author"
+    bl_label = "Author"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender."""
+        layout = self.layout
+        layout.menu(TACTILE_MT_add.bl_idname, text="Add Sensor or Indenter", icon="ADD")
+        thing = properties.of_role(context.scene, "INDENTER", context.object)
+        if thing is not None:
+            column = layout.column(align=True)
+            column.label(text=thing.name, icon="MESH_ICOSPHERE")
+            column.prop(thing.tactile, "press_by")
+            if thing.tactile.press_by == "FORCE":
+                column.prop(thing.tactile, "force")
+            if thing.tactile.spec:
+                column.prop(thing.tactile, "spec")
+        layout.operator(TACTILE_OT_simulate.bl_idname, icon="PHYSICS")
+        row = layout.row(align=True)
+        row.operator(TACTILE_OT_import_scene.bl_idname, text="Import Scene", icon="IMPORT")
+        row.operator(TACTILE_OT_export_scene.bl_idname, text="Export Scene", icon="EXPORT")
+
+
+CLASSES = (TACTILE_PT_recording, TACTILE_PT_picture, TACTILE_PT_author)
 
 
 def register() -> None:

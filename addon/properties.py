@@ -17,6 +17,10 @@ ROLES = (
     ("ELECTRODE", "Electrode", "A marker of one electrode"),
     ("INDENTER", "Indenter", "A body that presses"),
 )
+PRESS_BY = (
+    ("HEIGHT", "Height", "It presses as deep as it is moved into the DIGIT's gel"),
+    ("FORCE", "Force", "It presses with the keyframed force, wherever its height is"),
+)
 MOTIONS = (
     ("SHAPE_KEYS", "Shape Keys", "One shape key a frame along one curve: exact, and fast to play"),
     ("COMPACT", "Compact", "A few basis shape keys with animated weights: a small file; its largest error is reported"),
@@ -36,6 +40,19 @@ class TactileObject(bpy.types.PropertyGroup):
     tare: bpy.props.StringProperty(name="Tare", description="Frames without contact A:B, auto or none", default="auto")
     frames: bpy.props.StringProperty(name="Frames", description="Part of the recording, A:B:STEP", default=":")
     motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
+    spec: bpy.props.StringProperty(
+        name="Shape", description="An indenter's kind and sizes, as in a scene file; empty: the object's own mesh"
+    )
+    document: bpy.props.StringProperty(
+        name="Document", description="What else the scene file held that this indenter came from"
+    )
+    press_by: bpy.props.EnumProperty(
+        name="Press by", description="What says how hard the indenter presses", items=PRESS_BY
+    )
+    force: bpy.props.FloatProperty(
+        name="Force", description="Force of the press, in newtons; keyframe it like a location", min=0.0, soft_max=2.0,
+        default=0.0, precision=3, options={"ANIMATABLE"},
+    )  # fmt: skip
     first_frame: bpy.props.IntProperty(name="First Frame", description="Scene frame of the recording's first frame")
 
 
