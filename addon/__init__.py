@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from . import (
     add_menu,
+    command_line,
     import_recording,
     panels,
     preferences,
     preview,
     properties,
+    render_engine,
+    render_settings,
+    render_setup,
     scene_files,
     simulate,
     translate_recording,
@@ -17,14 +21,18 @@ from . import (
 # In the order of registration: properties before what uses them.
 PARTS = (
     properties,
+    render_settings,
     preferences,
     import_recording,
     translate_recording,
     preview,
+    render_engine,
+    render_setup,
     add_menu,
     simulate,
     scene_files,
     panels,
+    command_line,
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 
@@ -19,32 +21,44 @@ _PATIENCE = 5.0  # s that a cancelled job has to end by itself
 
 
 class Job:
-    """A worker and its folder. ``share`` : how much is done, 0..1; ``finished`` : whether it ended well."""
+    """A worker and its folder. ``done`` of ``total`` is what it has told; ``finished`` : whether it ended well."""
 
-    def __init__(self, kind: str, folder: Path, **options: object) -> None:
-        """Start it. folder : where its input lies and its output goes."""
-        self.folder, self.share, self.finished = folder, 0.0, False
+    def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:
+        """Start it. folder : where its input lies and its output goes; listening : whether it waits for ``tell``."""
+        self.folder, self.done, self.total, self.finished = folder, 0, 1, False
         (folder / "job.json").write_text(json.dumps({"kind": kind} | options), encoding="utf-8")
         self._lines: queue.Queue[str] = queue.Queue()
         with open(folder / "stderr.txt", "wb") as errors:
             self._process = subprocess.Popen(
                 [sys.executable, "-B", os.fspath(Path(__file__).with_name("worker.py")), os.fspath(folder)],
-                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True, encoding="utf-8",
+                stdin=subprocess.PIPE if listening else subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+                encoding="utf-8",
                 env=_environment(),
-            )  # fmt: skip
+            )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
+
+    @property
+    def share(self) -> float:
+        """How much is done, 0..1."""
+        return self.done / self.total
+
+    def tell(self, message: dict) -> None:
+        """Send a line to a worker that listens; one that has died says why in the next ``poll``."""
+        with contextlib.suppress(OSError):
+            self._process.stdin.write(json.dumps(message) + "\n")
+            self._process.stdin.flush()
 
     def poll(self, wait: float = 0.0) -> bool:
         """Take in what the worker has said; whether it is over. Raises TactileError with the reason when it failed."""
         error = None
-        if wait and self._lines.empty():
-            self._reader.join(wait)
-        while not self._lines.empty():
-            message = _message(self._lines.get())
+        for message in self._messages(wait):
             error = message.get("error", error)
             if message.get("total"):
-                self.share = message.get("done", 0) / message["total"]
+                self.done, self.total = message["done"], message["total"]
             self.finished = self.finished or bool(message.get("finished"))
         if error is not None:
             self.cancel()
@@ -65,7 +79,19 @@ class Job:
                 self._process.kill()
                 self._process.wait()
         self._reader.join(_PATIENCE)
-        self._process.stdout.close()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):  # what was not read by a dead worker
+                    pipe.close()
+
+    def _messages(self, wait: float) -> Iterator[dict]:
+        """What has come since the last time; waits at most so many seconds for the first."""
+        try:
+            yield _message(self._lines.get(timeout=wait) if wait else self._lines.get_nowait())
+            while True:
+                yield _message(self._lines.get_nowait())
+        except queue.Empty:
+            return
 
     def _read(self) -> None:
         for line in self._process.stdout:

@@ -6,6 +6,7 @@ from . import preview, properties, timeline
 from .add_menu import TACTILE_MT_add
 from .import_recording import TACTILE_OT_import_recording
 from .preview import TACTILE_OT_live_picture
+from .render_setup import draw_settings
 from .scene_files import TACTILE_OT_export_scene, TACTILE_OT_import_scene
 from .simulate import TACTILE_OT_simulate
 from .translate_recording import TACTILE_OT_translate
@@ -55,13 +56,14 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
     bl_idname = "TACTILE_PT_picture"
     bl_label = "Picture"
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         """Called by Blender."""
         layout = self.layout
         layout.operator(TACTILE_OT_live_picture.bl_idname, icon="HIDE_OFF" if preview.is_on() else "HIDE_ON",
                         depress=preview.is_on())  # fmt: skip
         if preview.failure():
             layout.label(text=preview.failure(), icon="ERROR")
+        draw_settings(layout, context)
 
 
 class TACTILE_PT_author(_Panel, bpy.types.Panel):

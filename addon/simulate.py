@@ -7,7 +7,6 @@ import bpy
 import numpy as np
 
 from ..tactile_core.errors import TactileError
-from ..tactile_core.scene_text import write_scene
 from . import scene_bridge, simulation_result
 from .jobs import Job, JobFolder
 from .reports import Refused, TactileOperator, reported, require
@@ -26,6 +25,8 @@ class TACTILE_OT_simulate(TactileOperator):
     def _begin(self, context: bpy.types.Context) -> None:
         """Raises TactileError."""
         require("h5py", "msgspec", "scipy")
+        from ..tactile_core.scene_text import write_scene
+
         found = scene_bridge.authored(context)
         if found.meshes:
             require("trimesh", "rtree")

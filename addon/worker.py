@@ -114,8 +114,23 @@ def _standing(folder: Path) -> None:
     np.savez(folder / "standing.npz", apex=np.array(apex), axes=np.array(axes))
 
 
+def render(folder: Path, job: dict, progress: Progress) -> None:
+    """For each line on stdin: FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8, by FOLDER/unit.toml."""
+    from tactile_core.optics.renderer import Renderer
+
+    from tactile_core.calibration_file import load_calibration
+
+    renderer = Renderer(load_calibration(folder / "unit.toml"), job["preset"])
+    for line in sys.stdin:
+        number = json.loads(line)["picture"]
+        picture = renderer(np.load(folder / "heights.npy", allow_pickle=False))
+        np.save(folder / "partial.npy", picture)
+        (folder / "partial.npy").replace(folder / "picture.npy")
+        progress(number, number)
+
+
 STEPS = 8  # of sinking by the free distance; each leaves a small part of it, far below a pixel after eight
-JOBS = {"simulate": simulate}
+JOBS = {"simulate": simulate, "render": render}
 
 if __name__ == "__main__":
     sys.exit(main(Path(sys.argv[1])))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -20,8 +21,8 @@ def builder():
     spec = importlib.util.spec_from_file_location("build_extension", ROOT / "scripts" / "build_extension.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    if not (ROOT / ".git").exists():
-        pytest.skip("the zip is made of what git tracks, and this is no checkout")
+    if not (ROOT / ".git").exists() or shutil.which("git") is None:
+        pytest.skip("the zip is made of what git tracks, and this is no checkout, or git is not here")
     return module
 
 
@@ -98,3 +99,16 @@ print("works")
         command = [sys.executable, "-c"]
     done = subprocess.run([*command, code], env=environment, capture_output=True, text=True, timeout=120)
     assert "works" in done.stdout, done.stdout + done.stderr
+
+
+@pytest.mark.skipif(
+    not (bpy.app.binary_path and os.environ.get("TACTILE_ZIP")), reason="needs a real Blender and a zip"
+)
+def test_a_real_blender_installs_the_zip_by_command(tmp_path):
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")}
+    command = [bpy.app.binary_path, "--background", "--command", "extension", "install-file", "--repo", "user_default"]
+    done = subprocess.run(
+        [*command, "--enable", os.environ["TACTILE_ZIP"]], env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "user" / "extensions" / "user_default" / "tactile" / "blender_manifest.toml").is_file()
