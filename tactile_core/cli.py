@@ -28,7 +28,10 @@ example:
 SIGTERM or SIGHUP."""
 
 # module -> extra that brings it
-EXTRAS = {"torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem"}
+EXTRAS = {
+    "torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem",
+    "mitsuba": "render", "drjit": "render", "OpenEXR": "render",
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

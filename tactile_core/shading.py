@@ -14,7 +14,7 @@ from .calibration_file import load_calibration
 from .camera import COLOURS, Camera, Led
 from .cast_shadows import FREE, ShadowCaster, bounding_box, disc_share
 from .errors import TactileError
-from .height_map import rest_height_map
+from .height_map import of_unit, rest_height_map
 from .view import View, slopes
 
 MIN_RISE = 10e-6  # m; what has risen less throws a shadow of a pixel at most, lights at 20 degrees or higher
@@ -25,7 +25,7 @@ class Shader:
 
     calibration : None for the one that ships
     background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the calibration's
-    rest : (H, W) heights of the undeformed gel, m; None for the calibration's
+    rest : (H, W) heights of the undeformed gel, m, that height maps rise from; None for the DIGIT's
     Raises TactileError for arrays of another shape, values that are not finite, or LEDs over the picture.
     """
 
@@ -37,7 +37,8 @@ class Shader:
     ) -> None:
         self.calibration = calibration = calibration or load_calibration()
         camera = self.camera = calibration.camera
-        rest = rest_height_map(camera) if rest is None else rest
+        self._dome = rest is None  # heights have the public mesh's dome, which the unit's own takes the place of
+        rest = of_unit(rest_height_map(camera), calibration) if rest is None else rest
         background = background_picture(calibration) if background is None else background
         rest = _checked(rest, camera.shape, "rest height map")
         self.background = _checked(background, (*camera.shape, 3), "background")
@@ -47,8 +48,11 @@ class Shader:
         self._lamps = [Lamp(camera, led, self.rest) for led in calibration.leds]
         self._rest_radiance = self._seen_radiance(self.rest)
 
-    def __call__(self, height_map: np.ndarray) -> np.ndarray:
-        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
+    def __call__(self, height_map: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
+        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.
+
+        noise : makes the camera's noise, as measured on the unit; None for none
+        """
         change = self._radiance(height_map)
         change -= self._rest_radiance
         picture = np.empty((*self.camera.shape, 3), np.uint8)
@@ -56,6 +60,8 @@ class Shader:
             level = self.background[..., channel].copy()
             for gain, light in zip(self._gain[channel], change, strict=True):
                 level += gain * light
+            if noise is not None:
+                level += np.float32(self.calibration.noise[channel]) * noise.standard_normal(level.shape, np.float32)
             np.rint(level, out=level)
             picture[..., channel] = np.clip(level, 0, LARGEST_LEVEL, out=level)
         return picture
@@ -65,7 +71,8 @@ class Shader:
         return np.moveaxis(self._radiance(height_map), 0, -1)
 
     def _radiance(self, height_map: np.ndarray) -> np.ndarray:
-        return self._seen_radiance(self._view(_checked(height_map, self.camera.shape, "height map")))
+        heights = _checked(height_map, self.camera.shape, "height map")
+        return self._seen_radiance(self._view(of_unit(heights, self.calibration) if self._dome else heights))
 
     def _seen_radiance(self, seen: np.ndarray) -> np.ndarray:
         """Radiance (3, H, W) of heights (H, W) that the pixels see."""

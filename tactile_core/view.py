@@ -29,7 +29,9 @@ class View:
         columns = np.arange(camera.width, dtype=np.float32)[None, :] - self._middle[1]
         self._rows, self._columns = rows, columns
         self._inverse = np.float32(1 / camera.apparent_height)
-        self._start = self._from_above(rest)
+        self._start = rest
+        for _ in range(NEWTON_STEPS):  # a dome is so flat that each turn of steps multiplies the error by 1e-3 or less
+            self._start = self(rest)
 
     def __call__(self, height: np.ndarray) -> np.ndarray:
         """Heights (H, W) float32, m, seen by the pixels; height : (H, W) float32, m, under the pixels.

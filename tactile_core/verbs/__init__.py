@@ -4,6 +4,7 @@ A verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what is left 
 (parser) and ``run`` (options -> exit status). Its rooms are imported in ``run``, so that help costs nothing.
 """
 
-from . import adapt, convert, info, mesh, pairs, simulate, train
+from . import adapt, calibrate, convert, doctor, info, mesh, pairs, render, simulate, train
 
-VERBS = {verb.__name__.rsplit(".", 1)[1]: verb for verb in (convert, info, adapt, simulate, pairs, train, mesh)}
+ALL = (convert, info, adapt, render, simulate, pairs, train, mesh, calibrate, doctor)
+VERBS = {verb.__name__.rsplit(".", 1)[1]: verb for verb in ALL}
