@@ -116,9 +116,8 @@ def _standing(folder: Path) -> None:
 
 def render(folder: Path, job: dict, progress: Progress) -> None:
     """For each line on stdin: FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8, by FOLDER/unit.toml."""
-    from tactile_core.optics.renderer import Renderer
-
     from tactile_core.calibration_file import load_calibration
+    from tactile_core.optics.renderer import Renderer
 
     renderer = Renderer(load_calibration(folder / "unit.toml"), job["preset"])
     for line in sys.stdin:

@@ -8,11 +8,15 @@ import bpy
 import numpy as np
 import pytest
 
-msgspec = pytest.importorskip("msgspec")
-pytest.importorskip("scipy")
-
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = sorted(path.parent for path in (ROOT / "scenes").glob("*/scene.toml"))
+
+
+@pytest.fixture(autouse=True)
+def _packages(extension):
+    """Only once the extension is there: in a real Blender they come with it."""
+    for name in ("msgspec", "scipy"):
+        pytest.importorskip(name)
 
 
 @pytest.fixture
@@ -41,6 +45,8 @@ def _export(folder):
 def test_an_indenter_looks_as_large_as_it_is(sensors, nodes_of, part, shape):
     bpy.ops.tactile.add_indenter(shape=shape)
     thing = bpy.context.object
+    import msgspec
+
     spec = msgspec.json.decode(thing.tactile.spec, type=part("tactile_core.scene_indenters").IndenterSpec)
     low, high = spec.build().bounds()
     nodes = nodes_of(thing)
@@ -58,6 +64,8 @@ def test_shipped_scenes_come_back_exactly(scene, part, tmp_path, folder):
         assert sum(thing.tactile.role == "INDENTER" for thing in scene.objects) == len(wanted.indenters)
         return
     found = load(_export(tmp_path))[0]
+
+    import msgspec
 
     def without_folders(spec):
         return msgspec.structs.replace(spec, file=Path(spec.file).name) if hasattr(spec, "file") else spec
