@@ -12,6 +12,7 @@ import numpy as np
 from ..tactile_core import convert, recordings, translate
 from ..tactile_core.recordings import PrepareOptions, Recording, Signals
 from ..tactile_core.translate import Translation
+from . import recording_reader
 
 CHUNK = 64  # frames between two steps of the progress: the networks' own block
 
@@ -50,7 +51,7 @@ _KEPT: dict[tuple, Translated] = {}  # the last one: importing and translating a
 
 
 def _translated(path: str, tare: str, frames: str, progress: Callable[[float], None]) -> Translated:
-    recording = recordings.read(path)
+    recording = recording_reader.read(path)
     chosen = convert.select(convert.parse_frames(frames), len(recording))
     signals = recordings.prepare(recording, PrepareOptions(tare=None if tare in ("", "auto") else tare))
     signals = _part(signals, chosen)

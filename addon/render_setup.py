@@ -31,6 +31,8 @@ class TACTILE_OT_set_up_render(TactileOperator):
         render = scene.render
         render.engine = ID
         render.resolution_x, render.resolution_y, render.resolution_percentage = camera.width, camera.height, 100
+        right, down = camera.pixel_size
+        render.pixel_aspect_x, render.pixel_aspect_y = max(1.0, right / down), max(1.0, down / right)
         render.dither_intensity = 0.0  # noise of a grey level that the camera does not have
         scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0

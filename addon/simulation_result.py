@@ -8,9 +8,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..tactile_core import patch_of_dent, recordings, sensors
+from ..tactile_core import patch_of_dent, sensors
 from ..tactile_core.recordings import Recording
-from . import axes, curves, custom_properties, motion, patch_nodes, pictures, properties
+from . import axes, curves, custom_properties, motion, patch_nodes, pictures, properties, recording_reader
 
 STANDING = "{} simulated"
 
@@ -27,7 +27,7 @@ class Result:
 def read(folder: Path) -> Result:
     """The result in a job's folder."""
     with np.load(folder / "standing.npz") as stored:
-        return Result(recordings.read(folder / "recording.h5"), stored["apex"], stored["axes"])
+        return Result(recording_reader.read(folder / "recording.h5"), stored["apex"], stored["axes"])
 
 
 def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) -> str:

@@ -6,6 +6,7 @@ each line on stdout is a JSON object: {"done": 3, "total": 10}, {"error": "..."}
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from collections.abc import Callable
@@ -128,8 +129,23 @@ def render(folder: Path, job: dict, progress: Progress) -> None:
         progress(number, number)
 
 
+def read(folder: Path, job: dict, progress: Progress) -> None:
+    """The recording at job["path"] -> arrays.npz and about.json, which ``recording_reader`` puts together again."""
+    from tactile_core import recordings
+
+    found = recordings.read(job["path"])
+    whole = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+    truth = whole.pop("truth")
+    if truth is not None:
+        whole |= {f"truth.{field.name}": getattr(truth, field.name) for field in dataclasses.fields(truth)}
+    arrays = {name: value for name, value in whole.items() if isinstance(value, np.ndarray)}
+    np.savez(folder / "arrays.npz", **arrays)
+    about = {name: value for name, value in whole.items() if name not in arrays}
+    (folder / "about.json").write_text(json.dumps(about), encoding="utf-8")
+
+
 STEPS = 8  # of sinking by the free distance; each leaves a small part of it, far below a pixel after eight
-JOBS = {"simulate": simulate, "render": render}
+JOBS = {"simulate": simulate, "render": render, "read": read}
 
 if __name__ == "__main__":
     sys.exit(main(Path(sys.argv[1])))

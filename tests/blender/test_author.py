@@ -112,7 +112,7 @@ def test_simulating_bakes_what_the_command_line_computes(scene, nodes_of, part, 
     (folder / "scene.toml").write_text(head + points)
     bpy.ops.tactile.import_scene(filepath=str(folder / "scene.toml"))
     assert bpy.ops.tactile.simulate(seed=3) == {"FINISHED"}
-    simulate, read = part("tactile_core.mechanics.recording").simulate_recording, part("tactile_core.recordings").read
+    simulate, read = part("tactile_core.mechanics.recording").simulate_recording, part("addon.recording_reader").read
     simulate(folder / "scene.toml", tmp_path / "wanted.h5", 3)
     truth = read(tmp_path / "wanted.h5").truth
     for frame in (0, 5, 10):

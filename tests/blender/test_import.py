@@ -141,3 +141,22 @@ def test_undo_takes_it_back(imported, scene):
     bpy.ops.ed.undo_push(message="after")
     bpy.ops.ed.undo()
     assert not bpy.context.scene.objects
+
+
+def test_a_recording_read_in_another_process_is_the_same(part):
+    reader, read = part("addon.recording_reader"), part("tactile_core.recordings").read
+    if not reader._hdf5_works():
+        pytest.skip("HDF5 does not work in this Blender's own process")
+    found, wanted = reader._read_elsewhere(str(RECORDING)), read(RECORDING)
+    for name in ("name", "layout", "start_time", "warnings", "simulated", "about", "rate"):
+        assert getattr(found, name) == getattr(wanted, name)
+    for name in ("time", "electrodes", "rows", "flags", "pdc"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
+    np.testing.assert_array_equal(found.truth.displacement_digit, wanted.truth.displacement_digit)
+
+
+def test_what_another_process_cannot_read_is_told_as_here(part, tmp_path):
+    bad = tmp_path / "bad.h5"
+    bad.write_bytes(b"\x89HDF\r\n\x1a\nrubbish")
+    with pytest.raises(part("tactile_core.errors").TactileError, match="damaged"):
+        part("addon.recording_reader")._read_elsewhere(str(bad))
