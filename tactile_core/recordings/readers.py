@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import os
 import pkgutil
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from functools import cache
 from types import ModuleType
 
@@ -32,7 +33,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
     Raises TactileError for a file that is not there, not a recording, of another sensor, or mostly unreadable.
     """
     path = os.fspath(path)
-    try:
+    with reading(path):
         container = _container(path)
         if container == "hdf5":
             with open_hdf5(path) as store:
@@ -43,6 +44,13 @@ def read(path: str | os.PathLike[str]) -> Recording:
                 return _layout(path, container, store.shapes).read(store)
         layout = _layout(path, container, read_header(path))
         return layout.read(read_table(path))
+
+
+@contextmanager
+def reading(path: str) -> Iterator[None]:
+    """Turn what the system refuses into a TactileError."""
+    try:
+        yield
     except OSError as error:
         raise TactileError(
             path, error.strerror or str(error), "a readable file", "Check the path and its permissions"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,17 @@ class Store:
     load: Callable[[str], np.ndarray]
     attributes: dict[str, Any] = field(default_factory=dict)
     attributes_of: Callable[[str], dict[str, Any]] = lambda name: {}
+    load_rows: Callable[[str, slice], np.ndarray] | None = None
+
+    def rows(self, rows: slice, count: int) -> Store:
+        """The same store with only these rows of all arrays that are `count` long; HDF5 alone reads in parts."""
+        long = {name for name, (shape, _) in self.shapes.items() if shape[:1] == (count,)}
+        cut = {name: ((rows.stop - rows.start, *self.shapes[name][0][1:]), self.shapes[name][1]) for name in long}
+
+        def load(name: str) -> np.ndarray:
+            return self.load_rows(name, rows) if name in long else self.load(name)
+
+        return replace(self, shapes=self.shapes | cut, load=load)
 
     def array(self, name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> np.ndarray:
         """The array as floats; shape has None where any length will do. Raises TactileError for all that is wrong."""
@@ -93,7 +104,9 @@ def open_hdf5(path: str) -> Iterator[Store]:
             with _damage_told(f"{path}, {name}", "attributes"):
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
-        yield Store(path, shapes, lambda name: file[name][()], attributes, attributes_of)
+        yield Store(
+            path, shapes, lambda name: file[name][()], attributes, attributes_of, lambda name, rows: file[name][rows]
+        )
 
 
 @contextmanager

@@ -5,6 +5,7 @@
 ``score(keys) -> float``  share (0..1) of the layout's own columns or arrays among those of the file
 ``read(source) -> Recording``  source is a ``table.Table`` for CSV, a ``store.Store`` for HDF5 and NPZ;
                it picks its columns and hands them to ``assemble.assemble``, which checks them.
+Those of HDF5 have ``ELECTRODES_NAME`` too, the array whose length is the number of frames: see ``parts``.
 """
 
 from __future__ import annotations
