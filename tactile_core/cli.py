@@ -28,7 +28,8 @@ example:
 SIGTERM or SIGHUP."""
 
 # module -> extra that brings it
-EXTRAS = {"torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem"}
+EXTRAS = {"torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem", "rosbags": "ros", "lz4": "ros"}
+EXTRAS |= {"distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -12,10 +12,10 @@ import msgspec
 
 from .. import results
 from ..errors import TactileError
+from ..recordings.bag import MARK, split
 
 SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3")  # what is taken from a folder
 SLIDE = "_bio.csv"  # of the slide set, whose other files (_cw.csv, _cp.csv) are no recordings
-BAG_MARK = "metadata.yaml"  # a folder with it is one ROS 2 bag
 
 
 class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -70,11 +70,11 @@ def _lines(file: Path) -> list[str]:
 
 def _of_folder(folder: Path) -> Iterator[Path]:
     """Recordings in a folder and below it, by name; links to folders are not followed."""
-    if (folder / BAG_MARK).is_file():
+    if (folder / MARK).is_file():
         yield folder
         return
     for place, folders, names in os.walk(folder):
-        bags = [name for name in folders if (Path(place) / name / BAG_MARK).is_file()]
+        bags = [name for name in folders if (Path(place) / name / MARK).is_file()]
         folders[:] = sorted(name for name in folders if name not in bags and not name.startswith("."))
         slides = [name for name in names if name.endswith(SLIDE)]
         plain = [name for name in names if name.lower().endswith(SUFFIXES) and not name.startswith(".")]
@@ -95,14 +95,9 @@ def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[
 
 def content_hash(path: Path) -> tuple[str, int]:
     """Hash and bytes of a file, or of all files of a bag's folder with their names. Raises TactileError."""
+    path = Path(split(str(path))[0])
     try:
-        if not path.is_dir():
-            return results.sha256(path), path.stat().st_size
-        files = sorted(file for file in path.iterdir() if file.is_file())
-        told = "\n".join(f"{results.sha256(file)} {file.name}" for file in files)
-        import hashlib
-
-        digest = hashlib.sha256(told.encode(errors="surrogateescape")).hexdigest()
-        return digest, sum(file.stat().st_size for file in files)
+        files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
+        return results.sha256(path), sum(file.stat().st_size for file in files)
     except OSError as error:
         raise TactileError(path, f"cannot be read ({error.strerror or error})", "a recording") from error

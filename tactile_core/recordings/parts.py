@@ -6,13 +6,15 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from .readers import _container, _layout, read, reading
+from .bag import open_bag, read_bag
+from .readers import container_of, layout_of, names, read, reading
 from .recording import Recording
 from .store import Store, open_hdf5
 from .table import read_header_of_start, read_tables
 
 TEXT_BYTES = 32 * 2**20  # a part's text: about 150,000 frames, 25 minutes at 100 Hz
 ARRAY_BYTES = 256 * 2**20  # a part's arrays, as the file declares them
+BAG_FRAMES = 100_000  # a part's messages
 CONTEXT = 200  # frames that a part shares with the one before: glitches are looked for over 50, smoothing over 101
 
 
@@ -40,21 +42,25 @@ def read_parts(path: str | os.PathLike[str]) -> Iterator[Part]:
 
 def _parts(path: str) -> Iterator[Part]:
     with reading(path):
-        container = _container(path)
+        container = container_of(path)
         if container == "csv" and os.path.getsize(path) > TEXT_BYTES:
-            layout = _layout(path, container, read_header_of_start(path))
+            layout = layout_of(path, container, read_header_of_start(path))
             for table, repeated in read_tables(path, TEXT_BYTES, CONTEXT):
                 yield Part(layout.read(table), repeated)
         elif container == "hdf5":
             with open_hdf5(path) as store:
                 yield from _of_store(store)
+        elif container == "bag":
+            with open_bag(path) as bag:
+                layout = layout_of(path, container, bag.topics)
+                for recording, repeated in read_bag(bag, layout, BAG_FRAMES, CONTEXT):
+                    yield Part(recording, repeated)
         else:
             yield Part(read(path), 0)
 
 
 def _of_store(store: Store) -> Iterator[Part]:
-    keys = {*store.shapes, f"format={store.attributes.get('format', '')}"}
-    layout = _layout(store.path, "hdf5", keys)
+    layout = layout_of(store.path, "hdf5", names(store))
     count = _frames(store, layout.ELECTRODES_NAME)
     frames = max(2 * CONTEXT, ARRAY_BYTES // max(1, _bytes_a_frame(store, count)))
     if count <= frames:

@@ -95,13 +95,13 @@ def open_hdf5(path: str) -> Iterator[Store]:
             shapes[_plain(name)] = (tuple(item.shape), item.dtype)
 
     with ExitStack() as stack:
-        with _damage_told(path, "HDF5"):
+        with damage_told(path, "HDF5"):
             file = stack.enter_context(h5py.File(path, "r"))
             file.visititems(note)
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
 
         def attributes_of(name: str) -> dict[str, Any]:
-            with _damage_told(f"{path}, {name}", "attributes"):
+            with damage_told(f"{path}, {name}", "attributes"):
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
         yield Store(
@@ -110,10 +110,12 @@ def open_hdf5(path: str) -> Iterator[Store]:
 
 
 @contextmanager
-def _damage_told(where: str, what: str) -> Iterator[None]:
+def damage_told(where: str, what: str) -> Iterator[None]:
     """Turn whatever a file library raises into a TactileError; see Store._loaded."""
     try:
         yield
+    except (TactileError, MemoryError):
+        raise
     except Exception as error:
         raise TactileError(
             where, f"damaged {what} ({_short(error)})", "a whole file", "Copy or export the recording again"
@@ -136,7 +138,7 @@ def open_npz(path: str) -> Iterator[Store]:
     """Open for reading; never unpickles. Sizes come from the arrays' own headers, not from unpacking them."""
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
     with ExitStack() as stack:
-        with _damage_told(path, "NPZ"):
+        with damage_told(path, "NPZ"):
             archive = stack.enter_context(zipfile.ZipFile(path))
             for member in archive.namelist():
                 if member.endswith(".npy"):
