@@ -1,4 +1,4 @@
-"""ACROSS: ``trial_i/step_j/nodal_coords_{biotac,digit}/env_k`` and ``net_force_vecs_{...}`` in results_SENSOR_JOB.hdf5."""
+"""ACROSS: ``trial_i/step_j/nodal_coords_SENSOR/env_k`` and ``net_force_vecs_SENSOR/env_k``, SENSOR biotac or digit."""
 
 from __future__ import annotations
 
