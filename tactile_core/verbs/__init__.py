@@ -4,6 +4,7 @@ A verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what is left 
 (parser) and ``run`` (options -> exit status). Its rooms are imported in ``run``, so that help costs nothing.
 """
 
-from . import adapt, batch, convert, info, mesh, pairs, simulate, train
+from . import adapt, batch, convert, export, info, mesh, pairs, simulate, train
 
-VERBS = {verb.__name__.rsplit(".", 1)[1]: verb for verb in (convert, batch, info, adapt, simulate, pairs, train, mesh)}
+_ORDER = (convert, batch, export, info, adapt, simulate, pairs, train, mesh)
+VERBS = {verb.__name__.rsplit(".", 1)[1]: verb for verb in _ORDER}
