@@ -52,6 +52,29 @@ class Table:
         return [p if p.field in keep else Problem(p.frame, p.row, p.field, p.found, False) for p in self.problems]
 
 
+@dataclass(frozen=True)
+class Header:
+    """names : of the columns, lower case; lines : up to and with the header; separator : between cells"""
+
+    names: tuple[str, ...]
+    lines: int
+    separator: str
+
+    @classmethod
+    def of(cls, path: str, start: bytes) -> Header:
+        """Of a text that starts with these whole lines. Raises TactileError."""
+        return cls(*_header(path, _text(path, start)))
+
+
+def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | None:
+    """The rows of some whole lines of a file that grows, `before` lines of which came earlier; None where none is."""
+    lines = _text(path, data)
+    skipped = max(0, header.lines - before)
+    if not any(line.strip(" \t") for line in lines[skipped:]):
+        return None
+    return _parsed(path, header.names, header.separator, lines[skipped:], before + skipped, last=False)
+
+
 def read_header(path: str) -> tuple[str, ...]:
     """Lower-case column names of the first line that is not empty."""
     return _header(path, _lines(path))[0]

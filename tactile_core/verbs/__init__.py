@@ -4,7 +4,7 @@ A verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what is left 
 (parser) and ``run`` (options -> exit status). Its rooms are imported in ``run``, so that help costs nothing.
 """
 
-from . import adapt, batch, convert, export, info, mesh, pairs, simulate, train
+from . import adapt, batch, convert, export, info, mesh, pairs, simulate, train, watch
 
-_ORDER = (convert, batch, export, info, adapt, simulate, pairs, train, mesh)
+_ORDER = (convert, watch, batch, export, info, adapt, simulate, pairs, train, mesh)
 VERBS = {verb.__name__.rsplit(".", 1)[1]: verb for verb in _ORDER}
