@@ -45,6 +45,13 @@ class Tools:
     shade: Callable[[np.ndarray], np.ndarray]
 
 
+def translated(signals: Signals, tools: Tools) -> dict[str, np.ndarray]:
+    """What a translation makes of all frames of `signals`, T first, by the names of frames.h5."""
+    translation = tools.translate(signals)
+    arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
+    return arrays | {"electrodes": signals.electrodes, "flags": arrays["flags"] | signals.flags}
+
+
 class FramePass:
     """Takes the selected frames once through all stages, and keeps of them only what the contact sheet shows."""
 
@@ -95,14 +102,8 @@ class FramePass:
         """All arrays of some frames, T first, by the names of frames.h5."""
         part = {name: getattr(self.signals, name)[frames] for name in ("change", "electrodes", "quiet", "flags")}
         with self.clock.stage("translate"):
-            translation = self.tools.translate(dataclasses.replace(self.signals, **part))
-        arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
-        return arrays | {
-            "frame": frames.astype(np.int32),
-            "time": self.recording.time[frames],
-            "electrodes": part["electrodes"],
-            "flags": arrays["flags"] | part["flags"],
-        }
+            arrays = translated(dataclasses.replace(self.signals, **part), self.tools)
+        return arrays | {"frame": frames.astype(np.int32), "time": self.recording.time[frames]}
 
     def _draw(self, folder: Path, frames: np.ndarray, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Heights, as far as they are kept; pictures go to their files. Frames that nobody looks at are passed over."""
@@ -121,7 +122,7 @@ class FramePass:
                     shown["pictures"] = picture
                 if "image" in self.keep:
                     with self.clock.stage("png"):
-                        _write_png(folder / results.IMAGES / results.IMAGE_NAME.format(frame), picture)
+                        write_png(folder / results.IMAGES / results.IMAGE_NAME.format(frame), picture)
         return {"height_map": heights} if "height" in self.keep else {}
 
     def _count_flags(self, bits: np.ndarray) -> None:
@@ -153,7 +154,8 @@ class FramePass:
         )
 
 
-def _write_png(path: Path, picture: np.ndarray) -> None:
+def write_png(path: Path, picture: np.ndarray) -> None:
+    """Write a picture (H, W, 3) uint8."""
     from PIL import Image
 
     Image.fromarray(picture).save(path, compress_level=PNG_LEVEL)
