@@ -64,9 +64,9 @@ def look() -> None:
     """From above and the side, at all sensors."""
     for thing in bpy.data.objects:
         thing.select_set(thing.type == "MESH" and thing.tactile.role != "NONE")
-    bpy.ops.view3d.view_axis(type="TOP")
-    bpy.ops.view3d.view_orbit(angle=0.9, type="ORBITUP")
-    bpy.ops.view3d.view_orbit(angle=0.5, type="ORBITLEFT")
+    bpy.ops.view3d.view_axis(type="FRONT")
+    bpy.ops.view3d.view_orbit(angle=0.8, type="ORBITUP")
+    bpy.ops.view3d.view_orbit(angle=0.4, type="ORBITLEFT")
     bpy.ops.view3d.view_selected()
     bpy.ops.object.select_all(action="DESELECT")
 
@@ -83,9 +83,10 @@ def begin() -> None:
 
 def click() -> None:
     """Close the splash, open the sidebar's tab."""
-    moves = ["mousemove", "640", "300", "key", "Escape", "sleep", "2", "mousemove", *TAB, "click", "1"]
-    subprocess.run(["xdotool", *moves, "mousemove", "500", "700"], check=False)
-    bpy.app.timers.register(photograph, first_interval=SETTLE)
+    moves = ["mousemove", "640", "300", "key", "Escape", "sleep", "2", "mousemove", *TAB, "sleep", "1", "click", "1"]
+    # Not waited for: Blender has to take these in one by one.
+    subprocess.Popen(["xdotool", *moves, "sleep", "1", "mousemove", "500", "700"])
+    bpy.app.timers.register(photograph, first_interval=2 * SETTLE)
 
 
 def photograph() -> None:
