@@ -79,10 +79,9 @@ def make(inputs: list[Input], recipe: Recipe, weights: str | None) -> Job:
 
 
 def write(folder: Path, job: Job) -> None:
-    """Make the job folder. Raises TactileError where it cannot be written."""
+    """Make the job folder, its job file first: all else is made again. Raises TactileError where it cannot be."""
     try:
-        for part in (PREPARED, SHARDS, ASIDE):
-            (folder / part).mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         atomic.write_json(folder / FILE, msgspec.to_builtins(job))
     except OSError as error:
         found = f"cannot be written ({error.strerror or error})"
