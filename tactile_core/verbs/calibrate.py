@@ -18,7 +18,7 @@ TEXT = """\
 Fit a DIGIT unit's calibration to photographs of a ball pressed into it, anywhere and to any depth: positions of camera
 and lights, their extent, colours, scale. Without a photograph of the untouched gel, its median over the photographs
 takes its place. Ten presses spread over the gel tell most; one or five do, from a calibration of another unit. What
-they tell too little of is held near that one, and named. Writes the calibration and a sheet to look at beside it (.png).
+they tell too little of is held near that one, and named. Writes the calibration, and a sheet to look at (.png).
 
 With --test, a calibration is tried on photographs instead: place and depth of each press are fitted, all else is the
 calibration's, and the picture is compared with the photograph, beside the null answer of the background alone."""
