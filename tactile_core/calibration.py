@@ -76,7 +76,7 @@ class Fit:
     ball_diameter : m
     errors : on those photographs, by the names of ``tactile calibrate --test``
     standard_errors : by parameter, in its unit in the file
-    not_identified : parameters that the photographs say nothing about; they kept the start's values
+    not_identified : parameters that the photographs tell too little of; held near the start's by how units differ
     """
 
     note: str

@@ -143,7 +143,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     words = ["calibrate", *common, "--ball-diameter", "6", "--start", str(start), "--out", str(out)]
     assert main(words) == 0
     told = capsys.readouterr()
-    assert "roi_psnr" in told.out and str(out) in told.out and "not told by these photographs" in told.err
+    assert "roi_psnr" in told.out and str(out) in told.out and "tell too little of" in told.err
     assert Image.open(tmp_path / "unit.png").size[0] > 3 * 240
     assert load_calibration(out).unit == "unit"
     rows, sheet = tmp_path / "rows.json", tmp_path / "trial.png"
