@@ -15,7 +15,7 @@ import argparse
 import dataclasses
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,7 @@ from tactile_core import atomic, results
 from tactile_core.calibration import Calibration
 from tactile_core.calibration_file import load_calibration
 from tactile_core.errors import TactileError
-from tactile_core.height_map import digit_mapper, rest_height_map
+from tactile_core.height_map import digit_mapper, of_unit, rest_height_map
 from tactile_core.mechanics.placement import pose_at
 from tactile_core.mechanics.random_contacts import random_contacts
 from tactile_core.mechanics.solve import solve
@@ -42,6 +42,7 @@ DIRECT_TARGET = {FAST: 0.5, "standard": 0.6}
 FULL_TARGET = {"quality": 1.0}
 MS_TARGET = {(FAST, None): 8, ("standard", LLVM): 100, ("quality", LLVM): 250, ("standard", SCALAR): 1500}
 QUICK_PASSES = 8  # of the reference in a quick run
+REPEATS = 5  # of a frame whose time is taken
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -114,29 +115,38 @@ def working_variants() -> list[str]:
 
 
 def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset) -> Iterator[Row]:
-    """Rows of every preset's error from the full model; the null is the background alone."""
-    rest = rest_height_map(unit.camera)
+    """Rows of every preset's error, from converged direct light and from the full model; null: the background alone."""
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
-    direct = MitsubaLight(unit, dataclasses.replace(truth, gather=None, window=False), variant, rest, seed=0)
-    lights = [MitsubaLight(unit, truth, variant, rest, seed) for seed in (0, 1)]
     of, levels = f"{len(heights)} fields", renderers[FAST].in_levels
-    resting = direct.radiance(rest)
-    converged = [levels(direct.radiance(height) - resting) for height in heights]
     changes = {
         name: [levels(renderer.radiance(height) - renderer.rest_radiance) for height in heights]
         for name, renderer in renderers.items()
     }
-    whole, again = (light.radiance(rest) for light in lights)
-    full = [levels(lights[0].radiance(height) - whole) for height in heights]
+    converged, full = zip(*converge(unit, heights, variant, truth, seed=0, levels=levels), strict=True)
     for name, change in changes.items():
         yield row(f"{name}_error_direct", rms(change, converged), "levels", DIRECT_TARGET.get(name),
                   null=rms(converged), of=of)  # fmt: skip
         yield row(f"{name}_error", rms(change, full), "levels", FULL_TARGET.get(name), null=rms(full), of=of)
-    other = [levels(lights[1].radiance(height) - again) for height in heights[:2]]
+    _, other = zip(*converge(unit, heights[:2], variant, truth, seed=1, levels=levels), strict=True)
     noise = rms(other, full[:2]) / np.sqrt(2)
     target = 0.1 if truth is REFERENCE else None
     yield row(f"{REFERENCE.name}_error", noise, "levels", target, null=rms(full[:2]),
               of=f"noise: two seeds, 2 fields, {truth.passes} passes")  # fmt: skip
+
+
+def converge(
+    unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int, levels: Callable
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Change of the picture of each field, grey levels (H, W, 3): by direct light alone, and by the full model."""
+    rest = of_unit(rest_height_map(unit.camera), unit)
+    light = MitsubaLight(unit, truth, variant, rest, seed)
+    resting, seen = light.direct(rest)
+    whole = light.completed(rest, resting, seen)
+    for number, height in enumerate(heights, 1):
+        height = of_unit(height, unit)
+        direct, seen = light.direct(height)
+        yield levels(direct - resting), levels(light.completed(height, direct, seen) - whole)
+        print(f"reference, seed {seed}: {number} of {len(heights)}", file=sys.stderr)
 
 
 def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> float:
@@ -154,23 +164,28 @@ def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
 
 
 def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray], quick: bool) -> Row:
-    """CPU ms of a frame on one thread: the median over fields after one that compiles."""
+    """CPU ms of a frame on one thread, after one that compiles: the median over fields of the best of a few."""
     one_thread(variant)
     renderer = Renderer(unit, name, None if name == FAST else variant)
-    heights = heights[:1] if name == REFERENCE.name or quick else heights
-    if name != REFERENCE.name:
+    slow = name == REFERENCE.name
+    if not slow:
         renderer(heights[0])
-        heights = 3 * heights[:2] if quick else heights
-    spent = []
-    for height in heights:
-        start = time.process_time()
-        renderer(height)
-        spent.append(1e3 * (time.process_time() - start))
+    spent = [best_ms(renderer, height, 1 if slow else REPEATS) for height in heights[: 1 if slow or quick else None]]
     small = unit.camera.width == 240
     target = MS_TARGET.get((name, None if name == FAST else variant)) if small else None
     label = "numpy" if name == FAST else variant
     size = f"{unit.camera.width}x{unit.camera.height}"
     return row(f"{name}_{label}_{size}_ms", float(np.median(spent)), "ms", target, of=f"{size}, one core, CPU time")
+
+
+def best_ms(renderer: Renderer, height: np.ndarray, repeats: int) -> float:
+    """Least CPU time: other programs on the machine make it longer, through caches that they empty."""
+    spent = []
+    for _ in range(repeats):
+        start = time.process_time()
+        renderer(height)
+        spent.append(1e3 * (time.process_time() - start))
+    return min(spent)
 
 
 def one_thread(variant: str) -> None:

@@ -61,7 +61,7 @@ class ShadowCaster:
         self._pixel_column = ((across - camera.right[0]) / step_right).clip(0, last_column).astype(np.float32)
         self._pixel_row = ((along - camera.down[0]) / step_down).clip(0, last_row).astype(np.float32)
         self._radii = self._radii_of_slope(camera, across, along).astype(np.float32)
-        self._shape = camera.shape
+        self._shape, self._polar_shape = camera.shape, (rows, columns)
 
     def _radii_of_slope(self, camera: Camera, across: np.ndarray, along: np.ndarray) -> np.ndarray:
         """LED radii that a unit of slope of the mapped line of sight is at the LED, across that line, (rows, columns).
@@ -82,8 +82,8 @@ class ShadowCaster:
         Returns sight (h, w) and the box of pixels it is for; it is 1 everywhere else.
         """
         reach = self._reach(float(height[box].max()), float(height.min()))
-        rows = _span(self._row[box], self._row)
-        columns = _span(self._column[box], self._column, reach)
+        rows = _span(self._row[box], self._polar_shape[0] - 1)
+        columns = _span(self._column[box], self._polar_shape[1] - 1, reach)
         polar = (rows, columns)
         field = bilinear(height, self._pixel_row[polar], self._pixel_column[polar])
         sight = self._march(field, polar, reach)
@@ -93,8 +93,10 @@ class ShadowCaster:
         sight = sight[shadow]
         first_row, first_column = rows.start + shadow[0].start, columns.start + shadow[1].start
         polar = slice(first_row, first_row + sight.shape[0]), slice(first_column, first_column + sight.shape[1])
-        height_range, width_range = (np.array([0, size - 1]) for size in self._shape)
-        pixels = _span(self._pixel_row[polar], height_range), _span(self._pixel_column[polar], width_range)
+        pixels = (
+            _span(self._pixel_row[polar], self._shape[0] - 1),
+            _span(self._pixel_column[polar], self._shape[1] - 1),
+        )
         row = np.clip(self._row[pixels] - np.float32(first_row), 0, sight.shape[0] - 1)
         column = np.clip(self._column[pixels] - np.float32(first_column), 0, sight.shape[1] - 1)
         return bilinear(sight, row, column), pixels
@@ -118,13 +120,14 @@ class ShadowCaster:
         return np.clip(sight, -1, FREE, out=sight)
 
 
-def march_steps(reach: int) -> list[int]:
+@functools.cache
+def march_steps(reach: int) -> tuple[int, ...]:
     """Steps of a march: each one at first, then every tenth of the way; what throws a shadow far is wide."""
     steps, k = [], 1
     while k <= reach:
         steps.append(k)
         k += max(1, k // 10)
-    return steps
+    return tuple(steps)
 
 
 def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | None:
@@ -138,10 +141,9 @@ def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | Non
     return box[0], box[1]
 
 
-def _span(wanted: np.ndarray, limits: np.ndarray, more: int = 0) -> slice:
-    """Two whole numbers or more that enclose the values wanted, `more` further up, within the limits' own range."""
-    lowest, highest = int(np.floor(limits.min())), int(np.ceil(limits.max()))
-    first = min(max(int(np.floor(wanted.min())), lowest), highest - 1)
+def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
+    """Two whole numbers or more from 0 to ``highest`` that enclose the values wanted, `more` further up."""
+    first = min(max(int(np.floor(wanted.min())), 0), highest - 1)
     last = min(int(np.ceil(wanted.max())) + more, highest)
     return slice(first, max(last, first + 1) + 1)
 

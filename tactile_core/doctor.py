@@ -9,6 +9,7 @@ import platform
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 from . import __version__
 from .optics.variant import LLVM, OLDEST_LLVM, llvm_trouble
@@ -53,11 +54,12 @@ LIBRARIES = (
 
 
 def report() -> Iterator[str]:
-    """Lines to print, as they are found; raises nothing."""
+    """Lines to print; raises nothing."""
     yield f"tactile {__version__}, Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} cores"
     found = {}
-    for library in LIBRARIES:
-        version, trouble = try_library(library)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        tried = list(pool.map(try_library, LIBRARIES))
+    for library, (version, trouble) in zip(LIBRARIES, tried, strict=True):
         found[library.module] = not trouble
         state = "missing" if trouble.startswith("missing") else "broken" if trouble else version or "works"
         yield f"  {library.package:<11} {state:<12} {library.use}" + (f": {trouble}" if trouble else "")

@@ -7,7 +7,7 @@ import numpy as np
 from .camera import Camera
 from .errors import TactileError
 
-NEWTON_STEPS = 3  # from the resting gel: presses of 1.5 mm are then met to 0.05 um but in folds (tests/test_view.py)
+NEWTON_STEPS = 2  # from the resting gel: presses of 1.5 mm are then met to 1 um, in folds apart (tests/test_view.py)
 STEEPEST = 0.05  # of 1 + slope . q / apparent height: below, the gel hides, or nearly hides, a part of itself
 MARCH_LEVELS, BISECTIONS = 64, 14  # of the search from above where it does: 2 mm / 64 / 2^14 is 2 nm
 
@@ -30,7 +30,7 @@ class View:
         self._rows, self._columns = rows, columns
         self._inverse = np.float32(1 / camera.apparent_height)
         self._start = rest
-        for _ in range(NEWTON_STEPS):  # a dome is so flat that each turn of steps multiplies the error by 1e-3 or less
+        for _ in range(NEWTON_STEPS):  # a dome is so flat that each turn makes the error 1,000 times smaller
             self._start = self(rest)
 
     def __call__(self, height: np.ndarray) -> np.ndarray:

@@ -46,19 +46,19 @@ def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray
 
 def similarity(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Structural similarity (H, W, 3) of two pictures in a window of 7 x 7 px, unbiased variances, edges mirrored."""
-    mean_one, mean_other = _windowed(one), _windowed(other)
+    mean_one, mean_other = windowed(one), windowed(other)
     unbiased = WINDOW**2 / (WINDOW**2 - 1)
-    var_one = unbiased * (_windowed(one * one) - mean_one**2)
-    var_other = unbiased * (_windowed(other * other) - mean_other**2)
-    covariance = unbiased * (_windowed(one * other) - mean_one * mean_other)
+    var_one = unbiased * (windowed(one * one) - mean_one**2)
+    var_other = unbiased * (windowed(other * other) - mean_other**2)
+    covariance = unbiased * (windowed(one * other) - mean_one * mean_other)
     above = (2 * mean_one * mean_other + _C1) * (2 * covariance + _C2)
     return above / ((mean_one**2 + mean_other**2 + _C1) * (var_one + var_other + _C2))
 
 
-def _windowed(values: np.ndarray) -> np.ndarray:
-    """Means over WINDOW x WINDOW px."""
-    half = WINDOW // 2
+def windowed(values: np.ndarray, width: int = WINDOW) -> np.ndarray:
+    """Means of values (H, W, k) over squares of ``width`` px, odd; edges mirrored."""
+    half = width // 2
     padded = np.pad(values, ((half + 1, half), (half + 1, half), (0, 0)), mode="symmetric")
     total = padded.cumsum(0).cumsum(1)
-    across = total[:, WINDOW:] - total[:, :-WINDOW]
-    return (across[WINDOW:] - across[:-WINDOW]) / WINDOW**2
+    across = total[:, width:] - total[:, :-width]
+    return (across[width:] - across[:-width]) / width**2

@@ -18,8 +18,6 @@ SMALLEST_PRESS = 300  # px at 240 x 320 changed by more than CHANGE; less is dus
 LARGEST_SHARE = 0.6  # of the picture changed: another lighting, not a press
 OVER_EXPOSED = 0.05  # share of the region with a channel at 255 from which on a press is flagged
 FEWEST_FOR_MEDIAN = 3  # photographs; of two, the median is their mean, which shows both presses
-MOST_FOR_MEDIAN = 25  # photographs, spread evenly over the set; their pairs are compared
-AGREEMENT = 8  # grey levels in every channel, of untouched gel in two photographs: noise of 1 level, drift of some 5
 NOISE_LIMIT = 12  # grey levels, of the difference of four pixels
 
 
@@ -110,22 +108,15 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
 
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
-    """Untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3): at each pixel the median of those that agree.
+    """Untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3), where presses cover less than half of them.
 
-    Where presses crowd, the plain median shows one; but untouched gel looks alike in all pictures, and presses do not.
-    So each pixel follows the picture that most others agree with, and takes the median of these.
+    The median at each pixel of those that differ from the median of all by CHANGE at most: presses that cover a third
+    of the pictures pull the plain median by up to that much.
     """
-    pictures = pictures[np.linspace(0, len(pictures) - 1, min(len(pictures), MOST_FOR_MEDIAN)).astype(int)]
-    pictures = pictures.astype(np.int16)
-    votes = np.zeros(pictures.shape[:3], np.int16)
-    for i, one in enumerate(pictures):
-        for j in range(i):
-            agrees = np.abs(one - pictures[j]).max(-1) <= AGREEMENT
-            votes[i] += agrees
-            votes[j] += agrees
-    most = np.take_along_axis(pictures, votes.argmax(0)[None, ..., None], axis=0)
-    kept = np.abs(pictures - most).max(-1, keepdims=True) <= AGREEMENT
-    return np.nanmedian(np.where(kept, pictures.astype(np.float32), np.nan), axis=0).astype(np.float32)
+    first = np.median(pictures, axis=0).astype(np.float32)
+    touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
+    found = np.nanmedian(np.where(touched, np.nan, pictures.astype(np.float32)), axis=0)
+    return np.where(np.isnan(found), first, found)
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:

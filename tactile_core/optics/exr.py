@@ -30,10 +30,10 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     try:
         with OpenEXR.File(os.fspath(path), separate_channels=True) as file:
             planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
-            header = file.header()
+            about = {name: value for name, value in file.header().items() if isinstance(value, str)}
     except Exception as error:  # the library raises RuntimeError and others
         raise TactileError(path, f"cannot be read as OpenEXR ({error})", "an EXR file") from error
-    return planes, {name: value for name, value in header.items() if isinstance(value, str)}
+    return planes, about
 
 
 def read_height(path: str | os.PathLike) -> np.ndarray:

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..calibration import Calibration
 from .direct_light import Hits, direct_light, lookup, map_lookup
+from .gel_mesh import MARGIN
 
-REACH = 6e-3  # m; of the picture's 13 x 17 mm, gel farther away is seen at grazing angles alone
-RIM = 3e-3  # m of gel beyond the picture (sensors.md: 18.4 x 25 mm, of which 13 x 17 are seen)
+REACH = 16e-3  # m: across a bowl every distance gives as much, so the whole picture and its rim count
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +73,7 @@ def _on_gel(
     rim = Hits.of(place, flat, flat)
     radiance = direct_light(rim, None, [(led.position,) for led in unit.leds], unit.leds)
     outside = np.maximum(np.abs(place[..., 0]) - camera.right[-1], np.abs(place[..., 1]) - camera.down[-1])
-    radiance[outside > RIM] = 0
+    radiance[outside > MARGIN] = 0
     inside = slice(margin, -margin), slice(margin, -margin)
     nearer = 1 / (1 - height[inside] / camera.apparent_height)
     look_up = map_lookup(place[(*inside, 0)] * nearer, place[(*inside, 1)] * nearer, camera)

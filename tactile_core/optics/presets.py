@@ -73,4 +73,9 @@ def cheapest(error: float, variant: str) -> str:
         best = min(NAMES, key=lambda name: table[name]["error"])
         found = f"{error:g} levels"
         raise TactileError("--error", found, f"{table[best]['error']:g} or more, which {best} has", "Allow more")
-    return min(good, key=lambda name: table[name]["ms"].get(variant, table[name]["ms"].get("numpy")))
+    return min(good, key=lambda name: _ms(table[name]["ms"], variant))
+
+
+def _ms(ms: dict[str, float], variant: str) -> float:
+    """Of a preset that needs no Mitsuba, or by a variant; one that was not measured counts as slowest."""
+    return ms.get("numpy", ms.get(variant, float("inf")))

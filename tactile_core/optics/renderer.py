@@ -10,7 +10,7 @@ from ..background import background_picture
 from ..calibration import LARGEST_LEVEL, Calibration
 from ..calibration_file import load_calibration
 from ..errors import TactileError
-from ..height_map import rest_height_map
+from ..height_map import of_unit, rest_height_map
 from ..shading import Shader
 from ..view import slopes
 from .direct_light import Hits, direct_light
@@ -40,7 +40,7 @@ class Renderer:
     calibration : None for the one that ships; preset : one of ``presets.NAMES``
     variant : of Mitsuba, "llvm_ad_rgb" or "scalar_rgb"; None for the faster one that works here. Not asked by ``fast``
     background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the calibration's
-    rest : (H, W) heights of the undeformed gel, m; None for the calibration's
+    rest : (H, W) heights of the undeformed gel, m; None for the calibration's, whose dome heights then get too
     seed : of the reference's random places and points; the others have none
     Raises TactileError for an unknown preset, arrays of another shape, values that are not finite, and a gel that
     reaches an LED or the camera; ModuleNotFoundError where mitsuba is missing.
@@ -57,18 +57,19 @@ class Renderer:
     ) -> None:
         self.calibration = calibration = calibration or load_calibration()
         self.camera = calibration.camera
-        rest = rest_height_map(self.camera) if rest is None else rest
+        self._domed = rest is None and calibration.dome_scale != 1
+        own = rest_height_map(self.camera) if rest is None else rest
+        resting = self._of_unit(check_heights(own, calibration, "rest height map"))
         background = background_picture(calibration) if background is None else background
-        check_heights(rest, calibration, "rest height map")
         self.background = _checked(background, (*self.camera.shape, 3), "background")
         self._gain = np.ascontiguousarray(calibration.gain.matrices(self.camera).transpose(2, 3, 0, 1), np.float32)
         if preset == FAST:
             self.variant = None
-            self._light: Light = Shader(calibration, background, rest)
+            self._light: Light = Shader(calibration, background, resting)
         else:
             self.variant = choose_variant(variant).name
-            self._light = MitsubaLight(calibration, preset_named(preset), self.variant, rest, seed)
-        self.rest_radiance = self._light.radiance(rest)
+            self._light = MitsubaLight(calibration, preset_named(preset), self.variant, resting, seed)
+        self.rest_radiance = self._light.radiance(resting)
 
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
@@ -76,8 +77,8 @@ class Renderer:
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3) float32 that each LED gives to what pixels see, in the unit of ``calibration``."""
-        check_heights(height_map, self.calibration, "height map")
-        return self._light.radiance(height_map)
+        heights = check_heights(height_map, self.calibration, "height map")
+        return self._light.radiance(self._of_unit(heights))
 
     def picture(self, radiance: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8: background + C (radiance - radiance at rest)."""
@@ -85,6 +86,9 @@ class Renderer:
         levels += self.background
         np.rint(levels, out=levels)
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
+
+    def _of_unit(self, heights: np.ndarray) -> np.ndarray:
+        return of_unit(heights, self.calibration) if self._domed else heights.astype(np.float32)
 
     def in_levels(self, radiance: np.ndarray) -> np.ndarray:
         """C times radiance (H, W, 3), grey levels float32: what the camera's channels make of it."""
@@ -105,18 +109,23 @@ class MitsubaLight:
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3) float32 of heights (H, W) m, in the unit of ``calibration``."""
         height = np.asarray(height_map, np.float32)
+        return self.completed(height, *self.direct(height))
+
+    def direct(self, height: np.ndarray) -> tuple[np.ndarray, Hits]:
+        """Radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W) float32, and what the first pass saw."""
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
-        total = np.zeros((*self.unit.camera.shape, 3), np.float32)
-        for number in range(self.preset.passes):
-            light, hits = self._one_pass(number, tilt)
-            if number == 0:
-                first = hits
-            total += light
-        radiance = total / np.float32(self.preset.passes)
-        if self.preset.gather and self.unit.albedo:
-            radiance += interreflection(height, radiance, first, self.unit, self.preset.gather)
-        return through_window(radiance, first.height, self.unit.camera) if self.preset.window else radiance
+        total, first = self._one_pass(0, tilt)
+        for number in range(1, self.preset.passes):
+            total += self._one_pass(number, tilt)[0]
+        return total / np.float32(self.preset.passes), first
+
+    def completed(self, height: np.ndarray, direct: np.ndarray, hits: Hits) -> np.ndarray:
+        """Direct light with what else the preset has: the gel's own light, and the window."""
+        radiance, preset = direct, self.preset
+        if preset.gather and self.unit.albedo:
+            radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)
+        return through_window(radiance, hits.height, self.unit.camera) if preset.window else radiance
 
     def _one_pass(self, number: int, tilt: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Hits]:
         """Direct light (H, W, 3) and what pixels saw."""
@@ -132,8 +141,8 @@ class MitsubaLight:
         return direct_light(hits, seen, points, leds, soften=self.preset.passes == 1), hits
 
 
-def check_heights(height: np.ndarray, unit: Calibration, name: str) -> None:
-    """Raises TactileError for heights of another shape, not finite, or that reach an LED or the camera."""
+def check_heights(height: np.ndarray, unit: Calibration, name: str) -> np.ndarray:
+    """The heights (H, W) m; raises TactileError for another shape, not finite ones, a gel at an LED or the camera."""
     height = _checked(height, unit.camera.shape, name)
     highest, lowest_led = float(height.max()), min(unit.leds, key=lambda led: led.position[2] - led.radius)
     limit = lowest_led.position[2] - lowest_led.radius
@@ -143,6 +152,7 @@ def check_heights(height: np.ndarray, unit: Calibration, name: str) -> None:
     if highest >= unit.camera.apparent_height:
         found = f"{highest * 1e3:.2f} mm high, the camera {unit.camera.apparent_height * 1e3:.2f} mm"
         raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")
+    return height
 
 
 def _checked(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
