@@ -95,7 +95,7 @@ class Calibration:
     leds : red, green, blue
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
     albedo : 0..1 share of light that the coating scatters back, for interreflection; 0 leaves it out
-    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for
+    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for it
     """
 
     unit: str
