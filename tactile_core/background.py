@@ -1,39 +1,61 @@
-"""A synthetic picture of an untouched DIGIT, made by formula: no photograph, no unit."""
+"""The picture of an untouched DIGIT: a calibration's smooth polynomial, or the user's own photograph."""
 
 from __future__ import annotations
 
-import functools
+import os
+from collections.abc import Iterator
 
 import numpy as np
 
-from .camera import COLOURS, DIGIT_CAMERA, DIGIT_LEDS, Camera, Led
-
-# Grey levels. Assumed: a light's strength at the shader's unit of radiance, and the even stray light that lifts the
-# darkest parts of real pictures from black.
-LIGHT = 105.0
-STRAY = 22.0
-_BOWL_RADIUS = 21e-3  # m, the gel's dome across (sensors.md); along it counts as flat
+from .calibration import BACKGROUND_DEGREE, BACKGROUND_UNIT, LARGEST_LEVEL, Calibration
+from .camera import Camera
+from .errors import TactileError
 
 
-@functools.cache
-def _synthetic(camera: Camera, leds: tuple[Led, ...]) -> np.ndarray:
-    right, down = np.meshgrid(camera.right, camera.down)
-    height, slope = right**2 / (2 * _BOWL_RADIUS), right / _BOWL_RADIUS
-    picture = np.full((*camera.shape, len(COLOURS)), STRAY)
-    for led in leds:
-        to_right, to_down, above = led.position[0] - right, led.position[1] - down, led.position[2] - height
-        cosine = np.maximum(above - slope * to_right, 0) / np.sqrt(1 + slope**2)
-        falloff = np.square(led.position).sum() / (to_right**2 + to_down**2 + above**2) ** 1.5
-        picture[..., led.channel] += LIGHT * np.sqrt(cosine * falloff)
-    picture = np.rint(picture).clip(0, 255).astype(np.uint8)
-    picture.flags.writeable = False
-    return picture
+def background_picture(calibration: Calibration) -> np.ndarray:
+    """Background (H, W, 3) float32, grey levels; whole numbers of 8 bits.
 
-
-def synthetic_background(camera: Camera = DIGIT_CAMERA, leds: tuple[Led, ...] = DIGIT_LEDS) -> np.ndarray:
-    """Background (H, W, 3) uint8: each LED's light on a matte cylinder of the dome's radius, and even stray light.
-
-    Lambert's cosine and inverse square of distance, evened out by a square root (assumed: the acrylic's rough edge
-    spreads the light of a real unit about as much); one formula a pixel, so smooth, and the same on every call.
+    Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures.
     """
-    return _synthetic(camera, tuple(leds)).copy()
+    if calibration.background.photograph:
+        return read_photograph(calibration.background.photograph, calibration.camera).astype(np.float32)
+    return polynomial_background(calibration.background.polynomial, calibration.camera)
+
+
+def polynomial_background(coefficients: tuple[tuple[float, ...], ...], camera: Camera) -> np.ndarray:
+    """(H, W, 3) float32 of a polynomial (3, 21) in the order of ``terms``, in whole grey levels of 8 bits."""
+    down, right = camera.down / BACKGROUND_UNIT, camera.right / BACKGROUND_UNIT
+    picture = np.zeros((*camera.shape, 3))
+    for (i, j), levels in zip(terms(), np.asarray(coefficients).T, strict=True):
+        picture += (down[:, None] ** j * right**i)[..., None] * levels
+    return np.rint(picture).clip(0, LARGEST_LEVEL).astype(np.float32)
+
+
+def fit_polynomial(picture: np.ndarray, camera: Camera) -> tuple[tuple[float, ...], ...]:
+    """Coefficients (3, 21), least squares, of a picture (H, W, 3) in grey levels."""
+    down, right = np.meshgrid(camera.down / BACKGROUND_UNIT, camera.right / BACKGROUND_UNIT, indexing="ij")
+    basis = np.stack([(right**i * down**j).ravel() for i, j in terms()], -1)
+    found = np.linalg.lstsq(basis, picture.reshape(-1, 3).astype(float), rcond=None)[0]
+    return tuple(tuple(row) for row in found.T.tolist())
+
+
+def terms() -> Iterator[tuple[int, int]]:
+    """Powers (i, j) of right and down, by i + j, then by j."""
+    for degree in range(BACKGROUND_DEGREE + 1):
+        for j in range(degree + 1):
+            yield degree - j, j
+
+
+def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np.ndarray:
+    """Picture (H, W, 3) uint8 of an image file; raises TactileError for what is no picture or of another size."""
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            picture = np.asarray(image.convert("RGB"))
+    except (OSError, ValueError, Image.DecompressionBombError) as error:
+        raise TactileError(path, f"cannot be read as a picture ({error})", "an image file") from error
+    if camera is not None and picture.shape[:2] != camera.shape:
+        found = f"{picture.shape[1]} x {picture.shape[0]} pixels"
+        raise TactileError(path, found, f"{camera.width} x {camera.height}, as the calibration's camera")
+    return picture

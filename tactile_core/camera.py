@@ -1,7 +1,8 @@
-"""The DIGIT's camera and lights as data: one camera model, used for every step between pixels and gel.
+"""A camera and lights as data: one camera model, used for every step between pixels and gel.
 
 Image frame, used by camera and lights: right and down along the picture, toward the camera as third axis,
-metres, origin in the picture's centre at height zero (``HEIGHT_ZERO_Y``).
+metres, origin in the picture's centre at height zero (``HEIGHT_ZERO_Y``). A unit's own camera and lights are in its
+calibration, see ``calibration_file``.
 """
 
 from __future__ import annotations
@@ -16,15 +17,20 @@ from .errors import TactileError
 # Plane of height zero, shared frame: the lowest point of the public gel mesh at rest (sensors.md). Heights grow
 # with y, toward the camera, so that an indentation raises them.
 HEIGHT_ZERO_Y = -8.301e-3
+LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a camera that is higher
 
 
 @dataclasses.dataclass(frozen=True)
 class Camera:
-    """An orthographic camera that looks at the coating along -y, from inside the gel.
+    """A pinhole camera that looks at the coating along -y, from inside the gel, over the picture's middle.
+
+    It stands where refraction by gel and acrylic makes it appear. A gel point is seen where its central projection
+    onto the plane of height zero falls: (right, down, h) at (right, down) / (1 - h / apparent_height).
 
     width, height : pixels
-    px_per_mm_x, px_per_mm_y : pixels a millimetre of gel, along the picture's rows (x) and columns (y)
+    px_per_mm_x, px_per_mm_y : pixels a millimetre of gel at height zero, along the picture's rows (x) and columns (y)
     centre_x, centre_z : m, the place on the gel, shared frame, in the middle of the picture
+    apparent_height : m, of the pinhole above the plane of height zero
     right_z, down_x : +1 or -1, the way z goes to the right and x goes down the picture
     """
 
@@ -34,6 +40,7 @@ class Camera:
     px_per_mm_y: float
     centre_x: float
     centre_z: float
+    apparent_height: float
     right_z: int
     down_x: int
 
@@ -51,11 +58,23 @@ class Camera:
                 raise TactileError(f"camera, {name}", repr(getattr(self, name)), "+1 or -1")
         if not (math.isfinite(self.centre_x) and math.isfinite(self.centre_z)):
             raise TactileError("camera, centre", f"({self.centre_x}, {self.centre_z})", "finite metres")
+        if not (math.isfinite(self.apparent_height) and self.apparent_height >= LOWEST_CAMERA):
+            expected = f"{LOWEST_CAMERA} m or more, above the gel"
+            raise TactileError("camera, apparent_height", repr(self.apparent_height), expected)
 
     @property
     def shape(self) -> tuple[int, int]:
         """(height, width) of arrays that hold a picture."""
         return self.height, self.width
+
+    def at_size(self, width: int, height: int) -> Camera:
+        """The same view in other pixels; raises TactileError for another aspect ratio."""
+        if width * self.height != height * self.width:
+            expected = f"the aspect ratio of {self.width} x {self.height}"
+            raise TactileError("camera, size", f"{width} x {height} pixels", expected)
+        factor = width / self.width
+        scale_x, scale_y = self.px_per_mm_x * factor, self.px_per_mm_y * factor
+        return dataclasses.replace(self, width=width, height=height, px_per_mm_x=scale_x, px_per_mm_y=scale_y)
 
     @property
     def pixel_size(self) -> tuple[float, float]:
@@ -64,44 +83,46 @@ class Camera:
 
     @property
     def right(self) -> np.ndarray:
-        """Image coordinate (width,) m of the pixel centres of a row, to the right from the picture's middle."""
+        """Image coordinate (width,) m of the pixel centres of a row at height zero, to the right from the middle."""
         return (np.arange(self.width) + 0.5 - self.width / 2) * self.pixel_size[0]
 
     @property
     def down(self) -> np.ndarray:
-        """Image coordinate (height,) m of the pixel centres of a column, down from the picture's middle."""
+        """Image coordinate (height,) m of the pixel centres of a column at height zero, down from the middle."""
         return (np.arange(self.height) + 0.5 - self.height / 2) * self.pixel_size[1]
 
     @property
     def gel_x(self) -> np.ndarray:
-        """x (height,) m on the gel of each row of pixels."""
+        """x (height,) m at height zero of each row of pixels: the rows of a height map."""
         return self.centre_x + self.down_x * self.down
 
     @property
     def gel_z(self) -> np.ndarray:
-        """z (width,) m on the gel of each column of pixels."""
+        """z (width,) m at height zero of each column of pixels: the columns of a height map."""
         return self.centre_z + self.right_z * self.right
 
-    def to_pixel(self, x: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(row, column), fractional, of gel places x, z in m; whole numbers are pixel centres."""
+    def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """(row, column), fractional, where gel points at x, z and height, m, are seen; whole numbers: pixel centres."""
         right, down = self.pixel_size
-        row = self.down_x * (np.asarray(x) - self.centre_x) / down + self.height / 2 - 0.5
-        column = self.right_z * (np.asarray(z) - self.centre_z) / right + self.width / 2 - 0.5
+        nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
+        row = self.down_x * (np.asarray(x) - self.centre_x) * nearer / down + self.height / 2 - 0.5
+        column = self.right_z * (np.asarray(z) - self.centre_z) * nearer / right + self.width / 2 - 0.5
         return row, column
 
-    def to_gel(self, row: np.ndarray, column: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(x, z) m on the gel of fractional pixels: the inverse of ``to_pixel``."""
+    def to_gel(self, row: np.ndarray, column: np.ndarray, height: np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """(x, z) m of the points at a height, m, that fractional pixels see: the inverse of ``to_pixel``."""
         right, down = self.pixel_size
-        x = self.centre_x + self.down_x * (np.asarray(row) + 0.5 - self.height / 2) * down
-        z = self.centre_z + self.right_z * (np.asarray(column) + 0.5 - self.width / 2) * right
+        nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
+        x = self.centre_x + self.down_x * (np.asarray(row) + 0.5 - self.height / 2) * down / nearer
+        z = self.centre_z + self.right_z * (np.asarray(column) + 0.5 - self.width / 2) * right / nearer
         return x, z
 
 
 @dataclasses.dataclass(frozen=True)
 class Led:
-    """One light of one colour, a small sphere.
+    """One light of one colour: a sphere, equally bright from all sides.
 
-    colour : "red", "green" or "blue", the only channel it is seen in
+    colour : "red", "green" or "blue"; its light is a channel of radiance of its own
     position : (right, down, toward the camera), m, image frame
     radius : m, its apparent size, which makes shadows soft
     """
@@ -125,18 +146,3 @@ class Led:
 
 
 COLOURS = ("red", "green", "blue")
-
-# Size: the sensor's 320 x 240 mode held in portrait; scale: the most frequent of 17-21 px/mm (sensors.md).
-# Centre: the middle of the even window of ``digit_shape``. Which way the picture lies on the gel is not published:
-# the fingertip (-x) up is assumed; z then runs to the left, because a camera without a mirror sees it so.
-DIGIT_CAMERA = Camera(
-    width=240, height=320, px_per_mm_x=18.8, px_per_mm_y=18.8, centre_x=-7.5e-3, centre_z=0.0, right_z=-1, down_x=1
-)
-
-# Positions: a fit to real pictures of one unit (sensors.md), start values and not a calibration.
-# Radius: assumed; lights and the roughness of the acrylic's edge, which widens them, differ between units.
-DIGIT_LEDS = (
-    Led("red", (10.8e-3, -10.9e-3, 7.0e-3), 1.0e-3),
-    Led("green", (-13.3e-3, -8.5e-3, 7.6e-3), 1.0e-3),
-    Led("blue", (1.6e-3, 14.6e-3, 5.8e-3), 1.0e-3),
-)

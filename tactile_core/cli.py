@@ -28,8 +28,11 @@ example:
 SIGTERM or SIGHUP."""
 
 # module -> extra that brings it
-EXTRAS = {"torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem", "rosbags": "ros", "lz4": "ros"}
-EXTRAS |= {"distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch"}
+EXTRAS = {
+    "torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem",
+    "mitsuba": "render", "drjit": "render", "OpenEXR": "render", "rosbags": "ros", "lz4": "ros",
+    "distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch",
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import atomic, sensors, surface
-from .camera import DIGIT_CAMERA, Camera
+from .calibration_file import load_calibration
+from .camera import Camera
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +71,7 @@ def contact_sheet(
     true_displacement_biotac: np.ndarray | None = None,
     simulated: bool = False,
     warnings: Sequence[str] = (),
-    camera: Camera = DIGIT_CAMERA,
+    camera: Camera | None = None,
 ) -> None:
     """Draw the sheet and write it to `path` as a PNG; equal input makes equal bytes.
 
@@ -79,6 +80,7 @@ def contact_sheet(
     force : (k, 3) N; confidence : (k,) 0..1; expected_error_digit : (k,) m, of the largest node
     contact_center : (k, 2) m = (x, z), NaN without contact
     true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
+    camera : None for the shipped calibration's
     Raises ValueError where the arrays of the columns do not count alike.
     """
     columns: dict[str, Any] = {
@@ -99,6 +101,7 @@ def contact_sheet(
         python_warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
         matplotlib.rcdefaults()  # a user's own settings must not change the bytes
         matplotlib.rcParams.update(STYLE)
+        camera = camera or load_calibration().camera
         sheet = _Sheet(len(frames), camera, _sentences(warnings, confidence), true_displacement_biotac is not None)
         sheet.title(name, simulated)
         sheet.electrodes(time, electrodes, frames)

@@ -122,7 +122,7 @@ class FramePass:
                     shown["pictures"] = picture
                 if "image" in self.keep:
                     with self.clock.stage("png"):
-                        _write_png(folder / results.IMAGES / results.IMAGE_NAME.format(frame), picture)
+                        write_png(folder / results.IMAGES / results.IMAGE_NAME.format(frame), picture)
         return {"height_map": heights} if "height" in self.keep else {}
 
     def _count_flags(self, bits: np.ndarray) -> None:
@@ -154,7 +154,8 @@ class FramePass:
         )
 
 
-def _write_png(path: Path, picture: np.ndarray) -> None:
+def write_png(path: Path, picture: np.ndarray) -> None:
+    """Write a picture (H, W, 3) uint8."""
     from PIL import Image
 
     Image.fromarray(picture).save(path, compress_level=PNG_LEVEL)

@@ -1,9 +1,10 @@
-"""Displaced gel -> the heights that the camera sees.
+"""Displaced gel -> its heights under the camera's pixels.
 
 A height is the position of the coating toward the camera, in metres. It grows with y of the shared frame: an
 indentation raises it. Zero is the plane ``camera.HEIGHT_ZERO_Y``, which touches the resting gel's lowest point, so
 the dome is part of the map: about 0 in the middle, up to 1.7 mm where the resting gel falls away. The map follows
-sideways movement too: a pixel shows the gel point that has come to lie under it.
+sideways movement too: it tells of the gel point that has come to lie there. It is a map of the gel, seen along its
+normal: pixels stand for the places on the plane of height zero where the camera sees them; perspective comes later.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ import logging
 import numpy as np
 
 from . import sensors
-from .camera import DIGIT_CAMERA, HEIGHT_ZERO_Y, Camera
+from .calibration import Calibration
+from .calibration_file import load_calibration
+from .camera import HEIGHT_ZERO_Y, Camera
 from .cubic_spline import EvenSpline, bspline_weights
 from .errors import TactileError
 from .lattice import Lattice
@@ -24,25 +27,28 @@ _log = logging.getLogger(__name__)
 REFINEMENT = 2  # grid for the sideways search, intervals a node interval; measured in tests/test_height_map.py
 MOVE_TOLERANCE = 1e-7  # m, of the sideways search: times a slope of 1, below a tenth of a grey level
 MOVE_ITERATIONS = 12  # 2 or 3 do for presses; where 12 do not, the surface folds over itself
+BEYOND_WINDOW = 1e-3  # m that a picture may reach past the window (17 px/mm: 0.7 mm); the edge is held there
 SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area is about to fold: steps stay finite
 
 
 class HeightMapper:
     """Height maps of one surface under one camera; matrices are made once.
 
-    surface : a lattice with an evenly spaced ``window`` that covers the camera's picture
-    Raises TactileError where the picture reaches beyond that window.
+    surface : a lattice with an evenly spaced ``window`` that covers the camera's picture, but for 1 mm at its edges
+    camera : None for the shipped calibration's
+    Raises TactileError where the picture reaches further.
     """
 
-    def __init__(self, surface: Lattice, camera: Camera = DIGIT_CAMERA) -> None:
+    def __init__(self, surface: Lattice, camera: Camera | None = None) -> None:
         if surface.window is None:
             raise TactileError("surface", "no evenly spaced window", "one", "Use sensors.digit_surface()")
+        camera = camera or load_calibration().camera
         self.surface, self.camera = surface, camera
         rest = surface.grid(surface.rest)[surface.window]
         self._along, self._across = _axis(rest[:, 0, 0]), _axis(rest[0, :, 2])
         for name, spline, seen in (("x", self._along, camera.gel_x), ("z", self._across, camera.gel_z)):
             low, high = spline.nodes[0], spline.nodes[-1]
-            if seen.min() < low or seen.max() > high:
+            if seen.min() < low - BEYOND_WINDOW or seen.max() > high + BEYOND_WINDOW:
                 raise TactileError(
                     f"camera, {name}", f"picture {seen.min() * 1e3:.2f}..{seen.max() * 1e3:.2f} mm",
                     f"inside the surface's even window {low * 1e3:.2f}..{high * 1e3:.2f} mm", "Raise its px/mm",
@@ -146,17 +152,32 @@ def _axis(nodes: np.ndarray) -> EvenSpline:
     return EvenSpline(nodes[0], (nodes[-1] - nodes[0]) / (len(nodes) - 1), len(nodes))
 
 
+def digit_mapper(camera: Camera | None = None) -> HeightMapper:
+    """The mapper of ``sensors.digit_surface()``, made once a camera; None for the shipped calibration's."""
+    return _digit_mapper(camera or load_calibration().camera)
+
+
 @functools.cache
-def digit_mapper(camera: Camera = DIGIT_CAMERA) -> HeightMapper:
-    """The mapper of ``sensors.digit_surface()``, made once a camera."""
+def _digit_mapper(camera: Camera) -> HeightMapper:
     return HeightMapper(sensors.digit_surface(), camera)
 
 
-def height_map(displacement: np.ndarray, camera: Camera = DIGIT_CAMERA) -> np.ndarray:
+def height_map(displacement: np.ndarray, camera: Camera | None = None) -> np.ndarray:
     """Heights (H, W) or (T, H, W) float32, m, of the DIGIT's gel displaced by (n_nodes, 3) or (T, n_nodes, 3) m."""
     return digit_mapper(camera)(displacement)
 
 
-def rest_height_map(camera: Camera = DIGIT_CAMERA) -> np.ndarray:
+def rest_height_map(camera: Camera | None = None) -> np.ndarray:
     """Heights (H, W) float32, m, of the undeformed DIGIT: its dome."""
     return digit_mapper(camera).rest.copy()
+
+
+def of_unit(heights: np.ndarray, calibration: Calibration) -> np.ndarray:
+    """Heights (H, W) or (T, H, W) m of the DIGIT's gel -> float32, of a unit whose dome is higher or flatter at rest.
+
+    What a contact raises stays; the resting dome is that of the public mesh times the calibration's ``dome_scale``.
+    """
+    heights = np.asarray(heights, np.float32)
+    if calibration.dome_scale == 1:
+        return heights
+    return heights - np.float32(1 - calibration.dome_scale) * digit_mapper(calibration.camera).rest

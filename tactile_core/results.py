@@ -54,20 +54,25 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
         if twin is not recording:
             advice = "Convert them into different --out folders"
             raise TactileError(recording, f"has the same name as {twin}", "one name for each result folder", advice)
-    _check_writable(out)
+    check_writable(out)
     atomic.sweep(out)
     folders = [out / Path(recording).stem for recording in recordings]
     for folder in folders:
-        if not os.path.lexists(folder):
-            continue
-        if not is_result(folder):
-            raise TactileError(folder, "exists and is no result", "a free place", "Name another --out folder")
-        if not overwrite:
-            raise TactileError(folder, "already holds a result", "a free place", "Add --overwrite, or another --out")
+        check_free(folder, overwrite)
     return folders
 
 
-def _check_writable(out: Path) -> None:
+def check_free(folder: Path, overwrite: bool) -> None:
+    """Raises TactileError where a result may not stand: one is there (unless `overwrite`), or something else is."""
+    if not os.path.lexists(folder):
+        return
+    if not is_result(folder):
+        raise TactileError(folder, "exists and is no result", "a free place", "Name another --out folder")
+    if not overwrite:
+        raise TactileError(folder, "already holds a result", "a free place", "Add --overwrite, or another --out")
+
+
+def check_writable(out: Path) -> None:
     """Make the folder and try a file in it; raises TactileError."""
     try:
         out.mkdir(parents=True, exist_ok=True)

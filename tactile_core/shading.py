@@ -1,157 +1,172 @@
 """Fast picture of the gel: three coloured LEDs on a white, matte coating, with soft cast shadows; numpy alone.
 
-Radiance is counted per colour in units of what the same LED gives on a coating that faces it at the distance from
-the LED to the picture's centre: Lambert's cosine times the inverse square of distance, in which a flat, level coating
-has sin(elevation), about 0.4. A picture is ``background + gain * (radiance - radiance at rest)`` in 8-bit values,
-without gamma (blender.md: raw 8-bit values beat every gamma tried).
+Radiance is counted per LED in the unit of ``calibration``: Lambert's cosine times the inverse square of distance, in
+which a flat, level coating has sin(elevation), about 0.4. What light the gel throws on itself is left out.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .background import synthetic_background
-from .camera import DIGIT_CAMERA, DIGIT_LEDS, Camera, Led
-from .cast_shadows import FREE, MIN_RISE, ShadowCaster, bounding_box, disc_share
+from .background import background_picture
+from .calibration import LARGEST_LEVEL, Calibration
+from .calibration_file import load_calibration
+from .camera import COLOURS, Camera, Led
+from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .errors import TactileError
-from .height_map import rest_height_map
+from .height_map import of_unit, rest_height_map
+from .view import View, slopes
 
-# Grey levels a unit of radiance, red, green, blue. Assumed: presses of a 6 mm ball then change pictures by up to
-# about 100 levels, as those of a real unit do; not fitted to them, which is a calibration's task.
-DIGIT_GAIN = (150.0, 150.0, 150.0)
+# px at 240 wide: on real pictures noise correlates by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px, along and across; means
+# over squares of 4 px by 0.75, 0.5, 0.25, 0.
+GRAIN = 4
+# A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
+# differences that slopes are made of.
+TANGENT, TANGENT_MARGIN = 1.1, 2  # of the radius, px
 
 
 class Shader:
     """Pictures of height maps; what only the resting gel decides is computed once.
 
-    gain : grey levels a unit of radiance, one a colour
-    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the synthetic one
-    rest : (H, W) heights of the undeformed gel, m; None for the DIGIT's
-    Raises TactileError for arrays of another shape, values that are not finite, or no LEDs.
+    calibration : None for the one that ships
+    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the calibration's
+    rest : (H, W) heights of the undeformed gel, m, that height maps rise from; None for the DIGIT's
+    Raises TactileError for arrays of another shape, values that are not finite, or LEDs over the picture.
     """
 
     def __init__(
         self,
-        camera: Camera = DIGIT_CAMERA,
-        leds: tuple[Led, ...] = DIGIT_LEDS,
-        gain: tuple[float, float, float] = DIGIT_GAIN,
+        calibration: Calibration | None = None,
         background: np.ndarray | None = None,
         rest: np.ndarray | None = None,
     ) -> None:
-        self.camera, self.leds = camera, tuple(leds)
-        if not self.leds:
-            raise TactileError("leds", "none", "one or more")
-        self.gain = np.asarray(gain, np.float32)
-        if self.gain.shape != (3,) or not np.isfinite(self.gain).all():
-            raise TactileError("gain", repr(gain), "three finite grey levels a unit of radiance")
-        rest = rest_height_map(camera) if rest is None else rest
-        background = synthetic_background(camera, self.leds) if background is None else background
-        self.rest = _checked(rest, camera.shape, "rest height map")
+        self.calibration = calibration = calibration or load_calibration()
+        camera = self.camera = calibration.camera
+        self._dome = rest is None  # heights have the public mesh's dome, which the unit's own takes the place of
+        rest = of_unit(rest_height_map(camera), calibration) if rest is None else rest
+        background = background_picture(calibration) if background is None else background
+        rest = _checked(rest, camera.shape, "rest height map")
         self.background = _checked(background, (*camera.shape, 3), "background")
-        self._casters = [ShadowCaster(camera, led) for led in self.leds]
-        self._offsets = [_offsets(camera, led) for led in self.leds]
-        self._rest_sight = [_whole_sight(caster, self.rest) for caster in self._casters]
-        self._rest_radiance = self.radiance(self.rest)
+        self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
+        self._gain = np.ascontiguousarray(calibration.gain.matrices(camera).transpose(2, 3, 0, 1), np.float32)
+        self._view = View(camera, rest)
+        self.rest = self._view(rest)
+        self._lamps = [Lamp(camera, led) for led in calibration.leds]
+        self._rest_radiance = self._seen_radiance(self.rest)
 
-    def __call__(self, height_map: np.ndarray) -> np.ndarray:
-        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
-        change = self.radiance(height_map)
+    def __call__(self, height_map: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
+        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.
+
+        noise : makes the camera's noise, as measured on the unit; None for none
+        """
+        change = self._radiance(height_map)
         change -= self._rest_radiance
-        change *= self.gain
-        change += self.background
-        np.rint(change, out=change)
-        return np.clip(change, 0, 255, out=change).astype(np.uint8)
+        picture = np.empty((*self.camera.shape, 3), np.uint8)
+        for channel in range(len(COLOURS)):
+            level = self._levels[channel].copy()
+            for gain, light in zip(self._gain[channel], change, strict=True):
+                level += gain * light
+            if noise is not None:
+                level += np.float32(self.calibration.noise[channel]) * grain(self.camera, noise)
+            np.rint(level, out=level)
+            picture[..., channel] = np.clip(level, 0, LARGEST_LEVEL, out=level)
+        return picture
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3) float32 of the coating at heights (H, W) m, in the module's unit."""
-        height = _checked(height_map, self.camera.shape, "height map")
-        slope_right, slope_down = _slopes(height, self.camera)
-        level = 1 / np.sqrt(1 + slope_right**2 + slope_down**2)  # the normal's third component
-        raised = _raised_box(height, self.rest)
-        radiance = np.zeros((*self.camera.shape, 3), np.float32)
-        for k, led in enumerate(self.leds):
-            right, down, square = self._offsets[k]
-            above = led.position[2] - height
-            # Half the radius squared: the mean inverse cube of the distance over a disc, to second order.
-            cubed = square + above**2 + np.float32(led.radius**2 / 2)
-            cubed *= np.sqrt(cubed)  # inverse square, and the length of (right, down, above) in the cosine
-            strength = level / cubed
-            strength *= np.float32(np.square(led.position).sum())
-            facing = above - slope_right * right - slope_down * down
-            light = np.maximum(facing, 0)
-            sight, box = self._sight(k, height, raised)
-            if sight is not None:
-                light[box] = _shadowed(sight, facing[box], square[box], above[box], led)
-            light *= strength
-            radiance[..., led.channel] += light
-        return radiance
+        """Radiance (H, W, 3) float32 of the coating that each pixel sees, by LED; height_map : (H, W) m."""
+        return np.moveaxis(self._radiance(height_map), 0, -1)
 
-    def _sight(
-        self, k: int, height: np.ndarray, raised: tuple[slice, slice] | None
-    ) -> tuple[np.ndarray | None, tuple[slice, slice]]:
-        """Sight of LED k and the box it is for: where the gel has risen, and where the resting gel shadows itself."""
-        rest, whole = self._rest_sight[k], (slice(0, self.camera.height), slice(0, self.camera.width))
-        if raised is None:
-            return rest, whole
-        if rest is not None:  # the rising gel may bring light to what the resting gel shadowed, wherever that is
-            raised = whole
-        sight, box = self._casters[k].sight(height, raised)
-        if rest is None:
-            return sight, box
-        both = np.full_like(rest, FREE)
-        both[box] = sight
-        return both, whole
+    def _radiance(self, height_map: np.ndarray) -> np.ndarray:
+        heights = _checked(height_map, self.camera.shape, "height map")
+        return self._seen_radiance(self._view(of_unit(heights, self.calibration) if self._dome else heights))
+
+    def _seen_radiance(self, seen: np.ndarray) -> np.ndarray:
+        """Radiance (3, H, W) of heights (H, W) that the pixels see."""
+        surface = SeenSurface(self._view, seen)
+        return np.stack([lamp.radiance(surface) for lamp in self._lamps])
 
 
-def _whole_sight(caster: ShadowCaster, height: np.ndarray) -> np.ndarray | None:
-    """Sight (H, W) of one LED; None where all of it is seen everywhere, as over the bowl of a dome."""
-    box = tuple(slice(0, size) for size in height.shape)
-    sight, box = caster.sight(height, box)
-    if not sight.size:
-        return None
-    whole = np.full(height.shape, FREE, np.float32)
-    whole[box] = sight
-    return whole
+class SeenSurface:
+    """What all LEDs need of the gel that the pixels see, all (H, W) float32.
 
-
-def _shadowed(sight: np.ndarray, facing: np.ndarray, square: np.ndarray, above: np.ndarray, led: Led) -> np.ndarray:
-    """Cosine times distance of the part of the LED's disc that stands above the horizon, times its share of the disc.
-
-    With l the vector to the LED and e the unit vector upward across it, that part's centre is l + radius moment /
-    share e; n' = (-slopes, 1) has n' . l = facing, so that n' . e = (|l|^2 - above facing) / (|l| plan distance).
+    With s = 1 - h / H the seen point is (q s, h), and its normal is along (-dh/dq, tilt), where dh/dq are the slopes of
+    h over the picture and tilt = s - q . dh/dq / H (from h(q) = height(q s)).
     """
-    share, moment = disc_share(sight)
-    length = square + above**2
-    moment *= length - above * facing
-    moment *= led.radius / np.sqrt(square * length)
-    return np.maximum(facing * share + moment, 0)
+
+    def __init__(self, view: View, seen: np.ndarray) -> None:
+        camera = view.camera
+        inverse = np.float32(1 / camera.apparent_height)
+        self.height = seen
+        self.slope_right, self.slope_down = slopes(seen, camera)
+        self.near = 1 - seen * inverse
+        outward = view.right * self.slope_right
+        outward += view.down * self.slope_down  # q . dh/dq
+        self.tilt = self.near - outward * inverse
+        # Of the cosine: normal . (LED - point) = tilt LED_up - slopes . LED + own
+        self.own = outward * self.near
+        self.own -= self.tilt * seen
+        self.normal = np.sqrt(self.slope_right**2 + self.slope_down**2 + self.tilt**2)
+        self.square = self.near**2 * (view.right**2 + view.down**2) + seen**2  # of the distance from the origin
+
+        self.mapped = seen / self.near  # the field on which shadows are cast, see ``cast_shadows``
 
 
-def _offsets(camera: Camera, led: Led) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """From each pixel to the LED: right (1, W), down (H, 1), and the sum of their squares (H, W), m."""
-    right = (led.position[0] - camera.right).astype(np.float32)[None, :]
-    down = (led.position[1] - camera.down).astype(np.float32)[:, None]
-    return right, down, right**2 + down**2
+class Lamp:
+    """One LED and what it gives to the gel that the pixels see."""
+
+    def __init__(self, camera: Camera, led: Led) -> None:
+        self.led = led
+        self._caster = ShadowCaster(camera, led)
+        right, down, _ = np.asarray(led.position, np.float32)
+        self._over_picture = camera.right.astype(np.float32) * right + (camera.down.astype(np.float32) * down)[:, None]
+
+    def radiance(self, surface: SeenSurface) -> np.ndarray:
+        """Radiance (H, W) float32."""
+        right, down, up = np.asarray(self.led.position, np.float32)
+        distance = self._over_picture * surface.near
+        distance += up * surface.height
+        distance *= -2
+        distance += surface.square
+        distance += np.float32(np.square(self.led.position).sum())  # squared, so far
+        facing = up * surface.tilt
+        facing -= right * surface.slope_right
+        facing -= down * surface.slope_down
+        facing += surface.own
+        light = np.maximum(facing, 0)
+        edge = bounding_box(facing < np.float32(TANGENT * self.led.radius) * surface.normal, TANGENT_MARGIN)
+        if edge is not None:
+            sight, box = self._caster.sight(surface.mapped, edge)
+            light[box] = self._shadowed(sight, facing[box], distance[box], surface, box)
+        distance *= np.sqrt(distance)
+        distance *= surface.normal
+        light /= distance
+        light *= np.float32(np.square(self.led.position).sum())
+        return light
+
+    def _shadowed(
+        self, sight: np.ndarray, facing: np.ndarray, square: np.ndarray, surface: SeenSurface, box: tuple[slice, slice]
+    ) -> np.ndarray:
+        """Cosine times distance of the part of the LED's disc that stands above the horizon, times its share of it.
+
+        With l the vector to the LED and e the unit vector upward across it, that part's centre is l + radius moment /
+        share e; and normal . e = (tilt |l|^2 - above facing) / (|l| plan distance).
+        """
+        share, moment = disc_share(sight)
+        above = self.led.position[2] - surface.height[box]
+        moment *= surface.tilt[box] * square - above * facing
+        moment *= np.float32(self.led.radius) / np.sqrt((square - above**2) * square)
+        share *= facing
+        share += moment
+        return np.maximum(share, 0, out=share)
 
 
-def _slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Slopes of heights (H, W) m along the picture's right and down, second order, at its edges too."""
-    right, down = camera.pixel_size
-    return _differences(height.T, right).T, _differences(height, down)
-
-
-def _differences(values: np.ndarray, step: float) -> np.ndarray:
-    slopes = np.empty_like(values)
-    np.subtract(values[2:], values[:-2], out=slopes[1:-1])
-    slopes[0] = 4 * values[1] - 3 * values[0] - values[2]
-    slopes[-1] = 3 * values[-1] - 4 * values[-2] + values[-3]
-    slopes *= np.float32(0.5 / step)
-    return slopes
-
-
-def _raised_box(height: np.ndarray, rest: np.ndarray) -> tuple[slice, slice] | None:
-    """Rows and columns of pixels that have risen enough to throw a shadow; None where none has."""
-    return bounding_box(height - rest > MIN_RISE)
+def grain(camera: Camera, random: np.random.Generator) -> np.ndarray:
+    """Camera noise (H, W) float32 of standard deviation 1: white noise, averaged over squares of GRAIN px."""
+    width = max(GRAIN * camera.width // 240, 1)
+    white = random.standard_normal((camera.height + width, camera.width + width), np.float32)
+    total = white.cumsum(0, dtype=np.float64).cumsum(1)
+    across = total[:, width:] - total[:, :-width]
+    return ((across[width:] - across[:-width]) / width).astype(np.float32)
 
 
 def _checked(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:

@@ -40,7 +40,7 @@ def only_line(text: str) -> str:
     return line
 
 
-@pytest.mark.parametrize("verb", ["convert", "info", "simulate", "pairs", "train", "mesh", "adapt"])
+@pytest.mark.parametrize("verb", ["convert", "info", "render", "simulate", "pairs", "train", "mesh", "adapt"])
 def test_each_verb_teaches_with_an_example(verb, capsys):
     with pytest.raises(SystemExit) as leave:
         cli.main([verb, "--help"])

@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.camera import DIGIT_CAMERA, HEIGHT_ZERO_Y
+from tactile_core.calibration_file import load_calibration
+from tactile_core.camera import HEIGHT_ZERO_Y
 from tactile_core.errors import TactileError
 from tactile_core.height_map import HeightMapper, digit_mapper, height_map, rest_height_map
 from tactile_core.lattice import Lattice, grid_faces
 
+DIGIT_CAMERA = load_calibration().camera
 CENTRE = np.array([-7.0e-3, 1.1e-3])
 
 
@@ -93,7 +95,7 @@ def test_rest_is_the_gel_above_its_lowest_point() -> None:
 def test_indentation_raises_the_height_where_it_is() -> None:
     gel = sensors.digit_surface()
     heights = height_map(dent(gel.rest[:, 0], gel.rest[:, 2])) - rest_height_map()
-    row, column = DIGIT_CAMERA.to_pixel(*CENTRE)
+    row, column = DIGIT_CAMERA.to_pixel(*CENTRE)  # of the map: at height zero
     peak = np.unravel_index(np.argmax(heights), heights.shape)
     assert np.hypot(peak[0] - row, peak[1] - column) < 3  # the dome's slope moves the peak by a pixel or two
     assert heights.max() == pytest.approx(0.5e-3, rel=0.02)

@@ -17,7 +17,10 @@ MODULES = sorted(
     for path in PACKAGE.rglob("*.py")
     if path.name != "__main__.py" and "training" not in path.relative_to(PACKAGE).parts
 )
-LAZY = ("h5py", "scipy", "matplotlib", "PIL", "mitsuba", "trimesh", "skfem", "cholespy", "rosbags", "distributed")
+LAZY = (
+    "h5py", "scipy", "matplotlib", "PIL", "mitsuba", "OpenEXR", "trimesh", "skfem", "cholespy", "rosbags",
+    "distributed",
+)  # fmt: skip
 HEAVY = (*LAZY, "torch", "bpy", "drjit", "tqdm")
 
 BLOCKER = """

@@ -1,8 +1,9 @@
 """Fine-tuning of S2MPN on a real sensor's recording that says where and how hard it was touched.
 
-Only S2MPN changes. A label fixes the place of the dent, two numbers of the BioTac's latent, and, through the frozen
-force head, the force; it says nothing of the dent's shape, for which the latent is held near what it was, on the
-recording's own signals and on the typical simulated signals that ship with the weights.
+Only S2MPN changes, or R2MPN where the recording is rectified. A label fixes the place of the dent, two numbers of the
+BioTac's latent, and, through the frozen force head, the force; it says nothing of the dent's shape, for which the
+latent is held near what it was, on the recording's own signals and on the typical simulated signals that ship with the
+weights.
 """
 
 from __future__ import annotations
@@ -55,11 +56,13 @@ def fine_tune(
     data = read_labelled(path, before.frames["MVB"], seed)
     typical = typical_signals.read(source).typical.astype(np.float32)
     prepare_folder(Path(out_folder), overwrite)
+    net = "R2MPN" if data.rectified else "S2MPN"
     with deterministic():
-        state = _train(before, data, typical, seed, progress or (lambda share, text: None))
-    after = Networks(before.tensors | {"S2MPN": state}, before.card)
+        state = _train(before, net, data, typical, seed, progress or (lambda share, text: None))
+    after = Networks(before.tensors | {net: state}, before.card)
     rows = [*_rows(before, data, "before"), *_rows(after, data, "after")]
     note = {
+        "network": net,
         "recording": os.path.basename(path),
         "recording_sha256": _file_sha256(path),
         "weights_sha256": before.sha256,
@@ -69,7 +72,7 @@ def fine_tune(
         "versions": versions(),
         "errors": rows,
     }
-    _write(Path(out_folder) / "weights", source, before.card, state, note)
+    _write(Path(out_folder) / "weights", source, before.card, net, state, note)
     return rows
 
 
@@ -78,9 +81,11 @@ def _file_sha256(path: str | os.PathLike) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _train(nets: Networks, data: Labelled, typical: np.ndarray, seed: int, progress: Progress) -> dict[str, np.ndarray]:
-    """S2MPN's tensors, rounded as they are written, at the epoch that was best on the validation presses."""
-    module, head = _module(nets, "S2MPN"), _module(nets, "force").requires_grad_(False)
+def _train(
+    nets: Networks, net: str, data: Labelled, typical: np.ndarray, seed: int, progress: Progress
+) -> dict[str, np.ndarray]:
+    """The network's tensors, rounded as they are written, at the epoch that was best on the validation presses."""
+    module, head = _module(nets, net), _module(nets, "force").requires_grad_(False)
     latent = torch.from_numpy(nets.encode_signal(data.change, data.rectified))
     rehearsed = torch.from_numpy(nets.encode_signal(np.abs(typical) if data.rectified else typical, data.rectified))
     place, force = torch.from_numpy(data.place), torch.from_numpy(data.force)
@@ -134,7 +139,7 @@ def _rows(nets: Networks, data: Labelled, when: str) -> list[Row]:
     """Median miss of place and force on the presses kept for it; null: always the training's median."""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVB"]
-    latent = nets.s2m(nets.encode_signal(data.change[test], data.rectified))
+    latent = nets.s2m(nets.encode_signal(data.change[test], data.rectified), data.rectified)
     true, middle = on_skin(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
     miss, null = (metrics.lengths(on_skin(frame, each) - true) for each in (latent[:, :PLACE], middle))
     load, usual = metrics.lengths(nets.force(latent)), np.median(data.force[train])
@@ -157,13 +162,13 @@ def on_skin(frame: MovingFrame, place: np.ndarray) -> np.ndarray:
     return (1 - t) * before + t * behind
 
 
-def _write(folder: Path, source: Path, card: dict, state: dict[str, np.ndarray], note: dict) -> None:
-    """The weights folder: all files of the source but S2MPN's, and the card with a note of the fine-tuning, last."""
-    for name in [*(f"{net}.safetensors" for net in NETS if net != "S2MPN"), typical_signals.FILE]:
+def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
+    """The weights folder: all files of the source but the tuned one, and the card with a note of it, last."""
+    for name in [*(f"{net}.safetensors" for net in NETS if net != tuned), typical_signals.FILE]:
         write_bytes(folder / name, read_bytes(source / name))
     data = to_safetensors(state)
-    write_bytes(folder / "S2MPN.safetensors", data)
-    entry = card["nets"]["S2MPN"] | {"sha256": sha256(data)}
-    card = card | {"nets": card["nets"] | {"S2MPN": entry}, "fine_tuned": note}
+    write_bytes(folder / f"{tuned}.safetensors", data)
+    entry = card["nets"][tuned] | {"sha256": sha256(data)}
+    card = card | {"nets": card["nets"] | {tuned: entry}, "fine_tuned": note}
     write_bytes(folder / CARD_NAME, card_bytes(card))
     networks.load(folder)  # what was written can be read

@@ -1,0 +1,120 @@
+"""What can be rendered: frames of a recording, height maps, a scene; each becomes height maps under a camera."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import sensors
+from ..errors import TactileError
+from ..frames_file import FORMAT as CONVERTED
+from ..recordings.simulated import FORMAT as SIMULATED
+from ..recordings.store import open_hdf5, open_npz
+
+if TYPE_CHECKING:
+    from ..recordings.store import Store
+
+EXPECTED = "frames.h5, a simulated recording (.h5), a height map (.npz, .exr), or a scene's folder"
+HEIGHT_ARRAY = "height_map"
+
+Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Frames:
+    """What is in an input: displacements of the DIGIT's nodes or height maps, one of the two.
+
+    kind : in words; numbers : (T,) by which frames are known
+    displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m
+    """
+
+    kind: str
+    numbers: np.ndarray
+    displacement: np.ndarray | None = None
+    scale: float = 1.0
+    heights: np.ndarray | None = None
+
+    def some(self, rows: np.ndarray) -> Iterator[np.ndarray]:
+        """Displacement (M, 3) m or heights (H, W) m of each of some frames."""
+        for row in rows:
+            if self.heights is not None:
+                yield self.heights[row]
+            else:
+                yield self.displacement[row] * self.scale
+
+
+def read_frames(path: str | os.PathLike, progress: Progress = nullcontext) -> Frames:
+    """What is in a file or folder; a scene is simulated, under `progress`, which yields a callback (done, in all).
+
+    Raises TactileError for anything else, or what cannot be read.
+    """
+    path = Path(path)
+    if path.is_dir() or path.suffix == ".toml":
+        return _of_scene(path, progress)
+    if not path.is_file():
+        raise TactileError(path, "there is no such file", EXPECTED)
+    if path.suffix == ".npz":
+        return _of_npz(path)
+    if path.suffix == ".exr":
+        from .exr import read_height
+
+        return Frames("height map", np.zeros(1, int), heights=read_height(path)[None])
+    return _of_hdf5(path)
+
+
+def _of_hdf5(path: Path) -> Frames:
+    with open_hdf5(os.fspath(path)) as store:
+        kind = store.attributes.get("format")
+        if kind == CONVERTED:
+            name, numbers = "displacement_digit", store.array("frame", (None,)).astype(int)
+        elif kind == SIMULATED:
+            name, numbers = "truth/displacement_digit", None
+        else:
+            raise TactileError(path, f"format {kind!r}", EXPECTED)
+        _check_displacement(store, name)
+        scale = float(store.attributes_of(name).get("scale", 1.0))
+        displacement = store.array(name, (None, len(sensors.digit_surface().rest), 3), np.float32)
+    numbers = np.arange(len(displacement)) if numbers is None else numbers
+    if len(numbers) != len(displacement) or not len(numbers):
+        raise TactileError(path, f"{len(displacement)} frames of {len(numbers)} numbers", "as many, one or more")
+    return Frames("converted" if kind == CONVERTED else "simulated", numbers, displacement, scale)
+
+
+def _check_displacement(store: Store, name: str) -> None:
+    if name not in store.shapes:
+        raise TactileError(f"{store.path}, {name}", "missing", "the gel's deformation of each frame",
+                           "Convert with --keep displacement")  # fmt: skip
+    shape, count = store.shapes[name][0], len(sensors.digit_surface().rest)
+    if shape[1:] != (count, 3):
+        raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {count}, 3)",
+                           "It was made with another version of the surface: make it anew")  # fmt: skip
+
+
+def _of_npz(path: Path) -> Frames:
+    with open_npz(os.fspath(path)) as store:
+        names = list(store.shapes)
+        if HEIGHT_ARRAY not in names and len(names) != 1:
+            expected = f"one called {HEIGHT_ARRAY}, or one in all"
+            raise TactileError(path, f"arrays {', '.join(names) or 'none'}", expected)
+        name = HEIGHT_ARRAY if HEIGHT_ARRAY in names else names[0]
+        shape = store.shapes[name][0]
+        if len(shape) not in (2, 3) or 0 in shape:
+            raise TactileError(f"{path}, {name}", f"shape {shape}", "heights (H, W) or (T, H, W), m")
+        heights = store.array(name, (None,) * len(shape), np.float32).reshape(-1, *shape[-2:])
+    return Frames("height map", np.arange(len(heights)), heights=heights)
+
+
+def _of_scene(path: Path, progress: Progress) -> Frames:
+    from ..mechanics.recording import simulate_recording
+
+    with tempfile.TemporaryDirectory() as folder, progress() as shown:
+        simulated = Path(folder) / "scene.h5"
+        simulate_recording(path, simulated, progress=shown)
+        return dataclasses.replace(_of_hdf5(simulated), kind="scene")

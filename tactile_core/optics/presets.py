@@ -1,0 +1,81 @@
+"""Presets: how exactly a picture is made, and what that was measured to cost."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from pathlib import Path
+from typing import Any
+
+from ..errors import TactileError
+from .gel_mesh import SPACING
+from .interreflection import Gather
+
+TABLE = Path(__file__).parent.parent / "data" / "optics_presets.json"
+
+
+@dataclasses.dataclass(frozen=True)
+class Preset:
+    """What Mitsuba is asked for.
+
+    points : that stand for each LED, a pass; passes : pictures from other points and other places of each pixel, over
+    which a picture is the mean; 1 looks at each pixel's middle alone
+    spacing : m between vertices of the gel's mesh
+    gather : how finely the gel's own light is gathered; None leaves it out
+    window : whether rays bend as the window makes them
+    """
+
+    name: str
+    says: str
+    points: int
+    passes: int = 1
+    spacing: float = SPACING
+    gather: Gather | None = None
+    window: bool = False
+
+
+FAST = "fast"  # shading.Shader: numpy alone
+STANDARD = Preset("standard", "direct light, 4 points an LED", points=4)
+QUALITY = Preset(
+    "quality", "6 points an LED, one bounce", points=6, gather=Gather(step=4, azimuths=12, growth=0.3, bounces=1)
+)
+REFERENCE = Preset(
+    "reference", "512 points an LED and 64 places a pixel, four bounces, the window", points=8, passes=64,
+    spacing=SPACING / 2, gather=Gather(step=2, azimuths=32, growth=0.1, bounces=4), window=True,
+)  # fmt: skip
+PRESETS = {preset.name: preset for preset in (STANDARD, QUALITY, REFERENCE)}
+NAMES = (FAST, *PRESETS)
+DEFAULT = STANDARD.name
+
+
+def preset_named(name: str) -> Preset:
+    """One of Mitsuba's presets; raises TactileError for another name."""
+    if name not in PRESETS:
+        raise TactileError("--preset", repr(name), f"one of {', '.join(NAMES)}")
+    return PRESETS[name]
+
+
+@functools.cache
+def measured() -> dict[str, Any]:
+    """What ``scripts/measure_presets.py`` found: how, and by preset error in grey levels and ms by variant."""
+    return json.loads(TABLE.read_text(encoding="utf-8"))
+
+
+def cheapest(error: float, variant: str) -> str:
+    """The fastest preset whose measured error, grey levels rms from the full model, is at most that.
+
+    Raises TactileError where none is.
+    """
+    table = measured()["presets"]
+    good = [name for name in NAMES if table[name]["error"] <= error]
+    if not good:
+        best = min(NAMES, key=lambda name: table[name]["error"])
+        found = f"{error:g} levels"
+        raise TactileError("--error", found, f"{table[best]['error']:g} or more, which {best} has", "Allow more")
+    return min(good, key=lambda name: _ms(table[name]["ms"], variant))
+
+
+def _ms(ms: dict[str, float], variant: str) -> float:
+    """Of a preset that needs no Mitsuba, or by a variant; one that was not measured counts as slowest."""
+    return ms.get("numpy", ms.get(variant, float("inf")))

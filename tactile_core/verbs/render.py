@@ -1,0 +1,90 @@
+"""``tactile render``: pictures by preset, from fast to physically based."""
+
+from __future__ import annotations
+
+import argparse
+import re
+
+from ..errors import TactileError
+from ..terminal import bar, tell
+from .common import NOTHING, progress_argument
+
+BRIEF = "pictures of deformed gels, physically based"
+TEXT = """\
+Draw what the DIGIT's camera sees of a deformed gel. INPUT is one of
+  frames.h5          of `tactile convert`, with displacement kept
+  recording.h5       simulated, with its true gel
+  heights.npz, .exr  heights in metres under the camera's pixels: array height_map, (H, W) or (T, H, W); channel height
+  a scene's folder   (or its scene.toml) with a [recording], which is simulated first
+
+DIR is a new folder, which appears whole or not at all:
+  images/%05d.png  8-bit pictures: background + C (L in contact - L at rest)
+  exr/%05d.exr     with --exr, float32: basis.red, .green, .blue = L of each LED; R, G, B = C L in grey levels
+  rest.exr         the same of the undeformed gel
+  note.json        input, calibration, preset, versions;  timings.json  ms a frame
+
+Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (pip install "tactile-core[render]").
+  fast       direct light, soft shadows            standard   direct light, traced
+  quality    and the light of one bounce           reference  everything, seconds a frame
+A picture is the same with LLVM and without it, but for rounding; `tactile doctor` says which runs here."""
+EPILOG = """\
+examples:
+  tactile render results/touch/frames.h5 --out pictures --frames 100:200
+  tactile render scenes/press_roll_slide --out pictures --preset quality --exr
+  tactile render heights.npz --out pictures --error 0.5 --calibration unit.toml"""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("input", metavar="INPUT")
+    verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
+    verb.add_argument(
+        "--preset", choices=("fast", "standard", "quality", "reference"), help="how exactly (default: standard)"
+    )
+    verb.add_argument(
+        "--error",
+        type=float,
+        metavar="LEVELS",
+        help="instead: the cheapest preset whose measured error, grey levels rms from the full model, is at most that",
+    )
+    verb.add_argument("--calibration", metavar="UNIT.toml", help="of your sensor (default: the one that ships)")
+    verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="only these, counted from 0 as in Python")
+    verb.add_argument("--size", metavar="WxH", help="pixels, such as 480x640 (default: the calibration's)")
+    verb.add_argument("--exr", action="store_true", help="write OpenEXR beside PNG")
+    verb.add_argument("--variant", choices=("llvm", "scalar"), help="of Mitsuba (default: the faster one that works)")
+    verb.add_argument("--overwrite", action="store_true", help="replace an older result")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Render."""
+    if options.error is not None and not options.error > 0:
+        raise TactileError("--error", f"{options.error:g}", "grey levels above 0")
+    size = _size(options.size)
+    from .. import convert
+    from ..optics import job, variant
+
+    wanted = {None: None, "llvm": variant.LLVM, "scalar": variant.SCALAR}[options.variant]
+    asked = job.Options(
+        preset=options.preset,
+        error=options.error,
+        calibration=options.calibration,
+        size=size,
+        frames=convert.parse_frames(options.frames),
+        exr=options.exr,
+        variant=wanted,
+        overwrite=options.overwrite,
+    )
+    done = job.render(options.input, options.out, asked, lambda word: bar(word, "frame", options.progress))
+    tell(str(done))
+    return 0
+
+
+def _size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    if not found:
+        raise TactileError("--size", repr(text), "WIDTHxHEIGHT in pixels, such as 480x640")
+    return int(found[1]), int(found[2])

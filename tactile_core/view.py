@@ -1,0 +1,127 @@
+"""Perspective: the heights that the pixels of a pinhole camera see on a height map of the gel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .camera import Camera
+from .errors import TactileError
+
+NEWTON_STEPS = 2  # from the resting gel: presses of 1.5 mm are then met to 1 um, in folds apart (tests/test_view.py)
+STEEPEST = 0.05  # of 1 + slope . q / apparent height: below, the gel hides, or nearly hides, a part of itself
+MARCH_LEVELS, BISECTIONS = 64, 14  # of the search from above where it does: 2 mm / 64 / 2^14 is 2 nm
+
+
+class View:
+    """The camera's view of height maps that lie about as the resting one.
+
+    A pixel at q = (right, down) on the plane of height zero sees the point q s, s = 1 - h / apparent height, where
+    h = height(q s): the first such point from the camera.
+    rest : (H, W) float32, m, heights of the undeformed gel
+    """
+
+    def __init__(self, camera: Camera, rest: np.ndarray) -> None:
+        self.camera = camera
+        self.right = camera.right.astype(np.float32)[None, :]
+        self.down = camera.down.astype(np.float32)[:, None]
+        self._middle = np.float32((camera.height - 1) / 2), np.float32((camera.width - 1) / 2)
+        rows = np.arange(camera.height, dtype=np.float32)[:, None] - self._middle[0]
+        columns = np.arange(camera.width, dtype=np.float32)[None, :] - self._middle[1]
+        self._rows, self._columns = rows, columns
+        self._inverse = np.float32(1 / camera.apparent_height)
+        self._start = rest
+        for _ in range(NEWTON_STEPS):  # a dome is so flat that each turn makes the error 1,000 times smaller
+            self._start = self(rest)
+
+    def __call__(self, height: np.ndarray) -> np.ndarray:
+        """Heights (H, W) float32, m, seen by the pixels; height : (H, W) float32, m, under the pixels.
+
+        Raises TactileError where the gel reaches the camera.
+        """
+        if height.max() >= 0.9 * self.camera.apparent_height:
+            found = f"{height.max() * 1e3:.1f} mm high"
+            raise TactileError("height map", found, f"below the camera at {self.camera.apparent_height * 1e3:.1f} mm")
+        steepness = self._steepness(height)
+        if float(steepness.min()) < STEEPEST - 1:
+            return self._from_above(height)
+        seen = self._start
+        for k in range(NEWTON_STEPS):
+            last = k == NEWTON_STEPS - 1
+            near = 1 - seen * self._inverse
+            row, column = self._places(near)
+            nearest = (row + np.float32(0.5)).astype(np.intp) * self.camera.width
+            nearest += (column + np.float32(0.5)).astype(np.intp)
+            at = bilinear(height, row, column) if last else height.take(nearest)
+            turn = steepness.take(nearest)  # of the tangent plane along the pixel's ray, times near
+            turn /= near
+            # The tangent plane at q near: h = at + turn (seen - h).
+            seen = (at + turn * seen) / (1 + turn)
+        return seen
+
+    def _steepness(self, height: np.ndarray) -> np.ndarray:
+        """Slope along the position p from the picture's middle, times |p| / apparent height, (H, W)."""
+        slope_right, slope_down = slopes(height, self.camera)
+        slope_right *= self.right * self._inverse
+        slope_down *= self.down * self._inverse
+        slope_right += slope_down
+        return slope_right
+
+    def _places(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Fractional rows and columns of the map at the pixels' positions times near, within the map."""
+        row, column = near * self._rows, near * self._columns
+        row += self._middle[0]
+        column += self._middle[1]
+        row = np.clip(row, 0, 2 * self._middle[0], out=row)
+        return row, np.clip(column, 0, 2 * self._middle[1], out=column)
+
+    def _from_above(self, height: np.ndarray) -> np.ndarray:
+        """The same by a search along each ray from the highest level down: slower, and right where gel hides gel."""
+        high, low = np.float32(height.max() + 1e-6), np.float32(height.min() - 1e-6)
+        above = np.full(self.camera.shape, high)
+        below = np.full(self.camera.shape, low)
+        open_ = np.ones(self.camera.shape, bool)
+        for level in np.linspace(high, low, MARCH_LEVELS + 1, dtype=np.float32)[1:]:
+            hidden = open_ & (self._at(height, np.full_like(above, level)) >= level)
+            below[hidden] = level
+            open_ &= ~hidden
+            above[open_] = level
+        for _ in range(BISECTIONS):
+            middle = (above + below) / 2
+            hidden = self._at(height, middle) >= middle
+            below = np.where(hidden, middle, below)
+            above = np.where(hidden, above, middle)
+        return (above + below) / 2
+
+    def _at(self, height: np.ndarray, level: np.ndarray) -> np.ndarray:
+        return bilinear(height, *self._places(1 - level * self._inverse))
+
+
+def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes of heights (H, W) m along the picture's right and down, second order, at its edges too."""
+    right, down = camera.pixel_size
+    return _differences(height.T, right).T, _differences(height, down)
+
+
+def _differences(values: np.ndarray, step: float) -> np.ndarray:
+    found = np.empty_like(values)
+    np.subtract(values[2:], values[:-2], out=found[1:-1])
+    found[0] = 4 * values[1] - 3 * values[0] - values[2]
+    found[-1] = 3 * values[-1] - 4 * values[-2] + values[-3]
+    found *= np.float32(0.5 / step)
+    return found
+
+
+def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """values (h, w), 2 x 2 or more, at fractional places within them; float32."""
+    height, width = values.shape
+    i, j = np.minimum(row.astype(np.intp), height - 2), np.minimum(column.astype(np.intp), width - 2)
+    t, s = row - i.astype(np.float32), column - j.astype(np.float32)
+    start, flat = i * width + j, np.ravel(values)
+    upper = flat.take(start)
+    upper += s * (flat.take(start + 1) - upper)
+    lower = flat.take(start + width)
+    lower += s * (flat.take(start + width + 1) - lower)
+    lower -= upper
+    lower *= t
+    upper += lower
+    return upper

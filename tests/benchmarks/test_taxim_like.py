@@ -1,0 +1,47 @@
+"""The physical model beside a Taxim-like table: same photographs to fit, same photographs to meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from taxim_like import TableBench, fit_table, try_table
+
+from tactile_core.calibrate.bench import Bench
+from tactile_core.calibrate.photographs import Photographs, chosen, read_photographs
+from tactile_core.calibrate.trial import mean_figures, try_unit
+from tactile_core.calibration_file import load_calibration
+from tactile_core.rows import HEADER, line, row
+
+BALL = 3e-3  # m, radius
+KEPT_APART = ["0003.png", "0018.png", "0033.png", "0036.png", "0039.png"]
+
+
+@pytest.fixture(scope="module")
+def photographs(outside_data: Callable[[str], Path]) -> Photographs:
+    return read_photographs(outside_data("digit_real") / "presses")
+
+
+def test_shipped_calibration_beats_a_table_fitted_on_the_same_presses(photographs: Photographs) -> None:
+    unit = load_calibration()
+    test = chosen(photographs, KEPT_APART)
+    table = fit_table(unit, chosen(photographs, list(unit.fit.photographs)), BALL)
+    rows_of_table = try_table(table, unit, test, BALL)
+    ours, null = mean_figures(try_unit(unit, test, BALL, search_radius=False))
+    theirs = {name: float(np.mean([found[name] for found in rows_of_table])) for name in rows_of_table[0]}
+    units = {"roi_l1": "levels", "roi_psnr": "dB", "roi_ssim": "", "frame_l1": "levels", "lobe_iou": ""}
+    print("\n" + HEADER)
+    for name in units:
+        for label, values in (("fast", ours), ("taxim_like", theirs)):
+            print(line(row(f"{label}_{name}", values[name], units[name], null=null[name], of="5 presses kept apart")))
+    assert null["roi_psnr"] < theirs["roi_psnr"] < ours["roi_psnr"]
+    assert ours["roi_l1"] < theirs["roi_l1"] < null["roi_l1"]
+
+
+def test_time_of_a_picture(photographs: Photographs, benchmark: Callable) -> None:
+    unit = load_calibration()
+    table = fit_table(unit, chosen(photographs, list(unit.fit.photographs)[:2]), BALL)
+    picture = benchmark(TableBench(Bench(unit), table).change, (0.0, 0.0, 1e-3, BALL))
+    assert np.isfinite(picture).all()

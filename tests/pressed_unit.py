@@ -1,0 +1,37 @@
+"""Photographs of a unit whose numbers are known: balls pressed into it, rendered by the fast picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from tactile_core.calibrate.ball_print import print_on
+from tactile_core.calibration import Calibration
+from tactile_core.height_map import rest_height_map
+from tactile_core.shading import Shader
+
+BALL = 3e-3  # m, radius
+PLACES = ((0.0, 0.0, 0.9), (-3.0, -4.0, 1.0), (3.2, -3.5, 0.8), (-3.1, 4.2, 1.1), (2.8, 3.9, 1.0))  # mm
+
+
+def photograph(
+    unit: Calibration, place: tuple[float, float, float], noise: np.random.Generator | None = None
+) -> np.ndarray:
+    """Picture (H, W, 3) uint8 of a ball at right, down, depth in mm."""
+    rest = rest_height_map(unit.camera)
+    right, down = np.meshgrid(unit.camera.right, unit.camera.down)
+    at_right, at_down, depth = (1e-3 * value for value in place)
+    return Shader(unit)(print_on(rest, right, down, (at_right, at_down, depth, BALL)), noise)
+
+
+def write_photographs(folder: Path, unit: Calibration, places: tuple = PLACES) -> Path:
+    """press_0.png, press_1.png ... and untouched.png beside the folder; with the camera's noise. Returns the folder."""
+    folder.mkdir()
+    noise = np.random.default_rng(0)
+    for k, place in enumerate(places):
+        Image.fromarray(photograph(unit, place, noise)).save(folder / f"press_{k}.png")
+    untouched = Shader(unit)(rest_height_map(unit.camera), noise)
+    Image.fromarray(untouched).save(folder.parent / "untouched.png")
+    return folder
