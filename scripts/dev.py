@@ -4,8 +4,10 @@
     python3 scripts/dev.py test                     check the style, then run the tests
     python3 scripts/dev.py test --train             the same with torch, so that the training tests run too
     python3 scripts/dev.py test tests/test_cli.py -x    what is not known here goes to pytest
+    python3 scripts/dev.py test-blender             the extension's tests in the bpy wheel (--bpy 5.0.1 for another)
+    python3 scripts/dev.py test-blender --binary /usr/bin/blender    and in a real Blender, from the zip that users get
 
-Both make `.venv` in the checkout and install the project there (editable, versions from constraints.txt).
+The first two make `.venv` in the checkout and install the project there (editable, versions from constraints.txt).
 Afterwards `.venv/bin/tactile` and `.venv/bin/python` work (Windows: `.venv\\Scripts\\`). A second call is instant.
 The file keeps to the syntax of Python 3.7, so that an old Python reads it far enough to say what it lacks.
 """
@@ -25,6 +27,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 OLDEST, NEWEST = (3, 11), (3, 13)
 DEMO_RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+# What the extension's tests need beside bpy; 4.2 to 5.0 were built for the first numpy's binary interface.
+BLENDER_PACKAGES = ("pytest", "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree")
+BLENDER_SECONDS = 1800  # some Blenders hang at exit (4.5 where an operator stays registered): no run may last longer
 STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
 # Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
@@ -51,13 +56,19 @@ def main(arguments: list[str] | None = None) -> int:
     test = commands.add_parser("test", help="run ruff and pytest; other arguments go to pytest", allow_abbrev=False)
     test.add_argument("--train", action="store_true", help="also install torch and run the training tests")
     test.add_argument("--numpy", metavar="VERSION", help="install this numpy instead of the pinned one")
+    blender = commands.add_parser("test-blender", help="test the extension inside Blender", allow_abbrev=False)
+    blender.add_argument("--bpy", metavar="VERSION", default="4.5.15", help="of the wheel (default: %(default)s)")
+    blender.add_argument("--binary", type=Path, metavar="PATH", help="a real Blender in place of the wheel")
+    blender.add_argument("--venv", type=Path, help="where to install (default: .venv-bpy-VERSION)")
     for command in (demo, test):
         command.add_argument("--venv", type=Path, default=ROOT / ".venv", help="where to install (default: .venv)")
     options, rest = parser.parse_known_args(arguments)
-    if rest and options.command != "test":
+    if rest and options.command == "demo":
         parser.error("unknown arguments: " + " ".join(rest))
     try:
         check_python(sys.version_info[:2])
+        if options.command == "test-blender":
+            return run_in_binary(options.binary, rest) if options.binary else run_in_bpy(options, rest)
         return run_demo(options.venv) if options.command == "demo" else run_tests(options, rest)
     except SetupError as error:
         print(f"dev.py: error: {error}", file=sys.stderr)
@@ -103,6 +114,64 @@ def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
         status = subprocess.call([str(python), "-m", *command], cwd=str(ROOT), env=environment())
         failed += [status] if status else []
     return failed[0] if failed else 0
+
+
+def run_in_bpy(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
+    """The extension's tests in the bpy wheel of one version; returns pytest's status."""
+    folder = options.venv or ROOT / (".venv-bpy-" + options.bpy)
+    old = tuple(int(part) for part in options.bpy.split(".")[:2]) < (5, 1)
+    needed = (3, 11) if old else (3, 13)
+    if sys.version_info[:2] != needed:
+        raise SetupError("bpy {} has wheels for Python {}.{} alone".format(options.bpy, *needed))
+    python = make_venv(folder)
+    packages = ["bpy==" + options.bpy, *BLENDER_PACKAGES]
+    wanted = {"root": str(ROOT), "python": python_version(), "packages": packages, "sources": sources_hash()}
+    have = read_stamp(folder)
+    if any(have.get(key) != value for key, value in wanted.items()):
+        say(f"installing {packages[0]} into {relative(folder)}; downloads up to about 450 MB")
+        write_stamp(folder, dict(wanted, state="installing"))
+        failure = run_pip(python, folder, packages, "1.26.4" if old else None)
+        if failure:
+            raise SetupError(failure)
+        write_stamp(folder, dict(wanted, state="ready"))
+    say(f"pytest tests/blender, {packages[0]}")
+    return call_with_limit([str(python), "-m", "pytest", "tests/blender", *pytest_arguments], environment())
+
+
+def run_in_binary(binary: Path, pytest_arguments: list[str]) -> int:
+    """The same tests inside a real Blender, on the zip with the wheels of its Python; returns pytest's status."""
+    code = "import sys; print('PYTHON %d.%d' % sys.version_info[:2])"
+    try:
+        command = [str(binary), "--background", "--factory-startup", "--python-expr", code]
+        asked = subprocess.run(command, stdout=subprocess.PIPE, timeout=120)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise SetupError(f"{binary} does not run ({error})") from None
+    found = re.search(r"PYTHON (\d+\.\d+)", asked.stdout.decode(errors="replace"))
+    if not found:
+        raise SetupError(f"{binary} runs no Python")
+    work = ROOT / "out" / "test-blender"
+    site, wheels = work / "site", work / "dist"
+    build = [sys.executable, str(ROOT / "scripts" / "build_extension.py"), "--python", found.group(1)]
+    constraint = ["--constraint", str(ROOT / "constraints.txt")]
+    pytest = [sys.executable, "-m", "pip", "install", "--upgrade", "--target", str(site), *constraint, "pytest"]
+    for step in ([*build, "--out", str(wheels)], pytest):
+        if subprocess.call(step, env=environment()):
+            raise SetupError("the step before failed")
+    packed = max(wheels.glob(f"*-py{found.group(1)}.zip"), key=lambda path: path.stat().st_mtime)
+    run = ROOT / "tests" / "blender" / "run_in_blender.py"
+    say(f"pytest tests/blender, {binary}, {packed.name}")
+    known = dict(environment(), TACTILE_ZIP=str(packed), TACTILE_SITE=str(site))
+    options = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", str(run), "--"]
+    return call_with_limit([str(binary), *options, *pytest_arguments], known)
+
+
+def call_with_limit(command: list[str], variables: dict[str, str]) -> int:
+    """Run a Blender; the status 124 when it did not end in time."""
+    try:
+        return subprocess.call(command, cwd=str(ROOT), env=variables, timeout=BLENDER_SECONDS)
+    except subprocess.TimeoutExpired:
+        print(f"dev.py: error: not done after {BLENDER_SECONDS} s", file=sys.stderr)
+        return 124
 
 
 def install(folder: Path, extras: tuple[str, ...], numpy: str | None = None) -> Path:
@@ -178,18 +247,23 @@ def why_unusable(python: Path, have: dict) -> str | None:
 
 
 def pip_install(python: Path, folder: Path, extras: tuple[str, ...], numpy: str | None) -> str | None:
+    """Install the project with these extras. Returns why it failed, or None."""
+    # pip reads `.[extra]` relative to its working folder, whatever characters the path of that folder holds.
+    project = ".[{}]".format(",".join(extras)) if extras else "."
+    return run_pip(python, folder, ["--editable", project], numpy)
+
+
+def run_pip(python: Path, folder: Path, what: list[str], numpy: str | None) -> str | None:
     """Run pip, showing its downloads and keeping all it says in a log. Returns why it failed, or None."""
     constraints = ROOT / "constraints.txt"
     if numpy:
         text = re.sub(r"(?m)^numpy==.*$", f"numpy=={numpy}", constraints.read_text(encoding="utf-8"))
         constraints = folder / "constraints.txt"
         constraints.write_text(text, encoding="utf-8")
-    # pip reads `.[extra]` relative to its working folder, whatever characters the path of that folder holds.
-    target = ".[{}]".format(",".join(extras)) if extras else "."
     command = [str(python), "-m", "pip", "install", "--no-input", "--constraint", str(constraints)]
     log = folder / LOG
     with subprocess.Popen(
-        [*command, "--editable", target], cwd=str(ROOT), env=environment(),
+        [*command, *what], cwd=str(ROOT), env=environment(),
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
     ) as process, open(str(log), "w", encoding="utf-8") as record:
         for raw in process.stdout:

@@ -11,6 +11,7 @@ translations are left in --out, in the form that judge_recordings.py, the tool b
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
@@ -41,6 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", default="out/translated", metavar="FOLDER", help="translations (default: %(default)s)")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")
     parser.add_argument("--card", metavar="FILE", help="write the model card (Markdown, and a picture beside it) here")
+    parser.add_argument("--sweep", metavar="FILE", help="rows of scripts/sweep_networks.py, for the card")
     parser.add_argument("--quick", action="store_true", help="a few recordings, or a few test presses")
     options = parser.parse_args(arguments)
     try:
@@ -75,7 +77,8 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
     if apart:
         found += test_set.unseen_rows(apart, pairs, bodies)
     if options.card:
-        write_model_card(Path(options.card), found, network, pairs, apart)
+        sweep = json.loads(Path(options.sweep).read_text()) if options.sweep else []
+        write_model_card(Path(options.card), found, network, pairs, apart, sweep)
     return found
 
 

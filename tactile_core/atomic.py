@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import secrets
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,14 +15,18 @@ from .errors import TactileError
 
 
 @contextlib.contextmanager
-def new_file(path: str | os.PathLike) -> Iterator[Path]:
+def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]:
     """Yield a temporary path in the same folder; leaving the block flushes it to disk and moves it to `path`.
 
     An error inside the block removes the temporary file and leaves what stood at `path` untouched. A killed process
     leaves `.<name>.tactile-partial`, which the next writer of the same file replaces.
+    shared : several processes may write the same file at once; each has a temporary name of its own, and `sweep_files`
+        clears those of killed ones
     """
     path = Path(path)
     partial = _beside(path, "partial")
+    if shared:
+        partial = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tactile-partial")
     try:
         yield partial
         _sync(partial)
@@ -32,17 +37,17 @@ def new_file(path: str | os.PathLike) -> Iterator[Path]:
     _sync_folder(path.parent)
 
 
-def write_bytes(path: str | os.PathLike, content: bytes) -> None:
-    """Write a whole file or nothing."""
-    with new_file(path) as partial:
+def write_bytes(path: str | os.PathLike, content: bytes, *, shared: bool = False) -> None:
+    """Write a whole file or nothing; shared : as for `new_file`."""
+    with new_file(path, shared=shared) as partial:
         partial.write_bytes(content)
 
 
-def write_json(path: str | os.PathLike, content: Any) -> None:
+def write_json(path: str | os.PathLike, content: Any, *, shared: bool = False) -> None:
     """Write readable JSON with sorted keys, so that equal content is equal bytes; raises ValueError for NaN."""
     text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
     # A file name that is no UTF-8 holds lone surrogates, which become JSON's own escapes.
-    write_bytes(path, (text + "\n").encode(errors="backslashreplace"))
+    write_bytes(path, (text + "\n").encode(errors="backslashreplace"), shared=shared)
 
 
 @contextlib.contextmanager
@@ -80,6 +85,12 @@ def sweep(folder: str | os.PathLike) -> None:
         path = lock.with_name(lock.name.removeprefix(".").removesuffix(".tactile-lock"))
         with contextlib.suppress(TactileError), _locked(path):
             _recover(path)
+
+
+def sweep_files(folder: str | os.PathLike) -> None:
+    """Clear the temporary files of killed writers; only for who knows that none is living."""
+    for leftover in Path(folder).glob(".*.tactile-partial"):
+        leftover.unlink(missing_ok=True)
 
 
 def _beside(path: Path, role: str) -> Path:

@@ -76,7 +76,7 @@ class Fit:
     ball_diameter : m
     errors : on those photographs, by the names of ``tactile calibrate --test``
     standard_errors : by parameter, in its unit in the file
-    not_identified : parameters that the photographs say nothing about; they kept the start's values
+    not_identified : parameters that the photographs tell too little of; held near the start's by how units differ
     """
 
     note: str
@@ -95,7 +95,7 @@ class Calibration:
     leds : red, green, blue
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
     albedo : 0..1 share of light that the coating scatters back, for interreflection; 0 leaves it out
-    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for
+    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for it
     """
 
     unit: str

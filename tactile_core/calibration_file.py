@@ -250,7 +250,7 @@ def _as_text(calibration: Calibration) -> str:
         "[fit.errors]  # on those photographs",
         *_named(fit.errors),
         "",
-        "[fit.standard_errors]  # in the unit of each parameter",
+        "[fit.standard_errors]  # in each parameter's unit; how units differ (assumed) counts as a measurement",
         *_named(fit.standard_errors),
         "",
     ]

@@ -30,7 +30,8 @@ SIGTERM or SIGHUP."""
 # module -> extra that brings it
 EXTRAS = {
     "torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem",
-    "mitsuba": "render", "drjit": "render", "OpenEXR": "render",
+    "mitsuba": "render", "drjit": "render", "OpenEXR": "render", "rosbags": "ros", "lz4": "ros",
+    "distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch",
 }  # fmt: skip
 
 

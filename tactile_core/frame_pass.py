@@ -45,6 +45,13 @@ class Tools:
     shade: Callable[[np.ndarray], np.ndarray]
 
 
+def translated(signals: Signals, tools: Tools) -> dict[str, np.ndarray]:
+    """What a translation makes of all frames of `signals`, T first, by the names of frames.h5."""
+    translation = tools.translate(signals)
+    arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
+    return arrays | {"electrodes": signals.electrodes, "flags": arrays["flags"] | signals.flags}
+
+
 class FramePass:
     """Takes the selected frames once through all stages, and keeps of them only what the contact sheet shows."""
 
@@ -95,14 +102,8 @@ class FramePass:
         """All arrays of some frames, T first, by the names of frames.h5."""
         part = {name: getattr(self.signals, name)[frames] for name in ("change", "electrodes", "quiet", "flags")}
         with self.clock.stage("translate"):
-            translation = self.tools.translate(dataclasses.replace(self.signals, **part))
-        arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
-        return arrays | {
-            "frame": frames.astype(np.int32),
-            "time": self.recording.time[frames],
-            "electrodes": part["electrodes"],
-            "flags": arrays["flags"] | part["flags"],
-        }
+            arrays = translated(dataclasses.replace(self.signals, **part), self.tools)
+        return arrays | {"frame": frames.astype(np.int32), "time": self.recording.time[frames]}
 
     def _draw(self, folder: Path, frames: np.ndarray, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Heights, as far as they are kept; pictures go to their files. Frames that nobody looks at are passed over."""

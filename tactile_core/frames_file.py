@@ -1,4 +1,4 @@
-"""``frames.h5``: the numbers of a converted recording, one row a frame, T first, SI units, float32."""
+"""``frames.h5``: the numbers of a converted recording, one row a frame, T first, SI units, float32 (time: float64)."""
 
 from __future__ import annotations
 
@@ -44,9 +44,14 @@ KEPT = {
     "height": {"height_map": ("m", "(T, 320, 240) of the gel seen by the camera; see tactile_core.height_map")},
     "image": {},
 }
+PICTURES = {"image": ("1", "(T, 320, 240, 3) sRGB pictures of the DIGIT")}  # in shards; elsewhere they are PNG files
 # Displacements and codes are stored plain: measured on smooth dents, gzip saves 21 % of the bytes for 1.5 ms a frame
 # (plain: 0.15 ms). Height maps, the largest and smoothest, are worth it.
-PACKED = {"height_map": {"compression": "gzip", "compression_opts": 1, "shuffle": True}}
+PACKED = {
+    "height_map": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
+    "image": {"compression": "gzip", "compression_opts": 4},
+}
+LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk of its own
 
 
 class FramesFile:
@@ -55,16 +60,22 @@ class FramesFile:
     All methods raise OSError, naming the file, where the disk cannot be written.
     """
 
-    def __init__(self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any]) -> None:
-        """path : new file; count : T; attributes : of the file itself, beside format and version."""
+    def __init__(
+        self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0
+    ) -> None:
+        """path : new file; count : T; attributes : of the file itself, beside format and version.
+
+        room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's seal; pictures are then in the file,
+            and a large array has one chunk a frame
+        """
         import h5py
 
         self._about = dict(ALWAYS)
         for word in keep:
-            self._about |= KEPT[word]
-        self._count = count
+            self._about |= PICTURES if room and word == "image" else KEPT[word]
+        self._count, self._framed = count, bool(room)
         self._disk = Disk(path)
-        self._file = h5py.File(self._disk, "w")
+        self._file = h5py.File(self._disk, "w", userblock_size=room)
         self._file.attrs.update({"format": FORMAT, "tactile_core": __version__, **attributes})
 
     def __enter__(self) -> FramesFile:
@@ -101,9 +112,10 @@ class FramesFile:
             self._file[name].attrs.update(attributes)
 
     def _create(self, name: str, array: np.ndarray) -> h5py.Dataset:
-        kind = "float32" if array.dtype.kind == "f" else array.dtype
+        kind = "float32" if array.dtype.kind == "f" and name != "time" else array.dtype  # an hour has 4e8 us
         packing = PACKED.get(name, {})
-        chunks = (1, *array.shape[1:]) if packing else None
+        large = self._framed and array[0].size >= LARGE
+        chunks = (1, *array.shape[1:]) if packing or large else None
         shape = (self._count, *array.shape[1:])
         data = self._file.create_dataset(name, shape, kind, chunks=chunks, track_times=False, **packing)
         unit, meaning = self._about[name]

@@ -16,6 +16,7 @@ from . import biotac_shape, sensors
 from .metrics import CORE
 
 STILL = 1e-9  # m: below, there is no dent to follow and the frame stays in the middle
+FADE = 5  # cells (assumed)
 PLACE_UNIT = 10.0  # cells a unit of the networks' inputs: places then are of the order of one (assumed)
 
 
@@ -85,6 +86,12 @@ class MovingFrame:
     @functools.cached_property
     def _middle(self) -> np.ndarray:
         return np.array([self.rows - 1, self.columns - 1], np.float32) / 2
+
+    def fade(self) -> np.ndarray:
+        """(width, width) float32: 1 in the window's middle, falling over FADE cells to 0 beyond its edge."""
+        inside = 1 + self.half - np.abs(np.arange(-self.half, self.half + 1))
+        along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(inside / (FADE + 1), 1))
+        return np.outer(along, along).astype(np.float32)
 
     def windows(self, local: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Field (T, n, 3) -> what lies in the window round each cell, (T, width, width, 3); 0 beyond the lattice."""

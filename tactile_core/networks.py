@@ -3,6 +3,7 @@
 Every network of `training/modules.py` has its forward pass here, with the same tensor names; float32 throughout.
 SVB  signal autoencoder       MVB  BioTac mesh autoencoder       MVD  DIGIT mesh autoencoder
 S2MPN  signal latent -> BioTac latent       M2MPN  BioTac latent -> DIGIT latent
+R2MPN  as S2MPN, for rectified signals: what makes it cope with unknown units would make S2MPN worse
 D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
 force and error  heads: force from the BioTac's latent, expected error from the signal
 
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,7 @@ COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outs
 ERROR_UNIT = 10e-6  # m, of the error head's logarithm
 WEIGHTS_FOLDER = Path(__file__).parent / "weights"
 # The card names the hash of every file of weights; this names the card that ships.
-SHIPPED_CARD_SHA256 = "90211e92657865db02987f64dfc21ae9645f3634764f9e742e4be7ac5a790e70"
+SHIPPED_CARD_SHA256 = "5be3809392c9bc65a99bd00dc5b7884b92598940e861aa0799968e1ad916e03a"
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,9 @@ class SignalDistance:
     mahalanobis: np.ndarray
     residual: np.ndarray
     largest: np.ndarray
+
+
+DISTANCES = tuple(field.name for field in fields(SignalDistance))
 
 
 def compress(change: np.ndarray) -> np.ndarray:
@@ -95,9 +99,15 @@ class Networks:
         size = self.sizes["SVB"]["latent"]
         return self._blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
 
-    def s2m(self, latent_signal: np.ndarray) -> np.ndarray:
-        """latent_signal (T, 8) -> latent_biotac (T, L)."""
-        return self._map("S2MPN", latent_signal)
+    def s2m(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """latent_signal (T, 8), rectified (T,) or one -> latent_biotac (T, L)."""
+        which = np.broadcast_to(np.asarray(rectified, bool), len(latent_signal))
+        if which.all() and len(which):
+            return self._map("R2MPN", latent_signal)
+        found = self._map("S2MPN", latent_signal)
+        if which.any():
+            found[which] = self._map("R2MPN", latent_signal)[which]
+        return found
 
     def m2m(self, latent_biotac: np.ndarray) -> np.ndarray:
         """latent_biotac (T, L) -> latent_digit (T, L')."""

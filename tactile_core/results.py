@@ -93,9 +93,13 @@ def is_result(folder: Path) -> bool:
 
 
 def sha256(path: str | os.PathLike) -> str:
-    """Hash of a file's bytes."""
+    """Hash of a file's bytes; of a folder (a bag): of its files' names and hashes."""
     import hashlib
 
+    if os.path.isdir(path):
+        files = sorted(file for file in Path(path).iterdir() if file.is_file())
+        told = "".join(f"{sha256(file)} {file.name}\n" for file in files)
+        return hashlib.sha256(told.encode(errors="surrogateescape")).hexdigest()
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -49,9 +49,14 @@ _LATERAL_SIGN = 1.0
 
 
 def electrodes() -> np.ndarray:
-    """Electrode positions (19, 3), m, shared frame: x = -x_e - 13.97 mm, y = z_e, z = +-y_e (sensors.md)."""
-    x, y, z = _ELECTRODES_SYNTOUCH_MM.T
-    return np.column_stack([-x - 13.97, z, _LATERAL_SIGN * y]) * 1e-3
+    """Electrode positions (19, 3), m, shared frame."""
+    return from_syntouch(1e-3 * _ELECTRODES_SYNTOUCH_MM)
+
+
+def from_syntouch(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) m of SynTouch's frame -> shared frame: x = -x_e - 13.97 mm, y = z_e, z = +-y_e (sensors.md)."""
+    x, y, z = np.asarray(points).T
+    return np.column_stack([-x - 13.97e-3, z, _LATERAL_SIGN * y])
 
 
 def biotac_surface() -> Lattice:

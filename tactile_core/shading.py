@@ -12,12 +12,17 @@ from .background import background_picture
 from .calibration import LARGEST_LEVEL, Calibration
 from .calibration_file import load_calibration
 from .camera import COLOURS, Camera, Led
-from .cast_shadows import FREE, ShadowCaster, bounding_box, disc_share
+from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .errors import TactileError
 from .height_map import of_unit, rest_height_map
 from .view import View, slopes
 
-MIN_RISE = 10e-6  # m; what has risen less throws a shadow of a pixel at most, lights at 20 degrees or higher
+# px at 240 wide: on real pictures noise correlates by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px, along and across; means
+# over squares of 4 px by 0.75, 0.5, 0.25, 0.
+GRAIN = 4
+# A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
+# differences that slopes are made of.
+TANGENT, TANGENT_MARGIN = 1.1, 2  # of the radius, px
 
 
 class Shader:
@@ -42,10 +47,11 @@ class Shader:
         background = background_picture(calibration) if background is None else background
         rest = _checked(rest, camera.shape, "rest height map")
         self.background = _checked(background, (*camera.shape, 3), "background")
+        self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
         self._gain = np.ascontiguousarray(calibration.gain.matrices(camera).transpose(2, 3, 0, 1), np.float32)
         self._view = View(camera, rest)
         self.rest = self._view(rest)
-        self._lamps = [Lamp(camera, led, self.rest) for led in calibration.leds]
+        self._lamps = [Lamp(camera, led) for led in calibration.leds]
         self._rest_radiance = self._seen_radiance(self.rest)
 
     def __call__(self, height_map: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
@@ -57,11 +63,11 @@ class Shader:
         change -= self._rest_radiance
         picture = np.empty((*self.camera.shape, 3), np.uint8)
         for channel in range(len(COLOURS)):
-            level = self.background[..., channel].copy()
+            level = self._levels[channel].copy()
             for gain, light in zip(self._gain[channel], change, strict=True):
                 level += gain * light
             if noise is not None:
-                level += np.float32(self.calibration.noise[channel]) * noise.standard_normal(level.shape, np.float32)
+                level += np.float32(self.calibration.noise[channel]) * grain(self.camera, noise)
             np.rint(level, out=level)
             picture[..., channel] = np.clip(level, 0, LARGEST_LEVEL, out=level)
         return picture
@@ -77,8 +83,7 @@ class Shader:
     def _seen_radiance(self, seen: np.ndarray) -> np.ndarray:
         """Radiance (3, H, W) of heights (H, W) that the pixels see."""
         surface = SeenSurface(self._view, seen)
-        raised = bounding_box(seen - self.rest > MIN_RISE)
-        return np.stack([lamp.radiance(surface, raised) for lamp in self._lamps])
+        return np.stack([lamp.radiance(surface) for lamp in self._lamps])
 
 
 class SeenSurface:
@@ -103,27 +108,20 @@ class SeenSurface:
         self.normal = np.sqrt(self.slope_right**2 + self.slope_down**2 + self.tilt**2)
         self.square = self.near**2 * (view.right**2 + view.down**2) + seen**2  # of the distance from the origin
 
-    @property
-    def mapped(self) -> np.ndarray:
-        """The field on which shadows are cast, see ``cast_shadows``."""
-        return self.height / self.near
+        self.mapped = seen / self.near  # the field on which shadows are cast, see ``cast_shadows``
 
 
 class Lamp:
-    """One LED and what it gives to the gel that the pixels see.
+    """One LED and what it gives to the gel that the pixels see."""
 
-    seen_rest : (H, W) float32, m, heights of the resting gel that the pixels see
-    """
-
-    def __init__(self, camera: Camera, led: Led, seen_rest: np.ndarray) -> None:
+    def __init__(self, camera: Camera, led: Led) -> None:
         self.led = led
         self._caster = ShadowCaster(camera, led)
         right, down, _ = np.asarray(led.position, np.float32)
         self._over_picture = camera.right.astype(np.float32) * right + (camera.down.astype(np.float32) * down)[:, None]
-        self._rest_sight = self._whole_sight(seen_rest / (1 - seen_rest * np.float32(1 / camera.apparent_height)))
 
-    def radiance(self, surface: SeenSurface, raised: tuple[slice, slice] | None) -> np.ndarray:
-        """Radiance (H, W) float32; raised : rows and columns of pixels where the gel may throw new shadows."""
+    def radiance(self, surface: SeenSurface) -> np.ndarray:
+        """Radiance (H, W) float32."""
         right, down, up = np.asarray(self.led.position, np.float32)
         distance = self._over_picture * surface.near
         distance += up * surface.height
@@ -134,40 +132,16 @@ class Lamp:
         facing -= right * surface.slope_right
         facing -= down * surface.slope_down
         facing += surface.own
-        sight, box = self._sight(surface, raised)
         light = np.maximum(facing, 0)
-        if sight is not None:
+        edge = bounding_box(facing < np.float32(TANGENT * self.led.radius) * surface.normal, TANGENT_MARGIN)
+        if edge is not None:
+            sight, box = self._caster.sight(surface.mapped, edge)
             light[box] = self._shadowed(sight, facing[box], distance[box], surface, box)
         distance *= np.sqrt(distance)
         distance *= surface.normal
         light /= distance
         light *= np.float32(np.square(self.led.position).sum())
         return light
-
-    def _sight(
-        self, surface: SeenSurface, raised: tuple[slice, slice] | None
-    ) -> tuple[np.ndarray | None, tuple[slice, slice]]:
-        """Sight and the box it is for: where the gel has risen, and where the resting gel shadows itself."""
-        rest, whole = self._rest_sight, tuple(slice(0, size) for size in surface.height.shape)
-        if raised is None:
-            return rest, whole
-        if rest is not None:  # the rising gel may bring light to what the resting gel shadowed, wherever that is
-            raised = whole
-        sight, box = self._caster.sight(surface.mapped, raised)
-        if rest is None:
-            return sight, box
-        both = np.full_like(rest, FREE)
-        both[box] = sight
-        return both, whole
-
-    def _whole_sight(self, mapped: np.ndarray) -> np.ndarray | None:
-        """Sight (H, W); None where the whole LED is seen everywhere, as over the bowl of a dome."""
-        sight, box = self._caster.sight(mapped, tuple(slice(0, size) for size in mapped.shape))
-        if not sight.size:
-            return None
-        whole = np.full(mapped.shape, FREE, np.float32)
-        whole[box] = sight
-        return whole
 
     def _shadowed(
         self, sight: np.ndarray, facing: np.ndarray, square: np.ndarray, surface: SeenSurface, box: tuple[slice, slice]
@@ -184,6 +158,15 @@ class Lamp:
         share *= facing
         share += moment
         return np.maximum(share, 0, out=share)
+
+
+def grain(camera: Camera, random: np.random.Generator) -> np.ndarray:
+    """Camera noise (H, W) float32 of standard deviation 1: white noise, averaged over squares of GRAIN px."""
+    width = max(GRAIN * camera.width // 240, 1)
+    white = random.standard_normal((camera.height + width, camera.width + width), np.float32)
+    total = white.cumsum(0, dtype=np.float64).cumsum(1)
+    across = total[:, width:] - total[:, :-width]
+    return ((across[width:] - across[:-width]) / width).astype(np.float32)
 
 
 def _checked(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:

@@ -16,7 +16,10 @@ from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
 UNTRAINED_CONFIDENCE = 0.2  # assumed
-FAR = 2.0  # times validation's outermost quantile: there confidence is gone, the frame out of range (assumed)
+FAR = 2.0  # times validation's outermost quantile: there confidence is gone (assumed)
+# Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
+# (scripts/evaluate_translation.py --kept-apart) it flags half of that part's frames, and most of those it should.
+IN_RANGE = 0.99
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,8 +56,6 @@ class Translator:
 
     def __init__(self, nets: Networks) -> None:
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
-        distance = self.card["distance"]
-        self._limits = {name: distance[name] for name in ("mahalanobis", "residual", "largest")}
         self._unrolled = surface.unrolled_nodes()
 
     def __call__(self, signals: Signals) -> Translation:
@@ -64,15 +65,15 @@ class Translator:
         change = np.asarray(signals.change, np.float32)
         change = np.where(rectified[:, None], np.abs(change), change)  # less its level at rest it may fall below zero
         latent_signal = nets.encode_signal(change, rectified)
-        latent_biotac = nets.s2m(latent_signal)
+        latent_biotac = nets.s2m(latent_signal, rectified)
         latent_digit = nets.m2m(latent_biotac)
         biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
         center = self._contact_center(digit)
         # Without its sign a weak signal leaves the dent undecided, but not the force: strength would stutter.
         silent = np.isnan(center[:, 0]) & ~rectified
-        confidence, out_of_range = self._trust(change, signals.flags, rectified)
+        confidence = self._confidence(change, signals.flags, rectified)
         flags = signals.flags.copy()
-        flags[out_of_range] |= np.uint16(Flag.OUT_OF_RANGE)
+        flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
         return Translation(
             latent_signal, latent_biotac, latent_digit, biotac, digit,
@@ -102,30 +103,34 @@ class Translator:
         return found
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """(T,) bool, whether changes (T, 19) counts lie far from those of the training."""
-        return self._nearness(np.asarray(change, np.float32), rectified) <= 0
+        """(T,) bool, whether changes (T, 19) counts lie outside those of the training, by any distance's quantile."""
+        return (self._distances(change, rectified) > self._quantile(IN_RANGE, rectified)).any(axis=0)
 
-    def _trust(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Confidence (T,) and whether a frame is out of range (T,)."""
-        confidence = self._nearness(change, rectified)
-        out_of_range = confidence <= 0
-        untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
-        confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
-        return confidence.astype(np.float32), out_of_range
-
-    def _nearness(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
+    def _confidence(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> np.ndarray:
         """(T,), 1 for signals like those of the training, 0 far from them.
 
         Each distance to the training signals counts against its quantiles in validation: all is well up to the 95 %
         quantile, nothing at ``FAR`` times the outermost. Not a calibrated probability: that is what bounds are for.
         """
-        distance = self.nets.signal_distance(change, rectified)
-        levels = self.card["distance"]["levels"]
-        confidence = np.ones(len(change), np.float32)
-        for name, limits in self._limits.items():
-            usual, far = np.interp(0.95, levels, limits), FAR * limits[-1]
-            confidence = np.minimum(confidence, np.clip((far - getattr(distance, name)) / (far - usual), 0, 1))
-        return confidence
+        usual, far = self._quantile(0.95, rectified), FAR * self._quantile(1.0, rectified)
+        confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
+        untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
+        confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
+        return confidence.astype(np.float32)
+
+    def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
+        """(distances, T) of `networks.SignalDistance`."""
+        distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
+        return np.stack([getattr(distance, name) for name in networks.DISTANCES])
+
+    def _quantile(self, level: float, rectified: np.ndarray | bool) -> np.ndarray:
+        """(distances, T) or (distances, 1), what as many of validation's frames of the same kind lay within."""
+        table = self.card["distance"]
+        limits = {
+            kind: np.array([[np.interp(level, table["levels"], table[kind][name])] for name in networks.DISTANCES])
+            for kind in KINDS
+        }
+        return np.where(rectified, limits["rectified"], limits["signed"])
 
     def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
         """Whether the BioTac is touched (T,) where the gel has no counterpart: the dent's centre rolls off the gel."""
@@ -139,25 +144,31 @@ class Translator:
         return core.any(axis=1) & (outside | (total == 0))
 
 
-QUANTILES = {"distance": ("mahalanobis", "residual", "largest"), "silence": ("biotac_m", "digit_m", "force_N")}
+KINDS = ("signed", "rectified")
 
 
 def _check_quantiles(card: dict, where: str) -> None:
     """What confidence and silence are measured by: growing finite numbers, as many as there are levels."""
-    for table, names in QUANTILES.items():
-        entry = card.get(table)
-        levels = entry.get("levels") if isinstance(entry, dict) else None
-        for name in ("levels", *names):
-            values = entry.get(name) if isinstance(entry, dict) else None
-            if not (_grows(values) and len(values) == len(levels)):
-                expected = "as many growing, finite numbers as levels"
-                raise TactileError(f"{where}, {table}.{name}", f"{values!r:.80}", expected, ADVICE)
+    _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
+    distance = card.get("distance") if isinstance(card.get("distance"), dict) else {}
+    for kind in KINDS:
+        table = distance.get(kind) if isinstance(distance.get(kind), dict) else {}
+        _check_table({"levels": distance.get("levels"), **table}, networks.DISTANCES, f"{where}, distance.{kind}")
+
+
+def _check_table(table: object, names: tuple[str, ...], where: str) -> None:
+    levels = table.get("levels") if isinstance(table, dict) else None
+    for name in ("levels", *names):
+        values = table.get(name) if isinstance(table, dict) else None
+        if not (_grows(values) and len(values) == len(levels)):
+            expected = "as many growing, finite numbers as levels"
+            raise TactileError(f"{where}.{name}", f"{values!r:.80}", expected, ADVICE)
 
 
 def _check_bounds(card: dict, where: str) -> None:
     """What expected errors are multiplied by: positive numbers for signed and rectified signals and both surfaces."""
     bounds = card.get("error_bounds")
-    for kind in ("signed", "rectified"):
+    for kind in KINDS:
         for name in network_sizes.SURFACES:
             kinds = bounds.get(kind) if isinstance(bounds, dict) else None
             value = kinds.get(name) if isinstance(kinds, dict) else None

@@ -7,7 +7,8 @@ import numpy as np
 from .camera import Camera
 from .errors import TactileError
 
-NEWTON_STEPS = 2  # from the resting gel: presses of 1.5 mm are then met to 1 um, in folds apart (tests/test_view.py)
+SETTLING_STEPS = 3  # of the view of the resting gel; each makes the error 1,000 times smaller over a dome
+HIGHEST_GEL = 0.9  # share of the camera's height
 STEEPEST = 0.05  # of 1 + slope . q / apparent height: below, the gel hides, or nearly hides, a part of itself
 MARCH_LEVELS, BISECTIONS = 64, 14  # of the search from above where it does: 2 mm / 64 / 2^14 is 2 nm
 
@@ -16,7 +17,7 @@ class View:
     """The camera's view of height maps that lie about as the resting one.
 
     A pixel at q = (right, down) on the plane of height zero sees the point q s, s = 1 - h / apparent height, where
-    h = height(q s): the first such point from the camera.
+    h = height(q s): the first such point from the camera. Presses of 1.5 mm are met to 1 um (tests/test_view.py).
     rest : (H, W) float32, m, heights of the undeformed gel
     """
 
@@ -29,34 +30,37 @@ class View:
         columns = np.arange(camera.width, dtype=np.float32)[None, :] - self._middle[1]
         self._rows, self._columns = rows, columns
         self._inverse = np.float32(1 / camera.apparent_height)
-        self._start = rest
-        for _ in range(NEWTON_STEPS):  # a dome is so flat that each turn makes the error 1,000 times smaller
-            self._start = self(rest)
+        self._begin_at(rest)
+        for _ in range(SETTLING_STEPS):
+            self._begin_at(self(rest))
+
+    def _begin_at(self, seen: np.ndarray) -> None:
+        """Take heights (H, W) m that are about seen as the start of each search."""
+        self._start, self._start_near = seen, 1 - seen * self._inverse
+        row, column = self._places(self._start_near)
+        self._start_nearest = _nearest(row, column, self.camera.width)
 
     def __call__(self, height: np.ndarray) -> np.ndarray:
         """Heights (H, W) float32, m, seen by the pixels; height : (H, W) float32, m, under the pixels.
 
         Raises TactileError where the gel reaches the camera.
         """
-        if height.max() >= 0.9 * self.camera.apparent_height:
+        if height.max() >= HIGHEST_GEL * self.camera.apparent_height:
             found = f"{height.max() * 1e3:.1f} mm high"
             raise TactileError("height map", found, f"below the camera at {self.camera.apparent_height * 1e3:.1f} mm")
         steepness = self._steepness(height)
         if float(steepness.min()) < STEEPEST - 1:
             return self._from_above(height)
-        seen = self._start
-        for k in range(NEWTON_STEPS):
-            last = k == NEWTON_STEPS - 1
-            near = 1 - seen * self._inverse
-            row, column = self._places(near)
-            nearest = (row + np.float32(0.5)).astype(np.intp) * self.camera.width
-            nearest += (column + np.float32(0.5)).astype(np.intp)
-            at = bilinear(height, row, column) if last else height.take(nearest)
-            turn = steepness.take(nearest)  # of the tangent plane along the pixel's ray, times near
-            turn /= near
-            # The tangent plane at q near: h = at + turn (seen - h).
-            seen = (at + turn * seen) / (1 + turn)
-        return seen
+        # Newton's method: the tangent plane at q near is h = at + turn (seen - h). One step on the nearest pixels of
+        # the map, one between them.
+        turn = steepness.take(self._start_nearest)
+        turn /= self._start_near
+        seen = (height.take(self._start_nearest) + turn * self._start) / (1 + turn)
+        near = 1 - seen * self._inverse
+        row, column = self._places(near)
+        turn = steepness.take(_nearest(row, column, self.camera.width))
+        turn /= near
+        return (bilinear(height, row, column) + turn * seen) / (1 + turn)
 
     def _steepness(self, height: np.ndarray) -> np.ndarray:
         """Slope along the position p from the picture's middle, times |p| / apparent height, (H, W)."""
@@ -94,6 +98,14 @@ class View:
 
     def _at(self, height: np.ndarray, level: np.ndarray) -> np.ndarray:
         return bilinear(height, *self._places(1 - level * self._inverse))
+
+
+def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
+    """Indices into a flat map of the pixels nearest to places within it."""
+    index = (row + np.float32(0.5)).astype(np.intp)
+    index *= width
+    index += (column + np.float32(0.5)).astype(np.intp)
+    return index
 
 
 def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:

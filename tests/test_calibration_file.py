@@ -100,3 +100,9 @@ def test_background_is_smooth_and_its_polynomial_is_found_again() -> None:
     found = fit_polynomial(picture, calibration.camera)
     again = dataclasses.replace(calibration, background=dataclasses.replace(calibration.background, polynomial=found))
     assert np.abs(background_picture(again) - picture).max() <= 1  # rounding to whole levels
+
+
+def test_start_of_unlike_units_reads() -> None:
+    start = load_calibration(Path(__file__).parent.parent / "scenes" / "calibrations" / "start.toml")
+    assert not start.fit.photographs
+    assert start.camera.shape == (320, 240)

@@ -69,3 +69,13 @@ def test_the_biotac_is_turned_so_that_inward_is_one_axis():
     local = frame.to_local(inward)
     np.testing.assert_allclose(local[0, : rows * columns], [[0, 1, 0]] * (rows * columns), atol=1e-5)
     np.testing.assert_allclose(frame.to_shared(local.copy()), inward, atol=1e-6)
+
+
+def test_what_is_drawn_in_the_window_fades_toward_its_edge():
+    fade = MovingFrame(30, 30, 12, np.zeros(900, np.float32)).fade()
+    middle = fade[12]
+    assert fade.shape == (25, 25)
+    np.testing.assert_array_equal(middle[5:20], 1)
+    assert (np.diff(middle[19:]) < 0).all()
+    assert 0 < middle[-1] < 0.1  # one cell on it would be zero
+    np.testing.assert_array_equal(fade, fade.T[::-1])

@@ -17,6 +17,7 @@ SIZES = {
     "SVB": {"latent": 8},
     "MVB": {"latent": 6, "wide": 5, "near": 7, "nodes": NODES["biotac"], "rows": 7, "columns": 4, "half": 1, **MLP},
     "S2MPN": {"inputs": 8, "outputs": 6, **MLP},
+    "R2MPN": {"inputs": 8, "outputs": 6, **MLP},
     "MVD": {"latent": 7, "wide": 4, "near": 9, "nodes": NODES["digit"], "rows": 6, "columns": 4, "half": 2, **MLP},
     "M2MPN": {"inputs": 8, "outputs": 7, **MLP},
     "D2BPN": {"inputs": 9, "outputs": 6, **MLP},

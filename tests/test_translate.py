@@ -154,13 +154,18 @@ def test_a_changed_card_is_refused(tmp_path):
 
     assert load().card == card
     distance = card["distance"]
+    signed = distance["signed"]
     for changes, said in [
-        ({"distance": None}, "distance.levels"),
+        ({"distance": None}, "distance.signed.levels"),
         ({"silence": {}}, "silence.levels"),
-        ({"distance": distance | {"levels": []}}, "distance.levels"),
-        ({"distance": distance | {"largest": "many"}}, "distance.largest"),
-        ({"distance": distance | {"residual": distance["residual"][:2]}}, "distance.residual"),
-        ({"distance": distance | {"residual": [float("nan")] * 5}}, "distance.residual"),
+        ({"distance": distance | {"levels": []}}, "distance.signed.levels"),
+        ({"distance": distance | {"rectified": 1}}, "distance.rectified.mahalanobis"),
+        ({"distance": distance | {"signed": signed | {"largest": "many"}}}, "distance.signed.largest"),
+        (
+            {"distance": distance | {"signed": signed | {"residual": signed["residual"][:2]}}},
+            "distance.signed.residual",
+        ),
+        ({"distance": distance | {"signed": signed | {"residual": [float("nan")] * 5}}}, "distance.signed.residual"),
         ({"nets": card["nets"] | {"M2MPN": card["nets"]["M2MPN"] | {"sizes": {"blocks": 10**9}}}}, "M2MPN"),
     ]:
         with pytest.raises(TactileError, match=said):

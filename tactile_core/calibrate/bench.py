@@ -6,9 +6,8 @@ import numpy as np
 
 from ..calibration import Calibration
 from ..camera import HEIGHT_ZERO_Y, Camera, Led
-from ..cast_shadows import bounding_box
 from ..digit_shape import BACK_Y, dome_height
-from ..shading import MIN_RISE, Lamp, SeenSurface
+from ..shading import Lamp, SeenSurface
 from ..view import View
 from .ball_print import print_on
 
@@ -25,15 +24,14 @@ class Bench:
         self.rest = (calibration.dome_scale * (BACK_Y - dome_height(x, z) - HEIGHT_ZERO_Y)).astype(np.float32)
         self.right, self.down = np.meshgrid(self.camera.right, self.camera.down)
         self.view = View(self.camera, self.rest)
-        self.seen_rest = self.view(self.rest)
-        self._flat = SeenSurface(self.view, self.seen_rest)
+        self._flat = SeenSurface(self.view, self.view(self.rest))
         self.lamps = [self.lamp(led) for led in calibration.leds]
         self.gain = np.moveaxis(calibration.gain.matrices(self.camera), (2, 3), (0, 1))
 
     def lamp(self, led: Led) -> tuple[Lamp, np.ndarray]:
         """A lamp in place of the calibration's, and its radiance (H, W) on the resting gel."""
-        lamp = Lamp(self.camera, led, self.seen_rest)
-        return lamp, lamp.radiance(self._flat, None)
+        lamp = Lamp(self.camera, led)
+        return lamp, lamp.radiance(self._flat)
 
     def surface(self, ball: tuple[float, float, float, float]) -> SeenSurface:
         """The gel that the pixels see under a ball (right, down, depth, radius), m."""
@@ -41,8 +39,7 @@ class Bench:
 
     def light(self, surface: SeenSurface, lamp: tuple[Lamp, np.ndarray]) -> np.ndarray:
         """Change (H, W) of one lamp's radiance by a press."""
-        raised = bounding_box(surface.height - self.seen_rest > MIN_RISE)
-        return lamp[0].radiance(surface, raised) - lamp[1]
+        return lamp[0].radiance(surface) - lamp[1]
 
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Change (3, H, W) of the radiance by a press."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..background import read_photograph
 from ..errors import TactileError
+from .measures import windowed
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 CHANGE = 18  # grey levels in some channel, of a pixel that the press has changed (issue: region of interest)
@@ -18,7 +19,8 @@ SMALLEST_PRESS = 300  # px at 240 x 320 changed by more than CHANGE; less is dus
 LARGEST_SHARE = 0.6  # of the picture changed: another lighting, not a press
 OVER_EXPOSED = 0.05  # share of the region with a channel at 255 from which on a press is flagged
 FEWEST_FOR_MEDIAN = 3  # photographs; of two, the median is their mean, which shows both presses
-NOISE_LIMIT = 12  # grey levels, of the difference of four pixels
+NOISE_WINDOW = 41  # px at 240 wide, of the means that are no noise
+NOISE_LIMIT = 15  # grey levels; more is dust or the rim of a press
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,17 +122,17 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
-    """Standard deviation (3,) of a pixel, grey levels, from differences of neighbours outside the presses.
+    """Standard deviation (3,) of the camera's noise, grey levels: of what changes outside the presses, less its means.
 
-    Neighbours in a row less those in the next (four pixels' noise: twice the deviation of one) cancel what is smooth;
-    what is left of edges and dust is cut off at NOISE_LIMIT. A background that is no median carries noise of its own.
+    Means over NOISE_WINDOW hold drift of the light. A photographed background adds noise of its own.
     """
+    window = NOISE_WINDOW * background.shape[1] // 240 | 1
     found = []
     for press in presses:
-        quiet = ~(press.region[:-1, :-1] | press.region[1:, 1:])
-        mixed = press.change[1:, 1:] - press.change[1:, :-1] - press.change[:-1, 1:] + press.change[:-1, :-1]
+        quiet = ~dilated(press.region, window // 4)
         if quiet.any():
-            found.append([channel[np.abs(channel) < NOISE_LIMIT].std() / 2 for channel in mixed[quiet].T])
+            rest = press.change - windowed(press.change.astype(float), window)
+            found.append([channel[np.abs(channel) < NOISE_LIMIT].std() for channel in rest[quiet].T])
     levels = np.median(found, axis=0) if found else np.zeros(3)
     return tuple(float(level) for level in levels)
 

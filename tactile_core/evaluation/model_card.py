@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,13 @@ from .test_set import SEED
 from .translation import mesh_columns, true_displacement
 
 PICTURE = "translation_cases.png"
+SWEEP = """\
+## Sweep
+
+Other latent sizes and KL weights, each a training of its own on the same fewer pairs, against the same test contacts
+(`scripts/sweep_networks.py`): to be compared with each other, not with the rows above. `published` has the latents and
+the KL weight of the method's authors. The direct network is the bar of the chain, on the trainings' own test presses.
+"""
 LIMITS = """\
 ## Limits
 
@@ -31,9 +39,17 @@ LIMITS = """\
 
 
 def write_model_card(
-    path: Path, rows: list[Row], translator: Translator, pairs: Pairs, apart: Translator | None = None
+    path: Path,
+    rows: list[Row],
+    translator: Translator,
+    pairs: Pairs,
+    apart: Translator | None = None,
+    sweep: Sequence[Row] = (),
 ) -> None:
-    """Write the card as Markdown, and the picture of cases beside it; ``apart``: the networks of the unseen rows."""
+    """Write the card as Markdown, and the picture of cases beside it.
+
+    apart : the networks of the unseen rows; sweep : rows of scripts/sweep_networks.py
+    """
     card = translator.card
     text = [
         "# Model card: the networks that translate touch",
@@ -51,6 +67,7 @@ def write_model_card(
         HEADER,
         *map(line, rows),
         "",
+        *([SWEEP, HEADER, *map(line, sweep), ""] if sweep else []),
         "## Cases",
         "",
         f"![best, median and worst contact]({PICTURE})",

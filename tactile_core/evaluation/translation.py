@@ -94,7 +94,7 @@ def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bo
 
 def error_columns(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, rectified: bool) -> Columns:
     """Largest node error (m) of signal to BioTac mesh and to DIGIT mesh, and what the error head expects."""
-    biotac = nets.s2m(nets.encode_signal(change, rectified))
+    biotac = nets.s2m(nets.encode_signal(change, rectified), rectified)
     answers = {"biotac": nets.decode_biotac(biotac), "digit": nets.decode_digit(nets.m2m(biotac))}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}
     found = {f"{name}_max_m": metrics.max_error(answer, truth[name]) for name, answer in answers.items()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib.resources
+import pathlib
 
 import numpy as np
 
@@ -168,7 +168,7 @@ def spread_field(sensor: str, at: Frame, field: np.ndarray) -> np.ndarray:
 @functools.cache
 def learned() -> dict[str, Learned]:
     """The shipped correction of each sensor."""
-    path = importlib.resources.files("tactile_core").joinpath("data", FILE)
+    path = pathlib.Path(__file__).parent.parent / "data" / FILE  # not by the package's name: Blender gives it another
     with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         return {
             sensor: Learned(**{

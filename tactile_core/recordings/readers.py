@@ -5,14 +5,17 @@ from __future__ import annotations
 import importlib
 import os
 import pkgutil
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 from types import ModuleType
 
 from ..errors import TactileError
 from . import formats
+from .bag import kind, open_bag, read_bag, split
 from .recording import Recording
-from .store import open_hdf5, open_npz
+from .store import Store, open_hdf5, open_npz
 from .table import read_header, read_table, shown
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
@@ -32,17 +35,31 @@ def read(path: str | os.PathLike[str]) -> Recording:
     Raises TactileError for a file that is not there, not a recording, of another sensor, or mostly unreadable.
     """
     path = os.fspath(path)
-    try:
-        container = _container(path)
+    with reading(path):
+        container = container_of(path)
         if container == "hdf5":
             with open_hdf5(path) as store:
-                keys = {*store.shapes, f"format={store.attributes.get('format', '')}"}
-                return _layout(path, container, keys).read(store)
+                return layout_of(path, container, names(store)).read(store)
         if container == "npz":
             with open_npz(path) as store:
-                return _layout(path, container, store.shapes).read(store)
-        layout = _layout(path, container, read_header(path))
+                return layout_of(path, container, store.shapes).read(store)
+        if container == "bag":
+            with open_bag(path) as bag:
+                return next(read_bag(bag, layout_of(path, container, bag.topics)))[0]
+        layout = layout_of(path, container, read_header(path))
         return layout.read(read_table(path))
+
+
+def names(store: Store) -> set[str]:
+    """What an HDF5 file's layout is told from."""
+    return {*store.shapes, f"format={store.attributes.get('format', '')}"}
+
+
+@contextmanager
+def reading(path: str) -> Iterator[None]:
+    """Turn what the system refuses into a TactileError."""
+    try:
+        yield
     except OSError as error:
         raise TactileError(
             path, error.strerror or str(error), "a readable file", "Check the path and its permissions"
@@ -51,13 +68,19 @@ def read(path: str | os.PathLike[str]) -> Recording:
         raise TactileError(path, "too large for this machine's memory", advice="Split the recording") from error
 
 
-def _container(path: str) -> str:
-    if os.path.isdir(path):
+def container_of(path: str) -> str:
+    """csv, hdf5, npz or bag. Raises TactileError for what is no file."""
+    path, finger = split(path)
+    if os.path.isdir(path) and kind(Path(path)) is None:
         raise TactileError(path, "a folder", "one recording file", "Name the recording inside the folder")
     if not os.path.exists(path):
-        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5 or NPZ)", "Check the path")
-    if not os.path.isfile(path):
-        raise TactileError(path, "not a regular file", "a recording (CSV, HDF5 or NPZ)")
+        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ or bag)", "Check the path")
+    if not os.path.isfile(path) and not os.path.isdir(path):
+        raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ or bag)")
+    if kind(Path(path)) is not None:
+        return "bag"
+    if finger is not None:
+        raise TactileError(path, f"finger {finger} of a file that is no bag", "one recording", "Leave out the #")
     with open(path, "rb") as file:
         start = file.read(8)
     if start == b"\x89HDF\r\n\x1a\n":
@@ -65,13 +88,13 @@ def _container(path: str) -> str:
     return "npz" if start.startswith(ZIP_STARTS) else "csv"
 
 
-def _layout(path: str, container: str, keys: Collection[str]) -> ModuleType:
-    """The layout that knows most of the file's columns or arrays."""
+def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
+    """The layout that knows most of the file's columns, arrays or messages. Raises TactileError for none."""
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
     best, layout = max(scored, key=lambda pair: pair[0])
     if best < RECOGNISED:
         held = ", ".join(list(keys)[:6] if container == "csv" else sorted(keys)[:6])
-        word = "columns" if container == "csv" else "arrays"
+        word = {"csv": "columns", "bag": "messages"}.get(container, "arrays")
         known = " | ".join(layout.NAME for _, layout in scored)
         raise TactileError(
             path,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,17 @@ class Store:
     load: Callable[[str], np.ndarray]
     attributes: dict[str, Any] = field(default_factory=dict)
     attributes_of: Callable[[str], dict[str, Any]] = lambda name: {}
+    load_rows: Callable[[str, slice], np.ndarray] | None = None
+
+    def rows(self, rows: slice, count: int) -> Store:
+        """The same store with only these rows of all arrays that are `count` long; HDF5 alone reads in parts."""
+        long = {name for name, (shape, _) in self.shapes.items() if shape[:1] == (count,)}
+        cut = {name: ((rows.stop - rows.start, *self.shapes[name][0][1:]), self.shapes[name][1]) for name in long}
+
+        def load(name: str) -> np.ndarray:
+            return self.load_rows(name, rows) if name in long else self.load(name)
+
+        return replace(self, shapes=self.shapes | cut, load=load)
 
     def array(self, name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> np.ndarray:
         """The array as floats; shape has None where any length will do. Raises TactileError for all that is wrong."""
@@ -84,23 +95,27 @@ def open_hdf5(path: str) -> Iterator[Store]:
             shapes[_plain(name)] = (tuple(item.shape), item.dtype)
 
     with ExitStack() as stack:
-        with _damage_told(path, "HDF5"):
+        with damage_told(path, "HDF5"):
             file = stack.enter_context(h5py.File(path, "r"))
             file.visititems(note)
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
 
         def attributes_of(name: str) -> dict[str, Any]:
-            with _damage_told(f"{path}, {name}", "attributes"):
+            with damage_told(f"{path}, {name}", "attributes"):
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
-        yield Store(path, shapes, lambda name: file[name][()], attributes, attributes_of)
+        yield Store(
+            path, shapes, lambda name: file[name][()], attributes, attributes_of, lambda name, rows: file[name][rows]
+        )
 
 
 @contextmanager
-def _damage_told(where: str, what: str) -> Iterator[None]:
+def damage_told(where: str, what: str) -> Iterator[None]:
     """Turn whatever a file library raises into a TactileError; see Store._loaded."""
     try:
         yield
+    except (TactileError, MemoryError):
+        raise
     except Exception as error:
         raise TactileError(
             where, f"damaged {what} ({_short(error)})", "a whole file", "Copy or export the recording again"
@@ -123,7 +138,7 @@ def open_npz(path: str) -> Iterator[Store]:
     """Open for reading; never unpickles. Sizes come from the arrays' own headers, not from unpacking them."""
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
     with ExitStack() as stack:
-        with _damage_told(path, "NPZ"):
+        with damage_told(path, "NPZ"):
             archive = stack.enter_context(zipfile.ZipFile(path))
             for member in archive.namelist():
                 if member.endswith(".npy"):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice, pairwise
+from typing import BinaryIO
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from ..errors import TactileError
 from .assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
+MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)
 MAX_BLANK = 8  # blank lines that a message names
 SHOWN = 40  # characters of a cell or header that a message repeats
 
@@ -49,20 +52,86 @@ class Table:
         return [p if p.field in keep else Problem(p.frame, p.row, p.field, p.found, False) for p in self.problems]
 
 
+@dataclass(frozen=True)
+class Header:
+    """names : of the columns, lower case; lines : up to and with the header; separator : between cells"""
+
+    names: tuple[str, ...]
+    lines: int
+    separator: str
+
+    @classmethod
+    def of(cls, path: str, start: bytes) -> Header:
+        """Of a text that starts with these whole lines. Raises TactileError."""
+        return cls(*_header(path, _text(path, start)))
+
+
+def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | None:
+    """The rows of some whole lines of a file that grows, `before` lines of which came earlier; None where none is."""
+    lines = _text(path, data)
+    skipped = max(0, header.lines - before)
+    if not any(line.strip(" \t") for line in lines[skipped:]):
+        return None
+    return _parsed(path, header.names, header.separator, lines[skipped:], before + skipped, last=False)
+
+
 def read_header(path: str) -> tuple[str, ...]:
     """Lower-case column names of the first line that is not empty."""
     return _header(path, _lines(path))[0]
+
+
+def read_header_of_start(path: str) -> tuple[str, ...]:
+    """As `read_header`, of a file of any length."""
+    with open(path, "rb") as file:
+        return _header(path, _text(path, _whole_lines(path, file, file.read(MAX_LINE))))[0]
 
 
 def read_table(path: str) -> Table:
     """Parse the file. Raises TactileError: not text, empty, no header, no data rows, columns named twice."""
     lines = _lines(path)
     header, first, separator = _header(path, lines)
-    if not lines[-1]:
-        ended, lines = True, lines[:-1]
-    else:
-        ended = False
-    kept = [(number, line) for number, line in enumerate(lines[first:], start=first + 1) if line.strip(" \t")]
+    return _parsed(path, header, separator, lines[first:], first)
+
+
+def read_tables(path: str, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
+    """The file in parts of about `part_bytes` of text; each begins with the last `context` rows of the one before.
+
+    Yields each part and how many of its rows were in the one before. Raises TactileError as `read_table`.
+    """
+    with open(path, "rb") as file:
+        data = _whole_lines(path, file, file.read(part_bytes))
+        lines = _text(path, data)
+        header, first, separator = _header(path, lines)
+        lines, repeated = lines[first:], 0
+        while True:
+            data = _whole_lines(path, file, file.read(part_bytes))
+            last = not data
+            table = _parsed(path, header, separator, lines, first, last)
+            yield table, repeated
+            if last:
+                return
+            repeated = min(context, len(table.lines))
+            kept = int(table.lines[-repeated]) - first - 1
+            lines, first = lines[kept:-1] + _text(path, data), first + kept
+
+
+def _whole_lines(path: str, file: BinaryIO, data: bytes) -> bytes:
+    """The bytes read from a file, and those up to the end of their last line."""
+    if data and not data.endswith(b"\n"):
+        data += file.readline(MAX_LINE)
+        if not data.endswith(b"\n") and file.read(1):
+            raise TactileError(path, f"a line of over {MAX_LINE // 2**20} MB", "a line for each frame")
+    return data
+
+
+def _parsed(
+    path: str, header: tuple[str, ...], separator: str, lines: list[str], first: int, last: bool = True
+) -> Table:
+    """The table of the lines after line `first`; last : the file ends with them."""
+    ended = not lines or not lines[-1]
+    if ended:
+        lines = lines[:-1]
+    kept = [(number, line) for number, line in enumerate(lines, start=first + 1) if line.strip(" \t")]
     if not kept:
         raise TactileError(
             path, "a header without data rows", "at least one frame", "Check that the recording was written to its end"
@@ -80,7 +149,7 @@ def read_table(path: str) -> Table:
                 "numbers",
                 "Check the export of this file",
             )
-    if not ended:
+    if last and not ended:
         _doubt_last_cell(kept, header, separator, values, problems)
     rows = np.array([number for number, _ in kept])
     return Table(path, header, values, rows, tuple(problems), _tell_blank_lines(first, rows))
@@ -106,6 +175,14 @@ def _lines(path: str) -> list[str]:
         raise TactileError(
             path, f"more than {MAX_BYTES // 2**20} MB of text", "a recording of some hours", "Split the recording"
         )
+    lines = _text(path, data)
+    if not any(line.strip() for line in lines):
+        raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
+    return lines
+
+
+def _text(path: str, data: bytes) -> list[str]:
+    """The lines of a text, an empty one after its last newline."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise TactileError(path, "UTF-16 text", "UTF-8 text", "Save the file as UTF-8 (in a spreadsheet: CSV UTF-8)")
     if b"\0" in data:
@@ -116,14 +193,14 @@ def _lines(path: str) -> list[str]:
         raise TactileError(
             f"{path}, byte {error.start}", "not UTF-8 text", "a CSV, HDF5 or NPZ recording", "Save a text file as UTF-8"
         ) from None
-    if not text.strip():
-        raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def _header(path: str, lines: list[str]) -> tuple[tuple[str, ...], int, str]:
     """Column names, number of lines up to and with the header, separator."""
-    first = next(i for i, line in enumerate(lines) if line.strip())
+    first = next((i for i, line in enumerate(lines) if line.strip()), None)
+    if first is None:
+        raise TactileError(path, "no text", "a header line", "Check that the recording was written to its end")
     line = lines[first]
     separator = max(",;\t", key=line.count)
     cells = [cell.strip().lower() for cell in line.split(separator)]

@@ -86,6 +86,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
         "MVB": {"latent": biotac, **surface_sizes(contacts.biotac), **common},
         "MVD": {"latent": digit, **surface_sizes(contacts.digit), **common},
         "S2MPN": {"inputs": signal, "outputs": biotac, **common},
+        "R2MPN": {"inputs": signal, "outputs": biotac, **common},
         "M2MPN": {"inputs": biotac + PLACE, "outputs": digit, **common},
         "D2BPN": {"inputs": digit + PLACE, "outputs": biotac, **common},
         "B2SPN": {"inputs": biotac + PLACE, "outputs": signal, **common},

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from ..layers import NORM_EPSILON
 from ..network_sizes import ELECTRODES, PLACE, SIGNAL_HIDDEN
 from ..networks import COUNT_SCALE
-from .surface import Surface
+from .surface import ROOT_FLOOR, Surface
 
 
 class Plain(nn.ModuleList):
@@ -114,10 +114,10 @@ class MeshVae(Vae):
         """Latent (B, L) -> (B, L + 2), with what the whole cell leaves of the place."""
         return torch.cat([latent, self.surface.cells(latent[:, :PLACE])[1]], -1)
 
-    def loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
+    def loss(self, latent: Tensor, rows: np.ndarray, floor: Tensor | float = ROOT_FLOOR) -> Tensor:
         """Error of what the latent (B, L) decodes to against the contacts of these rows: see `Surface.loss`."""
         cell, left = self.surface.cells(latent[:, :PLACE])
-        return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
+        return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows, floor)
 
     def field(self, latent: Tensor) -> Tensor:
         """Latent (B, L) -> displacement (B, n, 3) m in the nodes' own frames; carries no gradient."""

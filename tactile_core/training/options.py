@@ -22,16 +22,17 @@ class Options:
         Each was chosen among a few values as it let strength follow fluid pressure better on the sample recordings
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
     without : names of indenters that are kept from the training; without_below_x : m, as much of the pad beyond x
-    weight_decay : of AdamW; signal_decay : where signals come in (else rectified ones are over-fitted)
+    left_out : stages that are not run; their networks stay as they were drawn
+    weight_decay : of AdamW; signal_decay, rectified_decay : of SVB, of R2MPN (rectified signals are over-fitted else)
     rate : largest learning rate
     checkpoint_seconds : least time between two checkpoints; does not change the result
     """
 
     latent_signal: int = 8
-    latent_biotac: int = 48
+    latent_biotac: int = 64
     latent_digit: int = 96
-    wide_biotac: int = 48
-    near_biotac: int = 96
+    wide_biotac: int = 80
+    near_biotac: int = 160
     half_biotac: int = 12
     wide_digit: int = 32
     near_digit: int = 224
@@ -42,6 +43,7 @@ class Options:
     rate: float = 1.5e-3
     weight_decay: float = 1e-2
     signal_decay: float = 0.2
+    rectified_decay: float = 0.2
     beta: float = 1e-4
     noise: float = 1.5
     gain: float = 0.1
@@ -50,9 +52,11 @@ class Options:
     rectified_bulge: float = 0.5
     rectified_offset: float = 3.0
     rectified_missing: float = 0.2
+    rectified_floor: float = 20e-6
     silence: float = 0.05
     without: tuple[str, ...] = ()
     without_below_x: float | None = None
+    left_out: tuple[str, ...] = ()
     effort: float = 1.0
     svb_epochs: int = 10
     mvb_epochs: int = 10
@@ -67,15 +71,17 @@ class Options:
     checkpoint_seconds: float = 30.0
 
     def epochs(self, stage: str) -> int:
-        """Passes over the data in a stage, at least one."""
+        """Passes over the data in a stage, at least one unless it is left out."""
+        if stage in self.left_out:
+            return 0
         return max(1, round(self.effort * getattr(self, f"{stage.lower()}_epochs")))
 
     def decay(self, net: str) -> float:
         """Weight decay of a network."""
-        return self.signal_decay if net in ("SVB", "S2MPN") else self.weight_decay
+        return {"SVB": self.signal_decay, "R2MPN": self.rectified_decay}.get(net, self.weight_decay)
 
     def settings(self) -> dict[str, object]:
         """All options that change the result, as JSON gives them back."""
-        settings = asdict(self) | {"without": list(self.without)}
+        settings = asdict(self) | {"without": list(self.without), "left_out": list(self.left_out)}
         settings.pop("checkpoint_seconds")
         return settings

@@ -14,6 +14,7 @@ from ..networks import ERROR_UNIT, FORCE_SCALE
 from .data import Batch, Contacts
 from .modules import MeshVae, Residual, compress, initialise, signal_vae
 from .options import Options
+from .surface import ROOT_FLOOR
 
 FORCE_WIDTH, FORCE_BLOCKS = 64, 1  # a small head: three numbers out of a latent
 FORCE_FLOOR = 0.1  # N: an error counts against the force plus this, so that light touches do not rule (assumed)
@@ -23,7 +24,7 @@ CELL_WEIGHT = 4.0  # of an error of the place among those of the code, in the la
 
 
 class Model(nn.Module):
-    """The five networks, the force head, and the direct network that the chain is compared with (not shipped)."""
+    """The networks and heads that ship, and the direct network that the chain is compared with (not shipped)."""
 
     def __init__(self, options: Options, contacts: Contacts, generator: torch.Generator) -> None:
         super().__init__()
@@ -33,6 +34,7 @@ class Model(nn.Module):
         self.MVB = MeshVae(contacts.biotac, biotac, width, blocks)
         self.MVD = MeshVae(contacts.digit, digit, width, blocks)
         self.S2MPN = Residual(signal, biotac, width, blocks)
+        self.R2MPN = Residual(signal, biotac, width, blocks)
         self.M2MPN = Residual(biotac + PLACE, digit, width, blocks)
         self.force = Residual(biotac, 3, FORCE_WIDTH, FORCE_BLOCKS)
         self.error = Residual(signal + ERROR_FEATURES, len(SURFACES), FORCE_WIDTH, FORCE_BLOCKS)
@@ -44,7 +46,8 @@ class Model(nn.Module):
 
     def from_signal(self, signal: Tensor) -> Tensor:
         """signal (B, 20) -> latent_biotac."""
-        return self.S2MPN(self.SVB.mean(compress(signal)))
+        latent = self.SVB.mean(compress(signal))
+        return torch.where(signal[:, ELECTRODES:] > 0, self.R2MPN(latent), self.S2MPN(latent))
 
     def across(self, latent_biotac: Tensor) -> Tensor:
         """latent_biotac -> latent_digit."""
@@ -108,8 +111,8 @@ def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Latent of the signal -> latent of the BioTac, both means of frozen autoencoders."""
     with torch.no_grad():
-        signal, target = model.SVB.mean(compress(batch.signal)), model.MVB.mean(batch.biotac)
-    return latent_loss(model.S2MPN(signal), target)
+        target = model.MVB.mean(batch.biotac)
+    return latent_loss(model.from_signal(batch.signal), target)
 
 
 def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
@@ -137,9 +140,10 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
     biotac = model.from_signal(batch.signal)
     across = model.across(model.MVB.mean(batch.biotac))
     given = (model, contacts, batch, options, generator)
+    floor = torch.where(batch.signal[:, ELECTRODES] > 0, options.rectified_floor, ROOT_FLOOR)
     return (
-        model.MVB.loss(biotac, batch.rows)
-        + model.MVD.loss(model.across(biotac), batch.rows)
+        model.MVB.loss(biotac, batch.rows, floor)
+        + model.MVD.loss(model.across(biotac), batch.rows, floor)
         + model.MVD.loss(across, batch.rows)
         + 0.25 * svb_loss(*given)
         + 0.5 * (mvb_loss(*given) + mvd_loss(*given))
@@ -194,9 +198,9 @@ STAGES = (
     Stage("SVB", ("SVB",), svb_loss),
     Stage("MVB", ("MVB",), mvb_loss),
     Stage("MVD", ("MVD",), mvd_loss),
-    Stage("S2MPN", ("S2MPN",), s2mpn_loss),
+    Stage("S2MPN", ("S2MPN", "R2MPN"), s2mpn_loss),
     Stage("M2MPN", ("M2MPN",), m2mpn_loss),
-    Stage("chain", ("SVB", "MVB", "MVD", "S2MPN", "M2MPN"), chain_loss),
+    Stage("chain", ("SVB", "MVB", "MVD", "S2MPN", "R2MPN", "M2MPN"), chain_loss),
     Stage("force", ("force",), force_loss),
     Stage("error", ("error",), error_loss),
     Stage("back", ("D2BPN", "B2SPN"), back_loss),

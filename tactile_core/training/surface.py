@@ -40,7 +40,7 @@ class Surface:
         self.cell, self.left = frame.cells(self.place)
         some = rows[:: max(1, len(rows) // BASIS_ROWS)]
         self.wide = principal_basis(self._whole, some, wide, generator)
-        self.near = principal_basis(self._rest_in_window, some, near, generator)
+        self.near = principal_basis(self._tapered, some, near, generator)
         metres = 1e-3 * torch.cat([self._coefficients(np.arange(len(data))[part]) for part in _parts(len(data))])
         spread = metres[rows].square().mean(0).sqrt()
         self.scale = spread.clamp(min=max(SMALLEST_SCALE * float(spread.max()), 1e-9))
@@ -66,6 +66,11 @@ class Surface:
         fields = rest.view(len(rows), -1, 3).numpy()
         return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
 
+    def _tapered(self, rows: np.ndarray) -> Tensor:
+        """What the near basis is drawn from: it fades toward the window's edge, where decoded gel would have a step."""
+        fade = torch.from_numpy(self.frame.fade())
+        return (self._rest_in_window(rows).view(len(rows), *fade.shape, 3) * fade[:, :, None]).flatten(1)
+
     def _coefficients(self, rows: np.ndarray) -> Tensor:
         return torch.cat([self._whole(rows) @ self.wide.T, self._rest_in_window(rows) @ self.near.T], -1)
 
@@ -86,7 +91,7 @@ class Surface:
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
-    def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
+    def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray, floor: Tensor | float = ROOT_FLOOR) -> Tensor:
         """Mean over contacts of the rms error over moving nodes, for coefficients (B, K + K') round cells (B, 2).
 
         1 for no displacement. The root is taken contact by contact, as in the figure we report: deep contacts do not
@@ -99,7 +104,7 @@ class Surface:
             true = self._at_cells(at, cell.numpy()) * touched
             beyond = (self.total[at] - true.square().sum(-1)).clamp(min=0.0) * touched[:, 0]
         squares = (modes * self.scale - true).square().sum(-1) + beyond
-        return (squares / self.moving[at] + ROOT_FLOOR**2).sqrt().mean() / self.null
+        return (squares / self.moving[at] + floor**2).sqrt().mean() / self.null
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
         """Coefficients (B, K + K') round cells (B, 2) -> displacement (B, n, 3) m in the nodes' own frames."""

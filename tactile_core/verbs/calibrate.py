@@ -18,7 +18,7 @@ TEXT = """\
 Fit a DIGIT unit's calibration to photographs of a ball pressed into it, anywhere and to any depth: positions of camera
 and lights, their extent, colours, scale. Without a photograph of the untouched gel, its median over the photographs
 takes its place. Ten presses spread over the gel tell most; one or five do, from a calibration of another unit. What
-they do not tell is kept from that one, and named. Writes the calibration and a sheet to look at beside it (.png).
+they tell too little of is held near that one, and named. Writes the calibration, and a sheet to look at (.png).
 
 With --test, a calibration is tried on photographs instead: place and depth of each press are fitted, all else is the
 calibration's, and the picture is compared with the photograph, beside the null answer of the background alone."""
@@ -37,6 +37,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--ball-diameter", type=float, metavar="MM", help="of the ball (with --test: as fitted)")
     verb.add_argument("--background", metavar="FILE", help="photograph of the untouched gel (default: estimated)")
     verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
+    verb.add_argument("--unit", metavar="TEXT", help="the unit's name in the file (default: the file's)")
     verb.add_argument("--only", metavar="NAMES", help="photographs to use, file names separated by commas")
     verb.add_argument("--test", metavar="FILE", help="try this calibration instead of fitting one")
     verb.add_argument("--json", metavar="FILE", help="with --test: write the rows")
@@ -59,7 +60,7 @@ def _check_options(options: argparse.Namespace) -> None:
     from .. import atomic
 
     if options.test:
-        for name in ("out", "start"):
+        for name in ("out", "start", "unit"):
             if getattr(options, name) is not None:
                 raise TactileError(f"--{name}", "given with --test", "one or the other")
         for path in (options.json, options.sheet):
@@ -87,12 +88,11 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
 
     start = load_calibration(options.start)
     with bar("calibrate", "step", options.progress) as progress:
-        done = calibrate(
-            photographs, 1e-3 * options.ball_diameter, start, unit=Path(options.out).stem, progress=progress
-        )
+        name = options.unit or Path(options.out).stem
+        done = calibrate(photographs, 1e-3 * options.ball_diameter, start, unit=name, progress=progress)
     for warning in done.warnings:
         say(f"warning: {warning}")
-    say(f"not told by these photographs, kept from the start: {', '.join(done.calibration.fit.not_identified)}")
+    say(f"these photographs tell too little of: {', '.join(done.calibration.fit.not_identified)}")
     write_calibration(options.out, done.calibration)
     write_sheet(_sheet_beside(options.out), done.tried)
     _tell_rows(rows_of(done.tried, "presses it was fitted on"))

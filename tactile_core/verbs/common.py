@@ -18,6 +18,26 @@ def progress_argument(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--progress", action="store_true", help="show progress even where stderr is no terminal")
 
 
+def prepare_arguments(verb: argparse.ArgumentParser) -> None:
+    """How readings become signals."""
+    verb.add_argument(
+        "--tare",
+        default="auto",
+        metavar="auto|none|A:B",
+        help="frames without contact that give the resting reading (default: found automatically)",
+    )
+    verb.add_argument(
+        "--kind",
+        choices=("raw", "tared", "scaled", "rectified"),
+        help="what the file holds, where the automatic answer is wrong",
+    )
+    verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor to counts, for a scaled recording")
+    verb.add_argument(
+        "--smooth", type=int, metavar="N", help="average over N frames, odd (default: 3 if rectified, else 1)"
+    )
+    verb.add_argument("--no-drift", action="store_true", help="do not remove drift")
+
+
 def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
     """``--seed``; ``same`` : what the same seed makes again."""
     verb.add_argument("--seed", type=int, default=0, metavar="S", help=f"same seed, same {same} (default: 0)")

@@ -6,7 +6,7 @@ import argparse
 
 from ..errors import TactileError
 from ..terminal import bar, complain, say, tell
-from .common import NOTHING, progress_argument
+from .common import NOTHING, prepare_arguments, progress_argument
 
 BRIEF = "recordings to DIGIT pictures"
 TEXT = """\
@@ -50,22 +50,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         " latent,displacement,height,image (default: %(default)s)",
     )
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
-    verb.add_argument(
-        "--tare",
-        default="auto",
-        metavar="auto|none|A:B",
-        help="frames without contact that give the resting reading (default: found automatically)",
-    )
-    verb.add_argument(
-        "--kind",
-        choices=("raw", "tared", "scaled", "rectified"),
-        help="what the file holds, where the automatic answer is wrong",
-    )
-    verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor to counts, for a scaled recording")
-    verb.add_argument(
-        "--smooth", type=int, metavar="N", help="average over N frames, odd (default: 3 if rectified, else 1)"
-    )
-    verb.add_argument("--no-drift", action="store_true", help="do not remove drift")
+    prepare_arguments(verb)
     verb.add_argument("--sensor", metavar="FILE", help="gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
     progress_argument(verb)

@@ -9,11 +9,15 @@ from ..terminal import bar, tell
 from .common import RESUMES, check_seed, progress_argument, seed_argument
 
 BRIEF = "train the networks on pairs"
-TEXT = "Train the networks and the force estimate; DIR/weights then holds weights and card."
+TEXT = """\
+Train the networks and the force estimate on simulated pairs; or, with the word s2mpn in place of the pairs, fine-tune
+that one network on a real sensor's recording that says where and how hard it was touched (HDF5 with
+electrode_vals/data, contact_loc/data, force_vec/data). DIR/weights then holds weights and card."""
 EPILOG = """\
 example:
   tactile train pairs.h5 --out trained --seed 1
   tactile convert touch.csv --out results --weights trained/weights
+  tactile train s2mpn --real labelled.hdf5 --out tuned      starts from the shipped weights, or from --weights DIR
 
 Needs torch: pip install "tactile-core[train]". An interrupted run goes on where it stopped."""
 LEAVES = RESUMES
@@ -22,7 +26,9 @@ MAX_EFFORT = 1000.0
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Of this verb."""
-    verb.add_argument("pairs", metavar="PAIRS", help="HDF5 file of `tactile pairs`")
+    verb.add_argument("pairs", metavar="PAIRS", help="HDF5 file of `tactile pairs`, or the word s2mpn")
+    verb.add_argument("--real", metavar="FILE", help="of s2mpn: the labelled recording")
+    verb.add_argument("--weights", metavar="DIR", help="of s2mpn: where it starts (default: the shipped weights)")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder to write")
     seed_argument(verb, "weights")
     verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="times the usual epochs (default: 1)")
@@ -33,8 +39,13 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Train."""
+    """Train, or fine-tune."""
     check_seed(options.seed)
+    if options.pairs == "s2mpn":
+        return _fine_tune(options)
+    for name in ("real", "weights"):
+        if getattr(options, name) is not None:
+            raise TactileError(f"--{name}", f"beside pairs, {options.pairs}", "the word s2mpn in their place")
     if not 0 < options.effort <= MAX_EFFORT:
         raise TactileError("--effort", str(options.effort), f"above 0, at most {MAX_EFFORT}", "1 is the usual training")
     from ..training.options import Options
@@ -51,5 +62,30 @@ def run(options: argparse.Namespace) -> int:
             lambda share, text: shown(round(100 * share), 100),
             overwrite=options.overwrite,
         )
+    tell(options.out)
+    return 0
+
+
+def _fine_tune(options: argparse.Namespace) -> int:
+    """S2MPN on a labelled recording."""
+    for name, usual in (("effort", 1.0), ("without", []), ("without_below_x", None)):
+        if getattr(options, name) != usual:
+            raise TactileError(f"--{name.replace('_', '-')}", "beside s2mpn", "--real, --weights, --out and --seed")
+    if options.real is None:
+        raise TactileError("--real", "none", "a recording with contact places and forces")
+    from ..rows import HEADER, line
+    from ..training.fine_tune import fine_tune
+
+    with bar("fine-tuning", "%", options.progress) as shown:
+        rows = fine_tune(
+            options.real,
+            options.out,
+            options.weights,
+            options.seed,
+            lambda share, text: shown(round(100 * share), 100),
+            options.overwrite,
+        )
+    for text in (HEADER, *map(line, rows)):
+        tell(text)
     tell(options.out)
     return 0

@@ -117,6 +117,16 @@ def test_press_cut_by_the_edge_is_flagged(tmp_path: Path) -> None:
     assert cut.ball.right == pytest.approx(5.6e-3, abs=0.1e-3)
 
 
+def test_larger_photographs_are_the_same_view(tmp_path: Path) -> None:
+    large = plain_unit().at_size(480, 640)
+    folder = write_photographs(tmp_path / "presses", large, ((1.5, -2.0, 0.9),))
+    (tried,) = try_unit(plain_unit(), read_photographs(folder, tmp_path / "untouched.png"), BALL, search_radius=False)
+    assert tried.picture.shape == (640, 480, 3)
+    assert tried.ball.right == pytest.approx(1.5e-3, abs=0.03e-3)
+    assert tried.ball.depth == pytest.approx(0.9e-3, abs=0.03e-3)
+    assert tried.figures["roi_l1"] < 2 < tried.null["roi_l1"]  # levels, of which the noise makes 0.9
+
+
 def test_lying_photographs_are_refused(tmp_path: Path) -> None:
     folder = write_photographs(tmp_path / "presses", plain_unit(), PLACES[:3])
     for file in folder.iterdir():
@@ -133,7 +143,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     words = ["calibrate", *common, "--ball-diameter", "6", "--start", str(start), "--out", str(out)]
     assert main(words) == 0
     told = capsys.readouterr()
-    assert "roi_psnr" in told.out and str(out) in told.out and "not told by these photographs" in told.err
+    assert "roi_psnr" in told.out and str(out) in told.out and "tell too little of" in told.err
     assert Image.open(tmp_path / "unit.png").size[0] > 3 * 240
     assert load_calibration(out).unit == "unit"
     rows, sheet = tmp_path / "rows.json", tmp_path / "trial.png"

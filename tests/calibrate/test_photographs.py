@@ -26,7 +26,7 @@ def test_presses_background_and_noise_are_found(folder: Path) -> None:
     # The median of five noisy pictures (1 level) of which up to two show a press at a pixel.
     assert np.abs(found.background - 128).mean() < 0.7
     assert np.abs(found.background - 128).max() <= 8
-    # Noise of 1 level, rounding to whole levels (sd 0.29) and the median's own noise add up.
+    # Noise of 1 level, rounding to whole levels (sd 0.29) and the median's own noise (about 0.5) add up.
     assert all(0.9 < level < 1.3 for level in found.noise)
 
 

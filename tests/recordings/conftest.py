@@ -130,6 +130,16 @@ def write_container(layout: str, folder: Path, press: SimpleNamespace) -> Path:
             file["indenter_type/data"] = np.full((count, 1), 2.0)
     elif layout == "hdf5_simulated":
         recordings.write_simulated(path, **simulated_arrays(press))
+    elif layout == "bag_biotac_all":
+        pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
+        from bags import write_bag
+
+        write_bag(path, press, "ros1", "all")
+    elif layout == "bag_biotac_hand":
+        pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
+        from bags import write_bag
+
+        write_bag(path, press, "mcap", "hand")
     else:
         raise ValueError(layout)
     return path

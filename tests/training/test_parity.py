@@ -111,7 +111,10 @@ def test_mesh_autoencoders(model, nets, contacts, name):
 
 def test_maps(model, nets):
     biotac, digit = (torch.from_numpy(latent(nets.sizes[net]["latent"])) for net in ("MVB", "MVD"))
-    same(nets.s2m(latent(8)), model.S2MPN(torch.from_numpy(latent(8))))
+    rectified = np.arange(len(latent(8))) % 3 == 0
+    signed, folded = (net(torch.from_numpy(latent(8))) for net in (model.S2MPN, model.R2MPN))
+    same(nets.s2m(latent(8)), signed)
+    same(nets.s2m(latent(8), rectified), torch.where(torch.from_numpy(rectified)[:, None], folded, signed))
     same(nets.m2m(biotac.numpy()), model.across(biotac))
     same(nets.m2m_back(digit.numpy()), model.back(digit))
     same(compress(nets.decode_signal(nets.m2s(biotac.numpy()))), model.to_signal(biotac))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 from dataclasses import replace
 
@@ -69,9 +70,9 @@ def test_result_is_complete_and_loads(quick, pairs):
     for net, entry in card["nets"].items():
         shapes = {name: list(array.shape) for name, array in loaded.tensors[net].items()}
         assert shapes == entry["shapes"]
-    for name in ("mahalanobis", "residual", "largest"):
-        assert (np.diff(card["distance"][name]) >= 0).all()
-        assert len(card["distance"][name]) == len(card["distance"]["levels"])
+    for kind, name in itertools.product(("signed", "rectified"), networks.DISTANCES):
+        assert (np.diff(card["distance"][kind][name]) >= 0).all()
+        assert len(card["distance"][kind][name]) == len(card["distance"]["levels"])
     for name in ("biotac_m", "digit_m", "force_N"):
         assert (np.diff(card["silence"][name]) >= 0).all()
         assert len(card["silence"][name]) == len(card["silence"]["levels"])
@@ -115,6 +116,14 @@ def test_progress_ends_at_one(pairs, tmp_path):
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     assert len(shares) == len(STAGES)
+
+
+def test_stages_that_are_left_out_are_not_run(pairs, tmp_path):
+    left_out = ("direct", "back", "error")
+    train(pairs, tmp_path, 3, replace(QUICK, left_out=left_out), **SURFACES)
+    with open(tmp_path / "log.csv", newline="") as file:
+        run = {row["stage"] for row in csv.DictReader(file)}
+    assert run == {stage.name for stage in STAGES} - set(left_out)
 
 
 def interrupted(pairs, out):

@@ -65,8 +65,8 @@ def test_the_chain(nets, change, rectified):
     change = np.abs(change) if rectified else change
     latent = nets.encode_signal(change, rectified)
     same(latent, svb.mean(modules.compress(torch.from_numpy(np.concatenate([change, told], -1)))))
-    biotac = nets.s2m(latent)
-    same(biotac, residual(nets, "S2MPN")(torch.from_numpy(latent)))
+    biotac = nets.s2m(latent, rectified)
+    same(biotac, residual(nets, "R2MPN" if rectified else "S2MPN")(torch.from_numpy(latent)))
     digit = nets.m2m(biotac)
     same(digit, residual(nets, "M2MPN")(placed(nets, "MVB", biotac)))
     for net, z, decode in (("MVB", biotac, nets.decode_biotac), ("MVD", digit, nets.decode_digit)):

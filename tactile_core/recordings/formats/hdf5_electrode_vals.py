@@ -15,6 +15,7 @@ from ..recording import ELECTRODES, Recording
 from ..store import Store
 
 CONTAINER = "hdf5"
+ELECTRODES_NAME = "electrode_vals/data"
 NAME = "HDF5 with electrode_vals/data, contact_loc/data, force_vec/data, indenter_type/data"
 
 

@@ -9,6 +9,7 @@ from ..simulated import FORMAT, read_simulated
 from ..store import Store
 
 CONTAINER = "hdf5"
+ELECTRODES_NAME = "electrodes"
 NAME = f"HDF5 simulated recording ({FORMAT})"
 
 

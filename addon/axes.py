@@ -1,0 +1,36 @@
+"""From the sensors' frame in metres to Blender's axes in the scene's units, and back.
+
+The sensors' frame (``tactile_core.sensors``): x along the finger, y normal to the pad with the contact side at -y,
+z lateral. In Blender the pad looks up: X = x, Y = z, Z = -y, a rotation. Lengths follow the scene: one Blender unit is
+``unit_settings.scale_length`` metres. The importers set it to 0.001 unless told otherwise, so that a fingertip is 28
+units long and the viewport's clipping and grid suit it; the sidebar then shows millimetres.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+_SIGNS = np.array([1.0, 1.0, -1.0], np.float32)
+
+
+def to_blender(points: np.ndarray, per_metre: float) -> np.ndarray:
+    """Sensor points or displacements (..., 3) m as float32 Blender units."""
+    return np.asarray(points, np.float32)[..., [0, 2, 1]] * (_SIGNS * np.float32(per_metre))
+
+
+def to_sensor(points: np.ndarray, per_metre: float) -> np.ndarray:
+    """The inverse of ``to_blender``, float64 m."""
+    x, y, z = np.moveaxis(np.asarray(points, np.float64) / per_metre, -1, 0)
+    return np.stack([x, -z, y], -1)
+
+
+def units_per_metre(scene: bpy.types.Scene) -> float:
+    """Blender units a metre."""
+    return 1.0 / scene.unit_settings.scale_length
+
+
+def use_millimetres(scene: bpy.types.Scene) -> None:
+    """Make one Blender unit a millimetre, shown as such."""
+    units = scene.unit_settings
+    units.system, units.scale_length, units.length_unit = "METRIC", 1e-3, "MILLIMETERS"

@@ -1,0 +1,47 @@
+"""F-curves written whole, for every way that Blender 4.2 to 5.2 keeps them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+_LINEAR = 1  # bpy.types.Keyframe.interpolation as a number: CONSTANT 0, LINEAR 1, BEZIER 2
+
+
+def fcurves_of(owner: bpy.types.ID) -> Any:
+    """The F-curves of a datablock's action, which is made where it is missing."""
+    animation = owner.animation_data or owner.animation_data_create()
+    if animation.action is None:
+        animation.action = bpy.data.actions.new(f"{owner.name} Tactile")
+    action = animation.action
+    if not hasattr(action, "slots"):  # before Blender 4.4
+        return action.fcurves
+    if animation.action_slot is None:
+        animation.action_slot = next(
+            (slot for slot in action.slots if slot.target_id_type == owner.id_type), None
+        ) or action.slots.new(id_type=owner.id_type, name=owner.name)
+    layer = action.layers[0] if action.layers else action.layers.new("Tactile")
+    strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
+    return strip.channelbag(animation.action_slot, ensure=True).fcurves
+
+
+def write_curve(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, index: int = 0) -> None:
+    """Replace one F-curve by straight lines through ``values`` (T,) at ``frames`` (T,)."""
+    curves = fcurves_of(owner)
+    old = curves.find(path, index=index)
+    if old is not None:
+        curves.remove(old)
+    curve = curves.new(path, index=index)
+    curve.keyframe_points.add(len(frames))
+    points = np.column_stack([frames, values]).astype(np.float32)
+    curve.keyframe_points.foreach_set("co", points.ravel())
+    curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), _LINEAR, np.int32))
+    curve.update()
+
+
+def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray) -> None:
+    """One F-curve a column of ``values`` (T, k)."""
+    for index in range(values.shape[1]):
+        write_curve(owner, path, frames, values[:, index], index)

@@ -1,0 +1,41 @@
+"""Image datablocks and the arrays in them. Arrays have the picture's first row first, Blender's pixels the last."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+PICTURE, HEIGHTS = "DIGIT picture", "DIGIT height map"
+
+
+def new_image(name: str, width: int, height: int, *, floats: bool = False) -> bpy.types.Image:
+    """An image of this name and size, the old one where it fits; values are shown as they are, without conversion."""
+    found = bpy.data.images.get(name)
+    if found is not None and (tuple(found.size) != (width, height) or found.is_float != floats or found.packed_file):
+        bpy.data.images.remove(found)
+        found = None
+    if found is None:
+        found = bpy.data.images.new(name, width, height, alpha=False, float_buffer=floats, is_data=True)
+    return found
+
+
+def fill(image: bpy.types.Image, values: np.ndarray) -> None:
+    """Set the pixels: values (H, W, 3) or (H, W), 0..1 or, in float images, anything."""
+    pixels = np.ones((*values.shape[:2], 4), np.float32)
+    pixels[..., :3] = values[::-1] if values.ndim == 3 else values[::-1, :, None]
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+
+
+def show_picture(picture: np.ndarray) -> bpy.types.Image:
+    """The picture (H, W, 3) uint8 in its datablock."""
+    image = new_image(PICTURE, picture.shape[1], picture.shape[0])
+    fill(image, picture.astype(np.float32) / 255)
+    return image
+
+
+def show_heights(heights: np.ndarray) -> bpy.types.Image:
+    """The height map (H, W) m in its datablock, in millimetres."""
+    image = new_image(HEIGHTS, heights.shape[1], heights.shape[0], floats=True)
+    fill(image, 1e3 * heights)
+    return image

@@ -1,0 +1,67 @@
+"""What a scene says of its DIGIT pictures: preset, unit, lights, coating."""
+
+import dataclasses
+import importlib.util
+
+import bpy
+
+from ..tactile_core import calibration_file
+from ..tactile_core.calibration import Calibration
+
+_FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
+_MITSUBA = (
+    ("standard", "Standard", "Direct light, traced by Mitsuba"),
+    ("quality", "Quality", "And the light that bounces once"),
+    ("reference", "Reference", "Everything, seconds a frame"),
+)
+_PACKAGE = __package__.rsplit(".", 1)[0]
+TRACED = importlib.util.find_spec(f"{_PACKAGE}.tactile_core.optics") is not None
+PRESETS = (_FAST, *(_MITSUBA if TRACED else ()))
+_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+
+
+class TactileRender(bpy.types.PropertyGroup):
+    """Of each scene."""
+
+    preset: bpy.props.EnumProperty(name="Preset", description="How exactly the picture is made", items=PRESETS)
+    calibration: bpy.props.StringProperty(
+        name="Calibration", description="File of one DIGIT unit (tactile calibrate); empty: the one that ships",
+        subtype="FILE_PATH", options=_RELATIVE,
+    )  # fmt: skip
+    lights: bpy.props.FloatVectorProperty(
+        name="Lights", description="Strength of the red, green and blue LED, times that of the calibration", size=3,
+        default=(1.0, 1.0, 1.0), min=0.01, soft_max=2.0,
+    )  # fmt: skip
+    albedo: bpy.props.FloatProperty(
+        name="Coating", description="Share of light that the coating scatters back; negative: the calibration's."
+        " Seen by the presets in which light bounces", default=-1.0, min=-1.0, max=1.0,
+    )  # fmt: skip
+
+
+def calibration_of(scene: bpy.types.Scene, width: int, height: int) -> Calibration:
+    """The unit that a scene renders with, at a picture's size. Raises TactileError."""
+    settings = scene.tactile_render
+    path = bpy.path.abspath(settings.calibration) if settings.calibration else None
+    unit = calibration_file.load_calibration(path).at_size(width, height)
+    gain = unit.gain
+    scaled = {
+        field.name: tuple(
+            tuple(value * light for value, light in zip(row, settings.lights, strict=True))
+            for row in getattr(gain, field.name)
+        )
+        for field in dataclasses.fields(gain)
+    }
+    albedo = unit.albedo if settings.albedo < 0 else settings.albedo
+    return dataclasses.replace(unit, gain=dataclasses.replace(gain, **scaled), albedo=albedo)
+
+
+def register() -> None:
+    """Called by the package."""
+    bpy.utils.register_class(TactileRender)
+    bpy.types.Scene.tactile_render = bpy.props.PointerProperty(type=TactileRender, name="Tactile render")
+
+
+def unregister() -> None:
+    """Called by the package."""
+    del bpy.types.Scene.tactile_render
+    bpy.utils.unregister_class(TactileRender)

@@ -1,0 +1,48 @@
+"""Objects with a mesh of ``tactile_core``'s nodes and faces, and their materials."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+
+def new_mesh_object(name: str, nodes: np.ndarray, faces: np.ndarray, smooth: bool = True) -> bpy.types.Object:
+    """An object, in no collection yet, of nodes (n, 3) in Blender units and triangles (m, 3)."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(nodes))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(nodes, np.float32).ravel())
+    mesh.loops.add(faces.size)
+    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(faces, np.int32).ravel())
+    mesh.polygons.add(len(faces))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, faces.size, 3, dtype=np.int32))
+    if smooth:
+        mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
+    mesh.update(calc_edges=True)
+    mesh.validate()
+    return bpy.data.objects.new(name, mesh)
+
+
+def paint(thing: bpy.types.Object, colour: tuple[float, float, float, float]) -> None:
+    """One material, which shows the object's own colour, so that it can be animated and seen in every shading."""
+    thing.color = colour
+    thing.data.materials.append(_material())
+
+
+def _material() -> bpy.types.Material:
+    name = "Tactile object colour"
+    found = bpy.data.materials.get(name)
+    if found is not None:
+        return found
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    colour = nodes.new("ShaderNodeObjectInfo")
+    colour.location = (-250, 200)
+    links.new(colour.outputs["Color"], shader.inputs["Base Color"])
+    links.new(colour.outputs["Alpha"], shader.inputs["Alpha"])
+    shader.inputs["Roughness"].default_value = 0.6
+    if hasattr(material, "surface_render_method"):
+        material.surface_render_method = "DITHERED"
+    return material

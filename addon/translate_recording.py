@@ -1,0 +1,70 @@
+"""One button: the imported recording as a DIGIT would have felt it."""
+
+import bpy
+
+from ..tactile_core import patch_of_dent, sensors
+from ..tactile_core.errors import TactileError
+from . import (
+    custom_properties,
+    digit_objects,
+    motion,
+    patch_nodes,
+    pictures,
+    properties,
+    recording_data,
+    timeline,
+    view,
+)
+from .progress import shown
+from .reports import TactileOperator
+
+
+class TACTILE_OT_translate(TactileOperator):
+    """Translate the BioTac recording: add a DIGIT's gel that moves as it would have, with its contact patch"""
+
+    bl_idname = "tactile.translate"
+    bl_label = "Translate to DIGIT"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Only where there is a BioTac to translate."""
+        if properties.of_role(context.scene, "BIOTAC", context.object) is None:
+            cls.poll_message_set("Import a BioTac recording first")
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        skin = properties.of_role(context.scene, "BIOTAC", context.object)
+        properties.check_format(skin)
+        about = skin.tactile
+        if not about.recording:
+            raise TactileError(skin.name, "no recording", "an imported BioTac", "Import a BioTac recording")
+        with shown(context) as progress:
+            path = bpy.path.abspath(about.recording)
+            found = recording_data.load(path, about.tare, about.frames, progress)
+        frames = about.first_frame + found.chosen.astype(float)
+        group = skin.users_collection[0]
+        for old in [thing for thing in group.objects if thing.tactile.role == "DIGIT"]:
+            bpy.data.objects.remove(old)
+        gel = digit_objects.add_gel(group, about.per_metre, skin)
+        surface, moved = sensors.digit_surface(), found.translation.displacement_digit
+        told = motion.animate(gel, surface.rest, moved, frames, about.motion)
+        step = frames[1] - frames[0] if len(frames) > 1 else 1.0
+        patch_nodes.add_patch(gel, patch_of_dent.contact_patch(moved, surface), frames[0], step)
+        values = custom_properties.columns(found)
+        custom_properties.write(gel, {name: values[name] for name in ("force", "confidence")}, frames)
+        low = timeline.mark_low_confidence(context.scene, found.translation.confidence, frames)
+        view.show(context, [skin, gel])
+        pictures.update(gel, context.evaluated_depsgraph_get())
+        self.report({"INFO"}, f"{told}; {low} parts of low confidence")
+
+
+def register() -> None:
+    """Called by the package."""
+    bpy.utils.register_class(TACTILE_OT_translate)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    bpy.utils.unregister_class(TACTILE_OT_translate)

@@ -1,0 +1,116 @@
+"""Build installable zips of the Blender extension.
+
+    python3 scripts/build_extension.py                               linux-x64, for Blenders with Python 3.11
+    python3 scripts/build_extension.py --platform windows-x64 --python 3.13
+    python3 scripts/build_extension.py --no-wheels                   13 MB, any platform: numpy alone, see Preferences
+
+What git tracks goes in (no folder of git's own is read twice, nothing untracked slips in), and the wheels of what
+simulating and rendering need: about 115 MB a platform and Python, so each has a zip of its own. Blender 4.2 to 5.0
+run Python 3.11, 5.1 and later 3.13, Debian's 5.2 3.14. The same commit, platform and wheels give the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+# platform of Blender -> platforms of wheels, newest first
+PLATFORMS = {
+    "linux-x64": [f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 24, 17)] + ["manylinux2014_x86_64"],
+    "windows-x64": ["win_amd64"],
+    "macos-arm64": [f"macosx_{major}_0_arm64" for major in range(14, 10, -1)],
+}
+PYTHONS = ("3.11", "3.13", "3.14")
+# Never torch (users translate with numpy), never numpy (Blender ships it).
+WHEELS = ("h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "mitsuba", "drjit")
+# Of those that constraints.txt does not pin, because no other part of the project installs them.
+PINS = {"mitsuba": "3.9.1", "drjit": "1.5.0"}
+PACKED = ("__init__.py", "blender_manifest.toml", "LICENSE", "addon/", "tactile_core/", "scenes/")
+LEFT_OUT = ("scenes/training/", "tactile_core/training/")  # 1.8 MB for tests; torch
+EPOCH = (1980, 1, 1, 0, 0, 0)  # zip's own zero, so that the time of building changes no byte
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Build one zip and say how large it is; returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--platform", choices=tuple(PLATFORMS), default="linux-x64")
+    parser.add_argument("--python", choices=PYTHONS, default="3.11", help="of the Blender it is for (default: 3.11)")
+    parser.add_argument("--no-wheels", action="store_true", help="without wheels, for any platform and Python")
+    parser.add_argument("--out", type=Path, default=ROOT / "dist", metavar="DIR", help="default: dist")
+    options = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            wheels = [] if options.no_wheels else fetch(options.platform, options.python, Path(folder))
+            path = build(options.out, None if options.no_wheels else options.platform, options.python, wheels)
+        except (subprocess.CalledProcessError, OSError) as error:
+            print(f"build_extension.py: error: {error}", file=sys.stderr)
+            return 2
+    print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
+    return 0
+
+
+def tracked() -> list[str]:
+    """Files of the checkout that belong in the zip, sorted."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True).stdout.decode()
+    return sorted(n for n in listed.split("\0") if n.startswith(PACKED) and not n.startswith(LEFT_OUT))
+
+
+def fetch(platform: str, python: str, folder: Path) -> list[Path]:
+    """The wheels, downloaded into a folder; pip says what is missing."""
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:",
+               "--implementation", "cp", "--python-version", python, "--dest", str(folder)]  # fmt: skip
+    for name in PLATFORMS[platform]:
+        command += ["--platform", name]
+    subprocess.run([*command, *requirements()], check=True)
+    return sorted(folder.glob("*.whl"))
+
+
+def requirements() -> list[str]:
+    """``name==version`` of every wheel."""
+    text = (ROOT / "constraints.txt").read_text(encoding="utf-8")
+    pins = PINS | dict(re.findall(r"(?m)^([A-Za-z0-9_.-]+)==(\S+)$", text))
+    return [f"{name}=={pins[name]}" for name in WHEELS]
+
+
+def manifest(platform: str | None, wheels: list[Path]) -> str:
+    """The manifest with the platform and wheels of one zip, before its first table."""
+    text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
+    if platform is None:
+        return text
+    names = "".join(f'    "./wheels/{wheel.name}",\n' for wheel in wheels)
+    return text.replace("[permissions]", f'platforms = ["{platform}"]\nwheels = [\n{names}]\n\n[permissions]')
+
+
+def build(out: Path, platform: str | None, python: str, wheels: list[Path]) -> Path:
+    """Write the zip as one piece; returns its path."""
+    text = manifest(platform, wheels)
+    version = re.search(r'(?m)^version = "(.+)"$', text).group(1)
+    tag = f"-{platform}-py{python}" if platform else ""
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"tactile-{version}{tag}.zip"
+    partial = path.with_suffix(".partial")
+    with zipfile.ZipFile(partial, "w") as file:
+        for name in tracked():
+            content = text.encode() if name == "blender_manifest.toml" else (ROOT / name).read_bytes()
+            add(file, name, content, zipfile.ZIP_DEFLATED)
+        for wheel in wheels:
+            add(file, f"wheels/{wheel.name}", wheel.read_bytes(), zipfile.ZIP_STORED)  # already packed
+    partial.replace(path)
+    return path
+
+
+def add(file: zipfile.ZipFile, name: str, content: bytes, how: int) -> None:
+    """One member, without the time of day or the builder's file modes."""
+    member = zipfile.ZipInfo(name, EPOCH)
+    member.compress_type, member.external_attr = how, 0o644 << 16
+    file.writestr(member, content)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

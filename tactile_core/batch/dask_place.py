@@ -1,0 +1,108 @@
+"""Dask workers on any machines that see the same job folder under the same path.
+
+Dask's messages are pickles, which run code: a scheduler on ``tcp://`` obeys whoever reaches it. Use it in a private
+network, or ``tls://`` with certificates (Dask's own settings ``distributed.comm.tls`` name the files).
+"""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from ..errors import TactileError
+from . import tasks
+from .local import KILLS
+from .tasks import Reply, Task
+
+SCHEMES = ("tcp://", "tls://", "ucx://")
+WAIT = 30  # s for the scheduler to answer
+
+
+class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A TOML file that starts a cluster. jobs : to ask the queue for; options : of dask_jobqueue's cluster."""
+
+    queue: Literal["slurm", "pbs", "sge", "lsf", "htcondor"]
+    jobs: int
+    options: dict[str, Any]
+
+
+class Cluster:
+    """A Dask scheduler's workers. address : of the scheduler, or of a file as `QueueFile`."""
+
+    def __init__(self, folder: Path, address: str) -> None:
+        """Raises TactileError for an address or a file that is neither."""
+        self._folder = str(folder.resolve())
+        self._address = address
+        self._queue = None if address.startswith(SCHEMES) else _read(address)
+        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._tasks: dict[str, tuple[Task, Any]] = {}  # a future that nobody holds is given up
+
+    def submit(self, task: Task) -> None:
+        """Have a task done."""
+        plain = msgspec.to_builtins(task)
+        future = self._client.submit(tasks.run, self._folder, plain, pure=False)
+        self._tasks[future.key] = task, future
+        future.add_done_callback(self._done.put)
+
+    def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
+        """Replies as they come, as long as `count` says that some are awaited."""
+        while count():
+            future = self._done.get()
+            yield self._tasks.pop(future.key)[0], self._reply(future)
+
+    def _reply(self, future: Any) -> Reply:
+        from distributed import KilledWorker
+
+        error = future.exception() if future.status in ("error", "lost", "cancelled") else None
+        if isinstance(error, KilledWorker):
+            return Reply(error=f"killed its worker {KILLS} times ({error.last_worker.address}); set aside")
+        if future.status != "finished":
+            raise TactileError(self._address, f"a task was lost ({error or future.status})", "a working scheduler")
+        return msgspec.convert(future.result(), Reply)
+
+    def __enter__(self) -> Cluster:
+        import dask
+        from distributed import Client, Security
+
+        dask.config.set({"distributed.scheduler.allowed-failures": KILLS - 1})  # of a scheduler that starts here
+        self._cluster = None if self._queue is None else _start(self._queue)
+        security = Security(require_encryption=True) if self._address.startswith("tls://") else None
+        try:
+            self._client = Client(self._cluster or self._address, security=security, timeout=WAIT, set_as_default=False)
+        except (OSError, ValueError, TypeError, RuntimeError) as error:
+            found, advice = f"no scheduler answers ({error})", "Start one: dask scheduler"
+            raise TactileError(self._address, found, "a Dask scheduler", advice) from error
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._tasks.clear()
+        self._client.close()
+        if self._cluster is not None:
+            self._cluster.close()
+
+
+def _read(address: str) -> QueueFile:
+    try:
+        return msgspec.toml.decode(Path(address).read_bytes(), type=QueueFile)
+    except OSError as error:
+        expected = "tcp://HOST:PORT, tls://HOST:PORT or a TOML file"
+        raise TactileError("--cluster", f"{address!r} ({error.strerror})", expected) from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise TactileError(address, str(error), "queue, jobs and [options], as in the README") from error
+
+
+def _start(wanted: QueueFile) -> Any:
+    """A cluster whose workers are jobs of a queue. Raises TactileError for options it does not know."""
+    import dask_jobqueue
+
+    names = {"slurm": "SLURM", "pbs": "PBS", "sge": "SGE", "lsf": "LSF", "htcondor": "HTCondor"}
+    try:
+        cluster = getattr(dask_jobqueue, f"{names[wanted.queue]}Cluster")(**wanted.options)
+    except (TypeError, ValueError) as error:
+        raise TactileError("--cluster, options", str(error), f"options of dask_jobqueue's {wanted.queue}") from error
+    cluster.scale(jobs=wanted.jobs)
+    return cluster

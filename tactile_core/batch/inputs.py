@@ -1,0 +1,103 @@
+"""From what the user names (files, folders, globs, ``@list``) to recordings with names and hashes."""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import msgspec
+
+from .. import results
+from ..errors import TactileError
+from ..recordings.bag import MARK, split
+
+SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3")  # what is taken from a folder
+SLIDE = "_bio.csv"  # of the slide set, whose other files (_cw.csv, _cp.csv) are no recordings
+
+
+class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One recording of a job.
+
+    name : of its files in the job folder, different for each; path : absolute; sha256, bytes : of its content
+    """
+
+    name: str
+    path: str
+    sha256: str
+    bytes: int
+
+
+def find(words: Sequence[str], out: Path) -> list[Path]:
+    """The recordings that `words` name, in their order, each once; what lies in the folder `out` is left out.
+
+    Raises TactileError for a word that names nothing.
+    """
+    own = out.resolve()
+    found: dict[Path, None] = {}
+    for word in words:
+        paths = [path for path in _named(word) if not path.is_relative_to(own)]
+        if not paths:
+            advice = "Check the path; quote a glob, so that the shell leaves it alone"
+            raise TactileError(word, "names no recording", f"files ({', '.join(SUFFIXES)}), folders or globs", advice)
+        found |= dict.fromkeys(paths)
+    return list(found)
+
+
+def _named(word: str) -> Iterator[Path]:
+    if word.startswith("@"):
+        for line in _lines(Path(word[1:])):
+            yield from _named(os.path.join(os.path.dirname(word[1:]), line))
+    elif os.path.isdir(word):
+        yield from _of_folder(Path(word).resolve())
+    elif os.path.exists(word) or not glob.has_magic(word):
+        yield Path(word).resolve()
+    else:
+        for path in sorted(glob.glob(word, recursive=True)):
+            yield from _named(path)
+
+
+def _lines(file: Path) -> list[str]:
+    """Paths of a list file, one a line; blank lines and those that begin with # are passed over."""
+    try:
+        lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise TactileError(file, f"cannot be read ({error})", "a text file with one path a line") from error
+    return [line for line in lines if line and not line.startswith(("#", "@"))]
+
+
+def _of_folder(folder: Path) -> Iterator[Path]:
+    """Recordings in a folder and below it, by name; links to folders are not followed."""
+    if (folder / MARK).is_file():
+        yield folder
+        return
+    for place, folders, names in os.walk(folder):
+        bags = [name for name in folders if (Path(place) / name / MARK).is_file()]
+        folders[:] = sorted(name for name in folders if name not in bags and not name.startswith("."))
+        slides = [name for name in names if name.endswith(SLIDE)]
+        plain = [name for name in names if name.lower().endswith(SUFFIXES) and not name.startswith(".")]
+        for name in sorted([*bags, *(slides or plain)]):
+            yield Path(place) / name
+
+
+def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[Input]:
+    """Read every file once. Raises TactileError for one that cannot be read; progress : (files done, in all)."""
+    found = []
+    for index, path in enumerate(paths):
+        name = f"{index:05d}_{re.sub(r'[^A-Za-z0-9._-]', '_', path.stem)[:80]}"
+        digest, size = content_hash(path)
+        found.append(Input(name, str(path), digest, size))
+        progress(index + 1, len(paths))
+    return found
+
+
+def content_hash(path: Path) -> tuple[str, int]:
+    """Hash and bytes of a file, or of all files of a bag's folder with their names. Raises TactileError."""
+    path = Path(split(str(path))[0])
+    try:
+        files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
+        return results.sha256(path), sum(file.stat().st_size for file in files)
+    except OSError as error:
+        raise TactileError(path, f"cannot be read ({error.strerror or error})", "a recording") from error

@@ -1,0 +1,126 @@
+"""``job.json``: what a job is to make. It never changes after it is written; all else follows from it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta
+
+from .. import __version__, atomic, results
+from ..errors import TactileError
+from ..recordings import PrepareOptions
+from ..recordings.sensor_file import Sensor
+from .inputs import Input
+
+FORMAT = "tactile-job-1"
+FILE, PREPARED, SHARDS, ASIDE, MANIFEST = "job.json", "prepared", "shards", "aside", "manifest.json"
+SHARD_FRAMES = 1000
+MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
+ADVICE = "Use an empty --out folder"
+
+
+class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """As recordings.PrepareOptions, whose meanings these are."""
+
+    kind: str | None = None
+    tare: str | None = None
+    drift: bool = True
+    counts_per_unit: float | None = None
+    smooth: int | None = None
+
+    def options(self) -> PrepareOptions:
+        """For ``recordings.prepare``."""
+        return PrepareOptions(**msgspec.structs.asdict(self))
+
+
+class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """What is made of each recording: all that decides a shard's bytes beside the recording itself.
+
+    shard_frames : frames a shard; keep : words of results.KEEPABLE; weights : sha256 of the weights' card
+    """
+
+    keep: list[str]
+    weights: str
+    shard_frames: Annotated[int, Meta(ge=1, le=MAX_SHARD_FRAMES)] = SHARD_FRAMES
+    prepare: Prepare = Prepare()
+    sensor: Sensor | None = None
+    version: str = __version__
+
+
+class Job(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A job: `inputs` by `recipe`. weights : folder of the networks, None for the shipped ones; versions : a note."""
+
+    format: str
+    inputs: list[Input]
+    recipe: Recipe
+    weights: str | None
+    versions: dict[str, str]
+
+    @property
+    def id(self) -> str:
+        """Hash of all that decides the shards; the same inputs elsewhere have the same."""
+        named = [[one.name, one.sha256] for one in self.inputs]
+        return _hash([named, msgspec.to_builtins(self.recipe)])
+
+
+def _hash(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def make(inputs: list[Input], recipe: Recipe, weights: str | None) -> Job:
+    """A new job."""
+    folder = None if weights is None else os.path.abspath(weights)
+    return Job(FORMAT, inputs, recipe, folder, results.versions())
+
+
+def write(folder: Path, job: Job) -> None:
+    """Make the job folder. Raises TactileError where it cannot be written."""
+    try:
+        for part in (PREPARED, SHARDS, ASIDE):
+            (folder / part).mkdir(parents=True, exist_ok=True)
+        atomic.write_json(folder / FILE, msgspec.to_builtins(job))
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise TactileError(folder, found, "a writable folder", "Name another --out folder") from error
+
+
+def exists(folder: Path) -> bool:
+    """Whether the folder holds a job."""
+    return (folder / FILE).exists()
+
+
+def read(folder: Path) -> Job:
+    """The job of a folder. Raises TactileError for none, for one that is damaged or of another version."""
+    file = folder / FILE
+    try:
+        job = msgspec.convert(json.loads(file.read_text(encoding="utf-8")), Job)
+    except OSError as error:
+        advice = "Name recordings to start a job"
+        raise TactileError(file, f"cannot be read ({error.strerror or error})", "a job folder", advice) from error
+    except (ValueError, RecursionError) as error:  # of JSON and of msgspec
+        raise TactileError(file, f"damaged ({error})", f"a job file ({FORMAT})", ADVICE) from error
+    if job.format != FORMAT:
+        raise TactileError(f"{file}, format", repr(job.format), repr(FORMAT), ADVICE)
+    if job.recipe.version != __version__:
+        found = f"made by version {job.recipe.version}"
+        raise TactileError(file, found, f"version {__version__}, which is running", ADVICE)
+    for index, one in enumerate(job.inputs):
+        if not one.name.startswith(f"{index:05d}_") or os.path.basename(one.name) != one.name:
+            raise TactileError(f"{file}, inputs", f"the name {one.name!r:.80}", f"{index:05d}_<file name>", ADVICE)
+    results.parse_keep(",".join(job.recipe.keep))
+    return job
+
+
+def prepared_file(folder: Path, name: str) -> Path:
+    """Of the recording of that name."""
+    return folder / PREPARED / f"{name}.h5"
+
+
+def shard_file(folder: Path, name: str, number: int) -> Path:
+    """Of the shard of that number in the recording, from 0."""
+    return folder / SHARDS / f"{name}-{number:06d}.h5"

@@ -1,0 +1,57 @@
+"""One job a folder: the lock of a job, which the system drops when its holder dies."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..errors import TactileError
+
+FILE = ".tactile-batch-lock"
+
+
+@contextlib.contextmanager
+def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
+    """Hold the folder; with `part` (i, n) share it with the other parts of an array, but not with the same part.
+
+    Raises TactileError where another job, or the same part of it, is running. On a network file system the lock holds
+    as far as that passes locks on (NFS 4 and Lustre with flock do).
+    """
+    with contextlib.ExitStack() as stack:
+        if part is None:
+            stack.enter_context(_lock(folder / FILE, folder, shared=False))
+        else:
+            stack.enter_context(_lock(folder / FILE, folder, shared=True))
+            name = f"{FILE}-{part[0]}-of-{part[1]}"
+            stack.enter_context(_lock(folder / name, f"{folder}, --array {part[0]}/{part[1]}", shared=False))
+        yield
+
+
+@contextlib.contextmanager
+def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
+    """The file stays: a lock on a file that others remove guards nothing."""
+    descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        _take(descriptor, shared)
+    except OSError as error:
+        os.close(descriptor)
+        advice = "Wait for it, watch it with --status, or name another folder"
+        raise TactileError(where, "another job is running here", "one at a time", advice) from error
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _take(descriptor: int, shared: bool) -> None:
+    if os.name == "nt":
+        import msvcrt
+
+        if not shared:  # Windows has no shared locks here: parts of an array are kept apart by their own locks alone
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)

@@ -1,0 +1,182 @@
+"""A recording's signals, ready for the networks, in a sealed file that shards read a few rows of.
+
+Datasets, T first: ``time`` float64 s; ``change`` float64 and ``electrodes`` float32 (T, 19) counts; ``quiet`` bool;
+``flags`` uint16. ``part`` (P,) first frame of each part of the recording, ``rest`` (P, 19) counts. ``about``: JSON of
+what is told of the recording. Chunks carry checksums, so a shard reads no damaged ones.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import atomic
+from ..errors import TactileError
+from ..hdf5_disk import Disk
+from ..recordings import Recording, Signals, prepare, sensor_file
+from ..recordings.parts import read_parts
+from . import job as jobs
+from . import sealed
+from .inputs import content_hash
+
+if TYPE_CHECKING:
+    import h5py
+
+    from .job import Job
+
+CHUNK = 1024  # rows a chunk: 160 kB of changes
+COLUMNS = {"time": np.float64, "change": np.float64, "electrodes": np.float32, "quiet": bool, "flags": np.uint16}
+MAX_WARNINGS = 100  # kept of one recording, the rest are counted
+
+
+def make(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+    """Prepare recording `index` of the job, unless it is; returns its frames, and whether anything was made.
+
+    Raises TactileError for a recording that cannot be read or has changed since the job was made.
+    """
+    one = job.inputs[index]
+    file = jobs.prepared_file(folder, one.name)
+    if sealed.digest_of(file) is not None:
+        return len(Prepared(file)), False
+    digest, size = content_hash(Path(one.path))
+    if (digest, size) != (one.sha256, one.bytes):
+        found = "another content than when the job was made"
+        raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
+    with atomic.new_file(file, shared=True) as partial:
+        count = _write(partial, job, one.path, digest)
+        sealed.seal(partial)
+    return count, True
+
+
+def _write(file: Path, job: Job, path: str, digest: str) -> int:
+    import h5py
+
+    disk = Disk(file)
+    try:
+        with h5py.File(disk, "w", userblock_size=sealed.ROOM) as out:
+            writer = _Writer(out)
+            for recording, signals, repeated in _signals(path, job):
+                writer.append(recording, signals, repeated)
+            writer.close(digest)
+    except Exception:
+        disk.check()  # HDF5 stumbles over what the disk refused: that is the error to tell
+        raise
+    finally:
+        disk.close()
+    disk.check()
+    return writer.count
+
+
+def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
+    """Each part of a recording prepared, and how many of its frames the part before had."""
+    options, rest = job.recipe.prepare.options(), None
+    for part in read_parts(path):
+        recording = part.recording
+        if rest is not None and options.tare not in (None, "none"):  # told frames lie in the first part
+            options = dataclasses.replace(options, tare=slice(0, len(recording)))
+        signals = prepare(recording, options)
+        if rest is None:
+            unit = signals.report["counts_per_unit"]
+            options = dataclasses.replace(options, kind=signals.kind, counts_per_unit=unit)
+        elif options.tare is not None or not signals.quiet.any():
+            signals = _carried(signals, rest, told=options.tare is not None)
+        rest = signals.rest + signals.drift * recording.duration
+        if job.recipe.sensor is not None:
+            signals = sensor_file.apply(signals, job.recipe.sensor)
+        yield recording, signals, part.repeated
+
+
+def _carried(signals: Signals, rest: np.ndarray, told: bool) -> Signals:
+    """A part without rest of its own, from the rest (19,) at the end of the part before."""
+    drift = np.zeros_like(signals.drift)
+    warnings = tuple(text for text in signals.warnings if not text.startswith("no quiet part"))
+    if not told:
+        warnings += ("no quiet part: the rest of the part before is taken",)
+    change = signals.change + (signals.rest - rest)
+    return dataclasses.replace(signals, change=change, rest=rest, drift=drift, warnings=warnings)
+
+
+class _Writer:
+    """The datasets of a prepared file, part by part."""
+
+    def __init__(self, file: h5py.File) -> None:
+        self.count, self._file = 0, file
+        self._parts: list[tuple[int, np.ndarray]] = []
+        self._about: dict[str, Any] = {"warnings": [], "prepared": []}
+
+    def append(self, recording: Recording, signals: Signals, repeated: int) -> None:
+        """Add the frames of a part that are new."""
+        arrays = {"time": recording.time, **{name: getattr(signals, name) for name in tuple(COLUMNS)[1:]}}
+        end = self.count + len(recording) - repeated
+        for name, kind in COLUMNS.items():
+            values = np.asarray(arrays[name])[repeated:].astype(kind)
+            if name not in self._file:
+                options = {"chunks": (CHUNK, *values.shape[1:]), "fletcher32": True, "track_times": False}
+                shape = (0, *values.shape[1:])
+                self._file.create_dataset(name, shape, kind, maxshape=(None, *shape[1:]), **options)
+            self._file[name].resize(end, axis=0)
+            self._file[name][self.count :] = values
+        if not self._parts:
+            self._about |= {
+                "recording": recording.name, "layout": recording.layout, "simulated": recording.simulated,
+                "start_time": recording.start_time, "kind": signals.kind,
+            }  # fmt: skip
+        self._parts.append((self.count, signals.rest))
+        self._about["warnings"] += [text for text in signals.warnings if text not in self._about["warnings"]]
+        self._about["prepared"].append(signals.report)
+        self.count = end
+
+    def close(self, digest: str) -> None:
+        """Write what is known at the end. digest : of the recording."""
+        warnings = self._about["warnings"]
+        if len(warnings) > MAX_WARNINGS:
+            warnings[MAX_WARNINGS:] = [f"{len(warnings) - MAX_WARNINGS} more warnings"]
+        self._file["part"] = np.array([first for first, _ in self._parts], np.int64)
+        self._file["rest"] = np.array([rest for _, rest in self._parts])
+        # A name that is no UTF-8 holds lone surrogates, which ASCII escapes; frames.h5 replaces them as well.
+        text = json.dumps(self._about | {"sha256": digest, "frames": self.count}, sort_keys=True)
+        self._file.create_dataset("about", data=np.frombuffer(text.encode("ascii"), np.uint8), track_times=False)
+
+
+class Prepared:
+    """An open look into a prepared file; every call opens it anew, so that nothing stays open in a worker."""
+
+    def __init__(self, file: Path) -> None:
+        self._path = file
+
+    def __len__(self) -> int:
+        return self._read(lambda file: len(file["time"]))
+
+    def about(self) -> dict[str, Any]:
+        """What is told of the recording: warnings, kind, start_time, simulated, sha256, frames..."""
+        return json.loads(self._read(lambda file: file["about"][()].tobytes()))
+
+    def rows(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
+        """Times (T,) s and signals of the frames from `start` up to `stop`; `rest` is that of the first of them."""
+
+        def read(file: h5py.File) -> tuple[np.ndarray, Signals]:
+            arrays = {name: file[name][start:stop] for name in COLUMNS}
+            part = int(np.searchsorted(file["part"][()], start, side="right")) - 1
+            rest = file["rest"][part]
+            time = arrays.pop("time")
+            return time, Signals(
+                rest=rest, drift=np.zeros_like(rest), kind=about["kind"], warnings=(), report={}, **arrays
+            )
+
+        about = self.about()
+        return self._read(read)
+
+    def _read(self, what: Any) -> Any:
+        import h5py
+
+        try:
+            with h5py.File(self._path, "r") as file:
+                return what(file)
+        except (OSError, KeyError, ValueError) as error:
+            found, advice = f"damaged ({error})", "Run the job again: it is made anew"
+            raise TactileError(self._path, found, "a prepared recording", advice) from error

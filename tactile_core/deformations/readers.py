@@ -1,0 +1,51 @@
+"""The registry of layouts, and the one way in."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pkgutil
+from collections.abc import Iterator
+from functools import cache
+from types import ModuleType
+
+from ..errors import TactileError
+from ..recordings.store import damage_told
+from . import formats
+from .deformation import Deformation
+
+
+@cache
+def layouts() -> tuple[ModuleType, ...]:
+    """All modules of ``formats/``, in the order of their names."""
+    names = sorted(info.name for info in pkgutil.iter_modules(formats.__path__))
+    return tuple(importlib.import_module(f"{formats.__name__}.{name}") for name in names)
+
+
+def read(path: str | os.PathLike[str]) -> Iterator[Deformation]:
+    """The frames of a file in the order of trial, step, environment and sensor; which layout is told from its names.
+
+    Raises TactileError for a file that is no such HDF5 file, and for a frame that lacks a part.
+    """
+    import h5py
+
+    path = os.fspath(path)
+    with damage_told(path, "HDF5"):
+        file = h5py.File(path, "r")
+    with file:
+        names: list[str] = []
+        with damage_told(path, "HDF5"):
+            file.visit(names.append)
+        for layout in layouts():
+            frames = sorted((found for name in names if (found := layout.PATTERN.fullmatch(name))), key=_place)
+            if frames:
+                for found in frames:
+                    yield layout.read(file, found)
+                return
+    known = " | ".join(layout.NAME for layout in layouts())
+    raise TactileError(path, "no known deformations", known, "Compare the names of its groups")
+
+
+def _place(found: object) -> tuple:
+    parts = found.groupdict()
+    return int(parts.get("trial", 0)), int(parts["step"]), int(parts["environment"]), parts.get("sensor", "")

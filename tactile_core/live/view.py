@@ -1,0 +1,63 @@
+"""The newest frame as a picture, and how long that took."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..frame_pass import Tools
+from ..recordings.recording import Recording
+from .growing import newest
+from .live_signals import LiveSignals
+
+REMEMBERED = 1000  # latencies that figures are taken over
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """frame : its index; picture : (H, W, 3) uint8; force : N; latency : s from rows to picture"""
+
+    frame: int
+    picture: np.ndarray
+    force: float
+    latency: float
+
+
+class View:
+    """Rows in, pictures out: always the newest, older ones that came meanwhile are passed over."""
+
+    def __init__(self, tools: Tools, rate: float) -> None:
+        """rate : Hz of the recording."""
+        self._tools, self._signals = tools, LiveSignals(rate)
+        self.frames, self.passed = 0, 0
+        self.latencies: deque[float] = deque(maxlen=REMEMBERED)
+
+    @property
+    def rest_found(self) -> str:
+        """Where rest was taken from; empty while it is not known."""
+        return self._signals.found
+
+    def show(self, rows: Recording, came: float) -> Shown | None:
+        """The picture of the last of some rows that came at `came` (time.perf_counter); None before rest is known."""
+        self.frames += len(rows)
+        if not self._signals.learn(rows.electrodes):
+            return None
+        self.passed += len(rows) - 1
+        translation = self._tools.translate(self._signals.signals(newest(rows)[None]))
+        picture = self._tools.shade(self._tools.height_map(translation.displacement_digit)[0])
+        force = float(np.linalg.norm(translation.force[0]))
+        shown = Shown(self.frames - 1, picture, force, time.perf_counter() - came)
+        self.latencies.append(shown.latency)
+        return shown
+
+    def told(self) -> str:
+        """The latencies of the last pictures in words."""
+        if not self.latencies:
+            return "no picture yet: waiting for a quiet part"
+        middle, late = 1e3 * np.percentile(np.array(self.latencies), [50, 99])
+        return (
+            f"{middle:.1f} ms from frame to picture (99 of 100 below {late:.1f} ms), {self.passed} frames passed over"
+        )

@@ -1,0 +1,218 @@
+"""ROS 1 and ROS 2 bags and MCAP files, read without ROS, by our own definitions of the messages.
+
+What a bag says of its messages' layout is compared, never compiled: the library that decodes makes code of it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ..errors import TactileError
+from .assemble import MAX_FRAMES, assemble, check_electrodes
+from .recording import ELECTRODES, Recording
+from .store import damage_told
+
+STARTS = {b"#ROSBAG V": "ros1", b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite"}
+MARK = "metadata.yaml"  # of a folder that is a ROS 2 bag
+MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk; recorders make them of 1 to 16 MB (assumed enough)
+MAX_METADATA = 2**22
+PACKED = re.compile(rb"compression_mode:\s*[\"']?(file|message)", re.IGNORECASE)
+FINGER = re.compile(r"(.+)#([0-4])$")
+
+
+@dataclass(frozen=True)
+class Bag:
+    """An open bag. topics : message type -> its connections; finger : asked for as ``path#finger``, or None."""
+
+    path: str
+    ros1: bool
+    finger: int | None
+    topics: dict[str, list[Any]]
+    reader: Any
+
+
+def split(path: str) -> tuple[str, int | None]:
+    """``hand.bag#2`` -> the path and the finger; a path that exists is taken as it is."""
+    found = FINGER.match(path)
+    if found is None or Path(path).exists():
+        return path, None
+    return found[1], int(found[2])
+
+
+def kind(path: Path) -> str | None:
+    """Which bag a path is: ros1, mcap, sqlite or folder; None for anything else."""
+    if path.is_dir():
+        return "folder" if (path / MARK).is_file() else None
+    with open(path, "rb") as file:
+        start = file.read(16)
+    return next((name for mark, name in STARTS.items() if start.startswith(mark)), None)
+
+
+@contextmanager
+def open_bag(path: str) -> Iterator[Bag]:
+    """Open for reading; raises TactileError for damage, and for a ROS 2 bag that is packed file by file."""
+    from rosbags.rosbag1 import Reader as Reader1
+    from rosbags.rosbag2 import Reader as Reader2
+    from rosbags.rosbag2.storage_mcap import McapReader
+    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+
+    _bound_unpacking()
+    path, finger = split(path)
+    what = kind(Path(path))
+    if what == "folder":
+        with open(Path(path) / MARK, "rb") as file:
+            told = file.read(MAX_METADATA + 1)
+        if len(told) > MAX_METADATA or PACKED.search(told):
+            advice = "Unpack it: ros2 bag convert"
+            raise TactileError(path, "a bag packed file by file, or with huge metadata", "a plain bag", advice)
+    openers = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
+    with damage_told(path, "bag"):
+        reader = openers[what](Path(path))
+        reader.open()
+    try:
+        topics: dict[str, list[Any]] = {}
+        for connection in sorted(reader.connections, key=lambda one: one.topic):
+            topics.setdefault(connection.msgtype, []).append(connection)
+        yield Bag(path, what == "ros1", finger, topics, reader)
+    finally:
+        reader.close()
+
+
+def _bound_unpacking() -> None:
+    """Have the library unpack no chunk to more than MAX_CHUNK; by itself it unpacks whatever a file asks for."""
+    import bz2
+
+    import lz4.frame
+    from rosbags.rosbag1 import reader
+    from rosbags.rosbag2 import storage_mcap
+
+    def bounded(unpacker: Callable[[], Any]) -> Callable[..., bytes]:
+        def unpack(data: bytes, size: int = 0) -> bytes:
+            found = unpacker().decompress(data, max_length=MAX_CHUNK)
+            if len(found) >= MAX_CHUNK:
+                raise ValueError(f"a chunk of over {MAX_CHUNK // 2**20} MB")
+            return found
+
+        return unpack
+
+    lz4_bounded = bounded(lz4.frame.LZ4FrameDecompressor)
+    reader.decompressors |= {"bz2": bounded(bz2.BZ2Decompressor), "lz4": lz4_bounded}
+    storage_mcap.DECOMPRESSORS |= {"lz4": lz4_bounded, "zstd": bounded(storage_mcap.zstd.ZstdDecompressor)}
+
+
+def read_bag(
+    bag: Bag, layout: ModuleType, frames: int = MAX_FRAMES + 1, context: int = 0
+) -> Iterator[tuple[Recording, int]]:
+    """Recordings of `frames` frames, each beginning with the last `context` ones of the one before, and how many.
+
+    One finger's: the one asked for, or the first that is not all zeros; a warning names the others.
+    """
+    rows = np.empty((0, layout.WIDTH + 1))
+    finger, warnings, repeated = bag.finger, [], 0
+    for block in _blocks(bag, layout, frames):
+        if finger is None:
+            finger, warnings = _choose(bag, block)
+        if finger >= block.shape[1]:
+            raise TactileError(bag.path, f"{block.shape[1]} fingers, no number {finger}", "path#finger, from 0")
+        rows = np.concatenate([rows[len(rows) - repeated :], block[:, finger]])
+        yield _recording(bag, layout, rows, warnings), repeated
+        repeated = min(context, len(rows))
+    if finger is None:
+        raise TactileError(bag.path, f"no {layout.MESSAGE} message", "at least one frame")
+
+
+def _blocks(bag: Bag, layout: ModuleType, frames: int) -> Iterator[np.ndarray]:
+    """(n, fingers, 1 + WIDTH) float, stamp first, n up to `frames`."""
+    connections = bag.topics[layout.MESSAGE]
+    connections = [one for one in connections if one.topic == connections[0].topic]
+    rows: list[np.ndarray] = []
+    for stamp, message in _messages(bag, layout, connections):
+        sensors = layout.sensors(message)
+        if rows and len(sensors) != len(rows[-1]):
+            raise TactileError(bag.path, f"{len(sensors)} fingers after {len(rows[-1])}", "as many in each message")
+        row = np.empty((len(sensors), layout.WIDTH + 1))
+        for finger, sensor in enumerate(sensors):
+            values = layout.row(sensor)
+            if len(values) != layout.WIDTH:
+                check_electrodes(bag.path, len(values) - layout.WIDTH + ELECTRODES, layout.MESSAGE)
+            row[finger, 0], row[finger, 1:] = stamp, values
+        rows.append(row)
+        if len(rows) == frames:
+            yield np.stack(rows)
+            rows = []
+    if rows:
+        yield np.stack(rows)
+
+
+def _messages(bag: Bag, layout: ModuleType, connections: list[Any]) -> Iterator[tuple[float, Any]]:
+    """Stamps (unix s) and decoded messages of one topic; the header's stamp, or the bag's where that is 0."""
+    decode = None
+    with damage_told(bag.path, "bag"):
+        messages = bag.reader.messages(connections)
+        for connection, written, data in messages:
+            decode = decode or _decoder(bag, layout, connection)
+            message = decode(data)
+            stamp = message.header.stamp
+            seconds = stamp.sec + 1e-9 * stamp.nanosec
+            yield seconds or 1e-9 * written, message
+
+
+def _decoder(bag: Bag, layout: ModuleType, connection: Any) -> Callable[[bytes], Any]:
+    """What decodes a connection's messages: by the version of our definitions whose hash it carries."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    stores = []
+    for version in layout.VERSIONS:
+        store = get_typestore(Stores.ROS1_NOETIC if bag.ros1 else Stores.ROS2_HUMBLE)
+        for name, text in version.items():
+            store.register(get_types_from_msg(text, name))
+        stores.append(store)
+    hashes = [
+        store.generate_msgdef(layout.MESSAGE)[1] if bag.ros1 else store.hash_rihs01(layout.MESSAGE) for store in stores
+    ]
+    if connection.digest in hashes:
+        stores = [stores[hashes.index(connection.digest)]]
+    elif bag.ros1 or connection.digest:
+        found = f"{layout.MESSAGE} of hash {connection.digest[:32]}"
+        raise TactileError(bag.path, found, " or ".join(hashes), "Export it as CSV with a ROS of its own version")
+
+    def decode(data: bytes) -> Any:
+        for store in stores[:-1]:
+            with suppress(Exception):  # of the library, on another version's bytes
+                message = _decoded(store, layout, data, bag.ros1)
+                if all(len(layout.row(sensor)) == layout.WIDTH for sensor in layout.sensors(message)):
+                    return message
+        return _decoded(stores[-1], layout, data, bag.ros1)
+
+    return decode
+
+
+def _decoded(store: Any, layout: ModuleType, data: bytes, ros1: bool) -> Any:
+    return (store.deserialize_ros1 if ros1 else store.deserialize_cdr)(data, layout.MESSAGE)
+
+
+def _choose(bag: Bag, block: np.ndarray) -> tuple[int, list[str]]:
+    """The finger to read, and what to say of the others. block : (n, fingers, 1 + WIDTH), electrodes last."""
+    if not block.shape[1]:
+        raise TactileError(bag.path, "a hand without fingers", "at least one BioTac")
+    live = np.flatnonzero(block[..., -ELECTRODES:].any(axis=(0, 2)))
+    finger = int(live[0]) if len(live) else 0
+    others = ", ".join(str(number) for number in live[1:])
+    told = f"finger {finger} is read; others with signals: {others} (ask for one as {Path(bag.path).name}#{live[-1]})"
+    return finger, [told] if others else []
+
+
+def _recording(bag: Bag, layout: ModuleType, rows: np.ndarray, warnings: list[str]) -> Recording:
+    stamps, pdc, tac, tdc = rows[:, :4].T
+    return assemble(
+        bag.path, layout.NAME, electrodes=rows[:, -ELECTRODES:], stamps=stamps, warnings=warnings,
+        pdc=pdc, tac=tac, tdc=tdc, pac=rows[:, 4:-ELECTRODES],
+    )  # fmt: skip

@@ -1,0 +1,174 @@
+"""Fine-tuning of S2MPN on a real sensor's recording that says where and how hard it was touched.
+
+Only S2MPN changes, or R2MPN where the recording is rectified. A label fixes the place of the dent, two numbers of the
+BioTac's latent, and, through the frozen force head, the force; it says nothing of the dent's shape, for which the
+latent is held near what it was, on the recording's own signals and on the typical simulated signals that ship with the
+weights.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .. import metrics, networks, sensors, typical_signals
+from ..moving_frame import PLACE_UNIT, MovingFrame
+from ..network_sizes import NETS, PLACE
+from ..networks import FORCE_SCALE, Networks
+from ..rows import Row, row
+from ..weights import CARD_NAME, card_bytes, read_bytes, sha256, to_safetensors, write_bytes
+from .export import versions
+from .labelled import Labelled, read_labelled
+from .modules import Residual
+from .stages import FORCE_FLOOR
+from .train import deterministic, prepare_folder
+
+EPOCHS, BATCH, RATE = 30, 64, 2e-4  # a few passes at a low rate: the start is a trained network (assumed)
+HOLD = 0.3  # weight of the shape being held, against place and force, each about 1 at first (assumed)
+PLACE_FLOOR = 0.05  # half a cell of the lattice: a smaller miss of the place counts squared (assumed)
+
+Progress = Callable[[float, str], None]
+
+
+def fine_tune(
+    path: str | os.PathLike,
+    out_folder: str | os.PathLike,
+    weights_folder: str | os.PathLike | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+    overwrite: bool = False,
+) -> list[Row]:
+    """Write weights whose S2MPN was fine-tuned on the recording; returns the rows before and after on kept presses.
+
+    out_folder/weights is what ``tactile convert --weights`` takes; its card says what the fine-tuning was made of.
+    Raises TactileError: a recording without labels or with too few contacts, weights that cannot be read, a folder
+    that holds weights already.
+    """
+    before = networks.load(weights_folder)
+    source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
+    data = read_labelled(path, before.frames["MVB"], seed)
+    typical = typical_signals.read(source).typical.astype(np.float32)
+    prepare_folder(Path(out_folder), overwrite)
+    net = "R2MPN" if data.rectified else "S2MPN"
+    with deterministic():
+        state = _train(before, net, data, typical, seed, progress or (lambda share, text: None))
+    after = Networks(before.tensors | {net: state}, before.card)
+    rows = [*_rows(before, data, "before"), *_rows(after, data, "after")]
+    note = {
+        "network": net,
+        "recording": os.path.basename(path),
+        "recording_sha256": _file_sha256(path),
+        "weights_sha256": before.sha256,
+        "contacts": {name: len(rows) for name, rows in vars(data.split).items()},
+        "dropped": list(data.dropped),
+        "seed": seed,
+        "versions": versions(),
+        "errors": rows,
+    }
+    _write(Path(out_folder) / "weights", source, before.card, net, state, note)
+    return rows
+
+
+def _file_sha256(path: str | os.PathLike) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _train(
+    nets: Networks, net: str, data: Labelled, typical: np.ndarray, seed: int, progress: Progress
+) -> dict[str, np.ndarray]:
+    """The network's tensors, rounded as they are written, at the epoch that was best on the validation presses."""
+    module, head = _module(nets, net), _module(nets, "force").requires_grad_(False)
+    latent = torch.from_numpy(nets.encode_signal(data.change, data.rectified))
+    rehearsed = torch.from_numpy(nets.encode_signal(np.abs(typical) if data.rectified else typical, data.rectified))
+    place, force = torch.from_numpy(data.place), torch.from_numpy(data.force)
+    with torch.no_grad():
+        held, kept = module(latent), module(rehearsed)
+        spread = kept.std(0).clamp(min=1e-3)
+
+    def loss(rows: Tensor) -> Tensor:
+        found = module(latent[rows])
+        miss = (found[:, :PLACE] - place[rows]).square().sum(-1).add(PLACE_FLOOR**2).sqrt().mean()
+        load = _force(head, found)
+        share = ((load - force[rows]).abs() / (force[rows] + FORCE_FLOOR)).mean()
+        shape = ((found - held[rows]) / spread)[:, PLACE:].square().mean()
+        return miss + share + HOLD * shape
+
+    optimiser = torch.optim.AdamW(module.parameters(), lr=RATE, weight_decay=0.0)
+    train, validation = torch.from_numpy(data.split.train), torch.from_numpy(data.split.validation)
+    best, state = float("inf"), copy.deepcopy(module.state_dict())
+    for epoch in range(EPOCHS + 1):
+        with torch.no_grad():
+            level = float(loss(validation))
+        if level < best:
+            best, state = level, copy.deepcopy(module.state_dict())
+        progress(epoch / EPOCHS, f"epoch {epoch}/{EPOCHS}: validation {level:.4f}")
+        generator = torch.Generator().manual_seed(int(np.random.default_rng([seed, epoch]).integers(2**62)))
+        for rows in train[torch.randperm(len(train), generator=generator)].split(BATCH):
+            again = torch.randint(len(rehearsed), (len(rows),), generator=generator)
+            rehearsal = ((module(rehearsed[again]) - kept[again]) / spread).square().mean()
+            optimiser.zero_grad()
+            (loss(rows) + HOLD * rehearsal).backward()
+            optimiser.step()
+    return {f"map.{name}": tensor.numpy().astype(np.float16) for name, tensor in state.items()}
+
+
+def _module(nets: Networks, net: str) -> Residual:
+    """A network of the weights as torch's module."""
+    sizes = nets.sizes[net]
+    module = Residual(sizes["inputs"], sizes["outputs"], sizes["width"], sizes["blocks"])
+    module.load_state_dict(
+        {name.removeprefix("map."): torch.from_numpy(array.copy()) for name, array in nets.tensors[net].items()}
+    )
+    return module
+
+
+def _force(head: Residual, latent: Tensor) -> Tensor:
+    """(B,) N, magnitude."""
+    return (FORCE_SCALE * torch.sinh(head(latent).clamp(-8.0, 8.0))).square().sum(-1).add(1e-12).sqrt()
+
+
+def _rows(nets: Networks, data: Labelled, when: str) -> list[Row]:
+    """Median miss of place and force on the presses kept for it; null: always the training's median."""
+    test, train = data.split.test, data.split.train
+    frame = nets.frames["MVB"]
+    latent = nets.s2m(nets.encode_signal(data.change[test], data.rectified), data.rectified)
+    true, middle = on_skin(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
+    miss, null = (metrics.lengths(on_skin(frame, each) - true) for each in (latent[:, :PLACE], middle))
+    load, usual = metrics.lengths(nets.force(latent)), np.median(data.force[train])
+    share, nothing = (100 * np.abs(each - data.force[test]) / data.force[test] for each in (load, usual))
+    of = f"kept presses, {when}"
+    return [
+        row("real_position_mm", 1e3 * float(np.median(miss)), "mm", null=1e3 * float(np.median(null)), of=of),
+        row("real_force_percent", float(np.median(share)), "%", null=float(np.median(nothing)), of=of),
+    ]
+
+
+def on_skin(frame: MovingFrame, place: np.ndarray) -> np.ndarray:
+    """(F, 3) m on the resting skin of places (F, 2) on its lattice, between nodes by bilinear interpolation."""
+    rest = sensors.biotac_surface().rest[: frame.rows * frame.columns].reshape(frame.rows, frame.columns, 3)
+    size = np.array([frame.rows, frame.columns])
+    at = np.clip(place * PLACE_UNIT + (size - 1) / 2, 0, size - 1)
+    cell = np.minimum(at.astype(int), size - 2)
+    (i, j), (t, s) = cell.T, (at - cell).T[:, :, None]
+    before, behind = ((1 - s) * rest[row, j] + s * rest[row, j + 1] for row in (i, i + 1))
+    return (1 - t) * before + t * behind
+
+
+def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
+    """The weights folder: all files of the source but the tuned one, and the card with a note of it, last."""
+    for name in [*(f"{net}.safetensors" for net in NETS if net != tuned), typical_signals.FILE]:
+        write_bytes(folder / name, read_bytes(source / name))
+    data = to_safetensors(state)
+    write_bytes(folder / f"{tuned}.safetensors", data)
+    entry = card["nets"][tuned] | {"sha256": sha256(data)}
+    card = card | {"nets": card["nets"] | {tuned: entry}, "fine_tuned": note}
+    write_bytes(folder / CARD_NAME, card_bytes(card))
+    networks.load(folder)  # what was written can be read

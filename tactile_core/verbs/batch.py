@@ -1,0 +1,193 @@
+"""``tactile batch``: many recordings, in many processes or on many machines."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import TactileError
+from ..terminal import bar, complain, say, tell
+from .common import RESUMES, prepare_arguments, progress_argument
+
+if TYPE_CHECKING:
+    from ..batch.job import Job
+    from ..batch.run import Place
+
+BRIEF = "many recordings to shards, resumable, on one machine or many"
+TEXT = """\
+Convert recordings into the job folder DIR:
+  job.json      inputs and their hashes, weights, options; written once
+  shards/       HDF5, some frames of one recording each, in the layout of frames.h5; pictures inside
+  aside/        what could not be done and why; the next run tries it again
+  manifest.json all shards and their hashes, once the job is done
+Only what is missing or damaged is made, so the same command goes on after any interruption; without INPUTS it goes on
+without looking whether they changed. The bytes do not depend on the number of workers. INPUTS are files, folders, globs
+(quoted) and @LIST, a text file with one path a line."""
+EPILOG = """\
+examples:
+  tactile batch day1 'day2/*.csv' --out job --workers 8
+  tactile batch --out job --status
+  tactile batch --out job --verify
+  tactile batch --out job --array $SLURM_ARRAY_TASK_ID/100     one of 100 that share the work, without a scheduler
+  tactile batch --out job --cluster tcp://head:8786            on the workers of a Dask scheduler
+  tactile batch day1 --out job --plan                          write job.json alone, as arrays need it"""
+LEAVES = RESUMES
+RECIPE = (
+    ("keep", None), ("shard_frames", None), ("weights", None), ("sensor", None), ("tare", "auto"), ("kind", None),
+    ("counts_per_unit", None), ("smooth", None), ("no_drift", False),
+)  # fmt: skip
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; none: go on with the job in DIR")
+    verb.add_argument("--out", required=True, metavar="DIR", help="folder of the job")
+    verb.add_argument(
+        "--keep", metavar="WORDS", help="out of latent,displacement,height,image (default: latent,displacement)"
+    )
+    verb.add_argument("--shard-frames", type=int, metavar="N", help="frames a shard (default: 1000)")
+    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+    verb.add_argument("--sensor", metavar="FILE", help="gains and offsets of this sensor, from `tactile adapt`")
+    prepare_arguments(verb)
+    where = verb.add_mutually_exclusive_group()
+    where.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: 1)")
+    where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
+    verb.add_argument("--array", metavar="I/N", help="do part I of N, from 0, beside other processes that do theirs")
+    verb.add_argument("--restart", type=int, metavar="N", help="replace a worker after N tasks (default: 200)")
+    doing = verb.add_mutually_exclusive_group()
+    doing.add_argument("--plan", action="store_true", help="write job.json and stop")
+    doing.add_argument("--status", action="store_true", help="say how far the job is; reads files, changes nothing")
+    doing.add_argument("--verify", action="store_true", help="read every shard; exit status 2 if one is damaged")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Start, go on with, or look at a job."""
+    from ..batch import job as jobs
+    from ..batch import run as runs
+
+    folder, part = Path(options.out), _part(options.array)
+    if options.status or options.verify:
+        if options.inputs:
+            raise TactileError("--status and --verify", "given with INPUTS", "--out DIR alone")
+        job = jobs.read(folder)
+        return _status(folder, job) if options.status else _verify(folder, options.progress)
+    _check_numbers(options)
+    if part is not None and not jobs.exists(folder):
+        raise TactileError(folder, "no job yet", "a job that all parts share", "Make it once with --plan")
+    with runs.opened(folder, part):
+        job = _job(folder, options)
+        if options.plan:
+            tell(str(folder / jobs.FILE))
+            return 0
+        place = _place(folder, options)
+        with bar("batch", "task", options.progress) as shown:
+            done = runs.run(folder, job, place, part, shown)
+    for name, why in done.aside.items():
+        complain(f"{name}: {why}")
+    tell(f"{folder}: {done.made} shards made, {done.kept} kept, {len(done.aside)} set aside")
+    return 2 if done.aside else 0
+
+
+def _check_numbers(options: argparse.Namespace) -> None:
+    for name in ("workers", "restart", "shard_frames"):
+        value = getattr(options, name)
+        if value is not None and value < 1:
+            raise TactileError("--" + name.replace("_", "-"), str(value), "1 or more")
+
+
+def _part(text: str | None) -> tuple[int, int] | None:
+    """``"3/8"`` -> (3, 8). Raises TactileError."""
+    if text is None:
+        return None
+    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+    if not found or not int(found[1]) < int(found[2]):
+        raise TactileError("--array", repr(text), "I/N with I from 0 to N - 1", "Such as 0/8")
+    return int(found[1]), int(found[2])
+
+
+def _job(folder: Path, options: argparse.Namespace) -> Job:
+    """The job of the folder, made from the options where there is none. Raises TactileError where the two differ."""
+    from ..batch import inputs
+    from ..batch import job as jobs
+
+    there = jobs.read(folder) if jobs.exists(folder) else None
+    if not options.inputs:
+        if there is None:
+            raise TactileError(folder, "no job here", "INPUTS, or the folder of a job", "Name recordings to convert")
+        told = [name for name, usual in RECIPE if getattr(options, name) != usual]
+        if told:
+            raise TactileError("--" + told[0].replace("_", "-"), "given without INPUTS", "the job as it was begun")
+        return there
+    paths = inputs.find(options.inputs, folder)
+    with bar("reading", "file", options.progress) as shown:
+        found = inputs.hashed(paths, shown)
+    weights, recipe = _recipe(options)
+    job = jobs.make(found, recipe, weights)
+    if there is None:
+        others = [path.name for path in folder.iterdir() if not path.name.startswith(".")]
+        if others:
+            raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", "Name another --out")
+        jobs.write(folder, job)
+        return job
+    if job.id != there.id:
+        found, advice = "holds another job (other recordings, contents or options)", "Name another --out folder"
+        raise TactileError(folder, found, "the same command that began it", advice)
+    return there
+
+
+def _recipe(options: argparse.Namespace) -> tuple[str | None, object]:
+    """Folder of the weights, and the recipe that the options say."""
+    from .. import results, translate
+    from ..batch.job import SHARD_FRAMES, Prepare, Recipe
+    from ..recordings import sensor_file
+
+    keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
+    prepare = Prepare(
+        kind=options.kind,
+        tare=None if options.tare == "auto" else options.tare,
+        drift=not options.no_drift,
+        counts_per_unit=options.counts_per_unit,
+        smooth=options.smooth,
+    )
+    sensor = None if options.sensor is None else sensor_file.read(options.sensor)
+    sha256 = translate.load_translator(options.weights).sha256
+    frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
+    return options.weights, Recipe(list(keep), sha256, frames, prepare, sensor)
+
+
+def _place(folder: Path, options: argparse.Namespace) -> Place:
+    if options.cluster is not None:
+        from ..batch.dask_place import Cluster
+
+        return Cluster(folder, options.cluster)
+    from ..batch.local import RESTART, Local
+
+    return Local(folder.resolve(), options.workers or 1, options.restart or RESTART)
+
+
+def _status(folder: Path, job: Job) -> int:
+    from ..batch import manifest
+
+    found = manifest.status(folder, job)
+    tell(f"recordings  {found.prepared} of {found.recordings} prepared, {found.frames} frames")
+    tell(f"shards      {found.there} of {found.shards} of the prepared recordings")
+    tell(f"set aside   {len(found.aside)}")
+    for name, why in found.aside.items():
+        tell(f"  {name}: {why}")
+    tell("complete" if found.complete else "not complete: the same command goes on")
+    return 0
+
+
+def _verify(folder: Path, progress: bool) -> int:
+    from ..batch import manifest
+
+    with bar("verify", "file", progress) as shown:
+        bad = manifest.damaged(folder, shown)
+    for file in bad:
+        complain(f"{file}: damaged; the same command makes it anew")
+    if not bad:
+        say(f"{folder}: every file is as it was written")
+    return 2 if bad else 0

@@ -1,0 +1,94 @@
+"""Dask as one more place: the same bytes, over TLS too. Workers are threads; scripts/fault_test.py kills real ones."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+import fake_tools
+import pytest
+
+from tactile_core import convert
+from tactile_core.batch import run as runs
+from tactile_core.batch.dask_place import Cluster, QueueFile, _read
+from tactile_core.errors import TactileError
+
+distributed = pytest.importorskip("distributed", reason="distributed is absent: pip install tactile-core[batch]")
+
+
+@pytest.fixture(autouse=True)
+def tools(monkeypatch):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+
+
+def run_on(folder, job, address):
+    with runs.opened(folder, None):
+        return runs.run(folder, job, Cluster(folder, address), None, lambda done, total: None)
+
+
+def workers(**more):
+    return distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, host="127.0.0.1", **more
+    )
+
+
+def test_dask_makes_the_same_bytes(new_job, do, content):
+    folder, job = new_job("local")
+    do(folder, job)
+    other, same = new_job("dask")
+    with workers(protocol="tcp://") as cluster:
+        assert run_on(other, same, cluster.scheduler_address).made == 5
+        assert run_on(other, same, cluster.scheduler_address).kept == 5
+    assert content(folder) == content(other)
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates with")
+def test_tls_needs_the_certificate(new_job, tmp_path):
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=tactile",
+         "-keyout", key, "-out", certificate],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    files = {f"tls_{role}_{what}": str(path) for role in ("scheduler", "worker", "client")
+             for what, path in (("key", key), ("cert", certificate))}  # fmt: skip
+    security = distributed.Security(tls_ca_file=str(certificate), require_encryption=True, **files)
+    folder, job = new_job()
+    tls = {f"distributed.comm.tls.{role}.{what}": str(path) for role in ("scheduler", "worker", "client")
+           for what, path in (("key", key), ("cert", certificate))}  # fmt: skip
+    import dask
+
+    with workers(protocol="tls://", security=security) as cluster:
+        address = cluster.scheduler_address
+        assert address.startswith("tls://")
+        with pytest.raises(TactileError, match="no scheduler answers"):
+            run_on(folder, job, address)
+        with dask.config.set({"distributed.comm.tls.ca-file": str(certificate), **tls}):
+            assert run_on(folder, job, address).made == 5
+
+
+def test_nobody_listening_is_told(new_job, monkeypatch):
+    monkeypatch.setattr("tactile_core.batch.dask_place.WAIT", 1)  # s
+    folder, job = new_job()
+    place = Cluster(folder, "tcp://127.0.0.1:9")
+    with pytest.raises(TactileError, match="no scheduler answers"), runs.opened(folder, None):
+        runs.run(folder, job, place, None, lambda done, total: None)
+
+
+def test_a_queue_file_is_checked(tmp_path):
+    file = tmp_path / "slurm.toml"
+    file.write_text('queue = "slurm"\njobs = 10\n[options]\ncores = 1\nmemory = "4GB"\nwalltime = "01:00:00"\n')
+    assert _read(str(file)) == QueueFile("slurm", 10, {"cores": 1, "memory": "4GB", "walltime": "01:00:00"})
+    file.write_text('queue = "abacus"\njobs = 10\n[options]\n')
+    with pytest.raises(TactileError, match="queue"):
+        _read(str(file))
+    with pytest.raises(TactileError, match="tls://HOST:PORT"):
+        _read("here:8786")
+
+
+def test_the_script_that_a_slurm_cluster_would_submit(tmp_path):
+    jobqueue = pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
+    options = {"cores": 1, "memory": "4GB", "walltime": "01:00:00", "queue": "cpu", "interface": "lo"}
+    with jobqueue.SLURMCluster(**options, scheduler_options={"dashboard_address": None}) as cluster:
+        script = cluster.job_script()
+    assert "#SBATCH -p cpu" in script and "#SBATCH -t 01:00:00" in script and "distributed.cli.dask_worker" in script

@@ -1,0 +1,94 @@
+"""The extension under test inside Blender (the bpy wheel, or a real one): enabled once, a fresh scene for each test."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+PACKAGE = "bl_ext.user_default.tactile"
+
+HERE = "bpy" in sys.modules or importlib.util.find_spec("bpy") is not None
+collect_ignore_glob = [] if HERE else ["test_*.py"]
+
+if HERE and "bpy" not in sys.modules:
+    # A user folder of its own, before Blender starts: the tests neither see nor change the developer's settings.
+    os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="tactile-blender-")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def extension() -> Iterator[ModuleType]:
+    """The add-on, installed from the zip in TACTILE_ZIP or linked from the checkout, and switched off at the end.
+
+    Left on at the interpreter's exit, bpy 4.2 crashes and 4.5 hangs (blender.md).
+    """
+    import addon_utils
+    import bpy
+
+    packed = os.environ.get("TACTILE_ZIP")
+    if packed:
+        bpy.ops.extensions.package_install_files(filepath=packed, repo="user_default", enable_on_install=True)
+    else:
+        repository = next(r for r in bpy.context.preferences.extensions.repos if r.module == "user_default")
+        linked = Path(repository.directory) / "tactile"
+        linked.parent.mkdir(parents=True, exist_ok=True)
+        if not linked.exists():
+            linked.symlink_to(ROOT)
+    try:
+        assert addon_utils.enable(PACKAGE, default_set=True) is not None
+        yield sys.modules[PACKAGE]
+    finally:
+        addon_utils.disable(PACKAGE)
+
+
+@pytest.fixture(autouse=True)
+def scene(extension: ModuleType):
+    """An empty scene; the add-on stays on."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    if bpy.context.scene is None:
+        pytest.fail("Blender gave no scene")
+    return bpy.context.scene
+
+
+@pytest.fixture
+def part(extension: ModuleType):
+    """``part("addon.axes")``: a module of the extension as Blender imported it."""
+    return lambda name: importlib.import_module(f"{PACKAGE}.{name}")
+
+
+@pytest.fixture
+def imported(scene):
+    """``imported(motion="COMPACT")``: the shipped recording's frames 40 to 140, as the skin object."""
+    import bpy
+
+    def run(**options):
+        options = {"filepath": str(RECORDING), "frames": "40:140"} | options
+        assert bpy.ops.tactile.import_recording(**options) == {"FINISHED"}
+        return bpy.context.object
+
+    return run
+
+
+@pytest.fixture
+def nodes_of():
+    """``nodes_of(object)``: the vertices (n, 3) that Blender shows on the current frame, in the object's units."""
+    import bpy
+    import numpy as np
+
+    def read(thing):
+        vertices = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices
+        nodes = np.empty(len(vertices) * 3, np.float32)
+        vertices.foreach_get("co", nodes)
+        return nodes.reshape(-1, 3)
+
+    return read

@@ -1,0 +1,268 @@
+"""Author: sensors, indenters, scenes and the simulation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENES = sorted(path.parent for path in (ROOT / "scenes").glob("*/scene.toml"))
+
+
+@pytest.fixture(autouse=True)
+def _packages(extension):
+    """Only once the extension is there: in a real Blender they come with it."""
+    for name in ("msgspec", "scipy"):
+        pytest.importorskip(name)
+
+
+@pytest.fixture
+def sensors(scene):
+    bpy.ops.tactile.add_sensor(sensor="BIOTAC")
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    return scene
+
+
+def _key(thing, frame, **values):
+    for name, value in values.items():
+        if name == "force":
+            thing.tactile.force = value
+            thing.keyframe_insert("tactile.force", frame=frame)
+        else:
+            thing.location["xyz".index(name)] = value
+            thing.keyframe_insert("location", index="xyz".index(name), frame=frame)
+
+
+def _export(folder):
+    bpy.ops.tactile.export_scene(filepath=str(folder / "scene.toml"))
+    return folder / "scene.toml"
+
+
+@pytest.mark.parametrize("shape", ["sphere", "cylinder", "lying_cylinder", "box", "ring", "edge"])
+def test_an_indenter_looks_as_large_as_it_is(sensors, nodes_of, part, shape):
+    bpy.ops.tactile.add_indenter(shape=shape)
+    thing = bpy.context.object
+    import msgspec
+
+    spec = msgspec.json.decode(thing.tactile.spec, type=part("tactile_core.scene_indenters").IndenterSpec)
+    low, high = spec.build().bounds()
+    nodes = nodes_of(thing)
+    # A hundredth of a body of some mm: the hull's corners lie on the body, its edges a little inside.
+    np.testing.assert_allclose(nodes.min(axis=0), 1e3 * low, atol=0.1)
+    np.testing.assert_allclose(nodes.max(axis=0), 1e3 * high, atol=0.1)
+
+
+@pytest.mark.parametrize("folder", SCENES, ids=lambda path: path.name)
+def test_shipped_scenes_come_back_exactly(scene, part, tmp_path, folder):
+    load = part("tactile_core.scene").load_scene
+    wanted = load(folder)[0]
+    bpy.ops.tactile.import_scene(filepath=str(folder / "scene.toml"))
+    if wanted.recording is None:
+        assert sum(thing.tactile.role == "INDENTER" for thing in scene.objects) == len(wanted.indenters)
+        return
+    found = load(_export(tmp_path))[0]
+
+    import msgspec
+
+    def without_folders(spec):
+        return msgspec.structs.replace(spec, file=Path(spec.file).name) if hasattr(spec, "file") else spec
+
+    same = [msgspec.structs.replace(s, indenters=[without_folders(i) for i in s.indenters]) for s in (found, wanted)]
+    assert same[0] == same[1]
+
+
+def test_a_motion_of_the_user_s_own_is_exported(sensors, part, tmp_path):
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
+    ball = bpy.context.object
+    sensors.render.fps, sensors.frame_start, sensors.frame_end = 50, 1, 51
+    ball.tactile.press_by = "FORCE"
+    _key(ball, 1, x=-8, y=0, force=0.0)
+    _key(ball, 51, x=-10, y=2, force=0.4)
+    for curve in part("addon.curves").fcurves_of(ball):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+    recording = part("tactile_core.scene").load_scene(_export(tmp_path))[0].recording
+    assert [(p.time_s, p.x_mm, p.z_mm, p.force_n) for p in recording.points] == [
+        (0.0, -8.0, 0.0, 0.0), (1.0, -10.0, 2.0, 0.4),
+    ]  # fmt: skip
+
+
+def test_curved_motion_is_sampled(sensors, part, tmp_path):
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    ball = bpy.context.object
+    sensors.frame_start, sensors.frame_end = 1, 11
+    ball.tactile.press_by = "FORCE"
+    _key(ball, 1, x=-8, force=0.0)
+    _key(ball, 11, x=-10, force=0.4)
+    points = part("tactile_core.scene").load_scene(_export(tmp_path))[0].recording.points
+    assert len(points) == 11 and points[5].x_mm == pytest.approx(-9, abs=0.01)
+    assert points[2].x_mm > -8.4  # Bezier keys start slowly; a straight line would be there already
+
+
+def test_simulating_bakes_what_the_command_line_computes(scene, nodes_of, part, tmp_path):
+    folder = tmp_path / "short"
+    folder.mkdir()
+    text = (ROOT / "scenes" / "press" / "scene.toml").read_text()
+    head = text[: text.index("points")]
+    at = "x_mm = -8.0, z_mm = 0.0"
+    points = f"points = [{{ time_s = 0.0, {at}, force_n = 0.0 }}, {{ time_s = 0.1, {at}, force_n = 0.3 }}]\n"
+    (folder / "scene.toml").write_text(head + points)
+    bpy.ops.tactile.import_scene(filepath=str(folder / "scene.toml"))
+    assert bpy.ops.tactile.simulate(seed=3) == {"FINISHED"}
+    simulate, read = part("tactile_core.mechanics.recording").simulate_recording, part("addon.recording_reader").read
+    simulate(folder / "scene.toml", tmp_path / "wanted.h5", 3)
+    truth = read(tmp_path / "wanted.h5").truth
+    for frame in (0, 5, 10):
+        scene.frame_set(frame)
+        for role, surface, moved in (
+            ("BIOTAC", part("tactile_core.sensors").biotac_surface(), truth.displacement_biotac),
+            ("DIGIT", part("tactile_core.sensors").digit_surface(), truth.displacement_digit),
+        ):
+            sensor = next(thing for thing in scene.objects if thing.tactile.role == role)
+            wanted = part("addon.axes").to_blender(surface.rest + moved[frame], 1000)
+            np.testing.assert_allclose(nodes_of(sensor), wanted, atol=1e-3)
+    gel = scene.objects["DIGIT gel"]
+    assert gel["force"][2] == pytest.approx(-truth.force[10, 1], rel=1e-4)
+    # The twin stands in its dent: its lowest point is where the gel is deepest.
+    low = (scene.objects["ball simulated"].matrix_world.translation - gel.matrix_world.translation).z
+    assert low == pytest.approx(nodes_of(gel)[np.argmax(-1e3 * truth.displacement_digit[10, :, 1] * -1), 2], abs=0.15)
+
+
+def test_pressing_by_height_finds_the_force(sensors, part):
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
+    ball = bpy.context.object
+    sensors.render.fps, sensors.frame_start, sensors.frame_end = 100, 1, 3
+    touch = 8.3  # mm: the gel's top in the sensors' frame (sensors.md), where a ball's lowest point touches
+    for frame, height in ((1, touch + 1), (3, touch - 0.5)):
+        _key(ball, frame, z=height)
+    assert bpy.ops.tactile.simulate() == {"FINISHED"}
+    sensors.frame_set(1)
+    assert ball.tactile.force == 0
+    sensors.frame_set(3)
+    place = part("tactile_core.mechanics.placement").Placement(-8e-3, 0.0)
+    ball_shape = part("tactile_core.indenters").Sphere(3.5e-3)
+    wanted = part("tactile_core.mechanics.solve").solve("digit", ball_shape, place, depth=0.5e-3, friction=0.0)
+    # 10 %: the top of the gel is known to 10 um, and force goes with depth to the power of 1.5.
+    assert ball.tactile.force == pytest.approx(np.linalg.norm(wanted.force), rel=0.1)
+
+
+def _cube(scene, size=6.0, **options):
+    bpy.ops.mesh.primitive_cube_add(size=size, location=(-8, 0, 12))
+    thing = bpy.context.object
+    thing.parent = scene.objects["DIGIT gel"]
+    thing.location = (-8, 0, 12)
+    for name, value in options.items():
+        setattr(thing, name, value)
+    bpy.context.view_layer.update()
+    return thing
+
+
+def test_any_mesh_can_press_as_it_is_modifiers_and_scale_included(sensors, part, tmp_path):
+    thing = _cube(sensors, scale=(1, 1, 0.5))
+    bevel = thing.modifiers.new("round", "BEVEL")
+    bevel.width, bevel.segments = 0.8, 3
+    bpy.context.view_layer.update()
+    bpy.ops.tactile.use_as_indenter()
+    thing.tactile.press_by = "FORCE"
+    sensors.frame_start, sensors.frame_end = 1, 2
+    path = _export(tmp_path)
+    spec = part("tactile_core.scene").load_scene(path)[0].indenters[0]
+    corners = np.frombuffer(
+        Path(spec.file).read_bytes()[84:], np.dtype([("n", "<f4", 3), ("c", "<f4", (3, 3)), ("s", "<u2")])
+    )
+    nodes = corners["c"].reshape(-1, 3)
+    np.testing.assert_allclose(np.ptp(nodes, axis=0), [6, 6, 3], atol=1e-4)
+    assert len(corners) > 100  # the bevel's faces, not the cube's twelve triangles
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (lambda thing: setattr(thing, "scale", (1, 1, -1)), "negative"),
+        (lambda thing: setattr(thing, "scale", (0, 1, 1)), "negative or zero"),
+    ],
+)
+def test_a_mirrored_mesh_is_refused(sensors, spoil, expected):
+    thing = _cube(sensors)
+    spoil(thing)
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match=expected):
+        bpy.ops.tactile.use_as_indenter()
+    assert thing.tactile.role == "NONE"
+
+
+@pytest.mark.parametrize(("what", "expected"), [("open", "not closed"), ("huge", "0.2 to 100 mm")])
+def test_an_open_or_huge_mesh_is_refused_by_the_simulation(sensors, what, expected):
+    pytest.importorskip("trimesh")
+    pytest.importorskip("rtree")
+    thing = _cube(sensors, size=6.0 if what == "open" else 600.0)
+    if what == "open":
+        import bmesh
+
+        shape = bmesh.new()
+        shape.from_mesh(thing.data)
+        shape.faces.ensure_lookup_table()
+        bmesh.ops.delete(shape, geom=[shape.faces[0]], context="FACES")
+        shape.to_mesh(thing.data)
+        shape.free()
+    bpy.ops.tactile.use_as_indenter()
+    thing.tactile.press_by, thing.tactile.force = "FORCE", 0.1
+    sensors.frame_start, sensors.frame_end = 1, 2
+    before = len(bpy.data.objects)
+    with pytest.raises(RuntimeError, match=expected):
+        bpy.ops.tactile.simulate()
+    assert len(bpy.data.objects) == before and sensors.objects["DIGIT gel"].data.shape_keys is None
+
+
+def test_a_scaled_body_of_known_sizes_is_refused(sensors):
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    bpy.context.object.scale = (2, 2, 2)
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="turned or scaled"):
+        bpy.ops.tactile.simulate()
+
+
+def test_one_frame_is_no_motion(sensors):
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    sensors.frame_start = sensors.frame_end = 1
+    with pytest.raises(RuntimeError, match="two frames or more"):
+        bpy.ops.tactile.simulate()
+
+
+def test_there_must_be_an_indenter_and_a_sensor(scene):
+    with pytest.raises(RuntimeError, match="no indenter"):
+        bpy.ops.tactile.simulate()
+    with pytest.raises(RuntimeError, match="no sensor"):
+        bpy.ops.tactile.add_indenter(shape="sphere")
+
+
+def test_heights_have_no_forces_before_they_are_simulated(sensors, tmp_path):
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    with pytest.raises(RuntimeError, match="Simulate first"):
+        _export(tmp_path)
+
+
+def test_an_unwritable_folder_is_reported(scene, tmp_path):
+    bpy.ops.tactile.import_scene(filepath=str(ROOT / "scenes" / "press" / "scene.toml"))
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(RuntimeError, match="cannot be written"):
+        bpy.ops.tactile.export_scene(filepath=str(tmp_path / "file" / "scene.toml"))
+
+
+def test_a_worker_that_dies_is_reported(part, tmp_path):
+    jobs, error = part("addon.jobs"), part("tactile_core.errors").TactileError
+    job = jobs.Job("no such job", tmp_path)
+    with pytest.raises(error, match="KeyError"):
+        while not job.poll(0.1):
+            pass
+
+
+def test_a_cancelled_worker_is_gone(part, tmp_path):
+    jobs = part("addon.jobs")
+    (tmp_path / "scene.toml").write_text((ROOT / "scenes" / "press" / "scene.toml").read_text())
+    job = jobs.Job("simulate", tmp_path, seed=0)
+    job.cancel()
+    assert job._process.poll() is not None

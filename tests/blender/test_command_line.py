@@ -1,0 +1,79 @@
+"""``blender -b --command tactile``."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import bpy
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def run(part, scene):
+    """Calls the command as Blender does; the exit status."""
+    return lambda *arguments: part("addon.command_line").main([str(argument) for argument in arguments])
+
+
+def test_convert_writes_a_blend_and_pictures(run, slide_csv, tmp_path):
+    assert run("convert", slide_csv(), "--out", tmp_path / "out", "--pictures", "--frames", "60:63") == 0
+    assert (tmp_path / "out" / "touch" / "touch.blend").is_file()
+    names = sorted(path.name for path in (tmp_path / "out" / "touch" / "images").iterdir())
+    assert names == ["0060.png", "0061.png", "0062.png"]
+
+
+def test_render_draws_a_blend(run, slide_csv, tmp_path):
+    run("convert", slide_csv(), "--out", tmp_path / "out", "--frames", "60:62")
+    blend = tmp_path / "out" / "touch" / "touch.blend"
+    assert run("render", blend, "--out", tmp_path / "pictures") == 0
+    assert len(list((tmp_path / "pictures" / "touch" / "images").glob("*.png"))) == 2
+
+
+def test_a_batch_goes_on_after_a_failure_and_names_it(run, slide_csv, tmp_path, capfd):
+    folder = tmp_path / "day"
+    folder.mkdir()
+    slide_csv("good", folder=folder)
+    (folder / "bad.csv").write_text("a,b\n1,2\n")
+    (folder / "notes.txt").write_text("left alone")
+    assert run("batch", folder, "--out", tmp_path / "out", "--frames", "60:62") == 1
+    assert (tmp_path / "out" / "good" / "good.blend").is_file() and not (tmp_path / "out" / "bad").exists()
+    said = capfd.readouterr().err
+    assert "bad.csv: no known recording" in said and "1 of 2 failed" in said and "notes" not in said
+
+
+def test_an_older_result_is_kept_unless_told(run, slide_csv, tmp_path, capfd):
+    path = slide_csv()
+    assert run("convert", path, "--out", tmp_path / "out", "--frames", "60:62") == 0
+    assert run("convert", path, "--out", tmp_path / "out", "--frames", "60:62") == 1
+    assert "--overwrite" in capfd.readouterr().err
+    assert run("convert", path, "--out", tmp_path / "out", "--frames", "60:62", "--overwrite") == 0
+
+
+def test_nothing_to_do_is_an_error(run, tmp_path):
+    assert run("batch", tmp_path, "--out", tmp_path / "out") == 1
+
+
+def test_simulate_a_scene(run, tmp_path):
+    pytest.importorskip("scipy")
+    folder = tmp_path / "tiny"
+    folder.mkdir()
+    text = (ROOT / "scenes" / "press" / "scene.toml").read_text()
+    at = "x_mm = -8.0, z_mm = 0.0"
+    points = f"points = [{{ time_s = 0.0, {at}, force_n = 0.0 }}, {{ time_s = 0.02, {at}, force_n = 0.2 }}]\n"
+    (folder / "scene.toml").write_text(text[: text.index("points")] + points)
+    assert run("simulate", folder, "--out", tmp_path / "out") == 0
+    assert (tmp_path / "out" / "tiny" / "tiny.blend").is_file()
+    assert len(list((tmp_path / "out" / "tiny" / "tactile_simulations").glob("*.h5"))) == 1
+
+
+@pytest.mark.skipif(not bpy.app.binary_path, reason="the wheel has no command line")
+def test_a_real_blender_takes_the_command(slide_csv, tmp_path):
+    command = [bpy.app.binary_path, "--background", "--addons", "bl_ext.user_default.tactile", "--command", "tactile"]
+    done = subprocess.run(
+        [*command, "convert", str(slide_csv()), "--out", str(tmp_path / "out"), "--frames", "60:62"],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "out" / "touch" / "touch.blend").is_file()

@@ -1,0 +1,114 @@
+"""The zip that users install: its listing, Blender's own check of it, and the whole job from the installed copy."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import bpy
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def builder():
+    spec = importlib.util.spec_from_file_location("build_extension", ROOT / "scripts" / "build_extension.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not (ROOT / ".git").exists() or shutil.which("git") is None:
+        pytest.skip("the zip is made of what git tracks, and this is no checkout, or git is not here")
+    return module
+
+
+@pytest.fixture(scope="module")
+def packed(builder, tmp_path_factory):
+    return builder.build(tmp_path_factory.mktemp("dist"), None, "3.11", [])
+
+
+def test_the_listing_is_what_git_tracks(builder, packed):
+    with zipfile.ZipFile(packed) as file:
+        names = file.namelist()
+    assert names == builder.tracked()
+    for needed in (
+        "__init__.py",
+        "blender_manifest.toml",
+        "LICENSE",
+        "addon/panels.py",
+        "tactile_core/weights/MVB.safetensors",
+    ):
+        assert needed in names
+    assert not [
+        name for name in names if "torch" in name or name.startswith(("tests/", "scripts/", "tactile_core/training/"))
+    ]
+
+
+def test_the_same_checkout_gives_the_same_bytes(builder, packed, tmp_path):
+    assert builder.build(tmp_path, None, "3.11", []).read_bytes() == packed.read_bytes()
+
+
+def test_wheels_are_named_in_the_manifest(builder, tmp_path):
+    wheel = tmp_path / "h5py-3.16.0-cp311-cp311-manylinux_2_28_x86_64.whl"
+    wheel.write_bytes(b"a wheel")
+    path = builder.build(tmp_path, "linux-x64", "3.11", [wheel])
+    assert path.name.endswith("-linux-x64-py3.11.zip")
+    with zipfile.ZipFile(path) as file:
+        assert file.read(f"wheels/{wheel.name}") == b"a wheel"
+        text = file.read("blender_manifest.toml").decode()
+    assert f'"./wheels/{wheel.name}"' in text and 'platforms = ["linux-x64"]' in text
+
+
+def test_every_wheel_has_a_version(builder):
+    assert all("==" in line for line in builder.requirements())
+    assert not {"torch", "numpy"} & set(builder.WHEELS)
+
+
+def test_blender_s_own_check_passes(packed):
+    checker = Path(bpy.utils.system_resource("SCRIPTS")) / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
+    done = subprocess.run(
+        [sys.executable, str(checker), "validate", str(packed)], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_installed_copy_does_the_whole_job(packed, tmp_path, slide_csv):
+    code = f"""
+import sys
+import bpy, addon_utils
+bpy.ops.extensions.package_install_files(filepath={str(packed)!r}, repo="user_default", enable_on_install=True)
+name = "bl_ext.user_default.tactile"
+try:
+    assert name in bpy.context.preferences.addons, list(bpy.context.preferences.addons.keys())
+    assert {str(tmp_path)!r} in sys.modules[name].__file__
+    bpy.ops.tactile.import_recording(filepath={str(slide_csv())!r})
+    bpy.ops.tactile.translate()
+    assert bpy.data.images["DIGIT picture"].size[1] == 320
+finally:
+    addon_utils.disable(name)
+print("works")
+"""
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")}
+    if bpy.app.binary_path:
+        command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr"]
+    else:
+        command = [sys.executable, "-c"]
+    done = subprocess.run([*command, code], env=environment, capture_output=True, text=True, timeout=120)
+    assert "works" in done.stdout, done.stdout + done.stderr
+
+
+@pytest.mark.skipif(
+    not (bpy.app.binary_path and os.environ.get("TACTILE_ZIP")), reason="needs a real Blender and a zip"
+)
+def test_a_real_blender_installs_the_zip_by_command(tmp_path):
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")}
+    command = [bpy.app.binary_path, "--background", "--command", "extension", "install-file", "--repo", "user_default"]
+    done = subprocess.run(
+        [*command, "--enable", os.environ["TACTILE_ZIP"]], env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "user" / "extensions" / "user_default" / "tactile" / "blender_manifest.toml").is_file()

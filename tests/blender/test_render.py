@@ -1,0 +1,159 @@
+"""The render engine: files as Blender people expect them, with the library's own pixels in them."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def ready(imported):
+    """A translated recording, set up to render."""
+    imported(frames="70:90")
+    bpy.ops.tactile.translate()
+    bpy.ops.tactile.set_up_render()
+    return bpy.context.scene
+
+
+def _pixels(path):
+    image = bpy.data.images.load(str(path))
+    width, height = image.size
+    values = np.empty(width * height * 4, np.float32)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_get(values)
+    return values.reshape(height, width, 4)[::-1, :, :3]
+
+
+def _wanted(part, frame=80):
+    found = part("addon.recording_data")._KEPT
+    displacement = next(iter(found.values())).translation.displacement_digit[frame - 70]
+    return part("tactile_core.shading").Shader()(part("tactile_core.height_map").height_map(displacement))
+
+
+def test_a_frame_holds_the_library_s_own_pixels(ready, part, tmp_path):
+    ready.frame_set(80)
+    ready.render.filepath = str(tmp_path / "frame.png")
+    bpy.ops.render.render(write_still=True)
+    levels = np.rint(255 * _pixels(tmp_path / "frame.png"))
+    assert levels.shape == (320, 240, 3)
+    # A level: displacements of 30 mm coordinates are held in float32, and colour goes through sRGB's curve and back.
+    assert np.abs(levels - _wanted(part).astype(float)).max() <= 1
+
+
+def test_an_animation_writes_every_frame(ready, tmp_path):
+    ready.frame_start, ready.frame_end = 78, 80
+    ready.render.filepath = str(tmp_path) + "/"
+    bpy.ops.render.render(animation=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["0078.png", "0079.png", "0080.png"]
+
+
+def test_the_percentage_scales_the_picture(ready, part, tmp_path):
+    ready.frame_set(80)
+    ready.render.resolution_percentage = 200
+    ready.render.filepath = str(tmp_path / "large.png")
+    bpy.ops.render.render(write_still=True)
+    large = np.rint(255 * _pixels(tmp_path / "large.png"))
+    assert large.shape == (640, 480, 3)
+    small = large.reshape(320, 2, 240, 2, 3).mean(axis=(1, 3))
+    # The same view: means of four pixels against one, which differ at the dent's steep rim alone.
+    assert np.abs(small - _wanted(part)).mean() < 1
+
+
+def test_exr_holds_the_same_in_float(ready, part, tmp_path):
+    ready.frame_set(80)
+    ready.render.image_settings.file_format = "OPEN_EXR"
+    ready.render.filepath = str(tmp_path / "frame.exr")
+    bpy.ops.render.render(write_still=True)
+    linear = _pixels(tmp_path / "frame.exr")
+    picture = part("addon.render_engine").to_linear(_wanted(part))[::-1, :, :3]
+    assert np.abs(linear - picture).max() < 0.01  # a grey level is at most 0.009 of linear light
+
+
+def test_lights_change_their_own_colour(ready, tmp_path):
+    ready.frame_set(80)
+    levels = []
+    for factor in (1.0, 0.2):
+        ready.tactile_render.lights = (factor, 1, 1)
+        ready.render.filepath = str(tmp_path / f"{factor}.png")
+        bpy.ops.render.render(write_still=True)
+        levels.append(_pixels(tmp_path / f"{factor}.png"))
+    change = np.abs(levels[0] - levels[1]).max(axis=(0, 1))
+    # A unit's LEDs leak into the other colours (its gain matrix), by far less than they light their own.
+    assert change[0] > 0.1 and change[0] > 4 * max(change[1], change[2])
+
+
+def test_a_calibration_that_is_none_is_reported(ready, tmp_path):
+    bad = tmp_path / "unit.toml"
+    bad.write_text("format = 'something else'")
+    ready.tactile_render.calibration = str(bad)
+    ready.render.filepath = str(tmp_path / "frame.png")
+    with pytest.raises(RuntimeError, match=r"unit\.toml"):
+        bpy.ops.render.render(write_still=True)
+
+
+def test_another_aspect_ratio_is_reported(ready, tmp_path):
+    ready.render.resolution_x = 300
+    with pytest.raises(RuntimeError, match="aspect ratio"):
+        bpy.ops.render.render()
+
+
+def test_there_must_be_a_gel(scene):
+    with pytest.raises(RuntimeError, match="no DIGIT"):
+        bpy.ops.tactile.set_up_render()
+
+
+def test_the_camera_looks_at_what_the_picture_shows(ready, part):
+    from bpy_extras.object_utils import world_to_camera_view
+    from mathutils import Vector
+
+    unit = part("tactile_core.calibration_file").load_calibration().camera
+    gel = bpy.context.scene.objects["DIGIT gel"]
+    bpy.context.view_layer.update()
+    height_zero = part("tactile_core.camera").HEIGHT_ZERO_Y
+    for row, column in ((0, 0), (319, 239), (100, 60)):
+        x, z = unit.to_gel(row, column)
+        place = part("addon.axes").to_blender(np.array([x, height_zero, z]), 1000)
+        seen = world_to_camera_view(bpy.context.scene, ready.camera, gel.matrix_world @ Vector(place.tolist()))
+        assert seen.x * 240 - 0.5 == pytest.approx(column, abs=0.05)
+        assert (1 - seen.y) * 320 - 0.5 == pytest.approx(row, abs=0.05)
+
+
+def test_output_panels_are_shown_for_the_engine_and_given_back(extension):
+    import bl_ui.properties_output as output
+
+    part = sys.modules["bl_ext.user_default.tactile.addon.render_engine"]
+    assert part.ID in output.RENDER_PT_format.COMPAT_ENGINES
+    assert part.ID in output.RENDER_PT_output.COMPAT_ENGINES
+
+
+def test_a_saved_file_renders_headless(ready, tmp_path):
+    """What users type: `blender -b file.blend -a`, here with whatever Blender runs these tests."""
+    ready.frame_start, ready.frame_end = 79, 80
+    ready.render.filepath = str(tmp_path / "images") + "/"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    if not bpy.app.binary_path:
+        pytest.skip("the wheel has no command line; tests of real Blenders have")
+    options = ["--background", "--addons", "bl_ext.user_default.tactile", str(tmp_path / "a.blend")]
+    subprocess.run([bpy.app.binary_path, *options, "-E", "TACTILE_DIGIT", "-a"], check=True, timeout=120)
+    assert sorted(path.name for path in (tmp_path / "images").iterdir()) == ["0079.png", "0080.png"]
+
+
+TRACED = importlib.util.find_spec("mitsuba") is not None and (ROOT / "tactile_core" / "optics").exists()
+
+
+@pytest.mark.skipif(not TRACED, reason="mitsuba or the optics room is missing")
+def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, part, tmp_path):
+    ready.frame_set(80)
+    ready.tactile_render.preset = "standard"
+    ready.render.filepath = str(tmp_path / "frame.png")
+    bpy.ops.render.render(write_still=True)
+    levels = 255 * _pixels(tmp_path / "frame.png")
+    assert np.sqrt(np.mean((levels - _wanted(part)) ** 2)) < 5  # grey levels: fast and standard differ by one or two

@@ -1,0 +1,132 @@
+"""A finished job in the layouts of others, read back with their own tools."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import json
+import sys
+from pathlib import Path
+
+import fake_tools
+import numpy as np
+import pytest
+from PIL import Image
+
+from tactile_core import exporters
+from tactile_core.batch import inputs, local
+from tactile_core.batch import job as jobs
+from tactile_core.batch import run as runs
+from tactile_core.errors import TactileError
+from tactile_core.verbs import export as verb
+
+WORKER = Path(__file__).resolve().parents[1] / "batch" / "fake_worker.py"
+FRAMES = {"00000_a": 70, "00001_b": 45}
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    """A finished job of two recordings with pictures."""
+    folder = tmp_path_factory.mktemp("job")
+    paths = []
+    for name, frames in (("a", 70), ("b", 45)):
+        press = np.clip(np.arange(frames) - 20, 0, 30)[:, None] * np.linspace(1, 3, 19)
+        noise = np.random.default_rng(frames).normal(0, 1, (frames, 19))
+        paths.append(folder.parent / f"{name}.npz")
+        np.savez(paths[-1], electrodes=np.rint(3000 + press + noise), time=np.arange(frames) / 100)
+    recipe = jobs.Recipe(["latent", "image"], "0" * 64, shard_frames=40)
+    made = jobs.make(inputs.hashed(paths, lambda done, total: None), recipe, None)
+    jobs.write(folder, made)
+    with runs.opened(folder, None):
+        place = local.Local(folder, 1, command=(sys.executable, str(WORKER)))
+        runs.run(folder, made, place, None, lambda done, total: None)
+    return folder
+
+
+def silent(done, total):
+    """Progress that nobody watches."""
+
+
+def test_every_layout_has_a_test_here():
+    assert set(exporters.layouts()) == {"npz", "png", "lerobot"} == set(verb.LAYOUTS)
+
+
+def test_npz_holds_every_array_whole_and_the_same_bytes_each_time(job, tmp_path):
+    source = exporters.export(job, "npz", tmp_path / "a", silent)
+    exporters.export(job, "npz", tmp_path / "b", silent)
+    for one in source.recordings:
+        path = tmp_path / "a" / f"{one.name}.npz"
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+        with np.load(path, allow_pickle=False) as arrays:
+            for name in arrays:
+                joined = np.concatenate([block[name] for block in one.blocks()])
+                np.testing.assert_array_equal(arrays[name], joined)
+                assert len(joined) == FRAMES[one.name]
+
+
+def test_png_pictures_are_those_of_the_shards(job, tmp_path):
+    source = exporters.export(job, "png", tmp_path / "out", silent)
+    for one in source.recordings:
+        files = sorted((tmp_path / "out" / one.name).iterdir())
+        assert [file.name for file in files] == [f"{frame:06d}.png" for frame in range(one.frames)]
+        pictures = np.concatenate([block["image"] for block in one.blocks()])
+        np.testing.assert_array_equal(np.asarray(Image.open(files[-1])), pictures[-1])
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("pyarrow") is None, reason="pyarrow is absent: pip install tactile-core[batch]"
+)
+def test_lerobot_reads_back_with_plain_pyarrow(job, tmp_path):
+    import pyarrow.parquet as pq
+
+    source = exporters.export(job, "lerobot", tmp_path / "out", silent)
+    out = tmp_path / "out"
+    info = json.loads((out / "meta" / "info.json").read_text())
+    assert (info["codebase_version"], info["total_episodes"], info["total_frames"], info["fps"]) == (
+        "v3.0",
+        2,
+        115,
+        100,
+    )
+    episodes = pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    assert [one["length"] for one in episodes] == [70, 45]
+    assert pq.read_table(out / "meta" / "tasks.parquet").to_pylist()[0]["task_index"] == 0
+    for one, episode in zip(source.recordings, episodes, strict=True):
+        path = info["data_path"].format(chunk_index=episode["data/chunk_index"], file_index=episode["data/file_index"])
+        table = pq.read_table(out / path)
+        assert set(table.column_names) == set(info["features"])
+        rows = [row for row in table.to_pylist() if row["episode_index"] == episode["episode_index"]]
+        first, last = episode["dataset_from_index"], episode["dataset_to_index"]
+        assert [row["index"] for row in rows] == list(range(first, last))
+        assert [row["frame_index"] for row in rows] == list(range(one.frames))
+        arrays = {name: np.concatenate([block[name] for block in one.blocks()]) for name in one.arrays()}
+        for name in ("electrodes", "force", "latent_digit"):
+            found = np.array([row[f"observation.{name}"] for row in rows], np.float32)
+            np.testing.assert_array_equal(found, arrays[name])
+        picture = Image.open(io.BytesIO(rows[-1]["observation.images.digit"]["bytes"]))
+        np.testing.assert_array_equal(np.asarray(picture), arrays["image"][-1])
+        assert list(info["features"]["observation.images.digit"]["shape"]) == [*fake_tools.SHAPE, 3]
+    stats = json.loads((out / "meta" / "stats.json").read_text())
+    forces = np.concatenate([block["force"] for one in source.recordings for block in one.blocks()])
+    np.testing.assert_allclose(
+        stats["observation.force"]["std"], forces.std(axis=0, dtype=np.float64), rtol=1e-6, atol=1e-9
+    )
+
+
+def test_what_cannot_be_exported_is_told(job, tmp_path):
+    with pytest.raises(TactileError, match="already exists"):
+        exporters.export(job, "npz", tmp_path, silent)
+    with pytest.raises(TactileError, match="--to"):
+        exporters.export(job, "zarr", tmp_path / "out", silent)
+    file = next((job / "shards").iterdir())
+    whole = file.read_bytes()
+    try:
+        file.write_bytes(whole[:-1])
+        with pytest.raises(TactileError, match="damaged"):
+            exporters.export(job, "npz", tmp_path / "out", silent)
+        file.unlink()
+        with pytest.raises(TactileError, match="3 of 4 shards"):
+            exporters.export(job, "npz", tmp_path / "out", silent)
+    finally:
+        file.write_bytes(whole)
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,81 @@
+"""A growing recording: every row once, none half, and the newest shown."""
+
+from __future__ import annotations
+
+import fake_tools
+import numpy as np
+import pytest
+from PIL import Image
+
+from tactile_core import cli, convert, live, recordings
+from tactile_core.errors import TactileError
+
+
+def test_rows_come_once_and_whole_however_the_file_grows(slide_csv, tmp_path):
+    path = slide_csv(frames=80)
+    data, whole = path.read_bytes(), recordings.read(path).electrodes
+    path.write_bytes(b"")
+    growing, found, place = live.Growing(path), [], 0
+    for size in np.random.default_rng(5).integers(1, 900, 1000):
+        with open(path, "ab") as file:
+            file.write(data[place : place + size])
+        place += size
+        rows = growing.poll()
+        if rows is not None:
+            found.append(rows.electrodes)
+    np.testing.assert_array_equal(np.concatenate(found), whole)
+    assert growing.poll() is None and len(found) > 20
+
+
+def test_a_file_that_becomes_shorter_and_one_that_is_no_recording_are_told(slide_csv, tmp_path):
+    path = slide_csv(frames=5)
+    growing = live.Growing(path)
+    growing.poll()
+    path.write_bytes(b"")
+    with pytest.raises(TactileError, match="became shorter"):
+        growing.poll()
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(TactileError, match="no known recording"):
+        live.Growing(tmp_path / "other.csv").poll()
+    with pytest.raises(TactileError, match="no such file"):
+        live.Growing(tmp_path / "none.csv")
+
+
+def test_live_signals_are_those_of_the_whole_recording(slide_csv):
+    recording = recordings.read(slide_csv(frames=150))
+    signals = live.LiveSignals()
+    known = [signals.learn(recording.electrodes[i : i + 10]) for i in range(0, 150, 10)]
+    assert known.index(True) == 2  # 30 frames are the tare's window
+    change = signals.signals(recording.electrodes).change
+    # Rest from 30 frames with noise of 1 count has an error of 0.2; the whole recording's quiet part is longer.
+    np.testing.assert_allclose(change, recordings.prepare(recording).change, atol=1.0)
+
+
+def test_without_a_quiet_part_rest_is_guessed_in_the_end():
+    signals = live.LiveSignals()
+    frames = 3000 + 500 * np.sin(np.arange(1200)[:, None] / 3) * np.ones(19)
+    assert not signals.learn(frames[:900])
+    assert signals.learn(frames[900:]) and "guess" in signals.found
+
+
+def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    for more in (["--idle", "0.2"], ["--play"]):
+        out = tmp_path / "now.png"
+        path = str(slide_csv(frames=90))
+        assert cli.main(["watch", path, "--out", str(out), *more]) == 0
+        told = capsys.readouterr().out
+        assert told.startswith("90 frames: ") and "ms from frame to picture" in told
+        grey = np.asarray(Image.open(out))[0, -1, 0]
+        assert 50 < grey < 70  # the last frame is pressed by 29 counts times 1 to 3, a grey level a count
+        out.unlink()
+
+
+def test_watch_without_a_display_says_what_to_do(slide_csv, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    import matplotlib
+
+    matplotlib.use("agg")
+    assert cli.main(["watch", str(slide_csv(frames=5))]) == 2
+    assert "--out now.png" in capsys.readouterr().err

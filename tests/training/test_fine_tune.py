@@ -1,0 +1,119 @@
+"""Fine-tuning on a labelled recording: made here, in the layout of Narang et al., from contacts of the test set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs torch")
+h5py = pytest.importorskip("h5py")
+
+from tactile_core import cli, networks, sensors  # noqa: E402
+from tactile_core.errors import TactileError  # noqa: E402
+from tactile_core.paired_contacts import read_pairs  # noqa: E402
+from tactile_core.training.fine_tune import fine_tune, on_skin  # noqa: E402
+from tactile_core.training.labelled import read_labelled  # noqa: E402
+
+PAIRS = Path(__file__).resolve().parents[2] / "scenes" / "training" / "test_contacts.h5"
+HELD, PAUSE = 6, 4  # frames a contact is held, and without contact before it
+MM = 1e3
+
+
+@pytest.fixture(scope="module")
+def arrays():
+    """Readings of a sensor whose gains differ by 40 %, with places (mm, SynTouch's frame) and forces."""
+    pairs = read_pairs(PAIRS)
+    random = np.random.default_rng(5)
+    gain = np.exp(0.4 * random.standard_normal(19))
+    frame = networks.load().frames["MVB"]
+    skin = on_skin(frame, frame.place(pairs.displacement_biotac.astype(np.float32)))
+    place = np.column_stack([-MM * skin[:, 0] - 13.97, MM * skin[:, 2], MM * skin[:, 1]])
+    held = np.r_[np.zeros(PAUSE), np.ones(HELD)]
+    frames = len(pairs.press) * len(held)
+    change = (held[None, :, None] * (gain * pairs.signal)[:, None]).reshape(frames, 19)
+    return {
+        "electrode_vals": np.round(3300 + change + 1.5 * random.standard_normal(change.shape)),
+        "contact_loc": np.repeat(place, len(held), 0),
+        "force_vec": (held[None, :, None] * pairs.force[:, None]).reshape(frames, 3),
+    }
+
+
+def write(path, arrays):
+    with h5py.File(path, "w") as file:
+        for name, values in arrays.items():
+            file[f"{name}/data"] = values
+    return path
+
+
+def test_it_learns_the_sensor(arrays, tmp_path, capsys):
+    path = write(tmp_path / "labelled.hdf5", arrays)
+    assert cli.main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
+    assert "real_force_percent" in capsys.readouterr().out
+    before, after = networks.load(), networks.load(tmp_path / "tuned" / "weights")
+    rows = {(row["name"], row["set"].rsplit(" ", 1)[1]): row for row in after.card["fine_tuned"]["errors"]}
+    # Measured: places 5.7 -> 1.6 mm, forces 20 -> 19 % (nothing: 4.9 mm, 59 %); twenty presses are kept to tell.
+    for name, share in (("real_position_mm", 0.5), ("real_force_percent", 1.0)):
+        assert rows[name, "after"]["value"] < share * rows[name, "before"]["value"]
+        assert rows[name, "after"]["value"] < 0.5 * rows[name, "after"]["null"]
+    assert after.card["fine_tuned"]["weights_sha256"] == before.sha256
+    for net in (net for net in networks.NETS if net != "S2MPN"):
+        for name, tensor in before.tensors[net].items():
+            np.testing.assert_array_equal(tensor, after.tensors[net][name])
+
+
+def test_same_bytes_again(arrays, tmp_path):
+    path = write(tmp_path / "labelled.hdf5", arrays)
+    for name in ("a", "b"):
+        fine_tune(path, tmp_path / name)
+    first, second = ((tmp_path / name / "weights" / "card.json").read_bytes() for name in ("a", "b"))
+    assert first == second
+    with pytest.raises(TactileError, match="already holds weights"):
+        fine_tune(path, tmp_path / "a")
+
+
+def test_places_come_back_from_the_lattice():
+    frame = networks.load().frames["MVB"]
+    nodes = np.array([[9, 20], [30.5, 31.5], [55, 1]])  # one between nodes
+    place = (nodes - (np.array([frame.rows, frame.columns]) - 1) / 2) / 10
+    rest = sensors.biotac_surface().rest[: frame.rows * frame.columns].reshape(frame.rows, frame.columns, 3)
+    found = on_skin(frame, place)
+    np.testing.assert_allclose(found[[0, 2]], rest[[9, 55], [20, 1]], atol=1e-9)
+    np.testing.assert_allclose(found[1], rest[30:32, 31:33].mean((0, 1)), atol=1e-9)
+
+
+def changed(arrays, **values):
+    return {name: values.get(name, array) for name, array in arrays.items() if values.get(name, array) is not None}
+
+
+def test_metres_read_as_millimetres(arrays, tmp_path):
+    frame = networks.load().frames["MVB"]
+    first = read_labelled(write(tmp_path / "mm.hdf5", arrays), frame, 0)
+    metres = changed(arrays, contact_loc=1e-3 * arrays["contact_loc"])
+    second = read_labelled(write(tmp_path / "m.hdf5", metres), frame, 0)
+    np.testing.assert_array_equal(first.place, second.place)
+    assert not set(first.split.train) & set(first.split.test)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda a: changed(a, force_vec=None), "no forces"),
+        (lambda a: changed(a, contact_loc=None), "no contact places"),
+        (lambda a: changed(a, contact_loc=a["contact_loc"] + 30), "off the skin"),
+        (lambda a: changed(a, contact_loc=np.full_like(a["contact_loc"], np.nan)), "usable frames"),
+        (lambda a: changed(a, force_vec=0 * a["force_vec"]), "usable frames"),
+        (lambda a: {name: values[:300] for name, values in a.items()}, "usable frames"),
+    ],
+)
+def test_refusals(arrays, tmp_path, spoil, said):
+    with pytest.raises(TactileError, match=said):
+        fine_tune(write(tmp_path / "labelled.hdf5", spoil(arrays)), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_options_that_do_not_fit(tmp_path, capsys):
+    for words in (["s2mpn"], ["s2mpn", "--real", "x", "--effort", "2"], ["pairs.h5", "--real", "x"]):
+        assert cli.main(["train", *words, "--out", str(tmp_path / "out")]) == 2
+        assert "--" in capsys.readouterr().err
