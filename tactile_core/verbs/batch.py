@@ -169,6 +169,10 @@ def _place(folder: Path, options: argparse.Namespace) -> Place:
     if options.cluster is not None:
         from ..batch.dask_place import Cluster
 
+        if options.cluster.startswith("tcp://") and not options.cluster.startswith("tcp://127."):
+            say(
+                "warning: tcp:// is neither secret nor signed, and Dask's messages run code: private network, or tls://"
+            )
         return Cluster(folder, options.cluster)
     from ..batch.local import RESTART, Local
 
