@@ -73,7 +73,7 @@ class Cluster:
         security = Security(require_encryption=True) if self._address.startswith("tls://") else None
         try:
             self._client = Client(self._cluster or self._address, security=security, timeout=WAIT, set_as_default=False)
-        except (OSError, ValueError, TypeError, RuntimeError) as error:
+        except (OSError, ValueError, TypeError, RuntimeError, MemoryError) as error:  # the last: of other servers
             found, advice = f"no scheduler answers ({error})", "Start one: dask scheduler"
             raise TactileError(self._address, found, "a Dask scheduler", advice) from error
         return self
