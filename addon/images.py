@@ -9,13 +9,16 @@ PICTURE, HEIGHTS = "DIGIT picture", "DIGIT height map"
 
 
 def new_image(name: str, width: int, height: int, *, floats: bool = False) -> bpy.types.Image:
-    """An image of this name and size, the old one where it fits; values are shown as they are, without conversion."""
+    """An image of this name and size, the old one where it fits.
+
+    Bytes are a picture in sRGB, which editors show as it is; floats are data.
+    """
     found = bpy.data.images.get(name)
     if found is not None and (tuple(found.size) != (width, height) or found.is_float != floats or found.packed_file):
         bpy.data.images.remove(found)
         found = None
     if found is None:
-        found = bpy.data.images.new(name, width, height, alpha=False, float_buffer=floats, is_data=True)
+        found = bpy.data.images.new(name, width, height, alpha=False, float_buffer=floats, is_data=floats)
     return found
 
 

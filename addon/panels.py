@@ -92,15 +92,4 @@ class TACTILE_PT_author(_Panel, bpy.types.Panel):
 
 
 CLASSES = (TACTILE_PT_recording, TACTILE_PT_picture, TACTILE_PT_author)
-
-
-def register() -> None:
-    """Called by the package."""
-    for kind in CLASSES:
-        bpy.utils.register_class(kind)
-
-
-def unregister() -> None:
-    """Called by the package."""
-    for kind in reversed(CLASSES):
-        bpy.utils.unregister_class(kind)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -23,6 +23,7 @@ def add_patch(gel: bpy.types.Object, patch: np.ndarray, first: float, step: floa
     rows, columns = patch.shape
     values = np.repeat(patch[:, :, None], 3, axis=2).astype(np.float32)
     image = images.new_image(f"{gel.name} contact patch", columns, rows)
+    image.colorspace_settings.name = "Non-Color"  # numbers to look up, no picture
     images.fill(image, values)
     image.pack()
     modifier = gel.modifiers.get(_MODIFIER) or gel.modifiers.new(_MODIFIER, "NODES")

@@ -23,11 +23,4 @@ class TactilePreferences(bpy.types.AddonPreferences):
             column.label(text=ADVICE + ".", icon="INFO")
 
 
-def register() -> None:
-    """Called by the package."""
-    bpy.utils.register_class(TactilePreferences)
-
-
-def unregister() -> None:
-    """Called by the package."""
-    bpy.utils.unregister_class(TactilePreferences)
+register, unregister = bpy.utils.register_classes_factory((TactilePreferences,))

@@ -5,11 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..tactile_core.calibration import Calibration
 from ..tactile_core.errors import TactileError
 from ..tactile_core.height_map import height_map
-from ..tactile_core.shading import Shader
-from . import digit_objects, properties, render_settings, reports, tracer
+from . import digit_objects, pictures, properties, render_settings, reports, tracer
 
 ID = "TACTILE_DIGIT"
 # Panels of these kinds suit any engine; Blender shows them for engines that add themselves.
@@ -49,25 +47,14 @@ class TactileRenderEngine(bpy.types.RenderEngine):
             raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
         share = scene.render.resolution_percentage / 100
         width, height = (int(size * share) for size in (scene.render.resolution_x, scene.render.resolution_y))
-        unit = render_settings.calibration_of(scene, width, height)
+        unit = render_settings.calibration_of(scene, (width, height))
         self.update_stats("", f"Frame {scene.frame_current}: {scene.tactile_render.preset}")
         heights = height_map(digit_objects.displacement_of(gel, depsgraph), unit.camera)
         self.update_progress(0.1)
         if scene.tactile_render.preset == "fast":
-            return _shader(unit)(heights)
+            return pictures.shader_of(unit)(heights)
         reports.require("mitsuba")
         return tracer.tracer_for(unit, scene.tactile_render.preset).draw(heights, self.test_break)
-
-
-_shaders: dict[str, Shader] = {}  # one at most: the frames of an animation share it
-
-
-def _shader(unit: Calibration) -> Shader:
-    key = repr(unit)  # a calibration holds tables, which have no hash
-    if key not in _shaders:
-        _shaders.clear()
-        _shaders[key] = Shader(unit)
-    return _shaders[key]
 
 
 def _told(error: Exception) -> str:
@@ -111,5 +98,4 @@ def unregister() -> None:
     for panel in _panels():
         panel.COMPAT_ENGINES.discard(ID)
     tracer.close_all()
-    _shaders.clear()
     bpy.utils.unregister_class(TactileRenderEngine)

@@ -38,11 +38,12 @@ class TactileRender(bpy.types.PropertyGroup):
     )  # fmt: skip
 
 
-def calibration_of(scene: bpy.types.Scene, width: int, height: int) -> Calibration:
-    """The unit that a scene renders with, at a picture's size. Raises TactileError."""
+def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) -> Calibration:
+    """The unit that a scene renders with, its picture (width, height) pixels large. Raises TactileError."""
     settings = scene.tactile_render
     path = bpy.path.abspath(settings.calibration) if settings.calibration else None
-    unit = calibration_file.load_calibration(path).at_size(width, height)
+    unit = calibration_file.load_calibration(path)
+    unit = unit if size is None else unit.at_size(*size)
     gain = unit.gain
     scaled = {
         field.name: tuple(

@@ -66,10 +66,11 @@ def authored(context: bpy.types.Context) -> Authored:
     frames = _sampled(scene) if by_height else _key_frames(scene, thing, sensor)
     values = _motion(context, thing, sensor, frames)
     points = _points(scene, frames, values, kept.get("points", []))
+    pressing = specs[0].name
     order = {name: k for k, name in enumerate(document.pop("order", []))}
     specs.sort(key=lambda spec: order.get(spec.name, len(order)))
     recording = {"noise_counts": 1.0, "drift_counts": 3.0, "tilt_deg": 0.0} | kept
-    recording |= {"indenter": _spec(thing, sensor, context, {}).name, "points": points}
+    recording |= {"indenter": pressing, "points": points}
     return Authored(_scene(Scene, document, specs, recording), meshes, values["apex"] if by_height else None)
 
 

@@ -123,11 +123,4 @@ class TACTILE_OT_simulate(TactileOperator):
             self._timer = None
 
 
-def register() -> None:
-    """Called by the package."""
-    bpy.utils.register_class(TACTILE_OT_simulate)
-
-
-def unregister() -> None:
-    """Called by the package."""
-    bpy.utils.unregister_class(TACTILE_OT_simulate)
+register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_simulate,))

@@ -60,11 +60,4 @@ class TACTILE_OT_translate(TactileOperator):
         self.report({"INFO"}, f"{told}; {low} parts of low confidence")
 
 
-def register() -> None:
-    """Called by the package."""
-    bpy.utils.register_class(TACTILE_OT_translate)
-
-
-def unregister() -> None:
-    """Called by the package."""
-    bpy.utils.unregister_class(TACTILE_OT_translate)
+register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_translate,))

@@ -29,8 +29,6 @@ PLATFORMS = {
 PYTHONS = ("3.11", "3.13", "3.14")
 # Never torch (users translate with numpy), never numpy (Blender ships it).
 WHEELS = ("h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "mitsuba", "drjit")
-# Of those that constraints.txt does not pin, because no other part of the project installs them.
-PINS = {"mitsuba": "3.9.1", "drjit": "1.5.0"}
 PACKED = ("__init__.py", "blender_manifest.toml", "LICENSE", "addon/", "tactile_core/", "scenes/")
 LEFT_OUT = ("scenes/training/", "tactile_core/training/")  # 1.8 MB for tests; torch
 EPOCH = (1980, 1, 1, 0, 0, 0)  # zip's own zero, so that the time of building changes no byte
@@ -74,7 +72,7 @@ def fetch(platform: str, python: str, folder: Path) -> list[Path]:
 def requirements() -> list[str]:
     """``name==version`` of every wheel."""
     text = (ROOT / "constraints.txt").read_text(encoding="utf-8")
-    pins = PINS | dict(re.findall(r"(?m)^([A-Za-z0-9_.-]+)==(\S+)$", text))
+    pins = dict(re.findall(r"(?m)^([A-Za-z0-9_.-]+)==(\S+)$", text))
     return [f"{name}=={pins[name]}" for name in WHEELS]
 
 

@@ -37,15 +37,17 @@ class Options:
     sensor: Sensor | None = None
 
 
-def load_tools(weights: str | os.PathLike | None = None) -> Tools:
-    """The shipped weights, or those in a folder, and the DIGIT's camera and lights.
+def load_tools(weights: str | os.PathLike | None = None, calibration: str | os.PathLike | None = None) -> Tools:
+    """The shipped weights, or those in a folder, and the camera and lights of a DIGIT: the shipped unit's, or a file's.
 
-    Raises TactileError for weights that are missing, changed or of another shape.
+    Raises TactileError for weights that are missing, changed or of another shape, and for a bad calibration.
     """
     from . import height_map, shading, translate
+    from .calibration_file import load_calibration
 
-    translator = translate.load_translator(weights)
-    return Tools(translator, translator.card, translator.sha256, height_map.digit_mapper(), shading.Shader())
+    translator, unit = translate.load_translator(weights), load_calibration(calibration)
+    mapper, shader = height_map.digit_mapper(unit.camera), shading.Shader(unit)
+    return Tools(translator, translator.card, translator.sha256, mapper, shader)
 
 
 def parse_frames(text: str) -> slice:

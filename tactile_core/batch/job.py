@@ -42,6 +42,7 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """What is made of each recording: all that decides a shard's bytes beside the recording itself.
 
     shard_frames : frames a shard; keep : words of results.KEEPABLE; weights : sha256 of the weights' card
+    calibration : sha256 of the DIGIT's calibration file, empty for the shipped unit
     """
 
     keep: list[str]
@@ -49,16 +50,21 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     shard_frames: Annotated[int, Meta(ge=1, le=MAX_SHARD_FRAMES)] = SHARD_FRAMES
     prepare: Prepare = Prepare()
     sensor: Sensor | None = None
+    calibration: str = ""
     version: str = __version__
 
 
 class Job(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A job: `inputs` by `recipe`. weights : folder of the networks, None for the shipped ones; versions : a note."""
+    """A job: `inputs` by `recipe`.
+
+    weights, calibration : folder of the networks, file of the unit, None for the shipped ones; versions : a note
+    """
 
     format: str
     inputs: list[Input]
     recipe: Recipe
     weights: str | None
+    calibration: str | None
     versions: dict[str, str]
 
     @property
@@ -72,17 +78,16 @@ def _hash(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def make(inputs: list[Input], recipe: Recipe, weights: str | None) -> Job:
+def make(inputs: list[Input], recipe: Recipe, weights: str | None, calibration: str | None = None) -> Job:
     """A new job."""
-    folder = None if weights is None else os.path.abspath(weights)
-    return Job(FORMAT, inputs, recipe, folder, results.versions())
+    paths = [None if path is None else os.path.abspath(path) for path in (weights, calibration)]
+    return Job(FORMAT, inputs, recipe, *paths, results.versions())
 
 
 def write(folder: Path, job: Job) -> None:
-    """Make the job folder. Raises TactileError where it cannot be written."""
+    """Make the job folder, its job file first: all else is made again. Raises TactileError where it cannot be."""
     try:
-        for part in (PREPARED, SHARDS, ASIDE):
-            (folder / part).mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         atomic.write_json(folder / FILE, msgspec.to_builtins(job))
     except OSError as error:
         found = f"cannot be written ({error.strerror or error})"

@@ -177,6 +177,6 @@ class Prepared:
         try:
             with h5py.File(self._path, "r") as file:
                 return what(file)
-        except (OSError, KeyError, ValueError) as error:
+        except Exception as error:  # the library raises a dozen types on damaged bytes
             found, advice = f"damaged ({error})", "Run the job again: it is made anew"
             raise TactileError(self._path, found, "a prepared recording", advice) from error

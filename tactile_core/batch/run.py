@@ -76,6 +76,8 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
     Raises TactileError when the disk cannot be written.
     """
     work = _Work(folder, job, part)
+    for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
+        (folder / name).mkdir(exist_ok=True)
     with place:
         for task in work.first():
             place.submit(task)

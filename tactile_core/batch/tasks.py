@@ -12,6 +12,7 @@ from ..errors import TactileError
 from ..frame_pass import Tools
 from . import job as jobs
 from . import prepared, shard
+from .inputs import content_hash
 
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -55,7 +56,7 @@ def _run(folder: Path, task: Task) -> Reply:
         if task.shard is None:
             frames, made = prepared.make(folder, job, task.recording)
             return Reply(made=made, frames=frames)
-        tools = _tools(job.weights, job.recipe.weights)
+        tools = _tools(job.weights, job.recipe.weights, job.calibration, job.recipe.calibration)
         return Reply(made=shard.make(folder, job, task.recording, task.shard, tools))
     except TactileError as error:
         return Reply(error=str(error))
@@ -82,11 +83,14 @@ def _job(folder: str, stamp: tuple[int, int]) -> jobs.Job:
 
 
 @functools.lru_cache(maxsize=2)
-def _tools(weights: str | None, sha256: str) -> Tools:
-    """The networks, once a process. Raises TactileError where they are not those of the job."""
+def _tools(weights: str | None, sha256: str, calibration: str | None, unit_sha256: str) -> Tools:
+    """The networks and the unit, once a process. Raises TactileError where they are not those of the job."""
     from ..convert import load_tools
 
-    tools = load_tools(weights)
+    if calibration is not None and content_hash(Path(calibration))[0] != unit_sha256:
+        advice = "Use the calibration that the job was made with"
+        raise TactileError(calibration, "another content", f"sha256 {unit_sha256[:12]}..., as in the job", advice)
+    tools = load_tools(weights, calibration)
     if tools.sha256 != sha256:
         found, advice = f"sha256 {tools.sha256[:12]}...", "Use the weights that the job was made with"
         raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)

@@ -6,6 +6,7 @@ Started by ``local``. It ends by itself when its client is killed, and leaves no
 from __future__ import annotations
 
 import json
+import logging
 import os
 import signal
 import sys
@@ -25,6 +26,8 @@ def main() -> None:
     """``python -m tactile_core.batch.worker FOLDER``."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group: the client decides
     replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    # What the library warns of frame by frame is in the shards as flags and confidence; thousands of lines help nobody.
+    logging.getLogger(__package__.rpartition(".")[0]).setLevel(logging.ERROR)
     os.dup2(2, 1)  # whatever a library prints must not be taken for a reply
     try:
         serve(sys.argv[1], sys.stdin, replies)

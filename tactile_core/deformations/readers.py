@@ -35,7 +35,7 @@ def read(path: str | os.PathLike[str]) -> Iterator[Deformation]:
     with file:
         names: list[str] = []
         with damage_told(path, "HDF5"):
-            file.visit(names.append)
+            file.visit(lambda name: names.append(name) if isinstance(name, str) else None)  # bytes: no UTF-8
         for layout in layouts():
             frames = sorted((found for name in names if (found := layout.PATTERN.fullmatch(name))), key=_place)
             if frames:

@@ -74,6 +74,8 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
         vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
     except Exception as error:  # a damaged file fails wherever its parser happens to be
         raise TactileError(path, f"cannot be read as a mesh ({error})", "a triangle mesh") from error
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise TactileError(path, f"vertices {vertices.shape}, faces {faces.shape}", "three coordinates, three corners")
     if not len(faces):
         raise TactileError(path, "no triangles", "a triangle mesh")
     if len(faces) > MAX_FACES:

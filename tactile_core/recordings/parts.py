@@ -13,8 +13,8 @@ from .store import Store, open_hdf5
 from .table import read_header_of_start, read_tables
 
 TEXT_BYTES = 32 * 2**20  # a part's text: about 150,000 frames, 25 minutes at 100 Hz
-ARRAY_BYTES = 256 * 2**20  # a part's arrays, as the file declares them
-BAG_FRAMES = 100_000  # a part's messages
+ARRAY_BYTES = 256 * 2**20  # of a part's arrays, as the file declares them; a simulated one has 150 kB a frame
+PART_FRAMES = 100_000  # most frames of a part: 17 minutes at 100 Hz; preparing them takes 15 MB a copy
 CONTEXT = 200  # frames that a part shares with the one before: glitches are looked for over 50, smoothing over 101
 
 
@@ -53,7 +53,7 @@ def _parts(path: str) -> Iterator[Part]:
         elif container == "bag":
             with open_bag(path) as bag:
                 layout = layout_of(path, container, bag.topics)
-                for recording, repeated in read_bag(bag, layout, BAG_FRAMES, CONTEXT):
+                for recording, repeated in read_bag(bag, layout, PART_FRAMES, CONTEXT):
                     yield Part(recording, repeated)
         else:
             yield Part(read(path), 0)
@@ -62,7 +62,7 @@ def _parts(path: str) -> Iterator[Part]:
 def _of_store(store: Store) -> Iterator[Part]:
     layout = layout_of(store.path, "hdf5", names(store))
     count = _frames(store, layout.ELECTRODES_NAME)
-    frames = max(2 * CONTEXT, ARRAY_BYTES // max(1, _bytes_a_frame(store, count)))
+    frames = max(2 * CONTEXT, min(PART_FRAMES, ARRAY_BYTES // max(1, _bytes_a_frame(store, count))))
     if count <= frames:
         yield Part(layout.read(store), 0)
         return

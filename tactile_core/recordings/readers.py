@@ -14,9 +14,10 @@ from types import ModuleType
 from ..errors import TactileError
 from . import formats
 from .bag import kind, open_bag, read_bag, split
+from .cut_cell import shown
 from .recording import Recording
 from .store import Store, open_hdf5, open_npz
-from .table import read_header, read_table, shown
+from .table import read_header, read_table
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")

@@ -12,7 +12,7 @@ from ..terminal import bar, complain, say, tell
 from .common import RESUMES, prepare_arguments, progress_argument
 
 if TYPE_CHECKING:
-    from ..batch.job import Job
+    from ..batch.job import Job, Recipe
     from ..batch.run import Place
 
 BRIEF = "many recordings to shards, resumable, on one machine or many"
@@ -34,10 +34,11 @@ examples:
   tactile batch --out job --cluster tcp://head:8786            on the workers of a Dask scheduler
   tactile batch day1 --out job --plan                          write job.json alone, as arrays need it"""
 LEAVES = RESUMES
-RECIPE = (
-    ("keep", None), ("shard_frames", None), ("weights", None), ("sensor", None), ("tare", "auto"), ("kind", None),
-    ("counts_per_unit", None), ("smooth", None), ("no_drift", False),
-)  # fmt: skip
+RECIPE = (  # option, its value where it is not given
+    *((name, None) for name in ("keep", "shard_frames", "weights", "sensor", "calibration")),
+    *((name, None) for name in ("kind", "counts_per_unit", "smooth")),
+    *(("tare", "auto"), ("no_drift", False)),
+)
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
@@ -50,6 +51,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--shard-frames", type=int, metavar="N", help="frames a shard (default: 1000)")
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
     verb.add_argument("--sensor", metavar="FILE", help="gains and offsets of this sensor, from `tactile adapt`")
+    verb.add_argument("--calibration", metavar="FILE", help="the DIGIT whose pictures to make (`tactile calibrate`)")
     prepare_arguments(verb)
     where = verb.add_mutually_exclusive_group()
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: 1)")
@@ -124,8 +126,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     paths = inputs.find(options.inputs, folder)
     with bar("reading", "file", options.progress) as shown:
         found = inputs.hashed(paths, shown)
-    weights, recipe = _recipe(options)
-    job = jobs.make(found, recipe, weights)
+    job = jobs.make(found, _recipe(options), options.weights, options.calibration)
     if there is None:
         others = [path.name for path in folder.iterdir() if not path.name.startswith(".")]
         if others:
@@ -138,10 +139,12 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     return there
 
 
-def _recipe(options: argparse.Namespace) -> tuple[str | None, object]:
-    """Folder of the weights, and the recipe that the options say."""
+def _recipe(options: argparse.Namespace) -> Recipe:
+    """The recipe that the options say."""
     from .. import results, translate
+    from ..batch.inputs import content_hash
     from ..batch.job import SHARD_FRAMES, Prepare, Recipe
+    from ..calibration_file import load_calibration
     from ..recordings import sensor_file
 
     keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
@@ -155,13 +158,21 @@ def _recipe(options: argparse.Namespace) -> tuple[str | None, object]:
     sensor = None if options.sensor is None else sensor_file.read(options.sensor)
     sha256 = translate.load_translator(options.weights).sha256
     frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
-    return options.weights, Recipe(list(keep), sha256, frames, prepare, sensor)
+    unit = ""
+    if options.calibration is not None:
+        load_calibration(options.calibration)  # a bad one is refused here, not by each worker
+        unit, _ = content_hash(Path(options.calibration))
+    return Recipe(list(keep), sha256, frames, prepare, sensor, unit)
 
 
 def _place(folder: Path, options: argparse.Namespace) -> Place:
     if options.cluster is not None:
         from ..batch.dask_place import Cluster
 
+        if options.cluster.startswith("tcp://") and not options.cluster.startswith("tcp://127."):
+            say(
+                "warning: tcp:// is neither secret nor signed, and Dask's messages run code: private network, or tls://"
+            )
         return Cluster(folder, options.cluster)
     from ..batch.local import RESTART, Local
 

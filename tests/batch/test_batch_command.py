@@ -74,6 +74,19 @@ def test_what_cannot_be_done_is_told_in_one_line(words, told, tmp_path, capsys):
     assert told in error and error.count("\n") == 1
 
 
+def test_the_calibration_belongs_to_the_job(command, recordings, tmp_path):
+    from tactile_core.calibration_file import SHIPPED
+
+    out, unit = tmp_path / "job", tmp_path / "unit.toml"
+    unit.write_bytes(SHIPPED.read_bytes())
+    words = [recordings[1], "--out", out, "--keep", "latent"]
+    assert command(*words, "--calibration", unit, "--plan").returncode == 0
+    assert "holds another job" in command(*words).stderr
+    unit.write_bytes(SHIPPED.read_bytes() + b"\n")
+    done = command("--out", out)
+    assert done.returncode == 2 and "as in the job" in done.stderr
+
+
 def damage(job):
     yield "not json"
     yield "[" * 100_000

@@ -157,3 +157,44 @@ def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, part, tmp_path):
     bpy.ops.render.render(write_still=True)
     levels = 255 * _pixels(tmp_path / "frame.png")
     assert np.sqrt(np.mean((levels - _wanted(part)) ** 2)) < 5  # grey levels: fast and standard differ by one or two
+
+
+@pytest.fixture
+def traced(part, tmp_path):
+    """A worker as Mitsuba's presets use it, with the one that needs no Mitsuba; heights (H, W) m of a rest gel."""
+    unit = part("tactile_core.calibration_file").load_calibration()
+    tracer = part("addon.tracer").Tracer(unit, "fast")
+    yield tracer, part("tactile_core.height_map").rest_height_map(unit.camera)
+    tracer.close()
+
+
+def test_a_worker_draws_what_the_library_draws(traced, part):
+    tracer, heights = traced
+    raised = heights.copy()
+    raised[150:170, 100:120] += 2e-4
+    renderer = part("tactile_core.optics.renderer").Renderer(preset="fast")
+    for height in (heights, raised):
+        np.testing.assert_array_equal(tracer.draw(height, lambda: False), renderer(height))
+
+
+def test_esc_stops_a_worker(traced, part):
+    with pytest.raises(part("addon.tracer").Stopped):
+        traced[0].draw(traced[1], lambda: True)
+
+
+def test_a_worker_that_aborts_leaves_blender_alive(traced, part):
+    tracer, heights = traced
+    tracer._job._process.kill()
+    with pytest.raises(part("tactile_core.errors").TactileError, match="ended"):
+        tracer.draw(heights, lambda: False)
+
+
+def test_live_picture_and_render_are_of_the_same_unit(ready, part):
+    ready.frame_set(80)
+    gel = ready.objects["DIGIT gel"]
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    displacement = part("addon.digit_objects").displacement_of(gel, depsgraph)
+    before = part("addon.pictures").fast_picture(ready, displacement)[0].astype(float)
+    ready.tactile_render.lights = (0.2, 1, 1)
+    after = part("addon.pictures").fast_picture(ready, displacement)[0].astype(float)
+    assert np.abs(after - before)[..., 0].max() > 20

@@ -77,6 +77,13 @@ def test_a_huge_declared_shape_is_refused_unread(tmp_path):
         list(deformations.read(tmp_path / "a.hdf5"))
 
 
+def test_a_name_that_is_no_text_is_passed_over(tmp_path):
+    with h5py.File(tmp_path / "a.hdf5", "w") as file:
+        expected = narang(file)
+        file[b"\xff\xfe"] = 1
+    assert len(list(deformations.read(tmp_path / "a.hdf5"))) == len(expected)
+
+
 def test_other_files_are_refused(tmp_path):
     (tmp_path / "a").write_bytes(b"text")
     with h5py.File(tmp_path / "b", "w") as file:

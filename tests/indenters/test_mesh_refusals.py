@@ -98,6 +98,7 @@ def test_no_solid_is_refused(tmp_path, make, said):
         ("body.stl", b"solid nothing\nendsolid nothing\n", "cannot be read|no triangles"),
         ("body.ply", b"ply\nformat ascii 1.0\nelement vertex 9000000000\nend_header\n", "cannot be read|no triangles"),
         ("body.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|missing vertices"),
+        ("body.obj", b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "three coordinates|cannot be read"),
         ("body.off", b"OFF\n1 1 0\n0 0 0\n3 0 0 0\n", "across|cannot be read|not closed"),
     ],
 )

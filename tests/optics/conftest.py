@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 from gel_pictures import NO_MITSUBA, Press, works
+from plain_unit import plain_unit
 
-from tactile_core.calibration_file import load_calibration
 from tactile_core.optics.variant import LLVM, SCALAR, choose_variant
 
 
@@ -22,8 +22,8 @@ def any_variant() -> str:
 
 @pytest.fixture(scope="session")
 def small():
-    """The shipped unit with 60 x 80 pixels: a sixteenth of the work."""
-    return load_calibration().at_size(60, 80)
+    """The plain unit with 60 x 80 pixels: a sixteenth of the work."""
+    return plain_unit().at_size(60, 80)
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ import zlib
 
 import numpy as np
 from gel_pictures import Press, levels, with_leds
+from plain_unit import plain_unit
 
-from tactile_core.calibration_file import load_calibration
 from tactile_core.height_map import rest_height_map
 from tactile_core.optics.gel_mesh import MM, GelMesh
 from tactile_core.optics.interreflection import Gather, irradiance
@@ -183,7 +183,7 @@ def test_the_seed_matters_to_the_reference_alone(any_variant, small, press):
 
 def test_fast_is_the_reference_within_half_a_level_on_ten_random_contacts(any_variant):
     """Ten presses of balls anywhere, up to 1.2 mm deep, at half the real number of pixels each way."""
-    unit = load_calibration().at_size(120, 160)
+    unit = plain_unit().at_size(120, 160)
     rest = rest_height_map(unit.camera)
     few = dataclasses.replace(DIRECT, passes=6 if any_variant == LLVM else 2)
     reference, shader = MitsubaLight(unit, few, any_variant, rest, 0), Shader(unit, rest=rest)

@@ -34,7 +34,13 @@ def render(tmp_path, capsys):
 
 
 @pytest.fixture
-def heights(tmp_path, small, press):
+def small():
+    """The shipped unit, which the command takes by default, with 60 x 80 pixels."""
+    return load_calibration().at_size(60, 80)
+
+
+@pytest.fixture
+def heights(tmp_path, small):
     """A file of three height maps of 60 x 80."""
     path = tmp_path / "heights.npz"
     maps = [Press(depth=depth).on(small.camera) for depth in (0.3e-3, 0.6e-3, 0.9e-3)]

@@ -48,7 +48,7 @@ def test_a_single_mcap_file_and_parts(make, tmp_path, monkeypatch):
     press = make(frames=700)
     write_bag(tmp_path / "touch", press, "mcap", "hand")
     (path,) = (tmp_path / "touch").glob("*.mcap")
-    monkeypatch.setattr(parts, "BAG_FRAMES", 300)
+    monkeypatch.setattr(parts, "PART_FRAMES", 300)
     found = list(parts.read_parts(path))
     assert [(len(one.recording), one.repeated) for one in found] == [(300, 0), (500, 200), (300, 200)]
     joined = np.concatenate([one.recording.electrodes[one.repeated :] for one in found])

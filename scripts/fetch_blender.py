@@ -1,0 +1,126 @@
+"""Fetch a real Blender from Debian into a folder of its own, run the extension's tests in it and photograph its window.
+
+    python3 scripts/fetch_blender.py                        trixie's 4.3.2 into out/blender-trixie: 90 s, 1.7 GB
+    python3 scripts/fetch_blender.py --suite sid            sid's 5.2
+    python3 scripts/fetch_blender.py --no-tests             only the screenshots, in out/screenshots
+
+Needs Linux, root (it makes a Debian tree and changes into it) and apt-get with Debian's packages; nothing is installed
+on the machine itself. The checkout and /tmp are mounted into the tree while this runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = [
+    "blender",
+    "xvfb",
+    "xauth",
+    "xdotool",
+    "imagemagick",
+    "libgl1-mesa-dri",
+    "libegl1",
+    "libllvm19",
+    "python3-numpy",
+]
+# sid's Blender needs it for its extensions' command line.
+EXTRA = {"sid": ["python3-cattr"]}
+STAGES = ("imported", "translated", "rendered", "authored")
+MIRROR = "http://deb.debian.org/debian"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Fetch, test, photograph; returns the tests' exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--suite", choices=("trixie", "sid"), default="trixie")
+    parser.add_argument("--folder", type=Path, help="of the Debian tree (default: out/blender-SUITE)")
+    parser.add_argument("--no-tests", action="store_true", help="do not run the tests")
+    parser.add_argument("--no-screenshots", action="store_true", help="take none")
+    options = parser.parse_args(arguments)
+    if os.name != "posix" or os.geteuid() != 0:
+        print("fetch_blender.py: error: it must run as root on Linux", file=sys.stderr)
+        return 2
+    tree = (options.folder or ROOT / "out" / f"blender-{options.suite}").resolve()
+    try:
+        fetch(tree, options.suite)
+        with mounted(tree):
+            binary = wrapper(tree)
+            tests = [sys.executable, str(ROOT / "scripts" / "dev.py"), "test-blender", "--binary", str(binary), "-q"]
+            status = 0 if options.no_tests else subprocess.call(tests)
+            if not options.no_screenshots:
+                photograph(tree, binary)
+    except subprocess.CalledProcessError as error:
+        print(f"fetch_blender.py: error: {error}", file=sys.stderr)
+        return 2
+    return status
+
+
+def fetch(tree: Path, suite: str) -> None:
+    """Make the Debian tree, unless it is there."""
+    if (tree / "usr" / "bin" / "blender").exists():
+        return
+    tools = tree.parent / "debootstrap"
+    tools.mkdir(parents=True, exist_ok=True)
+    subprocess.run(["apt-get", "update", "-qq"], check=True)
+    subprocess.run(["apt-get", "download", "-qq", "debootstrap"], cwd=tools, check=True)
+    subprocess.run(["dpkg", "-x", str(max(tools.glob("debootstrap_*.deb"))), str(tools)], check=True)
+    scripts = os.environ | {"DEBOOTSTRAP_DIR": str(tools / "usr" / "share" / "debootstrap")}
+    command = [str(tools / "usr" / "sbin" / "debootstrap"), "--variant=minbase", suite, str(tree), MIRROR]
+    subprocess.run(command, env=scripts, check=True)
+    install = ["apt-get", "install", "-y", "-qq", "--no-install-recommends", *PACKAGES, *EXTRA.get(suite, [])]
+    subprocess.run(["chroot", str(tree), *install], check=True)
+
+
+@contextmanager
+def mounted(tree: Path) -> Iterator[None]:
+    """The checkout, /tmp, /dev and /proc inside the tree; taken away again."""
+    done = []
+    try:
+        for place in (str(ROOT), "/tmp", "/dev", "/proc"):
+            inside = tree / place.lstrip("/")
+            inside.mkdir(parents=True, exist_ok=True)
+            subprocess.run(["mount", "--bind", place, str(inside)], check=True)
+            done.append(inside)
+        yield
+    finally:
+        for inside in reversed(done):
+            subprocess.run(["umount", "--lazy", str(inside)], check=False)
+
+
+def wrapper(tree: Path) -> Path:
+    """A program that runs the tree's Blender on the paths of this machine."""
+    path = tree.parent / f"{tree.name}.sh"
+    path.write_text(f'#!/bin/sh\nexec chroot "{tree}" /usr/bin/env LIBGL_ALWAYS_SOFTWARE=1 blender "$@"\n')
+    path.chmod(0o755)
+    return path
+
+
+def photograph(tree: Path, binary: Path) -> None:
+    """The window at each stage, out/screenshots/<stage>.png."""
+    out = ROOT / "out" / "screenshots"
+    out.mkdir(parents=True, exist_ok=True)
+    ask = [str(binary), "-b", "--python-expr", "import sys; print('PY %d.%d' % sys.version_info[:2])"]
+    answer = subprocess.run(ask, check=True, capture_output=True, text=True).stdout
+    python = answer.split("PY ")[1].split()[0]
+    build = [sys.executable, str(ROOT / "scripts" / "build_extension.py"), "--python", python, "--out", str(out)]
+    packed = subprocess.run(build, check=True, capture_output=True, text=True).stdout.rsplit(" (", 1)[0].strip()
+    for stage in STAGES:
+        known = {"STAGE": stage, "OUT": str(out / f"{stage}.png"), "ZIP": packed, "LIBGL_ALWAYS_SOFTWARE": "1",
+                 "BLENDER_USER_RESOURCES": str(out / f"user-{stage}"), "HOME": "/root"}  # fmt: skip
+        variables = [f"{name}={value}" for name, value in known.items()]
+        window = ["blender", "--factory-startup", "--window-geometry", "0", "0", "1600", "900", "--python"]
+        script = ROOT / "tests" / "blender" / "screenshot.py"
+        run = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24", *window, str(script)]
+        subprocess.run(["chroot", str(tree), "env", *variables, *run], check=True, timeout=300)
+        print(out / f"{stage}.png")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,45 @@
+"""The last cell of a text file that does not end in a newline: it may be cut off."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .assemble import Problem
+
+SHOWN = 40  # characters of a cell or header that a message repeats
+
+
+def shown(text: str) -> str:
+    """The text as a message repeats it: quoted, and cut when long."""
+    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "…")
+
+
+def doubt_last_cell(
+    kept: list[tuple[int, str]], header: tuple[str, ...], separator: str, values: np.ndarray, problems: list[Problem]
+) -> None:
+    """The last number of a file that does not end in a newline may be cut off.
+
+    It is where every other row is closed by a separator and this one is not. Else it is doubted where the value tells:
+    see `_looks_cut`; complete files that merely lack the last newline are common.
+    """
+    number, line = kept[-1]
+    if len(kept) < 2 or line.count(separator) != len(header) - 1 or not np.isfinite(values[-1, -1]):
+        return
+    closed = kept[-2][1].rstrip(" ").endswith(separator)
+    if closed or _looks_cut(values[:, -1]):
+        cell = line.split(separator)[-1].strip()
+        values[-1, -1] = np.nan
+        found = f"the file ends in this cell, {shown(cell)}" + ("" if closed else ", far below the rows before")
+        problems.append(Problem(len(kept) - 1, number, header[-1], f"{found} (truncated)"))
+
+
+def _looks_cut(column: np.ndarray) -> bool:
+    """Whether the last value of a column (T,) looks like the first digits of a longer number.
+
+    A digit less makes a count ten times smaller: it is doubted below half of the last value before it (assumed), if
+    no step in the column is as large, so that a signal that swings around 0 is not. Lost decimals change little.
+    """
+    before = column[:-1][np.isfinite(column[:-1])]
+    if not len(before) or abs(column[-1]) >= 0.5 * abs(before[-1]):
+        return False
+    return bool(abs(column[-1] - before[-1]) > np.abs(np.diff(before)).max(initial=0.0))

@@ -1,0 +1,216 @@
+"""Every loader that meets files of strangers, a good file for each, and ways to spoil it.
+
+As a script it runs for a while: ``python tests/fuzz/hostile.py --seconds 60 [--only NAME]`` spoils files until the CPU
+time is spent, under a limit on the process's memory, and exits 1 at the first loader that raises anything but
+TactileError; the spoiled file is left beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import random
+import resource
+import shutil
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+from tactile_core import deformations, paired_contacts, recordings, scene, tet_file, weights  # noqa: E402
+from tactile_core.batch import job as jobs  # noqa: E402
+from tactile_core.batch import prepared, sealed  # noqa: E402
+from tactile_core.errors import TactileError  # noqa: E402
+from tactile_core.indenters import mesh_file  # noqa: E402
+from tactile_core.live import Growing  # noqa: E402
+from tactile_core.recordings import parts, sensor_file  # noqa: E402
+
+MEMORY = 4 * 2**30  # bytes of address space for the script; numpy's threads and libraries reserve the first of them
+WORDS = [b"nan", b"-1", b"1e308", b"99999999999999999999", b"../../x", b"\n", b",", b'"', b"[", b"{", b"\0", b"null"]
+NUMBERS = [0, 1, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**64 - 1]
+Loader = Callable[[Path], object]
+
+
+def spoil(data: bytes, chance: random.Random) -> bytes:
+    """One to six changes: bits, numbers, cuts, words, repeats."""
+    spoiled = bytearray(data)
+    for _ in range(chance.randint(1, 6)):
+        # Formats keep what decides in their first kilobytes.
+        place = chance.randrange(min(len(spoiled), chance.choice([64, 2048, 10**9])) or 1)
+        how = chance.randrange(7)
+        if how == 0 and spoiled:
+            spoiled[min(place, len(spoiled) - 1)] ^= 1 << chance.randrange(8)
+        elif how == 1:
+            spoiled[place : place + 1] = bytes([chance.choice([0, 1, 127, 128, 255, chance.randrange(256)])])
+        elif how == 2:
+            kind = chance.choice(["<I", "<Q", ">I", ">Q", "<H"])
+            value = chance.choice(NUMBERS) & (2 ** (8 * struct.calcsize(kind)) - 1)
+            spoiled[place : place + struct.calcsize(kind)] = struct.pack(kind, value)
+        elif how == 3:
+            del spoiled[place : place + chance.choice([1, 4, 100, 10**6])]
+        elif how == 4:
+            spoiled[place : place + chance.choice([0, 0, 4])] = chance.choice(WORDS)
+        elif how == 5:
+            spoiled[place:place] = spoiled[place : place + chance.choice([1, 16, 200])] * chance.choice([1, 2, 50])
+        else:
+            del spoiled[place:]
+    return bytes(spoiled)
+
+
+def good_recordings(folder: Path) -> dict[str, tuple[bytes, Loader]]:
+    """A recording in each container."""
+    frames = np.rint(3000 + np.random.default_rng(0).normal(0, 1, (60, 19)))
+    header = "timestamp,tdc,tac,pdc," + ",".join([f"pac{i}" for i in range(1, 23)] + [f"ele{i}" for i in range(1, 20)])
+    rows = np.column_stack([1.6e9 + np.arange(60) / 100, np.full((60, 25), 2000), frames])
+    text = io.StringIO()
+    np.savetxt(text, rows, fmt="%.10g", delimiter=",", header=header, comments="")
+    archive = io.BytesIO()
+    np.savez_compressed(archive, electrodes=frames, time=np.arange(60) / 100)
+    found: dict[str, tuple[bytes, Loader]] = {
+        "csv": (text.getvalue().encode(), prepare),
+        "npz": (archive.getvalue(), prepare),
+        "hdf5": (hdf5({"electrode_vals/data": frames, "force_vec/data": np.zeros((60, 3))}), prepare),
+        "growing": (text.getvalue().encode(), lambda path: Growing(path).poll()),
+    }
+    try:
+        import bags
+        import rosbags  # noqa: F401 - the extra [ros] may be absent
+    except ModuleNotFoundError:
+        return found
+    from types import SimpleNamespace
+
+    press = SimpleNamespace(time=np.arange(60) / 100, electrodes=frames, pdc=rows[:, 3], tac=rows[:, 2], tdc=rows[:, 1])
+    for container in ("ros1", "mcap", "sqlite3"):
+        bags.write_bag(folder / container, press, container, "hand")
+        path = folder / container
+        path = path if path.is_file() else next(file for file in path.iterdir() if file.suffix != ".yaml")
+        found[container] = (path.read_bytes(), prepare)
+    return found
+
+
+def prepare(path: Path) -> None:
+    """All that a batch does with a recording before the networks."""
+    for part in parts.read_parts(path):
+        recordings.prepare(part.recording)
+
+
+def hdf5(arrays: dict[str, np.ndarray]) -> bytes:
+    import h5py
+
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        for name, values in arrays.items():
+            file.create_dataset(name, data=values, compression="gzip" if values.ndim else None)
+    return memory.getvalue()
+
+
+def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
+    """Scenes, meshes, weights, sensor files, jobs, simulations of others."""
+    tetrahedra = b"v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nt 0 1 2 3\n"
+    faces = b"v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+    narang = {"step_1/nodal_coords/env_0": np.zeros((4, 3)), "step_1/net_force_vecs/env_0": np.zeros(3)}
+    header = {"a": {"dtype": "F32", "shape": [2, 2], "data_offsets": [0, 16]},
+              "b": {"dtype": "F16", "shape": [4], "data_offsets": [16, 24]}}  # fmt: skip
+    text = json.dumps(header).encode()
+    safetensors = struct.pack("<Q", len(text)) + text + bytes(24)
+    job = jobs.make([jobs.Input("00000_a", "/a", "0" * 64, 1)], jobs.Recipe(["latent"], "0" * 64), None)
+    (folder / "job").mkdir()
+    jobs.write(folder / "job", job)
+    sensor_file.write(folder / "sensor.toml", sensor_file.Sensor(sensor_file.FORMAT, "made up", [1.0] * 19, [0.0] * 19))
+    scenes = ROOT / "scenes" / "press_sphere" / "scene.toml"
+    return {
+        "scene": (scenes.read_bytes(), scene.load_scene),
+        "sensor": ((folder / "sensor.toml").read_bytes(), sensor_file.read),
+        "tet": (tetrahedra, tet_file.read_tet),
+        "obj": (faces, read_mesh(".obj")),
+        "stl": (bytes(80) + struct.pack("<I", 4) + triangles(), read_mesh(".stl")),
+        "safetensors": (safetensors, lambda path: weights.from_safetensors(weights.read_bytes(path), path)),
+        "job": ((folder / "job" / jobs.FILE).read_bytes(), read_job),
+        "deformations": (hdf5(narang), lambda path: list(deformations.read(path))),
+        "pairs": (hdf5({"press": np.zeros(4, np.int32), "force": np.zeros((4, 3))}), paired_contacts.read_pairs),
+        "prepared": (hdf5({"time": np.arange(8.0), "about": np.frombuffer(b"{}", np.uint8)}), read_prepared),
+        "seal": (sealed.MAGIC + b"0" * 64 + b"\n" + bytes(500), sealed.digest_of),
+    }
+
+
+def triangles() -> bytes:
+    """The body of an STL file: the faces of a tetrahedron, 10 mm wide."""
+    corners = 1e-2 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4")
+    found = [corners[list(face)] for face in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))]
+    return b"".join(struct.pack("<3f", 0, 0, 0) + face.astype("<f4").tobytes() + b"\0\0" for face in found)
+
+
+def read_mesh(suffix: str) -> Loader:
+    """Reads a mesh of the kind that the suffix names."""
+
+    def read(path: Path) -> object:
+        named = path.with_suffix(suffix)
+        shutil.copy(path, named)
+        return mesh_file.solid(mesh_file.read_bytes(named), named, 1.0, "y")
+
+    return read
+
+
+def read_job(path: Path) -> None:
+    shutil.copy(path, path.with_name(jobs.FILE))
+    jobs.read(path.parent)
+
+
+def read_prepared(path: Path) -> None:
+    found = prepared.Prepared(path)
+    len(found), found.about()
+
+
+def loaders(folder: Path) -> dict[str, tuple[bytes, Loader]]:
+    """Name -> a good file's bytes and what reads it."""
+    return good_recordings(folder) | good_others(folder)
+
+
+def survives(path: Path, data: bytes, load: Loader) -> None:
+    """Reading ends well or in a TactileError; anything else goes through."""
+    path.write_bytes(data)
+    try:
+        load(path)
+    except TactileError as error:
+        if len(str(error)) > 2000:
+            raise AssertionError(f"a message of {len(str(error))} characters") from error
+
+
+def main() -> int:
+    """Spoil files until the time is spent; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=60, help="CPU time for each loader (default: 60)")
+    parser.add_argument("--only", help="this loader alone")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    with tempfile.TemporaryDirectory() as name:
+        table = loaders(Path(name))
+        for word in [options.only] if options.only else table:
+            data, load = table[word]
+            chance, count, end = random.Random(options.seed), 0, time.process_time() + options.seconds
+            while time.process_time() < end:
+                bad = spoil(data, chance)
+                try:
+                    survives(Path(name) / "spoiled", bad, load)
+                except Exception as error:
+                    kept = Path(f"spoiled_{word}_{options.seed}_{count}")
+                    kept.write_bytes(bad)
+                    print(f"{word}: {type(error).__name__}: {error!s:.300} ({kept})")
+                    return 1
+                count += 1
+            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+            print(f"{word}: {count} spoiled files, largest memory so far {peak} MB", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

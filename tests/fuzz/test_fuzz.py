@@ -1,0 +1,66 @@
+"""Whatever the bytes, a loader ends well or in a TactileError. ``hostile.py`` runs the same for as long as told."""
+
+from __future__ import annotations
+
+import importlib.util
+import random
+import resource
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+found = importlib.util.spec_from_file_location("hostile", Path(__file__).with_name("hostile.py"))
+hostile = importlib.util.module_from_spec(found)
+sys.modules["hostile"] = hostile
+found.loader.exec_module(hostile)
+
+NAMES = [
+    *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3"),
+    *("scene", "sensor", "tet", "obj", "stl", "safetensors", "job", "deformations", "pairs", "prepared", "seal"),
+]
+FEW = settings(
+    max_examples=40,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+GROWTH = 512  # MB that all these files together may add to the process: 100 times the largest good one
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    return hostile.loaders(tmp_path_factory.mktemp("good"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@FEW
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_spoiled_file_is_refused_in_words(name, seed, table, tmp_path):
+    if name not in table:
+        pytest.skip("rosbags is absent: pip install tactile-core[ros]")
+    data, load = table[name]
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    hostile.survives(tmp_path / "spoiled", hostile.spoil(data, random.Random(seed)), load)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < GROWTH * 1024
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_good_file_is_read(name, table, tmp_path):
+    if name not in table:
+        pytest.skip("rosbags is absent: pip install tactile-core[ros]")
+    data, load = table[name]
+    path = tmp_path / "good"
+    path.write_bytes(data)
+    if name in ("pairs", "prepared"):  # only the containers are good: what they lack is told
+        with pytest.raises(hostile.TactileError):
+            load(path)
+            hostile.prepared.Prepared(path).rows(0, 1)
+    else:
+        load(path)
+
+
+def test_every_loader_is_here(table):
+    assert set(table) | {"ros1", "mcap", "sqlite3"} == set(NAMES)
