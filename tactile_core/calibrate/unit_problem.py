@@ -13,6 +13,7 @@ import numpy as np
 
 from ..calibration import Calibration, Gain
 from ..errors import TactileError
+from ..shading import SeenSurface
 from .bench import Bench
 from .press_fit import DEEPEST, SHALLOWEST, Sight
 from .unit_numbers import FIRST_LED, LARGEST_RADIUS, SMALLEST_RADIUS, SPREAD, STEP, numbers_of, with_numbers
@@ -28,7 +29,7 @@ PRESS_STEP = 10e-3  # mm
 class _Lights:
     """Radiance of a press: by LED and counted pixel (3, p), times 1, right, down in mm (9, p); the gel behind it."""
 
-    surface: object
+    surface: SeenSurface
     changes: np.ndarray
     terms: np.ndarray
 
