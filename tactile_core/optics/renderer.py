@@ -79,10 +79,15 @@ class Renderer:
         """Radiance (H, W, 3) float32 that each LED gives to what pixels see, in the unit of ``calibration``."""
         return self._light.radiance(self._heights(height_map, "height map"))
 
-    def picture(self, radiance: np.ndarray) -> np.ndarray:
-        """Picture (H, W, 3) uint8: background + C (radiance - radiance at rest)."""
+    def picture(self, radiance: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
+        """Picture (H, W, 3) uint8: background + C (radiance - radiance at rest).
+
+        noise : makes the camera's noise, as measured on the unit; None for none
+        """
         levels = self.in_levels(radiance - self.rest_radiance)
         levels += self.background
+        if noise is not None:
+            levels += noise.standard_normal(levels.shape, np.float32) * np.asarray(self.calibration.noise, np.float32)
         np.rint(levels, out=levels)
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
 
