@@ -48,6 +48,7 @@ class Options:
     preset : its name, None to choose by error; error : grey levels rms that will do, None for the default preset
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
     frames : part of the input; exr : whether to write OpenEXR too; variant : None for the faster one
+    noise : whether PNG pictures have the camera's noise, the same in every run
     """
 
     preset: str | None = None
@@ -57,6 +58,7 @@ class Options:
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
     exr: bool = False
     variant: str | None = None
+    noise: bool = False
     overwrite: bool = False
 
 
@@ -82,7 +84,7 @@ def render(path: str | os.PathLike, out: str | os.PathLike, options: Options, pr
     try:
         with atomic.new_folder(out, overwrite=options.overwrite) as folder, progress(preset) as shown:
             about = {"calibration": calibration.unit, "preset": preset, "units": UNITS}
-            _Work(frames, rows, renderer, clock, about).write(folder, options.exr, shown)
+            _Work(frames, rows, renderer, clock, about, options.noise).write(folder, options.exr, shown)
             atomic.write_json(folder / results.NOTE, _note(path, frames, rows, renderer, preset, options))
             timings = {"ms_a_frame": clock.per_frame(len(rows)), "frames": len(rows), "machine": results.machine()}
             atomic.write_json(folder / results.TIMINGS, timings)
@@ -121,13 +123,17 @@ def _at_size(calibration: Calibration, frames: Frames, size: tuple[int, int] | N
 
 @dataclasses.dataclass(frozen=True)
 class _Work:
-    """One input being rendered. rows : (n,) of the frames that are wanted; about : attributes of EXR files."""
+    """One input being rendered.
+
+    rows : (n,) of the frames that are wanted; about : attributes of EXR files; noise : whether pictures have some
+    """
 
     frames: Frames
     rows: np.ndarray
     renderer: Renderer
     clock: Stopwatch
     about: dict[str, str]
+    noise: bool
 
     def write(self, folder: Path, exr: bool, progress: Progress) -> None:
         """Pictures, one frame at a time."""
@@ -147,7 +153,8 @@ class _Work:
         with self.clock.stage("radiance"):
             radiance = self.renderer.radiance(height)
         with self.clock.stage("picture"):
-            picture = self.renderer.picture(radiance)
+            noise = np.random.default_rng(number) if self.noise else None
+            picture = self.renderer.picture(radiance, noise)
         with self.clock.stage("png"):
             write_png(folder / results.IMAGES / results.IMAGE_NAME.format(number), picture)
         if exr:
@@ -178,6 +185,7 @@ def _note(
         "input": {"file": file.name, "sha256": results.sha256(file), "kind": frames.kind},
         "frames": {"selected": frames_text(options.frames), "rendered": len(rows)},
         "calibration": {"file": calibration.name, "sha256": results.sha256(calibration), "unit": unit},
+        "noise": options.noise,
         "size": {"width": renderer.camera.width, "height": renderer.camera.height},
         "preset": {
             "name": preset, "settings": None if about is None else dataclasses.asdict(about),

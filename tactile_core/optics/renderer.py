@@ -59,7 +59,7 @@ class Renderer:
         self.camera = calibration.camera
         self._domed = rest is None and calibration.dome_scale != 1
         own = rest_height_map(self.camera) if rest is None else rest
-        resting = self._of_unit(check_heights(own, calibration, "rest height map"))
+        resting = self._heights(own, "rest height map")
         background = background_picture(calibration) if background is None else background
         self.background = _checked(background, (*self.camera.shape, 3), "background")
         self._gain = np.ascontiguousarray(calibration.gain.matrices(self.camera).transpose(2, 3, 0, 1), np.float32)
@@ -77,18 +77,26 @@ class Renderer:
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3) float32 that each LED gives to what pixels see, in the unit of ``calibration``."""
-        heights = check_heights(height_map, self.calibration, "height map")
-        return self._light.radiance(self._of_unit(heights))
+        return self._light.radiance(self._heights(height_map, "height map"))
 
-    def picture(self, radiance: np.ndarray) -> np.ndarray:
-        """Picture (H, W, 3) uint8: background + C (radiance - radiance at rest)."""
+    def picture(self, radiance: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
+        """Picture (H, W, 3) uint8: background + C (radiance - radiance at rest).
+
+        noise : makes the camera's noise, as measured on the unit; None for none
+        """
         levels = self.in_levels(radiance - self.rest_radiance)
         levels += self.background
+        if noise is not None:
+            levels += noise.standard_normal(levels.shape, np.float32) * np.asarray(self.calibration.noise, np.float32)
         np.rint(levels, out=levels)
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
 
-    def _of_unit(self, heights: np.ndarray) -> np.ndarray:
-        return of_unit(heights, self.calibration) if self._domed else heights.astype(np.float32)
+    def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
+        """The unit's heights (H, W) float32 m, checked."""
+        heights = _checked(given, self.camera.shape, name).astype(np.float32)
+        heights = of_unit(heights, self.calibration) if self._domed else heights
+        check_reach(heights, self.calibration, name)
+        return heights
 
     def in_levels(self, radiance: np.ndarray) -> np.ndarray:
         """C times radiance (H, W, 3), grey levels float32: what the camera's channels make of it."""
@@ -141,18 +149,14 @@ class MitsubaLight:
         return direct_light(hits, seen, points, leds, soften=self.preset.passes == 1), hits
 
 
-def check_heights(height: np.ndarray, unit: Calibration, name: str) -> np.ndarray:
-    """The heights (H, W) m; raises TactileError for another shape, not finite ones, a gel at an LED or the camera."""
-    height = _checked(height, unit.camera.shape, name)
-    highest, lowest_led = float(height.max()), min(unit.leds, key=lambda led: led.position[2] - led.radius)
-    limit = lowest_led.position[2] - lowest_led.radius
-    if highest >= limit:
-        found = f"{highest * 1e3:.2f} mm high, where the {lowest_led.colour} LED begins at {limit * 1e3:.2f} mm"
-        raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")
-    if highest >= unit.camera.apparent_height:
-        found = f"{highest * 1e3:.2f} mm high, the camera {unit.camera.apparent_height * 1e3:.2f} mm"
-        raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")
-    return height
+def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
+    """Raises TactileError for heights (H, W) m that reach an LED's middle or the camera."""
+    lowest = min(unit.leds, key=lambda led: led.position[2])
+    limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
+    for what, limit in limits.items():
+        if float(height.max()) >= limit:
+            found = f"{height.max() * 1e3:.2f} mm high, {what} {limit * 1e3:.2f} mm"
+            raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")
 
 
 def _checked(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:

@@ -52,6 +52,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="only these, counted from 0 as in Python")
     verb.add_argument("--size", metavar="WxH", help="pixels, such as 480x640 (default: the calibration's)")
     verb.add_argument("--exr", action="store_true", help="write OpenEXR beside PNG")
+    verb.add_argument("--noise", action="store_true", help="add the unit's camera noise to PNG pictures")
     verb.add_argument("--variant", choices=("llvm", "scalar"), help="of Mitsuba (default: the faster one that works)")
     verb.add_argument("--overwrite", action="store_true", help="replace an older result")
     progress_argument(verb)
@@ -74,6 +75,7 @@ def run(options: argparse.Namespace) -> int:
         frames=convert.parse_frames(options.frames),
         exr=options.exr,
         variant=wanted,
+        noise=options.noise,
         overwrite=options.overwrite,
     )
     done = job.render(options.input, options.out, asked, lambda word: bar(word, "frame", options.progress))

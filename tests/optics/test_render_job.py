@@ -171,6 +171,19 @@ def test_a_missing_mitsuba_is_named(render, heights, monkeypatch):
     assert NO_MITSUBA.endswith('"tactile-core[render]"')
 
 
+def test_noise_is_the_units_and_the_same_in_every_run(render, heights, tmp_path, small):
+    for out, more in (("plain", ()), ("one", ("--noise",)), ("two", ("--noise",))):
+        assert render(heights, *more, out=out)[0] == 0
+    plain, one, two = (
+        picture(tmp_path / out / "images" / "00001.png").astype(float) for out in ("plain", "one", "two")
+    )
+    np.testing.assert_array_equal(one, two)
+    found = (one - plain).std((0, 1))
+    expected = np.sqrt(np.square(small.noise) + 1 / 6)  # both pictures are rounded, a variance of 1/12 each
+    np.testing.assert_allclose(found, expected, rtol=0.1)  # 4,800 pixels: 1 %; and clipping at 0 and 255
+    assert not np.array_equal(one, picture(tmp_path / "one" / "images" / "00002.png"))
+
+
 def test_an_older_result_is_replaced_only_when_asked(render, heights, tmp_path):
     assert render(heights)[0] == 0
     status, _, err = render(heights)

@@ -138,7 +138,7 @@ def test_pixels_need_not_be_square(variant, small, press):
         (lambda h: h[:-1], "shape"),
         (lambda h: h[None], "shape"),
         (lambda h: h * 1e3, "LED"),
-        (lambda h: h + 5.5e-3, "LED"),
+        (lambda h: h + 5.8e-3, "LED"),
     ],
 )
 def test_bad_heights_are_refused(harm, words, any_variant, small, press):
