@@ -114,7 +114,7 @@ def test_simulating_bakes_what_the_command_line_computes(scene, nodes_of, part, 
     (folder / "scene.toml").write_text(head + points)
     bpy.ops.tactile.import_scene(filepath=str(folder / "scene.toml"))
     assert bpy.ops.tactile.simulate(seed=3) == {"FINISHED"}
-    command = [sys.executable, "-m", "tactile_core", "simulate", str(folder), "--seed", "3"]
+    command = [sys.executable, "-P", "-m", "tactile_core", "simulate", str(folder), "--seed", "3"]
     wanted = tmp_path / "wanted.h5"
     environment = part("addon.jobs")._environment()
     subprocess.run([*command, "--out", str(wanted)], env=environment, check=True, timeout=300)
