@@ -15,7 +15,8 @@ from ..errors import TactileError
 from .gel_mesh import MM, GelMesh, check_mesh
 from .variant import LLVM, activate
 
-NEAREST_MM, FARTHEST_MM = 1.0, 1e3  # what the camera sees: nothing is nearer to it, nothing of the gel farther
+NEAREST_MM = 1.0  # nothing is nearer to the camera
+BEHIND_MM = 1e3  # nothing of the gel lies farther behind the plane of height zero
 MOST_MISSED = 1e-3  # share of rays; measured: 1e-6 slip through
 
 
@@ -110,7 +111,7 @@ class _ScalarTracer(_Scene):
         eye = {
             "type": "perspective", "fov_axis": "x",
             "fov": 2 * math.degrees(math.atan(half_width / camera.apparent_height)),
-            "near_clip": NEAREST_MM, "far_clip": FARTHEST_MM,
+            "near_clip": NEAREST_MM, "far_clip": camera.apparent_height * MM + BEHIND_MM,
             "to_world": transform.look_at(origin=[0, 0, camera.apparent_height * MM], target=[0, 0, 0], up=[0, 1, 0]),
             # One sample in the middle of each pixel: nothing here is random.
             "film": film, "sampler": {"type": "stratified", "sample_count": 1, "jitter": False},
