@@ -132,6 +132,8 @@ class _Reader:
         table = self._content["background"]
         rows = tuple(_numbers(f"background, {colour}", table[colour], BACKGROUND_TERMS) for colour in COLOURS)
         name = _text("background, photograph", table["photograph"])
+        if name and Path(name).name != name:
+            raise TactileError("background, photograph", repr(name), "the name of a file beside the calibration")
         return Background(rows, str(folder / name) if name else "")
 
     def _fit(self) -> Fit:

@@ -106,3 +106,11 @@ def test_start_of_unlike_units_reads() -> None:
     start = load_calibration(Path(__file__).parent.parent / "scenes" / "calibrations" / "start.toml")
     assert not start.fit.photographs
     assert start.camera.shape == (320, 240)
+
+
+@pytest.mark.parametrize("name", ["../rest.png", "/etc/rest.png", "sub/rest.png"])
+def test_photograph_lies_beside_the_file(tmp_path: Path, name: str) -> None:
+    file = tmp_path / "unit.toml"
+    file.write_text(SHIPPED_TEXT.replace('photograph = ""', f'photograph = "{name}"'), encoding="utf-8")
+    with pytest.raises(TactileError, match="background, photograph"):
+        load_calibration(file)
