@@ -30,8 +30,8 @@ PACKAGES = [
     "libllvm19",
     "python3-numpy",
 ]
-# sid's Blender needs it for its extensions' command line.
-EXTRA = {"sid": ["python3-cattr"]}
+# sid's Blender needs them for its extensions' command line.
+EXTRA = {"sid": ["python3-cattr", "python3-requests"]}
 STAGES = ("imported", "translated", "rendered", "authored")
 MIRROR = "http://deb.debian.org/debian"
 
