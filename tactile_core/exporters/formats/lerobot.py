@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import atomic
+from ...errors import TactileError
 from ...recordings.recording import NOMINAL_RATE
 from ..finished import Finished, Recorded
 
@@ -43,7 +44,13 @@ PLAIN = {
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """The data set. Needs pyarrow, of the extra [batch]."""
+    """The data set. Needs pyarrow, of the extra [batch]; raises TactileError for one that this numpy does not load."""
+    try:
+        import pyarrow  # noqa: F401
+    except ModuleNotFoundError:
+        raise
+    except ImportError as error:
+        raise TactileError("pyarrow", str(error), "one that this numpy works with") from error
     features = _features(source.recordings[0])
     stats = {name: _Stats() for name in features if name != PICTURE}
     episodes: list[dict[str, Any]] = []
