@@ -23,7 +23,7 @@ SWEEP = """\
 
 Other latent sizes and KL weights, each a training of its own on the same fewer pairs, against the same test contacts
 (`scripts/sweep_networks.py`): to be compared with each other, not with the rows above. `published` has the latents and
-the KL weight of the method's authors. The direct network is the bar of the chain, on the trainings' own test presses.
+the KL weight of the method's authors.
 """
 LIMITS = """\
 ## Limits
