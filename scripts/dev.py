@@ -33,7 +33,7 @@ BLENDER_SECONDS = 1800  # some Blenders hang at exit (4.5 where an operator stay
 STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
 # Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
-SIZES_MB = {"": "50", "dev": "300", "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)"}
+SIZES_MB = {"": "50", "dev": "430", "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)"}
 NETWORK_SIGNS = ("NewConnectionError", "NameResolutionError", "ConnectTimeoutError", "ReadTimeoutError", "ProxyError",
                  "Max retries exceeded", "Failed to establish", "Temporary failure", "SSLError",
                  "(from versions: none)")
