@@ -119,8 +119,10 @@ class _Writer:
                 options = {"chunks": (CHUNK, *values.shape[1:]), "fletcher32": True, "track_times": False}
                 shape = (0, *values.shape[1:])
                 self._file.create_dataset(name, shape, kind, maxshape=(None, *shape[1:]), **options)
-            self._file[name].resize(end, axis=0)
-            self._file[name][self.count :] = values
+            data = self._file[name]
+            data.resize(end, axis=0)
+            data[self.count :] = values
+            data.flush()  # where its chunks lie in the file is settled now, not by when Python lets go of it
         if not self._parts:
             self._about |= {
                 "recording": recording.name, "layout": recording.layout, "simulated": recording.simulated,
