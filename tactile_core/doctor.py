@@ -49,6 +49,9 @@ LIBRARIES = (
     Library("trimesh", "trimesh", "fem", "indenters from mesh files"),
     Library("cholespy", "cholespy", "fem", "solid mechanics"),
     Library("pypardiso", "pypardiso", "mkl", "faster solid mechanics"),
+    Library("rosbags", "rosbags", "ros", "ROS bags and MCAP"),
+    Library("distributed", "distributed", "batch", "batches on many machines (tactile batch --cluster)"),
+    Library("pyarrow", "pyarrow", "batch", "LeRobot data sets (tactile export)"),
     Library("torch", "torch", "train", "training (tactile train)"),
 )
 

@@ -45,8 +45,8 @@ class Shader:
         self._dome = rest is None  # heights have the public mesh's dome, which the unit's own takes the place of
         rest = of_unit(rest_height_map(camera), calibration) if rest is None else rest
         background = background_picture(calibration) if background is None else background
-        rest = _checked(rest, camera.shape, "rest height map")
-        self.background = _checked(background, (*camera.shape, 3), "background")
+        rest = camera_array(rest, camera.shape, "rest height map")
+        self.background = camera_array(background, (*camera.shape, 3), "background")
         self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
         self._gain = np.ascontiguousarray(calibration.gain.matrices(camera).transpose(2, 3, 0, 1), np.float32)
         self._view = View(camera, rest)
@@ -77,7 +77,7 @@ class Shader:
         return np.moveaxis(self._radiance(height_map), 0, -1)
 
     def _radiance(self, height_map: np.ndarray) -> np.ndarray:
-        heights = _checked(height_map, self.camera.shape, "height map")
+        heights = camera_array(height_map, self.camera.shape, "height map")
         return self._seen_radiance(self._view(of_unit(heights, self.calibration) if self._dome else heights))
 
     def _seen_radiance(self, seen: np.ndarray) -> np.ndarray:
@@ -169,7 +169,8 @@ def grain(camera: Camera, random: np.random.Generator) -> np.ndarray:
     return ((across[width:] - across[:-width]) / width).astype(np.float32)
 
 
-def _checked(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
+def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
+    """values as float32; raises TactileError, by their name, for another shape or what is not finite."""
     values = np.asarray(values)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")

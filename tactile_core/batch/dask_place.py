@@ -92,7 +92,7 @@ def _read(address: str) -> QueueFile:
         expected = "tcp://HOST:PORT, tls://HOST:PORT or a TOML file"
         raise TactileError("--cluster", f"{address!r} ({error.strerror})", expected) from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise TactileError(address, str(error), "queue, jobs and [options], as in the README") from error
+        raise TactileError(address, str(error), "queue, jobs and [options], as in docs/batch.md") from error
 
 
 def _start(wanted: QueueFile) -> Any:

@@ -11,7 +11,7 @@ from ..calibration import LARGEST_LEVEL, Calibration
 from ..calibration_file import load_calibration
 from ..errors import TactileError
 from ..height_map import of_unit, rest_height_map
-from ..shading import Shader
+from ..shading import Shader, camera_array
 from ..view import slopes
 from .direct_light import Hits, direct_light
 from .gel_mesh import GelMesh
@@ -61,7 +61,7 @@ class Renderer:
         own = rest_height_map(self.camera) if rest is None else rest
         resting = self._heights(own, "rest height map")
         background = background_picture(calibration) if background is None else background
-        self.background = _checked(background, (*self.camera.shape, 3), "background")
+        self.background = camera_array(background, (*self.camera.shape, 3), "background")
         self._gain = np.ascontiguousarray(calibration.gain.matrices(self.camera).transpose(2, 3, 0, 1), np.float32)
         if preset == FAST:
             self.variant = None
@@ -93,7 +93,7 @@ class Renderer:
 
     def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
         """The unit's heights (H, W) float32 m, checked."""
-        heights = _checked(given, self.camera.shape, name).astype(np.float32)
+        heights = camera_array(given, self.camera.shape, name)
         heights = of_unit(heights, self.calibration) if self._domed else heights
         check_reach(heights, self.calibration, name)
         return heights
@@ -157,12 +157,3 @@ def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
         if float(height.max()) >= limit:
             found = f"{height.max() * 1e3:.2f} mm high, {what} {limit * 1e3:.2f} mm"
             raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")
-
-
-def _checked(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    values = np.asarray(values)
-    if values.shape != shape:
-        raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")
-    if not np.isfinite(values).all():
-        raise TactileError(name, "values that are not finite", "finite numbers", "Repair the frame first")
-    return values

@@ -18,6 +18,7 @@ class Options:
     rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
         rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
         from the simulated ones by), rectified_bulge, the same of all falling signals of a sample together,
+        rectified_floor, m, an error below which counts squared (assumed),
         rectified_offset, counts, of the tare before the fold, rectified_missing, share of channels that read nothing.
         Each was chosen among a few values as it let strength follow fluid pressure better on the sample recordings
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)

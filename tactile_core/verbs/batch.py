@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import TactileError
 from ..terminal import bar, complain, say, tell
-from .common import RESUMES, prepare_arguments, progress_argument
+from .common import RESUMES, prepare_arguments, prepare_words, progress_argument
 
 if TYPE_CHECKING:
     from ..batch.job import Job, Recipe
@@ -148,13 +148,7 @@ def _recipe(options: argparse.Namespace) -> Recipe:
     from ..recordings import sensor_file
 
     keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
-    prepare = Prepare(
-        kind=options.kind,
-        tare=None if options.tare == "auto" else options.tare,
-        drift=not options.no_drift,
-        counts_per_unit=options.counts_per_unit,
-        smooth=options.smooth,
-    )
+    prepare = Prepare(**prepare_words(options))
     sensor = None if options.sensor is None else sensor_file.read(options.sensor)
     sha256 = translate.load_translator(options.weights).sha256
     frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames

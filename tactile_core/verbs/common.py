@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from ..errors import TactileError
 
@@ -47,3 +48,14 @@ def check_seed(seed: int) -> None:
     """Raises TactileError for a seed that the generators do not take."""
     if not 0 <= seed <= MAX_SEED:
         raise TactileError("--seed", str(seed), f"0 to {MAX_SEED}", "Give another one")
+
+
+def prepare_words(options: argparse.Namespace) -> dict[str, Any]:
+    """What ``recordings.PrepareOptions`` is told, from the arguments of a verb that prepares recordings."""
+    return {
+        "kind": options.kind,
+        "tare": None if options.tare == "auto" else options.tare,
+        "drift": not options.no_drift,
+        "counts_per_unit": options.counts_per_unit,
+        "smooth": options.smooth,
+    }

@@ -6,7 +6,7 @@ import argparse
 
 from ..errors import TactileError
 from ..terminal import bar, complain, say, tell
-from .common import NOTHING, prepare_arguments, progress_argument
+from .common import NOTHING, prepare_arguments, prepare_words, progress_argument
 
 BRIEF = "recordings to DIGIT pictures"
 TEXT = """\
@@ -61,13 +61,7 @@ def run(options: argparse.Namespace) -> int:
     from .. import convert, results
     from ..recordings import PrepareOptions, sensor_file
 
-    prepare = PrepareOptions(
-        kind=options.kind,
-        tare=None if options.tare == "auto" else options.tare,
-        drift=not options.no_drift,
-        counts_per_unit=options.counts_per_unit,
-        smooth=options.smooth,
-    )
+    prepare = PrepareOptions(**prepare_words(options))
     keep, frames = results.parse_keep(options.keep), convert.parse_frames(options.frames)
     sensor = None if options.sensor is None else sensor_file.read(options.sensor)
     job = convert.Options(frames=frames, keep=keep, prepare=prepare, overwrite=options.overwrite, sensor=sensor)
