@@ -1,0 +1,162 @@
+"""Every command that README and the pages show is run here, page by page, in a folder with small files to work on."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from plain_unit import plain_unit
+from pressed_unit import write_photographs
+
+from tactile_core.scene import load_scene
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "scenes" / "README.md"]
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
+TORCH = importlib.util.find_spec("torch") is not None
+SECONDS = 300  # for one command; most take one or two
+MEASURES = "evaluate_translation.py"  # exits with 1 where a target is missed, as networks trained for a moment do
+
+# The same command on less: what a page says, what is run here.
+LESS = [
+    ("--count 50000", "--count 200"),
+    ("tactile train pairs.h5", "tactile train pairs.h5 --effort 0.001"),
+    ("tactile train s2mpn", "tactile train s2mpn --effort 0.01"),
+    ("evaluate_translation.py", "evaluate_translation.py --quick"),
+    ("source .venv/bin/activate", "true"),
+    ("/shared/job", "shared_job"),
+    ("seq 0 7 | parallel -j 8", "seq 0 7 | xargs -P 2 -I{}"),
+    ("--workers 8", "--workers 2"),
+]
+# What needs a machine of its own -> the file that runs it, and the words it is run by.
+ELSEWHERE = {
+    "python3 scripts/dev.py demo": (".ci/run", "dev.py demo"),
+    "python3 scripts/dev.py test-blender": (".ci/run", "dev.py test-blender"),
+    "python3 scripts/dev.py test": (".ci/run", "dev.py test"),
+    "python -m pip install": ("scripts/dev.py", '"install"'),
+    "python3 scripts/build_extension.py": ("tests/blender/test_extension_zip.py", "build_extension"),
+    "python3 scripts/fetch_blender.py": ("scripts/fetch_blender.py", "--suite"),
+    "blender ": ("tests/blender/test_command_line.py", "tactile"),
+    "openssl ": ("tests/batch/test_batch_dask.py", "openssl"),
+    "T=": ("tests/batch/test_batch_dask.py", "tls"),
+    "export DASK": ("tests/batch/test_batch_dask.py", "tls"),
+    "DASK_DISTRIBUTED": ("tests/batch/test_batch_dask.py", "tls"),
+    "OMP_NUM_THREADS=1 dask worker": ("tests/batch/test_batch_dask.py", "tls"),
+    "tactile batch day1 --out /shared/job --cluster": ("tests/batch/test_batch_dask.py", "tls"),
+    "sbatch ": ("docs/batch.md", "Not tried on a real cluster"),
+}
+
+
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """(language, text) of the fenced blocks."""
+    return FENCED.findall(page.read_text(encoding="utf-8"))
+
+
+def commands(page: Path) -> list[str]:
+    """The lines of blocks without a language, without comments."""
+    lines = [line for language, text in blocks(page) if not language for line in text.splitlines()]
+    return [found for line in lines if (found := re.sub(r"(^|\s{2,})#.*", "", line).strip())]
+
+
+def elsewhere(command: str) -> tuple[str, str] | None:
+    return next((where for start, where in ELSEWHERE.items() if command.startswith(start)), None)
+
+
+def shown(pages: list[Path], language: str) -> list[pytest.param]:
+    found = [(page, text) for page in pages for kind, text in blocks(page) if kind == language]
+    return [pytest.param(text, id=f"{page.name}-{k}") for k, (page, text) in enumerate(found)]
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory) -> Path:
+    """A folder with what the pages name, small."""
+    folder = tmp_path_factory.mktemp("user")
+    for name in ("scenes", "scripts", "constraints.txt"):
+        (folder / name).symlink_to(ROOT / name)
+    for name, frames in (("touch.csv", 80), ("day1/a.csv", 80), ("day2/b.csv", 80), ("touches/1.csv", None)):
+        (folder / name).parent.mkdir(exist_ok=True)
+        write_touch(folder / name, frames)
+    unit = plain_unit()
+    write_photographs(folder / "presses", unit)
+    shutil.copytree(folder / "presses", folder / "other_presses")
+    return folder
+
+
+def write_touch(path: Path, frames: int | None) -> None:
+    """The first frames of the recording that ships, as raw readings in CSV."""
+    header = ["timestamp", "tdc", "tac", "pdc", *(f"pac{i}" for i in range(1, 23)), *(f"ele{i}" for i in range(1, 20))]
+    with h5py.File(ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5", "r") as file:
+        electrodes = file["electrodes"][:frames]
+    rows = np.full((len(electrodes), len(header)), 2000.0)
+    rows[:, 0] = 1.6e9 + np.arange(len(rows)) / 100
+    rows[:, 26:] = electrodes
+    np.savetxt(path, rows, fmt=["%.6f"] + ["%d"] * 44, delimiter=",", header=",".join(header), comments="")
+
+
+@pytest.fixture
+def user(inputs, tmp_path) -> Path:
+    """That folder's copy for one page."""
+    folder = tmp_path / "user"
+    shutil.copytree(inputs, folder, symlinks=True)
+    return folder
+
+
+def run(command: str, folder: Path) -> subprocess.CompletedProcess:
+    """A line of a page, in bash, with this Python's tools first."""
+    for page, here in LESS:
+        command = command.replace(page, here)
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        ["bash", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, timeout=SECONDS
+    )
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the pages' commands are written for a Unix shell")
+@pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=lambda page: page.name)
+def test_commands_work(page, user):
+    every = commands(page)
+    if not TORCH and any(command.startswith("tactile train") for command in every):
+        pytest.skip("torch is not installed: dev.py test --train")
+    for command in every:
+        if elsewhere(command) is None:
+            done = run(command, user)
+            assert done.returncode <= (MEASURES in command), f"{command}\n{done.stdout}\n{done.stderr}"
+
+
+def test_what_is_run_elsewhere_is_run_there():
+    every = [command for page in PAGES for command in commands(page)]
+    for start, (file, word) in ELSEWHERE.items():
+        assert any(command.startswith(start) for command in every), f"no page shows {start}"
+        assert word in (ROOT / file).read_text(encoding="utf-8"), f"{file} does not run {start}"
+
+
+@pytest.mark.parametrize("text", shown(PAGES, "python"))
+def test_python_of_a_page_runs(text, tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", text], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=SECONDS
+    )
+    assert done.returncode == 0 and done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("text", [each for each in shown(PAGES, "toml") if "tactile-scene-1" in each.values[0]])
+def test_a_scene_of_a_page_loads(text, tmp_path):
+    (tmp_path / "scene.toml").write_text(text)
+    assert load_scene(tmp_path)[0].indenters
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    targets = LINK.findall(page.read_text(encoding="utf-8"))
+    assert not [target for target in targets if not (page.parent / target).exists()]
+
