@@ -1,7 +1,7 @@
 """Judge the translation against the simulated truth and on recordings of a real BioTac, beside doing nothing.
 
     python scripts/evaluate_translation.py --json FILE              on the test contacts that ship
-    python scripts/evaluate_translation.py --kept-apart FOLDER      and networks that some of it was kept from
+    python scripts/evaluate_translation.py --kept-apart FOLDER      and networks kept from some of it (again for more)
     python scripts/evaluate_translation.py --recordings DIR         on recordings, matM_K_{bio,cw,cp}.csv; --quick: six
 
 Prints a table; exits 1 when an error row misses its target. Needs scipy, of the extra [fem]. The recordings'
@@ -35,7 +35,13 @@ def main(arguments: list[str] | None = None) -> int:
     """Translate, measure, print, write; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--test-set", default=TEST_SET, metavar="FILE", help="pairs of the full tier (%(default)s)")
-    parser.add_argument("--kept-apart", metavar="FOLDER", help="weights of `tactile train --without ...`")
+    parser.add_argument(
+        "--kept-apart",
+        action="append",
+        default=[],
+        metavar="FOLDER",
+        help="weights of `tactile train --without ...`; may be given several times",
+    )
     parser.add_argument("--recordings", metavar="DIR", help="matM_K_{bio,cw,cp}.csv, flat or in matM/, in its place")
     parser.add_argument("--weights", metavar="FOLDER", help="networks of your own training instead of the shipped ones")
     parser.add_argument("--sensor", metavar="FILE", help="gains and offsets of their sensor, from `tactile adapt`")
@@ -73,9 +79,9 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
     if options.quick:
         pairs = pairs.some(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
     found = [*test_set.seen_rows(network, pairs, bodies), *test_set.speed_rows(network, pairs)]
-    apart = translate.load_translator(options.kept_apart) if options.kept_apart else None
-    if apart:
-        found += test_set.unseen_rows(apart, pairs, bodies)
+    apart = [translate.load_translator(folder) for folder in options.kept_apart]
+    for unaware in apart:
+        found += test_set.unseen_rows(unaware, pairs, bodies)
     if options.card:
         sweep = json.loads(Path(options.sweep).read_text()) if options.sweep else []
         write_model_card(Path(options.card), found, network, pairs, apart, sweep)

@@ -43,7 +43,7 @@ def write_model_card(
     rows: list[Row],
     translator: Translator,
     pairs: Pairs,
-    apart: Translator | None = None,
+    apart: Sequence[Translator] = (),
     sweep: Sequence[Row] = (),
 ) -> None:
     """Write the card as Markdown, and the picture of cases beside it.
@@ -63,7 +63,7 @@ def write_model_card(
         " mechanics on both sensors; signals read with 1.5 counts of noise and gains 10 % off. Depth bins (0.1-0.3,"
         " 0.3-0.6, 0.6-0.9, 0.9-1.2 mm on the BioTac) and indenters count alike, without slides; null: no deformation.",
         "",
-        *([] if apart is None else [_apart(apart.card["options"]), ""]),
+        *([_apart([each.card["options"] for each in apart]), ""] if apart else []),
         HEADER,
         *map(line, rows),
         "",
@@ -94,12 +94,16 @@ def _training(card: dict) -> str:
     )
 
 
-def _apart(options: dict) -> str:
-    names, below = " and ".join(options["without"]), options["without_below_x"]
-    region = "" if below is None else f", and without the pad beyond x = {1e3 * below:g} mm"
+def _apart(trainings: list[dict]) -> str:
+    each = []
+    for options in trainings:
+        left = [*options["without"]]
+        if options["without_below_x"] is not None:
+            left.append(f"the pad beyond x = {1e3 * options['without_below_x']:g} mm")
+        each.append(f"one without {' and '.join(left)} for {options['effort']:g} of the usual epochs")
     return (
-        f"Rows of unseen sets are of networks of their own, trained without {names}{region}, for"
-        f" {options['effort']:g} of the usual epochs; the weights that ship have seen all of it."
+        f"Rows of unseen sets are of networks of their own: {', '.join(each)};"
+        " the weights that ship have seen all of it."
     )
 
 
