@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import queue
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,11 +16,11 @@ import msgspec
 
 from ..errors import TactileError
 from . import tasks
+from .dask_loop import loop, wait
 from .local import KILLS
 from .tasks import Reply, Task
 
 SCHEMES = ("tcp://", "tls://", "ucx://")
-WAIT = 30  # s for the scheduler to answer
 
 
 class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -65,24 +66,26 @@ class Cluster:
         return msgspec.convert(future.result(), Reply)
 
     def __enter__(self) -> Cluster:
-        import dask
+        with ExitStack() as stack:
+            place = self._address if self._queue is None else stack.enter_context(_start(self._queue))
+            self._client = stack.enter_context(self._connected(place))
+            self._open = stack.pop_all()
+        return self
+
+    def _connected(self, place: Any) -> Any:
+        """A client of the scheduler. Raises TactileError where none answers."""
         from distributed import Client, Security
 
-        dask.config.set({"distributed.scheduler.allowed-failures": KILLS - 1})  # of a scheduler that starts here
-        self._cluster = None if self._queue is None else _start(self._queue)
         security = Security(require_encryption=True) if self._address.startswith("tls://") else None
         try:
-            self._client = Client(self._cluster or self._address, security=security, timeout=WAIT, set_as_default=False)
+            return Client(place, security=security, timeout=wait(), set_as_default=False, loop=loop())
         except (OSError, ValueError, TypeError, RuntimeError, MemoryError) as error:  # the last: of other servers
             found, advice = f"no scheduler answers ({error})", "Start one: dask scheduler"
             raise TactileError(self._address, found, "a Dask scheduler", advice) from error
-        return self
 
     def __exit__(self, *error: object) -> None:
         self._tasks.clear()
-        self._client.close()
-        if self._cluster is not None:
-            self._cluster.close()
+        self._open.close()
 
 
 def _read(address: str) -> QueueFile:
@@ -97,11 +100,13 @@ def _read(address: str) -> QueueFile:
 
 def _start(wanted: QueueFile) -> Any:
     """A cluster whose workers are jobs of a queue. Raises TactileError for options it does not know."""
+    import dask
     import dask_jobqueue
 
+    dask.config.set({"distributed.scheduler.allowed-failures": KILLS - 1})
     names = {"slurm": "SLURM", "pbs": "PBS", "sge": "SGE", "lsf": "LSF", "htcondor": "HTCondor"}
     try:
-        cluster = getattr(dask_jobqueue, f"{names[wanted.queue]}Cluster")(**wanted.options)
+        cluster = getattr(dask_jobqueue, f"{names[wanted.queue]}Cluster")(loop=loop(), **wanted.options)
     except (TypeError, ValueError) as error:
         raise TactileError("--cluster, options", str(error), f"options of dask_jobqueue's {wanted.queue}") from error
     cluster.scale(jobs=wanted.jobs)

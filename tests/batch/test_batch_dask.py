@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import shutil
 import subprocess
+import time
 
 import fake_tools
 import pytest
 
 from tactile_core import convert
 from tactile_core.batch import run as runs
+from tactile_core.batch.dask_loop import CONFIGURED, loop
 from tactile_core.batch.dask_place import Cluster, QueueFile, _read
 from tactile_core.errors import TactileError
 
@@ -27,9 +30,8 @@ def run_on(folder, job, address):
 
 
 def workers(**more):
-    return distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, host="127.0.0.1", **more
-    )
+    few = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None, "host": "127.0.0.1"}
+    return distributed.LocalCluster(**few, loop=loop(), **more)
 
 
 def test_dask_makes_the_same_bytes(new_job, do, content):
@@ -67,12 +69,37 @@ def test_tls_needs_the_certificate(new_job, tmp_path):
             assert run_on(folder, job, address).made == 5
 
 
-def test_nobody_listening_is_told(new_job, monkeypatch):
-    monkeypatch.setattr("tactile_core.batch.dask_place.WAIT", 1)  # s
+def test_nobody_listening_is_told(new_job):
+    import dask
+
     folder, job = new_job()
     place = Cluster(folder, "tcp://127.0.0.1:9")
-    with pytest.raises(TactileError, match="no scheduler answers"), runs.opened(folder, None):
+    told = pytest.raises(TactileError, match="no scheduler answers")
+    with dask.config.set({CONFIGURED: "1s"}), told, runs.opened(folder, None):
         runs.run(folder, job, place, None, lambda done, total: None)
+
+
+def late(seconds):
+    def run(coroutine):
+        time.sleep(seconds)
+        return started(coroutine)
+
+    started = asyncio.run
+    return run
+
+
+@pytest.mark.parametrize(("patience", "starts"), [("5s", True), ("100ms", False)])
+def test_a_loop_that_starts_late_is_waited_for_as_long_as_configured(patience, starts, monkeypatch):
+    """As on a busy machine, where Dask's own loop gives up after 10 s."""
+    import dask
+
+    monkeypatch.setattr(asyncio, "run", late(0.5))
+    with dask.config.set({CONFIGURED: patience}):
+        if starts:
+            assert loop.__wrapped__().asyncio_loop.is_running()
+        else:
+            with pytest.raises(TactileError, match="loop has not started"):
+                loop.__wrapped__()
 
 
 def test_a_queue_file_is_checked(tmp_path):
