@@ -15,6 +15,7 @@ from . import atomic
 from .calibration import BACKGROUND_TERMS, Background, Calibration, Fit, Gain
 from .camera import COLOURS, Camera, Led
 from .errors import TactileError
+from .small_text import read_toml_text
 
 FORMAT = "tactile-calibration-1"
 SHIPPED = Path(__file__).parent / "data" / "calibrations" / "default.toml"
@@ -49,10 +50,10 @@ def _shipped() -> Calibration:
 
 def _read(file: Path) -> Calibration:
     try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
+        content = tomllib.loads(read_toml_text(file))
     except OSError as error:
         raise TactileError(file, f"cannot be read ({error.strerror})", "a file of `tactile calibrate`") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise TactileError(file, str(error), "a file of `tactile calibrate`", ADVICE) from error
     try:
         return _Reader(content).calibration(file.parent)

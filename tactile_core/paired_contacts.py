@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import TactileError
+from .hdf5_checked import declared, open_checked
 
 FORMAT = "tactile-pairs-1"
 ELECTRODES = 19
@@ -90,10 +91,8 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
 
     raises: TactileError if it is missing, truncated, of another format, or if shapes or numbers are wrong
     """
-    import h5py
-
     try:
-        with h5py.File(path, "r") as file:
+        with open_checked(path) as file:
             found = str(file.attrs.get("format", ""))
             if found != FORMAT:
                 raise TactileError(path, f"format {found!r}", f"format {FORMAT!r}", ADVICE)
@@ -103,7 +102,9 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
             attributes = {name: str(file.attrs[name]) for name in ATTRIBUTES}
             arrays = {name: _dataset(file, name, path) for name in DATASETS}
             scales = {name: _scale(file[name], f"{os.fspath(path)}, {name}") for name in SCALED}
-    except (OSError, KeyError) as error:  # h5py: a truncated file is an OSError, damage inside it may be either
+    except TactileError:
+        raise
+    except Exception as error:  # h5py raises a dozen types on damaged bytes
         found = "cannot be read as HDF5, it is damaged or cut off" if os.path.exists(path) else "no such file"
         raise TactileError(path, found, "a whole HDF5 file of pairs", ADVICE) from error
     _check_values(arrays, path)
@@ -132,6 +133,7 @@ def _dataset(file: object, name: str, path: str | os.PathLike) -> np.ndarray:
     if data.dtype.kind != kind or (shape == (None, 3) and data.dtype != np.int16):
         expected = {"i": "int16", "f": "float32", "b": "bool"}[kind]
         raise TactileError(place, f"dtype {data.dtype}", expected, ADVICE)
+    declared(data, place)
     values = data[:]
     return values.astype(np.float32) if kind == "f" else values
 

@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from .errors import TactileError
 from .scene_indenters import IndenterSpec, NotNegative, Positive, with_files_of
+from .small_text import read_toml_text
 
 FORMAT = "tactile-scene-1"
 
@@ -67,12 +68,12 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
     file = pathlib.Path(path)
     file = file / "scene.toml" if file.is_dir() else file
     try:
-        text = file.read_text(encoding="utf-8")
+        text = read_toml_text(file)
     except (OSError, UnicodeDecodeError) as error:
         raise TactileError(file, f"cannot be read ({error})", "a scene.toml or a folder that holds one") from error
     try:
         scene = msgspec.toml.decode(text, type=Scene)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, RecursionError) as error:
         raise TactileError(file, str(error), "the fields of scenes/press_sphere/scene.toml") from error
     _check(file, scene)
     found = [with_files_of(file.parent, spec) for spec in scene.indenters]

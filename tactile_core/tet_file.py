@@ -12,7 +12,7 @@ import numpy as np
 from .errors import TactileError
 
 MAX_CELLS = 100_000  # the public BioTac mesh holds 15,410; a solve of 100,000 takes minutes and gigabytes
-MAX_BYTES = 64 * 2**20  # assumed: ten times what MAX_CELLS cells take
+MAX_BYTES = 16 * 2**20  # assumed: three times what MAX_CELLS cells take; its lines take 200 MB at most
 SIZES = 1e-3, 0.2  # m, smallest and largest extent of a fingertip's mesh (assumed): told apart from one in millimetres
 THINNEST = 1e-6  # volume of a cell over its longest edge's cube; below that it is flat (a regular one: 0.118)
 # What exporters write before the lists (Isaac Gym's own does); a file that was cut short holds less.
@@ -104,8 +104,9 @@ def _parse(path: Path, lines: list[str]) -> tuple[list[list[float]], list[list[i
             expected = "`v x y z` or `t a b c d`"
             advice = "The file may be cut short: fetch it again" if number == len(lines) else ""
             raise TactileError(f"{path}, line {number}", repr(line[:40]), expected, advice) from None
-        if len(cells) > MAX_CELLS:
-            raise TactileError(path, f"more than {MAX_CELLS} tetrahedra", f"at most {MAX_CELLS}", "Coarsen the mesh")
+        for found, word in ((nodes, "vertices"), (cells, "tetrahedra")):
+            if len(found) > MAX_CELLS:
+                raise TactileError(path, f"more than {MAX_CELLS} {word}", f"at most {MAX_CELLS}", "Coarsen the mesh")
     return nodes, cells, promised
 
 

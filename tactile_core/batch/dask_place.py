@@ -15,6 +15,7 @@ from typing import Any, Literal
 import msgspec
 
 from ..errors import TactileError
+from ..small_text import read_toml_text
 from . import tasks
 from .dask_loop import loop, wait
 from .local import KILLS
@@ -90,11 +91,11 @@ class Cluster:
 
 def _read(address: str) -> QueueFile:
     try:
-        return msgspec.toml.decode(Path(address).read_bytes(), type=QueueFile)
+        return msgspec.toml.decode(read_toml_text(address), type=QueueFile)
     except OSError as error:
         expected = "tcp://HOST:PORT, tls://HOST:PORT or a TOML file"
         raise TactileError("--cluster", f"{address!r} ({error.strerror})", expected) from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise TactileError(address, str(error), "queue, jobs and [options], as in docs/batch.md") from error
 
 

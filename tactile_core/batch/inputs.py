@@ -13,6 +13,7 @@ import msgspec
 from .. import results
 from ..errors import TactileError
 from ..recordings.bag import MARK, split
+from ..small_text import read_small
 
 SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3")  # what is taken from a folder
 SLIDE = "_bio.csv"  # of the slide set, whose other files (_cw.csv, _cp.csv) are no recordings
@@ -62,8 +63,10 @@ def _named(word: str) -> Iterator[Path]:
 def _lines(file: Path) -> list[str]:
     """Paths of a list file, one a line; blank lines and those that begin with # are passed over."""
     try:
-        lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
+        lines = [line.strip() for line in read_small(file).splitlines()]
+        if any("\0" in line for line in lines):
+            raise ValueError("it holds a zero byte")
+    except (OSError, ValueError) as error:
         raise TactileError(file, f"cannot be read ({error})", "a text file with one path a line") from error
     return [line for line in lines if line and not line.startswith(("#", "@"))]
 

@@ -6,10 +6,12 @@ import importlib
 import os
 import pkgutil
 from collections.abc import Iterator
+from contextlib import ExitStack
 from functools import cache
 from types import ModuleType
 
 from ..errors import TactileError
+from ..hdf5_checked import open_checked
 from ..recordings.store import damage_told
 from . import formats
 from .deformation import Deformation
@@ -27,12 +29,10 @@ def read(path: str | os.PathLike[str]) -> Iterator[Deformation]:
 
     Raises TactileError for a file that is no such HDF5 file, and for a frame that lacks a part.
     """
-    import h5py
-
     path = os.fspath(path)
-    with damage_told(path, "HDF5"):
-        file = h5py.File(path, "r")
-    with file:
+    with ExitStack() as stack:
+        with damage_told(path, "HDF5"):
+            file = stack.enter_context(open_checked(path))
         names: list[str] = []
         with damage_told(path, "HDF5"):
             file.visit(lambda name: names.append(name) if isinstance(name, str) else None)  # bytes: no UTF-8

@@ -18,6 +18,8 @@ from .mesh_crossing import first_crossing
 SUFFIXES = (".stl", ".ply", ".obj", ".off")
 UPS = ("x", "y", "z", "-x", "-y", "-z")
 MAX_BYTES, MAX_FACES = 100_000_000, 200_000
+# What MAX_FACES triangles take with normals and texture; parsers make a hundred times as many bytes of a word.
+MAX_WORDS, MAX_BINARY = 20 * MAX_FACES, 32_000_000
 EXTENT_MM = (0.2, 100.0)  # an indenter for a fingertip; outside of it the unit is wrong (assumed)
 _UNITS = {"metres": 1.0, "inches": 0.0254, "centimetres": 1e-2, "millimetres": 1e-3, "micrometres": 1e-6}
 _LOWEST_MM = 1e-4  # vertices this near to the lowest one belong to one flat
@@ -68,6 +70,7 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
     """Vertices (n, 3) in the file's unit and faces (m, 3)."""
     import trimesh
 
+    _check_length(content, path)
     options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     try:  # from memory: neither materials nor textures that the file names are looked up
         mesh = trimesh.load_mesh(io.BytesIO(content), file_type=path.suffix[1:].lower(), process=False, **options)
@@ -86,6 +89,13 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
     if not np.isfinite(vertices).all():
         raise TactileError(path, "a coordinate is nan or infinite", "finite coordinates")
     return vertices, np.unique(faces, return_inverse=True)[1].reshape(-1, 3)
+
+
+def _check_length(content: bytes, path: pathlib.Path) -> None:
+    """Refuse what holds far more than MAX_FACES triangles before a parser unfolds it."""
+    words = sum(content.count(mark) for mark in b" \t\r\n")
+    if words > MAX_WORDS or (b"\0" in content and len(content) > MAX_BINARY):
+        raise TactileError(path, f"{len(content) / 1e6:.0f} MB", f"at most {MAX_FACES} triangles", "Simplify it")
 
 
 def _check_size(where: str | os.PathLike, extent: float, scale: float) -> None:

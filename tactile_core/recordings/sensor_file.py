@@ -14,6 +14,7 @@ from msgspec import Meta
 
 from .. import atomic
 from ..errors import TactileError
+from ..small_text import read_toml_text
 from .recording import ELECTRODES
 from .signals import Signals
 
@@ -51,10 +52,10 @@ def read(path: str | os.PathLike) -> Sensor:
     """Read a sensor file; raises TactileError naming file and field for what is unreadable, unknown or out of range."""
     file = Path(path)
     try:
-        sensor = msgspec.toml.decode(file.read_bytes(), type=Sensor)
+        sensor = msgspec.toml.decode(read_toml_text(file), type=Sensor)
     except OSError as error:
         raise TactileError(file, f"cannot be read ({error.strerror})", "a file of `tactile adapt`") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise TactileError(file, str(error), "a file of `tactile adapt`", ADVICE) from error
     if sensor.format != FORMAT:
         raise TactileError(f"{file}, format", repr(sensor.format), repr(FORMAT), ADVICE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -11,11 +12,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
+from ..hdf5_checked import declared, open_checked
 from .assemble import MAX_FRAMES
 
 MAX_BYTES = (
     2 * 2**30
 )  # of one array in memory; a truth of 700 frames and 6,000 nodes takes 50 MB as float32 (assumed enough)
+MAX_HEADER = 10_000  # bytes of an array's header in NPZ, numpy's own limit
+_NPY_START = 12  # bytes: magic, version, length
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,7 @@ def open_hdf5(path: str) -> Iterator[Store]:
 
     with ExitStack() as stack:
         with damage_told(path, "HDF5"):
-            file = stack.enter_context(h5py.File(path, "r"))
+            file = stack.enter_context(open_checked(path))
             file.visititems(note)
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
 
@@ -104,9 +108,11 @@ def open_hdf5(path: str) -> Iterator[Store]:
             with damage_told(f"{path}, {name}", "attributes"):
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
-        yield Store(
-            path, shapes, lambda name: file[name][()], attributes, attributes_of, lambda name, rows: file[name][rows]
-        )
+        def load(name: str, rows: Any = ()) -> np.ndarray:
+            declared(file[name], f"{path}, {name}")
+            return file[name][rows]
+
+        yield Store(path, shapes, load, attributes, attributes_of, load)
 
 
 @contextmanager
@@ -140,10 +146,11 @@ def open_npz(path: str) -> Iterator[Store]:
     with ExitStack() as stack:
         with damage_told(path, "NPZ"):
             archive = stack.enter_context(zipfile.ZipFile(path))
-            for member in archive.namelist():
-                if member.endswith(".npy"):
+            for member in archive.infolist():
+                if member.filename.endswith(".npy"):
+                    _check_packing(path, member)
                     with archive.open(member) as stream:
-                        shapes[member[:-4]] = _npy_header(stream)
+                        shapes[member.filename[:-4]] = _npy_header(stream)
 
         def load(name: str) -> np.ndarray:
             with archive.open(name + ".npy") as stream:
@@ -152,8 +159,21 @@ def open_npz(path: str) -> Iterator[Store]:
         yield Store(path, shapes, load)
 
 
+def _check_packing(path: str, member: zipfile.ZipInfo) -> None:
+    """Other kinds of packing than deflate unpack at once whatever the file says, or ask for gigabytes to begin with."""
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        found = f"packed by method {member.compress_type}"
+        raise TactileError(f"{path}, {member.filename}", found, "stored or deflated, as numpy does", "Save it again")
+
+
 def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype]:
-    version = np.lib.format.read_magic(stream)
+    """Shape and type; a header that says it is long is not read: numpy would take it into memory before it looks."""
+    start = stream.read(_NPY_START)
+    length = int.from_bytes(start[8 : 10 if start[6:7] == b"\1" else 12], "little")
+    if not start.startswith(b"\x93NUMPY") or length > MAX_HEADER:
+        raise ValueError(f"a header of {length} bytes")
+    whole = io.BytesIO(start + stream.read(length))
+    version = np.lib.format.read_magic(whole)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(stream)
+    shape, _, dtype = read(whole)
     return tuple(int(n) for n in shape), dtype

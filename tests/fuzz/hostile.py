@@ -25,12 +25,23 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from tactile_core import deformations, paired_contacts, recordings, scene, tet_file, weights  # noqa: E402
+from tactile_core import (  # noqa: E402
+    calibration_file,
+    deformations,
+    networks,
+    paired_contacts,
+    recordings,
+    scene,
+    tet_file,
+    translate,
+    weights,
+)
+from tactile_core.batch import dask_place, inputs, prepared, sealed  # noqa: E402
 from tactile_core.batch import job as jobs  # noqa: E402
-from tactile_core.batch import prepared, sealed  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.indenters import mesh_file  # noqa: E402
 from tactile_core.live import Growing  # noqa: E402
+from tactile_core.optics import inputs as pictures  # noqa: E402
 from tactile_core.recordings import parts, sensor_file  # noqa: E402
 
 MEMORY = 4 * 2**30  # bytes of address space for the script; numpy's threads and libraries reserve the first of them
@@ -125,13 +136,23 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
     (folder / "job").mkdir()
     jobs.write(folder / "job", job)
     sensor_file.write(folder / "sensor.toml", sensor_file.Sensor(sensor_file.FORMAT, "made up", [1.0] * 19, [0.0] * 19))
-    scenes = ROOT / "scenes" / "press_sphere" / "scene.toml"
+    scenes, unit = ROOT / "scenes" / "press_sphere" / "scene.toml", calibration_file.SHIPPED
+    queue = b'queue = "slurm"\njobs = 10\n[options]\ncores = 1\nmemory = "4GB"\nwalltime = "01:00:00"\n'
+    heights = io.BytesIO()
+    np.savez_compressed(heights, height_map=np.zeros((2, 8, 6), np.float32))
     return {
         "scene": (scenes.read_bytes(), scene.load_scene),
+        "calibration": (unit.read_bytes(), calibration_file.load_calibration),
+        "list": (b"# two\na.csv\n\n./b.csv\n", read_list),
+        "queue": (queue, lambda path: dask_place._read(str(path))),
+        "weights_card": ((networks.WEIGHTS_FOLDER / weights.CARD_NAME).read_bytes(), read_weights),
+        "heights": (heights.getvalue(), read_heights),
         "sensor": ((folder / "sensor.toml").read_bytes(), sensor_file.read),
         "tet": (tetrahedra, tet_file.read_tet),
         "obj": (faces, read_mesh(".obj")),
         "stl": (bytes(80) + struct.pack("<I", 4) + triangles(), read_mesh(".stl")),
+        "ply": (PLY, read_mesh(".ply")),
+        "off": (OFF, read_mesh(".off")),
         "safetensors": (safetensors, lambda path: weights.from_safetensors(weights.read_bytes(path), path)),
         "job": ((folder / "job" / jobs.FILE).read_bytes(), read_job),
         "deformations": (hdf5(narang), lambda path: list(deformations.read(path))),
@@ -139,6 +160,14 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         "prepared": (hdf5({"time": np.arange(8.0), "about": np.frombuffer(b"{}", np.uint8)}), read_prepared),
         "seal": (sealed.MAGIC + b"0" * 64 + b"\n" + bytes(500), sealed.digest_of),
     }
+
+
+PLY = (
+    b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    b"element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+    b"0 0 0\n0.01 0 0\n0 0.01 0\n0 0 0.01\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+)
+OFF = b"OFF\n4 4 6\n0 0 0\n.01 0 0\n0 .01 0\n0 0 .01\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
 
 
 def triangles() -> bytes:
@@ -157,6 +186,28 @@ def read_mesh(suffix: str) -> Loader:
         return mesh_file.solid(mesh_file.read_bytes(named), named, 1.0, "y")
 
     return read
+
+
+def read_list(path: Path) -> None:
+    """The paths of a list: they are looked up, none is opened."""
+    for name in ("a.csv", "b.csv"):
+        (path.parent / name).touch()
+    inputs.find([f"@{path}"], path.parent / "out")
+
+
+def read_weights(path: Path) -> None:
+    """The shipped networks with another card."""
+    folder = path.parent / "weights"
+    if not folder.exists():
+        shutil.copytree(networks.WEIGHTS_FOLDER, folder)
+    shutil.copy(path, folder / weights.CARD_NAME)
+    translate.load_translator(folder)
+
+
+def read_heights(path: Path) -> None:
+    named = path.with_suffix(".npz")
+    shutil.copy(path, named)
+    pictures.read_frames(named)
 
 
 def read_job(path: Path) -> None:

@@ -19,7 +19,8 @@ found.loader.exec_module(hostile)
 
 NAMES = [
     *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3"),
-    *("scene", "sensor", "tet", "obj", "stl", "safetensors", "job", "deformations", "pairs", "prepared", "seal"),
+    *("scene", "calibration", "sensor", "list", "queue", "tet", "obj", "stl", "ply", "off", "heights"),
+    *("safetensors", "weights_card", "job", "deformations", "pairs", "prepared", "seal"),
 ]
 FEW = settings(
     max_examples=40,

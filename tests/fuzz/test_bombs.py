@@ -1,0 +1,323 @@
+"""Files that ask for far more than they hold: each loader says no, within the memory that stands here.
+
+Each is read in a child process that may take BOUND more than it has; what it says comes back through a pipe.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import resource
+import struct
+import zipfile
+import zlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tactile_core import deformations, paired_contacts, recordings, scene, tet_file, weights
+from tactile_core.batch import inputs
+from tactile_core.calibration_file import SHIPPED, load_calibration
+from tactile_core.errors import TactileError
+from tactile_core.indenters import mesh_file
+from tactile_core.optics.inputs import read_frames
+from tactile_core.recordings import parts
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows limits no process's memory")
+BOUND = 512 * 2**20  # bytes beyond what the process has: two unpacked chunks of HDF5 of the largest size that is taken
+SECONDS = 20  # of CPU time: the longest takes 3
+MANY = 10_000_000
+
+
+def told_by_child(load, path) -> str:
+    """What a loader says of a file under BOUND; anything but a TactileError fails."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        said = "no word"
+        try:
+            size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+            resource.setrlimit(resource.RLIMIT_AS, (size + BOUND, resource.RLIM_INFINITY))
+            resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+            load(path)
+            said = "read"
+        except TactileError as error:
+            said = f"told: {error}"
+        except BaseException as error:
+            said = f"{type(error).__name__}: {error}"
+        finally:
+            os.write(writer, said.encode(errors="replace")[:60_000])
+            os._exit(0)
+    os.close(writer)
+    with open(reader, "rb") as pipe:
+        said = pipe.read().decode()
+    status = os.waitpid(child, 0)[1]
+    assert status == 0, f"ended by {status}"
+    return said
+
+
+def prepare(path):
+    for part in parts.read_parts(path):
+        recordings.prepare(part.recording)
+
+
+def refused(load, path, words):
+    said = told_by_child(load, path)
+    assert said.startswith("told: ") and words in said and len(said) < 1000, said
+    assert "MemoryError" not in said and "machine's memory" not in said, f"only the limit stopped it: {said}"
+
+
+def electrodes(path, **more):
+    with h5py.File(path, "w") as file:
+        return file.create_dataset("electrode_vals/data", **more).id
+
+
+def huge_shape(path):
+    electrodes(path, shape=(10**12, 19), dtype="f8", chunks=(1000, 19))
+
+
+def many_frames_of_nothing(path):
+    """Under the limit of frames and bytes, none of them stored."""
+    electrodes(path, shape=(4_000_000, 19), dtype="i2", chunks=(1000, 19))
+
+
+def huge_chunk(path):
+    electrodes(path, shape=(10**7, 19), dtype="f8", chunks=(10**7, 19), compression="gzip")
+
+
+def packed_zeros(count: int) -> bytes:
+    """A deflate stream of zeros: a stretch of 16 MB, again and again."""
+    stretch = zlib.compressobj(9, zlib.DEFLATED, -15)
+    again = stretch.compress(bytes(2**24)) + stretch.flush(zlib.Z_FULL_FLUSH)
+    return b"\x78\xda" + again * (count // 2**24)
+
+
+PACKED = packed_zeros(2 * BOUND)
+
+
+def chunk_bomb(path):
+    """A chunk of 4 MB by its declaration that unpacks to twice BOUND."""
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("electrode_vals/data", (27_000, 19), "f8", chunks=(27_000, 19), compression="gzip")
+        data.id.write_direct_chunk((0, 0), PACKED)
+
+
+def external_storage(path):
+    electrodes(path, shape=(60, 19), dtype="u1", external=[("/etc/passwd", 0, 60 * 19)])
+
+
+def external_link(path):
+    with h5py.File(path, "w") as file:
+        file["electrode_vals/data"] = h5py.ExternalLink("/etc/hostname", "/x")
+
+
+def virtual_storage(path):
+    layout = h5py.VirtualLayout((60, 19), "f8")
+    layout[:] = h5py.VirtualSource("other.h5", "x", (60, 19))
+    with h5py.File(path, "w") as file:
+        file.create_virtual_dataset("electrode_vals/data", layout)
+
+
+def strange_filter(path):
+    electrodes(path, shape=(60, 19), dtype="i4", chunks=(60, 19), scaleoffset=0)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (huge_shape, "GB in memory"), (huge_chunk, "chunks of 1450 MB"), (chunk_bomb, "unpacks to more than"),
+        (external_storage, "other files"), (external_link, "a link to another file"), (virtual_storage, "other files"),
+        (strange_filter, "HDF5 filter 6"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("load", [prepare, lambda path: list(deformations.read(path)), paired_contacts.read_pairs])
+def test_hdf5(make, words, load, tmp_path):
+    make(tmp_path / "a.h5")
+    if make is huge_shape and load is not prepare:
+        words = ""  # told of its names first
+    elif make is huge_shape:
+        words = "0 stored bytes"
+    refused(load, tmp_path / "a.h5", words)
+
+
+def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
+    many_frames_of_nothing(tmp_path / "a.h5")
+    said = told_by_child(prepare, tmp_path / "a.h5")
+    assert said.startswith("told: "), said
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        file.attrs.update(format=paired_contacts.FORMAT, **dict.fromkeys(paired_contacts.ATTRIBUTES, "x"))
+        file.create_dataset("displacement_biotac", (10**6, 5000, 3), "i2", chunks=(1, 5000, 3))
+        for name in set(paired_contacts.DATASETS) - {"displacement_biotac"}:
+            file[name] = np.zeros(1)
+    refused(paired_contacts.read_pairs, tmp_path / "b.h5", "stored bytes")
+
+
+def npy(shape, header=None) -> bytes:
+    text = (header or f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}").encode()
+    return b"\x93NUMPY\x02\x00" + struct.pack("<I", len(text)) + text
+
+
+def archive(path, content, method=zipfile.ZIP_DEFLATED, name="electrodes.npy"):
+    with zipfile.ZipFile(path, "w", method) as file, file.open(name, "w", force_zip64=True) as out:
+        for part in content:
+            out.write(part)
+
+
+def zeros(megabytes):
+    return (bytes(2**20) for _ in range(megabytes))
+
+
+def long_header():
+    yield b"\x93NUMPY\x02\x00" + struct.pack("<I", 2**31)
+    yield from zeros(4)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ([npy("(100000000, 19)")], "GB in memory"),
+        ([npy("(-5, 19)")], "electrodes"),
+        ([npy("(60, 19)"), *[bytes(2**20)] * 2], None),  # more than declared: what is declared is read
+        ([npy("(60, 99999999999999999999)")], "electrodes"),
+        (long_header(), "header of"),
+        ([npy("", "{'descr': __import__('os').system('x')}")], "damaged"),
+        ([npy("", "(" * 9000)], "damaged"),
+    ],
+)
+def test_npz(content, words, tmp_path):
+    archive(tmp_path / "a.npz", content)
+    if words is None:
+        assert told_by_child(prepare, tmp_path / "a.npz") == "read"
+        return
+    for load in (prepare, read_frames):
+        refused(load, tmp_path / "a.npz", words if load is prepare else "")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_npz_packed_in_other_ways(method, tmp_path):
+    archive(tmp_path / "a.npz", [npy("(60, 19)"), *zeros(64)], method)
+    refused(prepare, tmp_path / "a.npz", "packed by method")
+
+
+def test_npz_with_names_that_leave_the_folder(tmp_path):
+    """Nothing is ever unpacked to disk; the name is one like any other."""
+    good = io.BytesIO()
+    np.save(good, np.full((60, 19), 3000.0))
+    archive(tmp_path / "a.npz", [good.getvalue()], name="../../electrodes.npy")
+    refused(prepare, tmp_path / "a.npz", "no known recording")
+    assert [file.name for file in tmp_path.iterdir()] == ["a.npz"]
+
+
+def safetensors(header, body=b"") -> bytes:
+    text = json.dumps(header).encode()
+    return struct.pack("<Q", len(text)) + text + body
+
+
+def tensor(begin, end, shape, dtype="F32"):
+    return {"dtype": dtype, "shape": shape, "data_offsets": [begin, end]}
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (safetensors({"a": tensor(0, 16, [4]), "b": tensor(8, 24, [4])}, bytes(24)), "from byte 8"),  # overlap
+        (safetensors({"a": tensor(0, 2**62, [2**60])}, bytes(24)), "a range inside"),
+        (safetensors({"a": tensor(0, 8, [2**60, 2**60])}, bytes(8)), "for shape"),
+        (safetensors({"a": tensor(0, 8, [-2])}, bytes(8)), "whole numbers"),
+        (safetensors({"a": tensor(-8, 0, [2])}, bytes(8)), "whole numbers"),
+        (safetensors({"a": tensor(0, 16, [4])}, bytes(24)), "24 bytes of data"),
+        (struct.pack("<Q", 2**63) + b"{}", "header of"),
+        (struct.pack("<Q", 900_000) + b"[" * 900_000, "not JSON"),
+    ],
+)
+def test_safetensors(data, words, tmp_path):
+    (tmp_path / "a").write_bytes(data)
+    refused(lambda path: weights.from_safetensors(weights.read_bytes(path), path), tmp_path / "a", words)
+
+
+def test_weights_larger_than_any(tmp_path):
+    with open(tmp_path / "a", "wb") as file:
+        file.truncate(2 * weights.MAX_FILE_BYTES)
+    refused(weights.read_bytes, tmp_path / "a", "at most")
+
+
+def binary_ply(count):
+    return (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n"
+        f"property float z\nelement face {count}\nproperty list uchar int vertex_indices\nend_header\n"
+    ).encode() + bytes(1000)
+
+
+MESHES = {
+    "declared.stl": lambda: bytes(80) + struct.pack("<I", MANY) + bytes(5000),
+    "all.stl": lambda: bytes(80) + struct.pack("<I", 1_900_000) + bytes(50 * 1_900_000),
+    "declared.ply": lambda: binary_ply(MANY),
+    "negative.ply": lambda: binary_ply(-5),
+    "text.ply": lambda: binary_ply(MANY).replace(b"binary_little_endian", b"ascii"),
+    "declared.off": lambda: f"OFF\n{MANY} {MANY} 0\n0 0 0\n".encode(),
+    "negative.off": lambda: b"OFF\n-4 -4 0\n0 0 0\n",
+    "all.off": lambda: b"OFF\n3 5000000 0\n0 0 0\n1 0 0\n0 1 0\n" + b"3 0 1 2\n" * 5_000_000,
+    "all.obj": lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\n" * 10_000_000,
+    "vertices.obj": lambda: b"v 0 0 0\n" * 11_000_000,
+    "far.obj": lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999\n",
+    "polygon.obj": lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf" + b" 1 2 3" * 1_000_000 + b"\n",
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_meshes(name, tmp_path):
+    path = tmp_path / name
+    path.write_bytes(MESHES[name]())
+    refused(lambda path: mesh_file.solid(mesh_file.read_bytes(path), path, 1e-3, "z"), path, str(path))
+
+
+def test_tetrahedra(tmp_path):
+    path = tmp_path / "a.tet"
+    path.write_bytes(b"v 0 0 0\n" * 2_000_000)
+    refused(tet_file.read_tet, path, str(path))
+
+
+@pytest.mark.parametrize("way", ["/etc/passwd", "../out.stl", "link.stl", "C:\\out.stl"])
+def test_scenes_name_no_files_outside_of_their_folder(way, tmp_path):
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    (tmp_path / "out.stl").write_bytes(b"secret")
+    (folder / "link.stl").symlink_to(tmp_path / "out.stl")
+    indenter = f"[[indenters]]\nkind = 'mesh'\nname = 'a'\nfile = {json.dumps(way)}\n"
+    (folder / "scene.toml").write_text(f"format = '{scene.FORMAT}'\nname = 'a'\ndescription = ''\n{indenter}")
+    refused(scene.load_scene, folder, "a file in the scene's folder")
+
+
+def test_scenes_and_calibrations_that_are_long(tmp_path):
+    for load in (scene.load_scene, load_calibration):
+        for content in (b"a = " + b"[" * 10**7, b"#" * 10**8, b"a" + b".a" * 10**6 + b" = 1"):
+            path = tmp_path / "a.toml"
+            path.write_bytes(content)
+            refused(load, path, str(path))
+
+
+def test_a_calibrations_photograph_is_bounded(tmp_path):
+    from PIL import Image
+
+    from tactile_core.background import background_picture
+
+    content = io.BytesIO()
+    Image.new("1", (1, 1)).save(content, "PNG")
+    header = b"IHDR" + struct.pack(">II", 60_000, 60_000) + content.getvalue()[24:29]
+    png = content.getvalue()[:12] + header + struct.pack(">I", zlib.crc32(header)) + content.getvalue()[33:]
+    (tmp_path / "bomb.png").write_bytes(png)
+    for name in ("../bomb.png", "bomb.png"):
+        text = SHIPPED.read_text().replace('photograph = ""', f'photograph = "{name}"')
+        (tmp_path / "a.toml").write_text(text)
+        refused(lambda path: background_picture(load_calibration(path)), tmp_path / "a.toml", "bomb.png")
+
+
+def test_lists_of_inputs(tmp_path):
+    (tmp_path / "list.txt").write_bytes(b"\xff\xfe" * 1000)
+    refused(lambda path: inputs.find([f"@{path}"], tmp_path / "out"), tmp_path / "list.txt", "list.txt")
+    with open(tmp_path / "list.txt", "wb") as file:
+        file.truncate(2**31)
+    refused(lambda path: inputs.find([f"@{path}"], tmp_path / "out"), tmp_path / "list.txt", "list.txt")
