@@ -39,8 +39,6 @@ class Learned:
     force_weights : (n,), of the logarithm of the force's factor; field_weights : (n, k); fields : (k, g, 3), per metre
         of depth, in the surface's own frames
     trust : (bins, 3), depth over thickness, and how much of the predicted logarithm and field is applied there, 0 to 1
-    errors : (bins, 4), upper end of depth over thickness, then the 95th percentile of the rms shape error m and of the
-        relative force error, found on presses kept apart, and how many there were
     """
 
     shift: np.ndarray
@@ -51,7 +49,6 @@ class Learned:
     field_weights: np.ndarray
     fields: np.ndarray
     trust: np.ndarray
-    errors: np.ndarray
 
     def predict(self, features: np.ndarray) -> tuple[float, np.ndarray]:
         """Factor of the force, and the correction on the grid (g, 3), per metre of depth."""
@@ -184,15 +181,10 @@ def _plain(values: np.ndarray) -> np.ndarray | float:
 
 @dataclasses.dataclass(frozen=True)
 class Corrected:
-    """A fast contact with its correction. displacement : (n, 3) m; factor : of all forces
-
-    shape_error, force_error : 95 % of presses kept apart lay below: rms m, and relative
-    """
+    """A fast contact with its correction. displacement : (n, 3) m; factor : of all forces."""
 
     displacement: np.ndarray
     factor: float
-    shape_error: float
-    force_error: float
 
 
 def force_factor(compliance: Compliance, contact: Contact) -> float:
@@ -206,10 +198,8 @@ def correct(compliance: Compliance, contact: Contact, parts: Learned | None = No
     """A fast contact as the full tier would have it, at the same depth."""
     parts = parts or learned()[compliance.name]
     if not len(contact.nodes):
-        return Corrected(contact.displacement, 1.0, 0.0, 0.0)
+        return Corrected(contact.displacement, 1.0)
     at = frame(compliance, contact)
     factor, field = parts.predict(features(compliance, contact, at))
     moved = contact.displacement + contact.depth * spread_field(compliance.name, at, field)
-    relative = contact.depth / (digit_shape.THICKNESS if compliance.name == "digit" else biotac_shape.SKIN_THICKNESS)
-    row = parts.errors[min(int(np.searchsorted(parts.errors[:, 0], relative)), len(parts.errors) - 1)]
-    return Corrected(moved, factor, float(row[1]), float(row[2]))
+    return Corrected(moved, factor)

@@ -33,7 +33,7 @@ _RIDGES = 1e-3, 1e-2, 1e-1
 _MOST = 0.6  # of the logarithm of a force's factor: beyond lie contacts too small for the fast tier's lattice
 _LEFT_OUT = 1e9  # scale of a feature that plays no part
 _FOLDS = 5
-_BINS = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 2.0  # depth over thickness, of the table of errors
+_BINS = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 2.0  # depth over thickness, of what is trusted and told
 _SIGNIFICANT = 10e-6  # m, nodes that move less do not count (issue 3, point 8)
 
 
@@ -150,7 +150,6 @@ def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Learned, list[Row]]:
     learned = dataclasses.replace(
         _fit(x, log_ratio, fields, *choice),
         trust=_trust(depth, guess[0], log_ratio, guess[1], fields),
-        errors=_table(depth, errors),
     )
     each = ((friction, frictions == friction) for friction in np.unique(frictions))
     return learned, [found for friction, part in each for found in _rows(sensor, friction, depth[part], errors[part])]
@@ -187,7 +186,7 @@ def _fit(
     shape = (len(basis), LINES * LINES, 3)
     return Learned(
         shift, scale, scaled.astype(np.float32), width, weights[:, 0], weights[:, 1:].astype(np.float32),
-        basis.reshape(shape).astype(np.float16), np.array([[0.0, 1.0, 1.0]]), np.zeros((0, 4)),
+        basis.reshape(shape).astype(np.float16), np.array([[0.0, 1.0, 1.0]]),
     )  # fmt: skip
 
 
@@ -244,12 +243,6 @@ def _bins(depth: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:
             yield low, high, here
 
 
-def _table(depth: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """See ``Learned.errors``."""
-    sizes = np.abs(errors[:, [0, 2]])
-    return np.array([[end, *np.quantile(sizes[here], 0.95, axis=0), here.sum()] for _, end, here in _bins(depth)])
-
-
 def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -> Iterator[Row]:
     """Median errors with the correction, beside those without it, in bins of depth."""
     measures = ("shape_rms", 0, 3, 1e6, "um"), ("shape_max", 1, 4, 1e6, "um"), ("force_error", 2, 5, 100, "percent")
@@ -261,4 +254,4 @@ def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -
             yield row(name, value, unit, null=null, of=of)
 
 
-_LEAST = 8  # contacts, below which a bin of the table of errors says nothing
+_LEAST = 8  # contacts, below which a bin says nothing

@@ -46,7 +46,8 @@ class Solution:
     displacement : (n, 3) m of the sensor's surface nodes; contact_patch : (n,) bool, nodes that carry force
     force : (3,) N, exerted by the indenter on the sensor; depth : m from first touch
     pressure : Pa, rise of the BioTac's fluid pressure, 0 for the DIGIT
-    shape_error, force_error : expected, rms m over nodes that move more than 10 um, and relative; NaN where unknown
+    shape_error, force_error : 95 of 100 such contacts have less, see ``expected_error``: rms m over nodes that move
+        more than 10 um, and relative
     penetration : m, deepest place of a node in the indenter or the core; slipping : share of the touching nodes
     core_nodes : inner-skin nodes that press on the core; load_steps : how many it took to get here from the last
     volume : the solid and its state, of the full and the reference tier
@@ -147,6 +148,10 @@ class _Path:
         if any(step.force for step in steps):
             self.deepest = self.limit
 
+    def errors(self, depth: float) -> tuple[float, float]:
+        """Of a contact at a depth, m: see ``Solution``."""
+        return expected_error(self.tier, self.sensor, depth / self.thickness)
+
     def unreachable(self, force: float) -> TactileError:
         """What is said where no depth within the limit gives a force."""
         expected = f"a force that is reached within {self.limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
@@ -172,7 +177,7 @@ class _Fast(_Path):
         patch[compliance.touchable[contact.nodes]] = True
         return Solution(
             "fast", contact.converged, contact.iterations, corrected.displacement, patch, found.force, contact.depth,
-            found.pressure, corrected.shape_error, corrected.force_error, contact.penetration,
+            found.pressure, *self.errors(contact.depth), contact.penetration,
             float(contact.slipping.mean()) if len(contact.slipping) and self.friction else 0.0, len(contact.core_nodes),
         )  # fmt: skip
 
@@ -220,11 +225,10 @@ class _FiniteStrain(_Path):
 
     def _solution(self, touch: Touch) -> Solution:
         gap = touch.outer.gaps(self.body.solid.mesh.nodes + touch.state.displacement)
-        shape_error, force_error = expected_error(self.tier, self.sensor, touch.depth / self.thickness)
         slips = touch.outer.slipping[touch.outer.active]
         return Solution(
             self.tier, True, touch.iterations, self.body.displacement(touch), self.body.contact_patch(touch),
-            touch.force, touch.depth, touch.fluid, shape_error, force_error, float(-gap.min(initial=0.0)),
+            touch.force, touch.depth, touch.fluid, *self.errors(touch.depth), float(-gap.min(initial=0.0)),
             float(slips.mean()) if len(slips) and self.friction else 0.0, len(touch.inner.nodes), touch.steps,
             (self.body.solid, touch.state),
         )  # fmt: skip
