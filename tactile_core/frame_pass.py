@@ -12,6 +12,7 @@ import numpy as np
 from . import flags, results
 from .contact_sheet import choose_frames, contact_sheet
 from .frames_file import FramesFile
+from .png_file import write_png
 from .stopwatch import Stopwatch
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from .translate import Translation
 
 CHUNK = 64  # frames in memory at a time: about 5 MB of displacements and 20 MB of heights
-PNG_LEVEL = 4  # of zlib; measured on the simulated recording: 5 ms and 28 kB a picture, 10 ms and 24 kB at level 6
 SHEET_ARRAYS = (
     "displacement_biotac", "displacement_digit", "force", "confidence", "expected_error_digit", "contact_center"
 )  # fmt: skip
@@ -152,10 +152,3 @@ class FramePass:
             warnings=self.warnings(),
             **columns,
         )
-
-
-def write_png(path: Path, picture: np.ndarray) -> None:
-    """Write a picture (H, W, 3) uint8."""
-    from PIL import Image
-
-    Image.fromarray(picture).save(path, compress_level=PNG_LEVEL)

@@ -24,8 +24,8 @@ from ..calibration_file import SHIPPED, load_calibration
 from ..camera import COLOURS
 from ..convert import frames_text, select
 from ..errors import TactileError
-from ..frame_pass import write_png
 from ..height_map import digit_mapper
+from ..png_file import write_png
 from ..stopwatch import Stopwatch
 from .inputs import Frames, read_frames
 from .presets import DEFAULT, FAST, PRESETS, cheapest, measured

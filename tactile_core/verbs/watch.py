@@ -105,13 +105,12 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
     """Writes pictures to a file that is always whole."""
     import io
 
-    from PIL import Image
-
     from .. import atomic
+    from ..png_file import write_png
 
     def draw(picture: np.ndarray) -> bool:
         out = io.BytesIO()
-        Image.fromarray(picture).save(out, "PNG", compress_level=1)
+        write_png(out, picture)
         try:
             atomic.write_bytes(path, out.getvalue())
         except OSError as error:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ... import atomic
 from ...errors import TactileError
+from ...png_file import write_png
 from ...recordings.recording import NOMINAL_RATE
 from ..finished import Finished, Recorded
 
@@ -33,7 +34,6 @@ FILE_MB = 100  # a data file is closed at the end of the episode that takes it b
 TASK = "touch, BioTac to DIGIT"
 NUMBERS = ("electrodes", "force", "contact_center", "confidence", "latent_digit")
 PICTURE = "observation.images.digit"
-PNG_LEVEL = 4
 PLAIN = {
     "timestamp": "float32",
     "frame_index": "int64",
@@ -106,10 +106,8 @@ def _rows(one: Recorded, episode: int, start: int, features: dict[str, Any]) -> 
 
 
 def _png(picture: np.ndarray) -> bytes:
-    from PIL import Image
-
     out = io.BytesIO()
-    Image.fromarray(picture).save(out, "PNG", compress_level=PNG_LEVEL)
+    write_png(out, picture)
     return out.getvalue()
 
 
