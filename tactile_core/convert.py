@@ -142,5 +142,5 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
         "warnings": list(made.warnings()),
         "flagged_frames": made.flagged,
         "weights": {"sha256": tools.sha256, "card": tools.card},
-        "versions": results.versions(),
+        "versions": results.versions("PIL", "matplotlib"),
     }  # fmt: skip

@@ -104,13 +104,13 @@ def sha256(path: str | os.PathLike) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def versions() -> dict[str, str]:
-    """What can change the bytes of a result, besides its input and the weights."""
+def versions(*more: str) -> dict[str, str]:
+    """What can change the bytes of a result, besides its input and the weights; more : libraries that made it too."""
     import importlib
     import platform
 
     # Asked of the modules, not of the package index: inside Blender they have no metadata.
-    modules = {name: importlib.import_module(name).__version__ for name in ("numpy", "h5py", "PIL", "matplotlib")}
+    modules = {name: importlib.import_module(name).__version__ for name in ("numpy", "h5py", *more)}
     return {"tactile_core": __version__, "python": platform.python_version(), **modules}
 
 

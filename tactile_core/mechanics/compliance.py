@@ -123,8 +123,9 @@ def cache_folder() -> pathlib.Path:
 
 def _cached(name: str, lattice: Lattice, touchable: np.ndarray, mesh: HexMesh, material: Material) -> Compliance:
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
-    watch, watch_gap = _watched(mesh)
-    for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, np.round(watch * 1e9), watch_gap):
+    watched = _watched(mesh)
+    places = watched.rows, watched.columns, np.round(watched.weights * 1e9), watched.gap
+    for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, *places):
         digest.update(np.ascontiguousarray(array).tobytes())
     folder = cache_folder() / f"compliance-{name}-{digest.hexdigest()[:16]}"
     try:
@@ -171,7 +172,8 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
     touchable : (m,) surface nodes that may carry force. Raises ValueError for a solid without mirror symmetry or held
     nowhere, TactileError where the memory does not suffice.
     """
-    watch, watch_gap = _watched(mesh)
+    watched = _watched(mesh)
+    watch, watch_gap = watched.dense(3 * len(mesh.nodes)), watched.gap
     source, mirrored = _images(mesh, watch.shape[1])
     kept = np.unique(source)
     loads, column, sign = watch[:, kept], np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
@@ -215,20 +217,35 @@ def _volume_gradient(mesh: HexMesh) -> np.ndarray:
     return QuadraticCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)
 
 
-def _watched(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Weights (3 n_nodes, w) that turn a displacement into the change of each watched gap, and the gaps at rest."""
+class Watched(NamedTuple):
+    """What turns a displacement into the change of w watched gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
+
+    rows, columns : (k,) int; weights : (k,); gap : (w,) m
+    """
+
+    rows: np.ndarray
+    columns: np.ndarray
+    weights: np.ndarray
+    gap: np.ndarray
+
+    def dense(self, size: int) -> np.ndarray:
+        """The matrix (size, w): 700 MB of the skin's, which only a build needs."""
+        matrix = np.zeros((size, len(self.gap)))
+        matrix[self.rows, self.columns] = self.weights
+        return matrix
+
+
+def _watched(mesh: HexMesh) -> Watched:
+    """The electrodes' feet, three nodes each, then the inner nodes over the core."""
     if not len(mesh.inner):
-        return np.zeros((3 * len(mesh.nodes), 0)), np.zeros(0)
-    inner = biotac_shape.skin_surface("inner")
+        return Watched(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     feet = electrode_feet()
+    corners = biotac_shape.skin_surface("inner").faces[feet.face]
     core_nodes, core_out, core_gap = _over_core(mesh)
-    weights = np.zeros((len(mesh.nodes), 3, len(feet.gap) + len(core_nodes)))
-    for e, (face, barycentric, out) in enumerate(zip(feet.face, feet.weights, feet.outward, strict=True)):
-        for node, weight in zip(inner.faces[face], barycentric, strict=True):
-            weights[mesh.inner[node], :, e] += weight * out
-    columns = len(feet.gap) + np.arange(len(core_nodes))
-    weights[mesh.inner[core_nodes], :, columns] = core_out
-    return weights.reshape(-1, weights.shape[-1]), np.r_[feet.gap, core_gap]
+    nodes = mesh.inner[np.r_[corners.ravel(), core_nodes]]
+    columns = np.r_[np.repeat(np.arange(len(feet.gap)), 3), len(feet.gap) + np.arange(len(core_nodes))]
+    out = np.concatenate([(feet.weights[..., None] * feet.outward[:, None]).reshape(-1, 3), core_out])
+    return Watched(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap])
 
 
 @dataclasses.dataclass(frozen=True)

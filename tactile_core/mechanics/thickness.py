@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from .. import biotac_shape, digit_shape, sensors
@@ -51,7 +53,9 @@ def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float
     return min(share * thickness_under(sensor, indenter, pose), _DEEPEST)
 
 
+@functools.cache
 def _outward() -> np.ndarray:
+    """Outward normals (n, 3) of the resting skin."""
     from .. import surface
 
     lattice = sensors.biotac_surface()

@@ -191,7 +191,7 @@ def _note(
             "name": preset, "settings": None if about is None else dataclasses.asdict(about),
             "measured": measured()["presets"][preset],
         },
-        "versions": results.versions() | _mitsuba_versions(renderer.variant),
+        "versions": results.versions("PIL") | _mitsuba_versions(renderer.variant),
     }  # fmt: skip
 
 
