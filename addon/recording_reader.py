@@ -56,6 +56,8 @@ def _read_elsewhere(path: str) -> Recording:
         with np.load(folder / "arrays.npz", allow_pickle=False) as stored:
             arrays = dict(stored)
     names = [field.name for field in dataclasses.fields(Truth)]
-    truth = Truth(*(arrays.pop(f"truth.{name}") for name in names)) if f"truth.{names[0]}" in arrays else None
+    truth = None
+    if "truth.force" in arrays:
+        truth = Truth(*(arrays.pop(f"truth.{name}", None) for name in names))
     about["warnings"] = tuple(about["warnings"])
     return Recording(**about, **arrays, truth=truth)

@@ -7,11 +7,17 @@ import bpy
 import numpy as np
 
 from ..tactile_core.errors import TactileError
-from . import scene_bridge, simulation_result
+from . import properties, scene_bridge, simulation_result
 from .jobs import Job, JobFolder
 from .reports import Refused, TactileOperator, reported, require
 
 _STEP = 0.1  # s between two looks at the worker
+
+
+def _outputs(scene: bpy.types.Scene) -> list[str]:
+    """What the sensors of a scene are for: one that is not there is not solved."""
+    of = {"BIOTAC": ["electrodes", "displacement_biotac"], "DIGIT": ["displacement_digit"]}
+    return [word for role, words in of.items() if properties.of_role(scene, role) for word in words]
 
 
 class TACTILE_OT_simulate(TactileOperator):
@@ -35,7 +41,7 @@ class TACTILE_OT_simulate(TactileOperator):
         write_scene(self._folder.path, found.scene, found.meshes)
         if found.apexes is not None:
             np.savez(self._folder.path / "heights.npz", apex=found.apexes)
-        self._job = Job("simulate", self._folder.path, seed=self.seed)
+        self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(context.scene))
 
     def _bake(self, context: bpy.types.Context) -> None:
         thing = context.scene.objects.get(self._thing)
@@ -48,7 +54,7 @@ class TACTILE_OT_simulate(TactileOperator):
 
     def _keep(self, context: bpy.types.Context) -> None:
         """The simulated recording beside the saved .blend, so that it can be translated like a real one."""
-        skin = scene_bridge.properties.of_role(context.scene, "BIOTAC")
+        skin = properties.of_role(context.scene, "BIOTAC")
         if not bpy.data.is_saved or skin is None:
             return
         name = f"{bpy.path.clean_name(self._thing)}.h5"

@@ -9,44 +9,48 @@ import bpy
 import numpy as np
 
 from ..tactile_core import patch_of_dent, sensors
-from ..tactile_core.recordings import Recording
-from . import axes, curves, custom_properties, motion, patch_nodes, pictures, properties, recording_reader
+from . import axes, curves, custom_properties, motion, patch_nodes, pictures, properties
 
 STANDING = "{} simulated"
 
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """recording : with its truth; apex (T, 3) m, turn (T, 3, 3): where the indenter stood on the DIGIT."""
+    """seconds (T,), force (T, 3) N; apex (T, 3) m, turn (T, 3, 3): where the indenter stood, on the DIGIT if any.
 
-    recording: Recording
+    moved : displacement (T, n, 3) m of each sensor that was solved, by ``"biotac"`` and ``"digit"``
+    """
+
+    seconds: np.ndarray
+    force: np.ndarray
     apex: np.ndarray
     turn: np.ndarray
+    moved: dict[str, np.ndarray]
 
 
 def read(folder: Path) -> Result:
     """The result in a job's folder."""
-    with np.load(folder / "standing.npz") as stored:
-        return Result(recording_reader.read(folder / "recording.h5"), stored["apex"], stored["axes"])
+    with np.load(folder / "result.npz") as stored:
+        moved = {sensor: stored[sensor] for sensor in ("biotac", "digit") if sensor in stored}
+        return Result(stored["seconds"], stored["force"], stored["apex"], stored["axes"], moved)
 
 
 def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) -> str:
     """Bake onto the scene's frames; a sentence for the user."""
-    scene, recording = context.scene, result.recording
+    scene = context.scene
     frames = np.arange(scene.frame_start, scene.frame_end + 1, dtype=float)
     rate = scene.render.fps / scene.render.fps_base
-    seconds = recording.time + recording.start_time
-    seconds = seconds - seconds[0]
+    seconds = result.seconds - result.seconds[0]
     # The mechanics run at the sensor's 100 Hz: each frame shows the nearest of its samples.
     sample = np.abs((frames - scene.frame_start)[:, None] / rate - seconds[None, :]).argmin(axis=1)
-    truth, told = recording.truth, []
-    force = truth.force[sample][:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
+    told = []
+    force = result.force[sample][:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
     for role, surface, moved in (
-        ("BIOTAC", sensors.biotac_surface(), truth.displacement_biotac),
-        ("DIGIT", sensors.digit_surface(), truth.displacement_digit),
+        ("BIOTAC", sensors.biotac_surface(), result.moved.get("biotac")),
+        ("DIGIT", sensors.digit_surface(), result.moved.get("digit")),
     ):
         sensor = properties.of_role(scene, role)
-        if sensor is None:
+        if sensor is None or moved is None:  # it was added, or removed, while the other process worked
             continue
         told.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
         custom_properties.write(sensor, {"force": force}, frames)

@@ -45,16 +45,17 @@ def say(**message: Any) -> None:
 
 
 def simulate(folder: Path, job: dict, progress: Progress) -> None:
-    """FOLDER/scene.toml -> recording.h5, and standing.npz: where the indenter stands on each of its frames.
+    """FOLDER/scene.toml -> recording.h5, and result.npz: its truth, and where the indenter stands on each frame.
 
-    With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
+    job["keep"] : outputs, so that a sensor that is not in the scene is not solved. With heights.npz in the folder the
+    scene's forces are first found from how deep the indenter has been moved.
     """
     from tactile_core.mechanics.recording import simulate_recording
 
     if (folder / "heights.npz").exists():
         _forces_from_heights(folder, progress)
-    simulate_recording(folder / "scene.toml", folder / "recording.h5", job["seed"], progress)
-    _standing(folder)
+    simulate_recording(folder / "scene.toml", folder / "recording.h5", job["seed"], progress, keep=job["keep"])
+    _result(folder)
 
 
 def _forces_from_heights(folder: Path, progress: Progress) -> None:
@@ -88,31 +89,38 @@ def _forces_from_heights(folder: Path, progress: Progress) -> None:
     (folder / "scene.toml").write_text(to_toml(msgspec.structs.replace(text, recording=recording)), encoding="utf-8")
 
 
-def _standing(folder: Path) -> None:
-    """Apex (T, 3) m and axes (T, 3, 3) of the indenter on the DIGIT: it has sunk until it touches the dented gel."""
-    from tactile_core import recordings, sensors
+def _result(folder: Path) -> None:
+    """The truth; and apex (T, 3) m and axes (T, 3, 3) of the indenter: it has sunk until it touches the dented gel.
+
+    It stands on the DIGIT, or on the BioTac where that alone was solved.
+    """
+    from tactile_core import sensors
     from tactile_core.mechanics.placement import Placement, pose_at
+    from tactile_core.recordings.simulated import read_truth
     from tactile_core.scene import load_scene
 
     scene = load_scene(folder)[0]
     spec = scene.recording
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
-    recording = recordings.read(folder / "recording.h5")
+    seconds, truth = read_truth(folder / "recording.h5")
+    moved = {"biotac": truth.displacement_biotac, "digit": truth.displacement_digit}
+    moved = {sensor: values for sensor, values in moved.items() if values is not None}
+    sensor = "digit" if "digit" in moved else "biotac"
     columns = [(p.time_s, p.x_mm, p.z_mm) for p in spec.points]
     times, x, z = np.array(columns).T
-    seconds = recording.time + recording.start_time
-    rest = sensors.digit_surface().rest
+    rest = sensors.sensor_surface(sensor).rest
     apex, axes = [], []
     for k, second in enumerate(seconds):
         at = Placement(
             np.interp(second, times, x) * 1e-3, np.interp(second, times, z) * 1e-3, np.radians(spec.tilt_deg)
         )
-        pose = pose_at("digit", indenter, at)
-        nodes = rest + recording.truth.displacement_digit[k]
-        for _ in range(STEPS if recording.truth.force[k].any() else 0):
+        pose = pose_at(sensor, indenter, at)
+        nodes = rest + moved[sensor][k]
+        for _ in range(STEPS if truth.force[k].any() else 0):
             pose = pose.moved(float(pose.distance(indenter, nodes)[0].min()))
         apex.append(pose.apex), axes.append(pose.axes)
-    np.savez(folder / "standing.npz", apex=np.array(apex), axes=np.array(axes))
+    arrays = {"apex": np.array(apex), "axes": np.array(axes), "seconds": seconds, "force": truth.force}
+    np.savez(folder / "result.npz", **arrays, **moved)
 
 
 def render(folder: Path, job: dict, progress: Progress) -> None:
@@ -137,7 +145,8 @@ def read(folder: Path, job: dict, progress: Progress) -> None:
     whole = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
     truth = whole.pop("truth")
     if truth is not None:
-        whole |= {f"truth.{field.name}": getattr(truth, field.name) for field in dataclasses.fields(truth)}
+        held = {f"truth.{field.name}": getattr(truth, field.name) for field in dataclasses.fields(truth)}
+        whole |= {name: values for name, values in held.items() if values is not None}
     arrays = {name: value for name, value in whole.items() if isinstance(value, np.ndarray)}
     np.savez(folder / "arrays.npz", **arrays)
     about = {name: value for name, value in whole.items() if name not in arrays}

@@ -141,13 +141,14 @@ class FramePass:
         shown = np.array(list(self.shown))
         columns = {name: np.stack([at[name] for at in self.shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
         truth = self.recording.truth
+        skin = None if truth is None else truth.displacement_biotac
         contact_sheet(
             path,
             name=self.recording.name,
             time=self.recording.time[self.frames],
             electrodes=self.signals.change[self.frames],
             frames=np.searchsorted(self.frames, shown),
-            true_displacement_biotac=None if truth is None else truth.displacement_biotac[shown],
+            true_displacement_biotac=None if skin is None else skin[shown],
             simulated=self.recording.simulated,
             warnings=self.warnings(),
             **columns,

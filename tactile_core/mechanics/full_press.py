@@ -1,8 +1,9 @@
-"""A press in the full tier, at depths or at forces, with all that a paired contact keeps of it."""
+"""A press in the full or the reference tier, at depths or at forces, with all that a paired contact keeps of it."""
 
 from __future__ import annotations
 
 import dataclasses
+from typing import Literal
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from .finite_strain_tier import Body, Sensor, graded_body
 from .first_touch import fall
 from .newton import Tolerance, Touch
 from .pose_path import same_line
+
+Tier = Literal["full", "reference"]
 
 FORCE_TOLERANCE = 2e-3  # relative, of the force asked for: a contact is taken as it is
 # m of a load step with friction: against half of it 0.1 to 0.2 % of force, 0.3 to 3 um rms, under a ball and a cube.
@@ -50,11 +53,14 @@ class FullPress:
     """An indenter in front of one sensor in the full tier; contacts follow each other.
 
     pose : at first touch; reach : m, the greatest depth, for which the mesh is made; friction : Coulomb's coefficient
+    tier : its cells; the tolerances are the full tier's in both
     """
 
-    def __init__(self, sensor: Sensor, indenter: Indenter, pose: Pose, reach: float, friction: float) -> None:
+    def __init__(
+        self, sensor: Sensor, indenter: Indenter, pose: Pose, reach: float, friction: float, tier: Tier = "full"
+    ) -> None:
         self.pose, self.indenter, self.sensor = pose, indenter, sensor
-        self.body = graded_body(sensor, indenter, pose, reach)
+        self.body = graded_body(sensor, indenter, pose, reach, tier)
         self.problem = self.body.contact(indenter, pose, reach, friction)
         self.problem.tolerance = _TOLERANCE
         self.last = self.problem.start()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
@@ -11,20 +11,21 @@ from .. import __version__, atomic, sensors
 from ..errors import TactileError
 from ..indenters import Indenter
 from ..recordings import Truth, write_simulated
-from ..scene import RecordingSpec, load_scene
-from .compliance import Compliance, biotac_compliance, compliance_of, digit_compliance
-from .corrected_press import CorrectedPress, FastContact
-from .electrodes import Wiring, electrode_gaps, readings, signal_of_gaps
-from .pair_rows import contact_center
-from .placement import Placement, on_gel, pose_at
-from .thickness import DEPTH_LIMIT, thickness_under
+from ..scene import RecordingSpec, Scene, load_scene
+from .electrodes import Wiring, readings, signal_of_gaps
+from .frame_contact import FrameContact, frame_contact
+from .placement import Placement, on_gel
 
 # Pa a count: the range 0 to 100 kPa (SynTouch, BioTac sensor details, 2011) over the 12 bits of PDC: assumed.
 PRESSURE_PER_COUNT = 100e3 / 4096
 PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (sensors.md)
 _STILL_COUNT = 2000  # TDC and TAC, not simulated: a constant reading
 
-Pair = tuple[FastContact, FastContact]
+# What a file may hold beside time, force and, where there is a DIGIT, the contact's centre; and the sensor it needs.
+OUTPUTS = {"electrodes": "biotac", "displacement_biotac": "biotac", "displacement_digit": "digit"}
+ALL = tuple(OUTPUTS)
+
+Solved = dict[str, FrameContact]  # by sensor; empty without contact
 
 
 def simulate_recording(
@@ -33,44 +34,77 @@ def simulate_recording(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
     wiring: Wiring | None = None,
+    *,
+    keep: Collection[str] = ALL,
+    tiers: Mapping[str, str] | None = None,
 ) -> None:
     """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
 
     The motion is linear between the scene's points; rolling and sliding differ in nothing else, for contact is without
     friction here. progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
+    keep : words of OUTPUTS; a sensor that none of them needs is not solved. tiers : of each sensor, fast by default.
     Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked, or
     tared wiring: this kind of file holds raw counts.
     """
     scene, text = load_scene(scene_path)
-    spec = scene.recording
-    if spec is None:
-        raise TactileError(
-            f"{scene_path}, recording", "missing", "a [recording] table", "See scenes/press_roll_slide/scene.toml"
-        )
+    spec = recording_of(scene, scene_path)
+    sensors_used = sensors_of(keep)
     wiring = wiring or _wiring(spec)
     if wiring.tared:
         raise TactileError("wiring, tared", "True", "raw counts in a simulated recording", "Tare it when it is read")
     atomic.claim(out)
-    _check_places(scene_path, spec)
+    check_places(scene_path, spec)
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
-    time, place, force = _motion(spec)
-    frames: list[Pair | None] = []
+    time, place, force = motion(spec)
+    frames: list[Solved] = []
     for t, (x, z), newtons in zip(time, place, force, strict=True):
         at = Placement(x, z, np.radians(spec.tilt_deg))
-        frames.append(_solve(scene_path, indenter, at, newtons, t) if newtons > 0 else None)
+        frames.append(_solve(scene_path, indenter, at, newtons, t, sensors_used, tiers or {}))
         if progress:
             progress(len(frames), len(time))
-    electrodes = readings(_signals(frames), time, wiring, seed)
-    pressure = _pressure(frames)
-    still = np.full(len(time), _STILL_COUNT, np.int16)
+    told, counts = "", {}
+    if "electrodes" in keep:
+        pressure, still = _pressure(frames), np.full(len(time), _STILL_COUNT, np.int16)
+        counts = {"electrodes": readings(_signals(frames), time, wiring, seed), "pdc": pdc_counts(pressure)}
+        counts |= {"tac": still, "tdc": still}
+        told = " " + _told(pressure)
     write_simulated(
-        out, time=time, electrodes=electrodes, pdc=pdc_counts(pressure), tac=still, tdc=still, truth=_truth(frames),
-        scene=text, seed=seed, made_by=f"tactile {__version__}, mechanics.recording",
-        note=f"Simulated, not measured: {scene.description} {_told(pressure)}",
+        out, time=time, **counts, truth=_truth(frames, keep), scene=text, seed=seed,
+        made_by=f"tactile {__version__}, mechanics.recording{_tiers_told(tiers)}",
+        note=f"Simulated, not measured: {scene.description}{told}",
     )  # fmt: skip
 
 
-def _check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
+def parse_keep(text: str) -> tuple[str, ...]:
+    """``"electrodes,displacement_digit"`` as words of OUTPUTS, in its order. Raises TactileError for other words."""
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    for word in words:
+        if word not in OUTPUTS:
+            raise TactileError("--keep", repr(word), f"words out of {', '.join(OUTPUTS)}", "Separate them by commas")
+    if not words:
+        raise TactileError("--keep", "nothing", f"one or more of {', '.join(OUTPUTS)}")
+    return tuple(word for word in OUTPUTS if word in words)
+
+
+def sensors_of(keep: Collection[str]) -> tuple[str, ...]:
+    """The sensors that outputs need, of ``"biotac"`` and ``"digit"``."""
+    return tuple(dict.fromkeys(sensor for word, sensor in OUTPUTS.items() if word in keep))
+
+
+def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
+    """The scene's [recording]; raises TactileError where it has none."""
+    if scene.recording is None:
+        advice = "See scenes/press_roll_slide/scene.toml"
+        raise TactileError(f"{path}, recording", "missing", "a [recording] table", advice)
+    return scene.recording
+
+
+def _tiers_told(tiers: Mapping[str, str] | None) -> str:
+    return "" if not tiers else ", " + ", ".join(f"{sensor} {tier}" for sensor, tier in sorted(tiers.items()))
+
+
+def check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
+    """Raises TactileError for a point that presses beside the DIGIT's gel."""
     for number, point in enumerate(spec.points, 1):
         if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3):
             raise TactileError(
@@ -79,7 +113,7 @@ def _check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
             )  # fmt: skip
 
 
-def _motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """time (T,) s, place (T, 2) m and force (T,) N at 100 Hz."""
     points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
     time = np.arange(round(points[0, 0] * sensors.SAMPLE_RATE), round(points[-1, 0] * sensors.SAMPLE_RATE) + 1)
@@ -88,31 +122,31 @@ def _motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return time, np.column_stack([x, z]) * 1e-3, force
 
 
-def _solve(scene_path, indenter, place: Placement, force: float, time: float) -> Pair:  # noqa: ANN001
-    biotac, digit = (_press(sensor, indenter, place).at_force(force) for sensor in ("biotac", "digit"))
-    if biotac is None or digit is None:
-        which = "BioTac" if biotac is None else "DIGIT"
-        raise TactileError(
-            f"{scene_path}, recording, {time:.2f} s", f"{force:.3g} N at ({place.x * 1e3:.1f}, {place.z * 1e3:.1f}) mm",
-            f"a force that the {which} bears within 60 % of its thickness", "Lower force_n there",
-        )  # fmt: skip
-    return biotac, digit
+def _solve(
+    scene_path: str | os.PathLike, indenter: Indenter, place: Placement, force: float, time: float,
+    sensors_used: tuple[str, ...], tiers: Mapping[str, str],
+) -> Solved:  # fmt: skip
+    if not force > 0:
+        return {}
+    found = {name: frame_contact(name, indenter, place, force, tiers.get(name, "fast")) for name in sensors_used}
+    for name, contact in found.items():
+        if contact is None:
+            which = "BioTac" if name == "biotac" else "DIGIT"
+            raise TactileError(
+                f"{scene_path}, recording, {time:.2f} s",
+                f"{force:.3g} N at ({place.x * 1e3:.1f}, {place.z * 1e3:.1f}) mm",
+                f"a force that the {which} bears within 60 % of its thickness", "Lower force_n there",
+            )  # fmt: skip
+    return found
 
 
-def _press(sensor: str, indenter: Indenter, place: Placement) -> CorrectedPress:
-    pose = pose_at(sensor, indenter, place)
-    return CorrectedPress(compliance_of(sensor), indenter, pose, DEPTH_LIMIT * thickness_under(sensor, indenter, pose))
+def _signals(frames: list[Solved]) -> np.ndarray:
+    return np.stack([signal_of_gaps(found["biotac"].gaps) if found else np.zeros(19) for found in frames])
 
 
-def _signals(frames: list[Pair | None]) -> np.ndarray:
-    skin = biotac_compliance()
-    return np.stack([np.zeros(19) if f is None else signal_of_gaps(electrode_gaps(skin, f[0].linear)) for f in frames])
-
-
-def _pressure(frames: list[Pair | None]) -> np.ndarray:
+def _pressure(frames: list[Solved]) -> np.ndarray:
     """The fluid's pressure (T,) Pa over the surrounding air."""
-    rise = [0.0 if f is None else f[0].pressure for f in frames]
-    return PRESSURE_AT_REST + np.array(rise)
+    return PRESSURE_AT_REST + np.array([found["biotac"].pressure if found else 0.0 for found in frames])
 
 
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
@@ -132,17 +166,19 @@ def _wiring(spec: RecordingSpec) -> Wiring:
     return Wiring(noise=spec.noise_counts, drift=spec.drift_counts / lasts)
 
 
-def _truth(frames: list[Pair | None]) -> Truth:
-    skin, gel = biotac_compliance(), digit_compliance()
+def _truth(frames: list[Solved], keep: Collection[str]) -> Truth:
+    """Displacements as far as they are kept; the force is the BioTac's, or the DIGIT's where that is solved alone."""
 
-    def moved(compliance: Compliance, contact: FastContact | None) -> np.ndarray:
-        if contact is None:
-            return np.zeros((len(compliance.surface.rest), 3), np.float32)
-        return contact.corrected.displacement.astype(np.float32)
+    def moved(sensor: str) -> np.ndarray | None:
+        if f"displacement_{sensor}" not in keep:
+            return None
+        nodes = len(sensors.sensor_surface(sensor).rest)
+        arrays = (found[sensor].displacement if found else np.zeros((nodes, 3)) for found in frames)
+        return np.stack([array.astype(np.float32) for array in arrays])
 
-    return Truth(
-        displacement_biotac=np.stack([moved(skin, f and f[0]) for f in frames]),
-        displacement_digit=np.stack([moved(gel, f and f[1]) for f in frames]),
-        force=np.stack([np.zeros(3) if f is None else f[0].force for f in frames]),
-        contact_center=np.stack([np.full(2, np.nan) if f is None else contact_center(f[1].linear) for f in frames]),
-    )
+    first, *_ = solved = sensors_of(keep)
+    centre = None
+    if "digit" in solved:
+        centre = np.stack([found["digit"].centre if found else np.full(2, np.nan) for found in frames])
+    force = np.stack([found[first].force if found else np.zeros(3) for found in frames])
+    return Truth(moved("biotac"), moved("digit"), force, centre)

@@ -116,5 +116,5 @@ def _of_scene(path: Path, progress: Progress) -> Frames:
 
     with tempfile.TemporaryDirectory() as folder, progress() as shown:
         simulated = Path(folder) / "scene.h5"
-        simulate_recording(path, simulated, progress=shown)
+        simulate_recording(path, simulated, progress=shown, keep=("displacement_digit",))
         return dataclasses.replace(_of_hdf5(simulated), kind="scene")

@@ -57,10 +57,9 @@ def _channels(recording: Recording) -> str:
     if recording.pac is not None:
         held.insert(0, f"pac ({recording.pac.shape[1]} a frame)")
     if recording.truth is not None:
-        held.append(
-            f"truth ({recording.truth.displacement_biotac.shape[1]} BioTac and "
-            f"{recording.truth.displacement_digit.shape[1]} DIGIT nodes)"
-        )
+        moved = ("BioTac", recording.truth.displacement_biotac), ("DIGIT", recording.truth.displacement_digit)
+        nodes = [f"{values.shape[1]} {sensor}" for sensor, values in moved if values is not None]
+        held.append(f"truth ({' and '.join(nodes)} nodes)" if nodes else "truth (force)")
     return ", ".join(["electrodes", *held])
 
 

@@ -13,7 +13,7 @@ NOMINAL_RATE = 100.0  # Hz: 44-word frames of a BioTac (SynTouch)
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What a simulated recording knows about itself; real ones have none.
+    """What a simulated recording knows about itself; real ones have none. None is what its file was made without.
 
     displacement_biotac : (T, N, 3) float32, m, of the outer skin's nodes
     displacement_digit : (T, M, 3) float32, m, of the gel surface's nodes
@@ -21,10 +21,10 @@ class Truth:
     contact_center : (T, 2) float, m, (x, z) on the DIGIT after unrolling; NaN without contact
     """
 
-    displacement_biotac: np.ndarray
-    displacement_digit: np.ndarray
+    displacement_biotac: np.ndarray | None
+    displacement_digit: np.ndarray | None
     force: np.ndarray
-    contact_center: np.ndarray
+    contact_center: np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)

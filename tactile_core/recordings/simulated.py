@@ -4,7 +4,8 @@ Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sen
 ``made_by``, ``note``, ``start_time`` (unix s, 0 if unknown). Datasets, T first: ``time`` (T,) float64 s; ``electrodes``
 (T, 19), ``pdc``, ``tac``, ``tdc`` (T,) int16 raw 12-bit counts; ``truth/displacement_biotac`` (T, N, 3) and
 ``truth/displacement_digit`` (T, M, 3) int16 with attribute ``scale`` (m a unit); ``truth/force`` (T, 3) float32 N;
-``truth/contact_center`` (T, 2) float32 m. The same arrays give the same bytes.
+``truth/contact_center`` (T, 2) float32 m. The same arrays give the same bytes. `tactile simulate --keep` leaves out the
+rest but ``time`` and ``truth/force``; without ``electrodes`` (and the counts) the file is no recording to translate.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from .. import atomic
 from ..errors import TactileError
 from .assemble import assemble
 from .recording import ELECTRODES, Recording, Truth
-from .store import Store
+from .store import Store, open_hdf5
 
 if TYPE_CHECKING:
     import h5py
@@ -35,10 +36,10 @@ def write_simulated(
     path: str | os.PathLike[str],
     *,
     time: np.ndarray,
-    electrodes: np.ndarray,
-    pdc: np.ndarray,
-    tac: np.ndarray,
-    tdc: np.ndarray,
+    electrodes: np.ndarray | None = None,
+    pdc: np.ndarray | None = None,
+    tac: np.ndarray | None = None,
+    tdc: np.ndarray | None = None,
     truth: Truth,
     scene: str,
     seed: int,
@@ -47,22 +48,25 @@ def write_simulated(
     sensor: str = "BioTac",
     start_time: float = 0.0,
 ) -> Path:
-    """Write the file whole or not at all, and return its path. Shapes and units: see the module.
+    """Write the file whole or not at all, and return its path; None is left out. Shapes and units: see the module.
 
     Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm.
     """
     path = Path(path)
     frames = len(time)
     _check_shape(path, "time", time, (frames,))
-    counts = {"electrodes": _counts(path, "electrodes", electrodes, (frames, ELECTRODES))}
-    counts |= {
-        name: _counts(path, name, value, (frames,)) for name, value in (("pdc", pdc), ("tac", tac), ("tdc", tdc))
+    given = {"electrodes": electrodes, "pdc": pdc, "tac": tac, "tdc": tdc}
+    counts = {
+        name: _counts(path, name, value, (frames, ELECTRODES) if name == "electrodes" else (frames,))
+        for name, value in given.items()
+        if value is not None
     }
-    _check_shape(path, "truth/force", truth.force, (frames, 3))
-    _check_shape(path, "truth/contact_center", truth.contact_center, (frames, 2))
-    steps = {
-        name: _steps(path, name, getattr(truth, name), frames) for name in ("displacement_biotac", "displacement_digit")
-    }
+    forces = {"force": truth.force, "contact_center": truth.contact_center}
+    forces = {f"truth/{name}": np.asarray(value, np.float32) for name, value in forces.items() if value is not None}
+    for name, value in forces.items():
+        _check_shape(path, name, value, (frames, 3 if name == "truth/force" else 2))
+    moved = {name: getattr(truth, name) for name in ("displacement_biotac", "displacement_digit")}
+    steps = {name: _steps(path, name, value, frames) for name, value in moved.items() if value is not None}
     attributes = {
         "format": FORMAT,
         "simulated": True,
@@ -74,7 +78,6 @@ def write_simulated(
         "start_time": float(start_time),
     }
     plain = {"time": np.asarray(time, np.float64)} | counts
-    forces = {f"truth/{name}": np.asarray(getattr(truth, name), np.float32) for name in ("force", "contact_center")}
     _write_whole(path, lambda file: _fill(file, attributes, plain, steps, forces))
     return path
 
@@ -101,24 +104,23 @@ def _fill(
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
-    """The Recording of an opened file of this format, with its truth as float32 in m."""
+    """The Recording of an opened file of this format, with its truth as float32 in m.
+
+    Raises TactileError for what does not belong together, and for a file that was made without electrodes.
+    """
+    if "electrodes" not in store.shapes:
+        expected = "readings, which a recording has"
+        raise TactileError(f"{store.path}, electrodes", "missing", expected, "Simulate it with --keep electrodes")
     electrodes = store.array("electrodes", (None, ELECTRODES))
     frames = len(electrodes)
     about = {key: store.attributes.get(key, "") for key in ("sensor", "scene", "seed", "made_by", "note")}
-    truth = Truth(
-        _displacement(store, "truth/displacement_biotac", frames),
-        _displacement(store, "truth/displacement_digit", frames),
-        store.array("truth/force", (frames, 3)),
-        store.array("truth/contact_center", (frames, 2)),
-    )
-    start = store.attributes.get("start_time", 0.0)
-    start = float(start) if isinstance(start, int | float) and np.isfinite(start) else 0.0
+    time, truth = _times(store, frames), _truth(store, frames)
     columns = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
     return assemble(
         store.path,
         layout,
         electrodes=electrodes,
-        stamps=store.array("time", (frames,)) + start,
+        stamps=time,
         truth=truth,
         simulated=True,
         about=about,
@@ -126,9 +128,34 @@ def read_simulated(store: Store, layout: str) -> Recording:
     )
 
 
-def _displacement(store: Store, name: str, frames: int) -> np.ndarray:
-    nodes = store.shapes[name][0][1:2] if name in store.shapes else (None,)
-    steps = store.array(name, (frames, *nodes, 3), np.float32)
+def read_truth(path: str | os.PathLike) -> tuple[np.ndarray, Truth]:
+    """Stamps (T,) s and truth of a file of this format, with electrodes or without. Raises TactileError."""
+    with open_hdf5(os.fspath(path)) as store:
+        if store.attributes.get("format") != FORMAT:
+            raise TactileError(path, f"format {store.attributes.get('format')!r}", repr(FORMAT))
+        frames = len(store.array("time", (None,)))
+        return _times(store, frames), _truth(store, frames)
+
+
+def _times(store: Store, frames: int) -> np.ndarray:
+    start = store.attributes.get("start_time", 0.0)
+    start = float(start) if isinstance(start, int | float) and np.isfinite(start) else 0.0
+    return store.array("time", (frames,)) + start
+
+
+def _truth(store: Store, frames: int) -> Truth:
+    return Truth(
+        _displacement(store, "truth/displacement_biotac", frames),
+        _displacement(store, "truth/displacement_digit", frames),
+        store.array("truth/force", (frames, 3)),
+        store.optional("truth/contact_center", (frames, 2)),
+    )
+
+
+def _displacement(store: Store, name: str, frames: int) -> np.ndarray | None:
+    if name not in store.shapes:
+        return None
+    steps = store.array(name, (frames, *store.shapes[name][0][1:2], 3), np.float32)
     scale = store.attributes_of(name).get("scale")
     if not isinstance(scale, float) or not 0 < scale < 1:
         raise TactileError(f"{store.path}, {name}", f"attribute scale = {scale!r}", "metres a unit, such as 1e-7")

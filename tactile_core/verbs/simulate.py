@@ -10,7 +10,8 @@ from .common import NOTHING, check_seed, progress_argument, seed_argument
 
 BRIEF = "simulate a recording"
 TEXT = """\
-Simulate the recording that a scene describes, marked so and with its true meshes.
+Simulate the recording that a scene describes, marked so and with its true meshes. A sensor that nothing of --keep
+needs is not solved: electrodes and displacement_biotac need the BioTac, displacement_digit the DIGIT.
 
 With --isaac-like the scene's motion presses a BioTac skin of your own, as Isaac Gym computed it: linear tetrahedra,
 E 1.552 MPa, nu 0.316, no fluid, hence no electrodes, and no friction. Ten frames a second of displacement, force and
@@ -18,6 +19,7 @@ depth come out, for comparison with data that was made that way. Such meshes loc
 EPILOG = """\
 examples:
   tactile simulate scenes/press_roll_slide/scene.toml --seed 1 --out press_roll_slide.h5
+  tactile simulate scenes/press --keep electrodes --out press.h5          the BioTac alone
   tactile simulate scenes/press_roll_slide --isaac-like skin.tet --core core.obj --out isaac.h5"""
 LEAVES = NOTHING
 
@@ -27,6 +29,11 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("scene", metavar="SCENE", help="scene.toml with a [recording]")
     seed_argument(verb, "file")
     verb.add_argument("--out", required=True, metavar="FILE", help="HDF5 file to write")
+    verb.add_argument(
+        "--keep",
+        metavar="WORDS",
+        help="what the file holds, out of electrodes,displacement_biotac,displacement_digit (default: all)",
+    )
     verb.add_argument(
         "--isaac-like",
         metavar="FILE.tet",
@@ -47,6 +54,8 @@ def run(options: argparse.Namespace) -> int:
     check_seed(options.seed)
     if options.core and not options.isaac_like:
         raise TactileError("--core", options.core, "--isaac-like FILE.tet beside it", "Our own skin has its core")
+    if options.keep is not None and options.isaac_like:
+        raise TactileError("--keep", options.keep, "no --isaac-like beside it, whose file has no electrodes")
     with bar("simulate", "frame", options.progress) as shown:
         if options.isaac_like:
             from ..mechanics.isaac_recording import simulate_isaac_like
@@ -55,8 +64,9 @@ def run(options: argparse.Namespace) -> int:
             if missed:
                 say(f"warning: {missed} frames did not reach their force and are marked (converged is false)")
         else:
-            from ..mechanics.recording import simulate_recording
+            from ..mechanics.recording import ALL, parse_keep, simulate_recording
 
-            simulate_recording(options.scene, options.out, options.seed, shown)
+            keep = ALL if options.keep is None else parse_keep(options.keep)
+            simulate_recording(options.scene, options.out, options.seed, shown, keep=keep)
     tell(options.out)
     return 0

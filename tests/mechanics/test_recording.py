@@ -7,13 +7,18 @@ import pytest
 
 from tactile_core import recordings, sensors
 from tactile_core.errors import TactileError
+from tactile_core.mechanics import recording as recording_room
 from tactile_core.mechanics.electrodes import Wiring
 from tactile_core.mechanics.recording import (
     PRESSURE_AT_REST,
     PRESSURE_PER_COUNT,
+    parse_keep,
     pdc_counts,
+    sensors_of,
     simulate_recording,
 )
+from tactile_core.recordings import info
+from tactile_core.recordings.simulated import read_truth
 
 SHORT = """
 format = "tactile-scene-1"
@@ -122,3 +127,69 @@ def test_a_place_off_the_gel_names_the_point(scene, tmp_path):
     scene.write_text(SHORT.replace("z_mm = 2.0, force_n = 0.3", "z_mm = 9.5, force_n = 0.3"), encoding="utf-8")
     with pytest.raises(TactileError, match="point 3"):
         simulate_recording(scene, tmp_path / "x.h5")
+
+
+@pytest.fixture
+def unsolved(monkeypatch):
+    """``unsolved("digit")``: solving a contact on that sensor fails the test."""
+
+    def forbid(sensor):
+        solve = recording_room.frame_contact
+
+        def guarded(name, *given):
+            assert name != sensor
+            return solve(name, *given)
+
+        monkeypatch.setattr(recording_room, "frame_contact", guarded)
+
+    return forbid
+
+
+def test_electrodes_alone_need_no_digit(scene, seed_4, tmp_path, unsolved):
+    unsolved("digit")
+    simulate_recording(scene, tmp_path / "x.h5", seed=4, keep=("electrodes",))
+    whole, part = recordings.read(seed_4), recordings.read(tmp_path / "x.h5")
+    np.testing.assert_array_equal(part.electrodes, whole.electrodes)
+    np.testing.assert_array_equal(part.truth.force, whole.truth.force)
+    assert part.truth.displacement_biotac is part.truth.displacement_digit is part.truth.contact_center is None
+    assert "truth (force)" in info.describe(tmp_path / "x.h5")
+
+
+def test_the_gel_alone_needs_no_biotac(scene, seed_4, tmp_path, unsolved):
+    unsolved("biotac")
+    simulate_recording(scene, tmp_path / "x.h5", keep=("displacement_digit",))
+    time, truth = read_truth(tmp_path / "x.h5")
+    whole = recordings.read(seed_4)
+    np.testing.assert_array_equal(time, whole.time)
+    np.testing.assert_array_equal(truth.displacement_digit, whole.truth.displacement_digit)
+    np.testing.assert_array_equal(truth.contact_center, whole.truth.contact_center)
+    # Both bear the force asked for; their surfaces lean differently, so the parts across the motion differ.
+    sizes = [np.linalg.norm(force, axis=1) for force in (truth.force, whole.truth.force)]
+    np.testing.assert_allclose(*sizes, rtol=0.05)
+    with pytest.raises(TactileError, match="--keep electrodes"):
+        recordings.read(tmp_path / "x.h5")
+
+
+def test_the_full_tier_moves_what_the_fast_one_does(tmp_path):
+    """One frame in contact; the fast tier's shape is off by 5 % of the depth at most (docs/mechanics.md)."""
+    text = SHORT.replace("time_s = 0.5", "time_s = 0.01").replace("time_s = 0.6", "time_s = 0.02")
+    text = text.replace("    { time_s = 0.4, x_mm = -8.0, z_mm = 0.0, force_n = 0.0 },\n", "")
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    simulate_recording(tmp_path, tmp_path / "fast.h5", keep=("displacement_digit",))
+    simulate_recording(tmp_path, tmp_path / "full.h5", keep=("displacement_digit",), tiers={"digit": "full"})
+    fast, full = (read_truth(tmp_path / f"{tier}.h5")[1].displacement_digit for tier in ("fast", "full"))
+    assert not fast[0].any() and not full[2].any()
+    difference = np.abs(fast[1] - full[1]).max()
+    assert 1e-6 < difference < 0.2 * np.abs(full[1]).max()
+
+
+@pytest.mark.parametrize(("text", "match"), [("electrodes,image", "image"), (" , ", "nothing"), ("digit", "digit")])
+def test_outputs_that_are_none_are_refused(text, match):
+    with pytest.raises(TactileError, match=match):
+        parse_keep(text)
+
+
+def test_outputs_name_the_sensors_they_need():
+    assert parse_keep("displacement_digit, electrodes") == ("electrodes", "displacement_digit")
+    assert sensors_of(("electrodes", "displacement_biotac")) == ("biotac",)
+    assert sensors_of(("displacement_digit",)) == ("digit",)
