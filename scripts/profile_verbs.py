@@ -36,14 +36,17 @@ HEAVY = (
     "rtree", "cholespy", "pypardiso", "skfem", "rosbags", "distributed", "pyarrow", "safetensors",
 )  # fmt: skip
 CHILD = """
-import json, resource, sys
+import json, pathlib, re, resource, sys
 from tactile_core import cli
 try:
     status = cli.main(sys.argv[2:])
 except SystemExit as end:
     status = end.code
 used = resource.getrusage(resource.RUSAGE_SELF)
-peak = used.ru_maxrss / (1024 * 1024 if sys.platform == "darwin" else 1024)
+if sys.platform == "linux":  # where ru_maxrss begins with what the parent had
+    peak = int(re.search(r"VmHWM:\\s+(\\d+)", pathlib.Path("/proc/self/status").read_text())[1]) / 1024
+else:
+    peak = used.ru_maxrss / (1024 * 1024 if sys.platform == "darwin" else 1024)
 told = {"status": status, "cpu": used.ru_utime + used.ru_stime, "peak": peak, "modules": sorted(sys.modules)}
 open(sys.argv[1], "w").write(json.dumps(told))
 """

@@ -114,7 +114,9 @@ def contact_sheet(
         sheet.picture_row("DIGIT picture", pictures)
         sheet.captions(force, confidence, expected_error_digit)
         content = io.BytesIO()
-        FigureCanvasAgg(sheet.figure).print_png(content, metadata={"Software": None})
+        # 1.1 MB in 0.2 s; at zlib's level 6, matplotlib's own, 1.0 MB in 0.5 s.
+        packing = {"compress_level": 4}
+        FigureCanvasAgg(sheet.figure).print_png(content, metadata={"Software": None}, pil_kwargs=packing)
     atomic.write_bytes(path, content.getvalue())
 
 

@@ -44,7 +44,8 @@ def cost_of(scratch):
     return cost
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if name != "doctor"])  # that one looks at libraries in other processes
+# The doctor looks at libraries in other processes.
+@pytest.mark.parametrize("name", [name for name in CASES if name != "doctor"])
 def test_a_verb_loads_what_it_needs_and_nothing_else(name, cost_of):
     needed = NEEDS.get(name)
     if needed and importlib.util.find_spec(needed) is None:

@@ -124,7 +124,8 @@ def cache_folder() -> pathlib.Path:
 def _cached(name: str, lattice: Lattice, touchable: np.ndarray, mesh: HexMesh, material: Material) -> Compliance:
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
     watched = _watched(mesh)
-    places = watched.rows, watched.columns, np.round(watched.weights * 1e9), watched.gap
+    # Rounded, and without a minus before zero, which differ between versions of numpy and scipy.
+    places = watched.rows, watched.columns, *(np.round(each * 1e9) + 0.0 for each in (watched.weights, watched.gap))
     for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, *places):
         digest.update(np.ascontiguousarray(array).tobytes())
     folder = cache_folder() / f"compliance-{name}-{digest.hexdigest()[:16]}"
