@@ -37,17 +37,30 @@ class Options:
     sensor: Sensor | None = None
 
 
-def load_tools(weights: str | os.PathLike | None = None, calibration: str | os.PathLike | None = None) -> Tools:
+def load_tools(
+    weights: str | os.PathLike | None = None,
+    calibration: str | os.PathLike | None = None,
+    preset: str = "fast",
+    variant: str | None = None,
+) -> Tools:
     """The shipped weights, or those in a folder, and the camera and lights of a DIGIT: the shipped unit's, or a file's.
 
-    Raises TactileError for weights that are missing, changed or of another shape, and for a bad calibration.
+    preset, variant : of ``optics.Renderer``, for all pictures but fast ones
+    Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
+    ``optics.Renderer`` raises.
     """
     from . import height_map, shading, translate
     from .calibration_file import load_calibration
 
     translator, unit = translate.load_translator(weights), load_calibration(calibration)
-    mapper, shader = height_map.digit_mapper(unit.camera), shading.Shader(unit)
-    return Tools(translator, translator.card, translator.sha256, mapper, shader)
+    mapper = height_map.digit_mapper(unit.camera)
+    if preset == "fast":
+        shade = shading.Shader(unit)
+    else:
+        from .optics.renderer import Renderer
+
+        shade = Renderer(unit, preset, variant)
+    return Tools(translator, translator.card, translator.sha256, mapper, shade)
 
 
 def parse_frames(text: str) -> slice:

@@ -75,12 +75,13 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
         scene = msgspec.toml.decode(text, type=Scene)
     except (msgspec.DecodeError, RecursionError) as error:
         raise TactileError(file, str(error), "the fields of scenes/press_sphere/scene.toml") from error
-    _check(file, scene)
+    check(file, scene)
     found = [with_files_of(file.parent, spec) for spec in scene.indenters]
     return msgspec.structs.replace(scene, indenters=found), text
 
 
-def _check(file: pathlib.Path, scene: Scene) -> None:
+def check(file: str | os.PathLike, scene: Scene) -> None:
+    """Raises TactileError for what the fields' types do not say: finite numbers, names, growing times."""
     if scene.format != FORMAT:
         raise TactileError(f"{file}, format", repr(scene.format), repr(FORMAT))
     numbers = list(_numbers(msgspec.to_builtins(scene)))

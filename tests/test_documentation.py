@@ -159,4 +159,3 @@ def test_a_scene_of_a_page_loads(text, tmp_path):
 def test_links_lead_somewhere(page):
     targets = LINK.findall(page.read_text(encoding="utf-8"))
     assert not [target for target in targets if not (page.parent / target).exists()]
-

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import hashlib
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -11,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from .. import results
+from ..calibration_file import load_calibration
 from ..errors import TactileError
 from ..recordings.bag import MARK, split
 from ..small_text import read_small
@@ -94,6 +96,13 @@ def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[
         found.append(Input(name, str(path), digest, size))
         progress(index + 1, len(paths))
     return found
+
+
+def unit_hash(calibration: Path) -> str:
+    """Of a DIGIT's calibration file and the photograph that it names. Raises TactileError for a bad one."""
+    photograph = load_calibration(calibration).background.photograph
+    digests = [content_hash(Path(file))[0] for file in (calibration, photograph) if file]
+    return hashlib.sha256(" ".join(digests).encode()).hexdigest() if photograph else digests[0]
 
 
 def content_hash(path: Path) -> tuple[str, int]:

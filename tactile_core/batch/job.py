@@ -6,52 +6,18 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-from msgspec import Meta
 
 from .. import __version__, atomic, results
 from ..errors import TactileError
-from ..recordings import PrepareOptions
-from ..recordings.sensor_file import Sensor
 from .inputs import Input
+from .recipes import Recipe, Simulate, Translate
 
 FORMAT = "tactile-job-1"
 FILE, PREPARED, SHARDS, ASIDE, MANIFEST = "job.json", "prepared", "shards", "aside", "manifest.json"
-SHARD_FRAMES = 1000
-MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
 ADVICE = "Use an empty --out folder"
-
-
-class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """As recordings.PrepareOptions, whose meanings these are."""
-
-    kind: str | None = None
-    tare: str | None = None
-    drift: bool = True
-    counts_per_unit: float | None = None
-    smooth: int | None = None
-
-    def options(self) -> PrepareOptions:
-        """For ``recordings.prepare``."""
-        return PrepareOptions(**msgspec.structs.asdict(self))
-
-
-class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """What is made of each recording: all that decides a shard's bytes beside the recording itself.
-
-    shard_frames : frames a shard; keep : words of results.KEEPABLE; weights : sha256 of the weights' card
-    calibration : sha256 of the DIGIT's calibration file, empty for the shipped unit
-    """
-
-    keep: list[str]
-    weights: str
-    shard_frames: Annotated[int, Meta(ge=1, le=MAX_SHARD_FRAMES)] = SHARD_FRAMES
-    prepare: Prepare = Prepare()
-    sensor: Sensor | None = None
-    calibration: str = ""
-    version: str = __version__
 
 
 class Job(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -117,7 +83,11 @@ def read(folder: Path) -> Job:
     for index, one in enumerate(job.inputs):
         if not one.name.startswith(f"{index:05d}_") or os.path.basename(one.name) != one.name:
             raise TactileError(f"{file}, inputs", f"the name {one.name!r:.80}", f"{index:05d}_<file name>", ADVICE)
-    results.parse_keep(",".join(job.recipe.keep))
+    if isinstance(job.recipe, Translate):
+        results.parse_keep(",".join(job.recipe.keep))
+    if isinstance(job.recipe, Simulate) and len(job.recipe.values) != len(job.inputs):
+        found = f"{len(job.recipe.values)} sets of values"
+        raise TactileError(f"{file}, recipe", found, f"{len(job.inputs)}, one for each input", ADVICE)
     return job
 
 

@@ -10,9 +10,8 @@ from typing import Any
 
 from .. import atomic
 from . import job as jobs
-from . import sealed, shard
+from . import kinds, sealed
 from .job import Job
-from .prepared import Prepared
 
 FORMAT = "tactile-batch-1"
 
@@ -41,14 +40,13 @@ def status(folder: Path, job: Job) -> Status:
     """How far a job is. Reads names and lengths, no content: `damaged` checks that."""
     found = Status(len(job.inputs), aside=_aside(folder))
     there = {path.name for path in (folder / jobs.SHARDS).glob("*.h5")}
-    for one in job.inputs:
-        file = jobs.prepared_file(folder, one.name)
-        if not file.exists():
+    for index, one in enumerate(job.inputs):
+        seen = kinds.of(job).seen(folder, job, index)
+        if seen is None:
             continue
-        frames = len(Prepared(file))
-        names = [jobs.shard_file(folder, one.name, number).name for number in range(shard.count(frames, job))]
+        names = [jobs.shard_file(folder, one.name, number).name for number in range(seen.shards)]
         found.prepared += 1
-        found.frames += frames
+        found.frames += seen.frames
         found.shards += len(names)
         found.there += sum(name in there for name in names)
     return found
@@ -87,15 +85,11 @@ def write(folder: Path, job: Job) -> None:
 
 def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
     one = job.inputs[index]
-    file = jobs.prepared_file(folder, one.name)
-    told: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": 0, "shards": [], "warnings": []}
-    if not file.exists():
-        return told
-    about = Prepared(file).about()
-    frames = about["frames"]
-    for number in range(shard.count(frames, job)):
+    seen = kinds.of(job).seen(folder, job, index) or kinds.Seen(0)
+    told: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
+    for number in range(seen.shards):
         path = jobs.shard_file(folder, one.name, number)
         digest = sealed.seal_of(path)
         if digest is not None:
             told["shards"].append({"file": path.name, "sha256": digest})
-    return told | {"frames": frames, "warnings": about["warnings"]}
+    return told | {"warnings": list(seen.warnings)}

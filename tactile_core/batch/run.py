@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol
@@ -11,7 +12,7 @@ from typing import Protocol
 from .. import atomic
 from ..errors import TactileError
 from . import job as jobs
-from . import lock, manifest, shard, tasks
+from . import kinds, lock, manifest, tasks
 from .job import Job
 from .tasks import Reply, Task
 
@@ -97,6 +98,8 @@ class _Work:
         self._folder, self._job = folder, job
         self._part, self._parts = part or (0, 1)
         self.done, self.known, self.finished = Done(), 0, 0
+        self._grows = kinds.of(job).GROWS
+        self._asked, self._open = Counter[int](), Counter[int]()  # shards of each input: so far, and not done of them
 
     def awaited(self) -> int:
         """Tasks whose reply has not come."""
@@ -119,15 +122,26 @@ class _Work:
             self._set_aside(task, reply.error)
             return []
         self._clear(task)
-        if task.shard is not None:
+        if task.shard is None:
+            follow = self._shards(task.recording, reply.shards)
+        else:
             self.done.made += reply.made
             self.done.kept += not reply.made
-            return []
-        numbers = range(shard.count(reply.frames, self._job))
+            self._open[task.recording] -= 1
+            follow = [Task(task.recording)] if self._grows and not self._open[task.recording] else []
+        self.known += len(follow)
+        return follow
+
+    def _shards(self, recording: int, count: int) -> list[Task]:
+        """Those of the first `count` shards of a recording that are this part's and were not asked for yet."""
+        if self._grows:
+            count = max(count, self._parts)  # each part makes one, from which it learns how many there are
+        numbers = range(self._asked[recording], count)
+        self._asked[recording] = max(count, self._asked[recording])
         # Shifted by the recording, so that many short ones are spread over the parts too.
-        mine = [number for number in numbers if (number + task.recording) % self._parts == self._part]
-        self.known += len(mine)
-        return [Task(task.recording, number) for number in mine]
+        mine = [number for number in numbers if (number + recording) % self._parts == self._part]
+        self._open[recording] += len(mine)
+        return [Task(recording, number) for number in mine]
 
     def _file(self, task: Task) -> Path:
         return self._folder / jobs.ASIDE / f"{tasks.name(self._job, task)}.json"

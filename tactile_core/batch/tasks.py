@@ -9,14 +9,12 @@ from typing import Any
 import msgspec
 
 from ..errors import TactileError
-from ..frame_pass import Tools
 from . import job as jobs
-from . import prepared, shard
-from .inputs import content_hash
+from . import kinds
 
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Prepare recording `recording` of the job (shard None), or make one of its shards."""
+    """What input `recording` of the job needs first (shard None), or one of its shards; see ``kinds``."""
 
     recording: int
     shard: int | None = None
@@ -25,12 +23,12 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """What became of a task.
 
-    made : False where it was there already; frames : of the recording, of a prepared one
+    made : False where it was there already; shards : that follow, of an input's first task
     error : why it cannot be done, as the user reads it; stop : no other task can be done either
     """
 
     made: bool = False
-    frames: int = 0
+    shards: int = 0
     error: str = ""
     stop: bool = False
 
@@ -53,11 +51,11 @@ def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
 def _run(folder: Path, task: Task) -> Reply:
     try:
         job = _job(str(folder), _stamp(folder))
+        kind = kinds.of(job)
         if task.shard is None:
-            frames, made = prepared.make(folder, job, task.recording)
-            return Reply(made=made, frames=frames)
-        tools = _tools(job.weights, job.recipe.weights, job.calibration, job.recipe.calibration)
-        return Reply(made=shard.make(folder, job, task.recording, task.shard, tools))
+            shards, made = kind.first(folder, job, task.recording)
+            return Reply(made=made, shards=shards)
+        return Reply(made=kind.make(folder, job, task.recording, task.shard))
     except TactileError as error:
         return Reply(error=str(error))
     except (OSError, MemoryError) as error:
@@ -80,18 +78,3 @@ def _stamp(folder: Path) -> tuple[int, int]:
 @functools.lru_cache(maxsize=4)
 def _job(folder: str, stamp: tuple[int, int]) -> jobs.Job:
     return jobs.read(Path(folder))
-
-
-@functools.lru_cache(maxsize=2)
-def _tools(weights: str | None, sha256: str, calibration: str | None, unit_sha256: str) -> Tools:
-    """The networks and the unit, once a process. Raises TactileError where they are not those of the job."""
-    from ..convert import load_tools
-
-    if calibration is not None and content_hash(Path(calibration))[0] != unit_sha256:
-        advice = "Use the calibration that the job was made with"
-        raise TactileError(calibration, "another content", f"sha256 {unit_sha256[:12]}..., as in the job", advice)
-    tools = load_tools(weights, calibration)
-    if tools.sha256 != sha256:
-        found, advice = f"sha256 {tools.sha256[:12]}...", "Use the weights that the job was made with"
-        raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)
-    return tools

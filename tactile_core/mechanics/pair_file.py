@@ -8,6 +8,7 @@ import pathlib
 import numpy as np
 
 from .. import __version__, atomic, sensors
+from ..batch import pack
 from ..errors import TactileError
 from ..hdf5_disk import Disk
 
@@ -42,11 +43,11 @@ def _write_merged(files, count, out, text, seed, names) -> None:  # noqa: ANN001
         })  # fmt: skip
         done = 0
         for path in files:
-            with np.load(path, allow_pickle=False) as block:
-                take = min(int(block["count"]), count - done)
-                for name in DATASETS if take else ():
-                    _append(file, name, block[name][:take], count, done)
-                done += take
+            block = pack.read(path)
+            take = min(int(block["count"]), count - done)
+            for name in DATASETS if take else ():
+                _append(file, name, block[name][:take], count, done)
+            done += take
             disk.check()
 
 

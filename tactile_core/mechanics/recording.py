@@ -47,6 +47,22 @@ def simulate_recording(
     tared wiring: this kind of file holds raw counts.
     """
     scene, text = load_scene(scene_path)
+    simulate_scene(scene, text, scene_path, out, seed, progress, wiring, keep=keep, tiers=tiers)
+
+
+def simulate_scene(
+    scene: Scene,
+    text: str,
+    scene_path: str | os.PathLike,
+    out: str | os.PathLike,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    wiring: Wiring | None = None,
+    *,
+    keep: Collection[str] = ALL,
+    tiers: Mapping[str, str] | None = None,
+) -> None:
+    """As ``simulate_recording``, of a scene that is loaded; text : of it; scene_path : for messages."""
     spec = recording_of(scene, scene_path)
     sensors_used = sensors_of(keep)
     wiring = wiring or _wiring(spec)

@@ -27,7 +27,7 @@ from ..errors import TactileError
 from ..height_map import digit_mapper
 from ..png_file import write_png
 from ..stopwatch import Stopwatch
-from .inputs import Frames, read_frames
+from .inputs import read_frames
 from .presets import DEFAULT, FAST, PRESETS, cheapest, measured
 from .renderer import Renderer
 from .variant import SCALAR, choose_variant
@@ -70,28 +70,39 @@ def render(path: str | os.PathLike, out: str | os.PathLike, options: Options, pr
     """
     clock = Stopwatch()
     out = Path(out)
-    results.check_free(out, options.overwrite)
-    results.check_writable(out.parent)
-    atomic.sweep(out.parent)
-    calibration = load_calibration(options.calibration)
-    preset = choose_preset(options)
+    load_calibration(options.calibration)
+    preset = claimed(out, options)
     with clock.stage("read"):
         frames = read_frames(path, lambda: progress("simulate"))
-    calibration = _at_size(calibration, frames, options.size)
+    shape = None if frames.heights is None else frames.heights.shape[1:]
     rows = select(options.frames, len(frames.numbers))
     with clock.stage("prepare"):
-        renderer = Renderer(calibration, preset, options.variant)
+        made = pictures(
+            options.calibration, preset, options.variant, shape, options.size, options.noise, options.exr, clock
+        )
     try:
         with atomic.new_folder(out, overwrite=options.overwrite) as folder, progress(preset) as shown:
-            about = {"calibration": calibration.unit, "preset": preset, "units": UNITS}
-            _Work(frames, rows, renderer, clock, about, options.noise).write(folder, options.exr, shown)
-            atomic.write_json(folder / results.NOTE, _note(path, frames, rows, renderer, preset, options))
+            made.begin(folder)
+            made.write_rest(folder)
+            for done, (row, values) in enumerate(zip(rows, frames.some(rows), strict=True), 1):
+                made.write_frame(folder, int(frames.numbers[row]), values)
+                shown(done, len(rows))
+            note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
+            atomic.write_json(folder / results.NOTE, note)
             timings = {"ms_a_frame": clock.per_frame(len(rows)), "frames": len(rows), "machine": results.machine()}
             atomic.write_json(folder / results.TIMINGS, timings)
     except OSError as error:
         found, advice = f"cannot be written ({error.strerror or error})", "Make room, or name another --out folder"
         raise TactileError(out, found, "a writable folder", advice) from error
     return out
+
+
+def claimed(out: Path, options: Options) -> str:
+    """The preset, when `out` may be written; raises TactileError where not, and what `choose_preset` raises."""
+    results.check_free(out, options.overwrite)
+    results.check_writable(out.parent)
+    atomic.sweep(out.parent)
+    return choose_preset(options)
 
 
 def choose_preset(options: Options) -> str:
@@ -110,10 +121,13 @@ def choose_preset(options: Options) -> str:
     return cheapest(options.error, variant)
 
 
-def _at_size(calibration: Calibration, frames: Frames, size: tuple[int, int] | None) -> Calibration:
-    """The calibration in pixels of the height maps, or of the size asked for."""
-    if frames.heights is not None:
-        height, width = frames.heights.shape[1:]
+def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
+    """The calibration in pixels of height maps (H, W), or of the size (width, height) asked for.
+
+    Raises TactileError where both are there and differ.
+    """
+    if heights is not None:
+        height, width = heights
         if size not in (None, (width, height)):
             found = f"{size[0]} x {size[1]}, the height map {width} x {height}"
             raise TactileError("--size", found, "the height map's size", "Leave it out")
@@ -122,34 +136,35 @@ def _at_size(calibration: Calibration, frames: Frames, size: tuple[int, int] | N
 
 
 @dataclasses.dataclass(frozen=True)
-class _Work:
-    """One input being rendered.
+class Pictures:
+    """Writes frames as files.
 
-    rows : (n,) of the frames that are wanted; about : attributes of EXR files; noise : whether pictures have some
+    about : attributes of EXR files; heights : whether frames are height maps, not displacements
+    noise : whether PNG pictures have some; exr : whether to write OpenEXR too
     """
 
-    frames: Frames
-    rows: np.ndarray
     renderer: Renderer
     clock: Stopwatch
     about: dict[str, str]
+    heights: bool
     noise: bool
+    exr: bool
 
-    def write(self, folder: Path, exr: bool, progress: Progress) -> None:
-        """Pictures, one frame at a time."""
+    def begin(self, folder: Path) -> None:
+        """Make the folders of the files."""
         (folder / results.IMAGES).mkdir()
-        if exr:
+        if self.exr:
             (folder / EXR).mkdir()
-            self._write_exr(folder / REST, self.renderer.rest_radiance, self.about)
-        numbers = self.frames.numbers[self.rows]
-        for done, values in enumerate(self.frames.some(self.rows), 1):
-            self._write_frame(folder, int(numbers[done - 1]), values, exr)
-            progress(done, len(self.rows))
 
-    def _write_frame(self, folder: Path, number: int, values: np.ndarray, exr: bool) -> None:
+    def write_rest(self, folder: Path) -> None:
+        """The undeformed gel, where OpenEXR is asked for."""
+        if self.exr:
+            self._write_exr(folder / REST, self.renderer.rest_radiance, self.about)
+
+    def write_frame(self, folder: Path, number: int, values: np.ndarray) -> None:
         """values : displacement (M, 3) m or heights (H, W) m."""
         with self.clock.stage("height_map"):
-            height = values if self.frames.heights is not None else digit_mapper(self.renderer.camera)(values)
+            height = values if self.heights else digit_mapper(self.renderer.camera)(values)
         with self.clock.stage("radiance"):
             radiance = self.renderer.radiance(height)
         with self.clock.stage("picture"):
@@ -157,7 +172,7 @@ class _Work:
             picture = self.renderer.picture(radiance, noise)
         with self.clock.stage("png"):
             write_png(folder / results.IMAGES / results.IMAGE_NAME.format(number), picture)
-        if exr:
+        if self.exr:
             with self.clock.stage("exr"):
                 about = {**self.about, "frame": str(number)}
                 self._write_exr(folder / EXR / EXR_NAME.format(number), radiance, about)
@@ -171,8 +186,28 @@ class _Work:
         write_exr(path, channels, about)
 
 
-def _note(
-    path: str | os.PathLike, frames: Frames, rows: np.ndarray, renderer: Renderer, preset: str, options: Options
+def pictures(
+    calibration: str | os.PathLike | None,
+    preset: str,
+    variant: str | None,
+    heights: tuple[int, int] | None,
+    size: tuple[int, int] | None,
+    noise: bool,
+    exr: bool,
+    clock: Stopwatch | None = None,
+) -> Pictures:
+    """What writes frames; heights : (H, W) of height maps, None for displacements; the rest as of `Options`.
+
+    Raises TactileError for a bad calibration or size, and what ``Renderer`` raises.
+    """  # fmt: skip
+    unit = at_size(load_calibration(calibration), heights, size)
+    about = {"calibration": unit.unit, "preset": preset, "units": UNITS}
+    renderer = Renderer(unit, preset, variant)
+    return Pictures(renderer, clock or Stopwatch(), about, heights is not None, noise, exr)
+
+
+def note_of(
+    path: str | os.PathLike, kind: str, count: int, renderer: Renderer, preset: str, options: Options
 ) -> dict[str, Any]:
     """Where a result came from, fit for JSON: only what the same input makes again."""
     path = Path(path)
@@ -182,8 +217,8 @@ def _note(
     return {
         "format": results.FORMAT,
         "made_by": "tactile render",
-        "input": {"file": file.name, "sha256": results.sha256(file), "kind": frames.kind},
-        "frames": {"selected": frames_text(options.frames), "rendered": len(rows)},
+        "input": {"file": file.name, "sha256": results.sha256(file), "kind": kind},
+        "frames": {"selected": frames_text(options.frames), "rendered": count},
         "calibration": {"file": calibration.name, "sha256": results.sha256(calibration), "unit": unit},
         "noise": options.noise,
         "size": {"width": renderer.camera.width, "height": renderer.camera.height},

@@ -62,6 +62,11 @@ def choose_variant(wanted: str | None = None) -> Choice:
     return Choice(SCALAR, trouble)
 
 
+def variant_for(preset: str, wanted: str | None = None) -> str:
+    """The variant that all workers of a job use, so that their pictures agree; "" for fast ones, which need none."""
+    return "" if preset == "fast" else choose_variant(wanted).name
+
+
 @functools.cache
 def llvm_trouble(library: str) -> str:
     """What keeps LLVM from working, in words; "" where it works. library : DRJIT_LIBLLVM_PATH, "" where unset"""

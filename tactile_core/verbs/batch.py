@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import TactileError
 from ..terminal import bar, complain, say, tell
-from .common import RESUMES, prepare_arguments, prepare_words, progress_argument
+from . import engine
+from .common import PRESETS, RESUMES, prepare_arguments, prepare_words, progress_argument
 
 if TYPE_CHECKING:
-    from ..batch.job import Job, Recipe
-    from ..batch.run import Place
+    from ..batch.job import Job
+    from ..batch.recipes import Translate
 
 BRIEF = "many recordings to shards, resumable, on one machine or many"
 TEXT = """\
@@ -35,7 +35,7 @@ examples:
   tactile batch day1 --out job --plan                          write job.json alone, as arrays need it"""
 LEAVES = RESUMES
 RECIPE = (  # option, its value where it is not given
-    *((name, None) for name in ("keep", "shard_frames", "weights", "sensor", "calibration")),
+    *((name, None) for name in ("keep", "shard_frames", "weights", "sensor", "calibration", "preset")),
     *((name, None) for name in ("kind", "counts_per_unit", "smooth")),
     *(("tare", "auto"), ("no_drift", False)),
 )
@@ -52,12 +52,10 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
     verb.add_argument("--sensor", metavar="FILE", help="gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--calibration", metavar="FILE", help="the DIGIT whose pictures to make (`tactile calibrate`)")
+    verb.add_argument("--preset", choices=PRESETS, help="of the pictures, see `tactile render --help` (default: fast)")
     prepare_arguments(verb)
-    where = verb.add_mutually_exclusive_group()
-    where.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: 1)")
-    where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
+    engine.place_arguments(verb)
     verb.add_argument("--array", metavar="I/N", help="do part I of N, from 0, beside other processes that do theirs")
-    verb.add_argument("--restart", type=int, metavar="N", help="replace a worker after N tasks (default: 200)")
     doing = verb.add_mutually_exclusive_group()
     doing.add_argument("--plan", action="store_true", help="write job.json and stop")
     doing.add_argument("--status", action="store_true", help="say how far the job is; reads files, changes nothing")
@@ -70,13 +68,13 @@ def run(options: argparse.Namespace) -> int:
     from ..batch import job as jobs
     from ..batch import run as runs
 
-    folder, part = Path(options.out), _part(options.array)
+    folder, part = Path(options.out), engine.part(options.array)
     if options.status or options.verify:
         if options.inputs:
             raise TactileError("--status and --verify", "given with INPUTS", "--out DIR alone")
         job = jobs.read(folder)
         return _status(folder, job) if options.status else _verify(folder, options.progress)
-    _check_numbers(options)
+    engine.check_counts(options, "workers", "restart", "shard_frames")
     if part is not None and not jobs.exists(folder):
         raise TactileError(folder, "no job yet", "a job that all parts share", "Make it once with --plan")
     with runs.opened(folder, part):
@@ -84,30 +82,12 @@ def run(options: argparse.Namespace) -> int:
         if options.plan:
             tell(str(folder / jobs.FILE))
             return 0
-        place = _place(folder, options)
+        place = engine.place(folder, options)
         with bar("batch", "task", options.progress) as shown:
             done = runs.run(folder, job, place, part, shown)
-    for name, why in done.aside.items():
-        complain(f"{name}: {why}")
+    status = engine.told(done)
     tell(f"{folder}: {done.made} shards made, {done.kept} kept, {len(done.aside)} set aside")
-    return 2 if done.aside else 0
-
-
-def _check_numbers(options: argparse.Namespace) -> None:
-    for name in ("workers", "restart", "shard_frames"):
-        value = getattr(options, name)
-        if value is not None and value < 1:
-            raise TactileError("--" + name.replace("_", "-"), str(value), "1 or more")
-
-
-def _part(text: str | None) -> tuple[int, int] | None:
-    """``"3/8"`` -> (3, 8). Raises TactileError."""
-    if text is None:
-        return None
-    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
-    if not found or not int(found[1]) < int(found[2]):
-        raise TactileError("--array", repr(text), "I/N with I from 0 to N - 1", "Such as 0/8")
-    return int(found[1]), int(found[2])
+    return status
 
 
 def _job(folder: Path, options: argparse.Namespace) -> Job:
@@ -139,12 +119,12 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     return there
 
 
-def _recipe(options: argparse.Namespace) -> Recipe:
+def _recipe(options: argparse.Namespace) -> Translate:
     """The recipe that the options say."""
     from .. import results, translate
-    from ..batch.inputs import content_hash
-    from ..batch.job import SHARD_FRAMES, Prepare, Recipe
-    from ..calibration_file import load_calibration
+    from ..batch.inputs import unit_hash
+    from ..batch.recipes import SHARD_FRAMES, Prepare, Translate
+    from ..optics.variant import variant_for
     from ..recordings import sensor_file
 
     keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
@@ -152,33 +132,19 @@ def _recipe(options: argparse.Namespace) -> Recipe:
     sensor = None if options.sensor is None else sensor_file.read(options.sensor)
     sha256 = translate.load_translator(options.weights).sha256
     frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
-    unit = ""
-    if options.calibration is not None:
-        load_calibration(options.calibration)  # a bad one is refused here, not by each worker
-        unit, _ = content_hash(Path(options.calibration))
-    return Recipe(list(keep), sha256, frames, prepare, sensor, unit)
-
-
-def _place(folder: Path, options: argparse.Namespace) -> Place:
-    if options.cluster is not None:
-        from ..batch.dask_place import Cluster
-
-        if options.cluster.startswith("tcp://") and not options.cluster.startswith("tcp://127."):
-            say(
-                "warning: tcp:// is neither secret nor signed, and Dask's messages run code: private network, or tls://"
-            )
-        return Cluster(folder, options.cluster)
-    from ..batch.local import RESTART, Local
-
-    return Local(folder.resolve(), options.workers or 1, options.restart or RESTART)
+    unit = "" if options.calibration is None else unit_hash(Path(options.calibration))
+    preset = options.preset or "fast"
+    if options.preset is not None and "image" not in keep:
+        raise TactileError("--preset", preset, "--keep image", "Keep the pictures that it makes")
+    return Translate(list(keep), sha256, frames, prepare, sensor, unit, preset, variant_for(preset))
 
 
 def _status(folder: Path, job: Job) -> int:
     from ..batch import manifest
 
     found = manifest.status(folder, job)
-    tell(f"recordings  {found.prepared} of {found.recordings} prepared, {found.frames} frames")
-    tell(f"shards      {found.there} of {found.shards} of the prepared recordings")
+    tell(f"inputs      {found.prepared} of {found.recordings} prepared, {found.frames} frames")
+    tell(f"shards      {found.there} of {found.shards} of the prepared inputs")
     tell(f"set aside   {len(found.aside)}")
     for name, why in found.aside.items():
         tell(f"  {name}: {why}")

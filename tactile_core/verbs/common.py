@@ -11,6 +11,7 @@ from ..errors import TactileError
 NOTHING = "no half file is left"
 RESUMES = "the same command goes on where it stopped"
 
+PRESETS = ("fast", "standard", "quality", "reference")  # of optics.presets, without importing it
 MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from ..errors import TactileError
 from ..terminal import bar, tell
+from . import engine
 from .common import RESUMES, check_seed, progress_argument, seed_argument
 
 BRIEF = "simulate paired contacts"
@@ -13,6 +13,9 @@ TEXT = "Simulate contacts of a scene's indenters with both sensors: same force, 
 EPILOG = """\
 example:
   tactile pairs scenes/press_sphere/scene.toml --count 2000 --seed 1 --out pairs.h5 --workers 4
+
+  tactile pairs SCENE --count 50000 --out pairs.h5 --plan       and then, on each of 8 machines:
+  tactile batch --out pairs.h5.parts --array 0/8                then the first line again, which puts all together
 
 An interrupted run goes on where it stopped when the same command is given again."""
 LEAVES = RESUMES
@@ -26,18 +29,23 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json, what is in it, goes beside"
     )
-    verb.add_argument("--workers", type=int, default=1, metavar="N", help="processes; changes no bit (default: 1)")
+    engine.parts_arguments(verb)
     progress_argument(verb)
 
 
 def run(options: argparse.Namespace) -> int:
     """Make the pairs."""
-    if options.workers < 1:
-        raise TactileError("--workers", str(options.workers), "1 or more", "Give the number of processes")
+    engine.check_counts(options, "workers", "restart")
     check_seed(options.seed)
-    from ..mechanics.pairs import make_pairs
+    from ..batch import parts
+    from ..mechanics import pairs
 
-    with bar("pairs", "contact", options.progress) as shown:
-        make_pairs(options.scene, options.count, options.seed, options.out, options.workers, shown)
+    if options.plan:
+        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out)
+        tell(str(parts.write(options.out, job)))
+        return 0
+    place = engine.place_or_none(options)
+    with bar("pairs", "block", options.progress) as shown:
+        pairs.make_pairs(options.scene, options.count, options.seed, options.out, progress=shown, place=place)
     tell(options.out)
     return 0

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import argparse
 import re
+from typing import TYPE_CHECKING
 
 from ..errors import TactileError
 from ..terminal import bar, tell
-from .common import NOTHING, progress_argument
+from . import engine
+from .common import NOTHING, PRESETS, progress_argument
+
+if TYPE_CHECKING:
+    from ..optics.job import Options
 
 BRIEF = "pictures of deformed gels, physically based"
 TEXT = """\
@@ -26,7 +31,10 @@ DIR is a new folder, which appears whole or not at all:
 Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (pip install "tactile-core[render]").
   fast       direct light, soft shadows            standard   direct light, traced
   quality    and the light of one bounce           reference  everything, seconds a frame
-A picture is the same with LLVM and without it, but for rounding; `tactile doctor` says which runs here."""
+A picture is the same with LLVM and without it, but for rounding; `tactile doctor` says which runs here.
+
+With --workers, --cluster or --plan frames are rendered in other processes, by the same bytes. They wait in OUT.parts
+until all are there, and the same command goes on after any interruption; no timings.json is written."""
 EPILOG = """\
 examples:
   tactile render results/touch/frames.h5 --out pictures --frames 100:200
@@ -39,9 +47,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Of this verb."""
     verb.add_argument("input", metavar="INPUT")
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
-    verb.add_argument(
-        "--preset", choices=("fast", "standard", "quality", "reference"), help="how exactly (default: standard)"
-    )
+    verb.add_argument("--preset", choices=PRESETS, help="how exactly (default: standard)")
     verb.add_argument(
         "--error",
         type=float,
@@ -55,6 +61,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--noise", action="store_true", help="add the unit's camera noise to PNG pictures")
     verb.add_argument("--variant", choices=("llvm", "scalar"), help="of Mitsuba (default: the faster one that works)")
     verb.add_argument("--overwrite", action="store_true", help="replace an older result")
+    engine.parts_arguments(verb)
     progress_argument(verb)
 
 
@@ -62,6 +69,7 @@ def run(options: argparse.Namespace) -> int:
     """Render."""
     if options.error is not None and not options.error > 0:
         raise TactileError("--error", f"{options.error:g}", "grey levels above 0")
+    engine.check_counts(options, "workers", "restart")
     size = _size(options.size)
     from .. import convert
     from ..optics import job, variant
@@ -78,7 +86,23 @@ def run(options: argparse.Namespace) -> int:
         noise=options.noise,
         overwrite=options.overwrite,
     )
+    if options.plan or options.workers or options.cluster:
+        return _run_in_parts(options, asked)
     done = job.render(options.input, options.out, asked, lambda word: bar(word, "frame", options.progress))
+    tell(str(done))
+    return 0
+
+
+def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
+    """Render in other processes, or write the plan of that."""
+    from ..batch import parts
+    from ..optics.parts import plan, render_in_parts
+
+    if options.plan:
+        tell(str(parts.write(options.out, plan(options.input, options.out, asked))))
+        return 0
+    with bar("render", "task", options.progress) as shown:
+        done = render_in_parts(options.input, options.out, asked, lambda folder: engine.place(folder, options), shown)
     tell(str(done))
     return 0
 

@@ -6,6 +6,7 @@ import argparse
 
 from ..errors import TactileError
 from ..terminal import bar, say, tell
+from . import engine
 from .common import NOTHING, check_seed, progress_argument, seed_argument
 
 BRIEF = "simulate a recording"
@@ -15,12 +16,16 @@ needs is not solved: electrodes and displacement_biotac need the BioTac, displac
 
 With --isaac-like the scene's motion presses a BioTac skin of your own, as Isaac Gym computed it: linear tetrahedra,
 E 1.552 MPa, nu 0.316, no fluid, hence no electrodes, and no friction. Ten frames a second of displacement, force and
-depth come out, for comparison with data that was made that way. Such meshes lock: the force is too high."""
+depth come out, for comparison with data that was made that way. Such meshes lock: the force is too high.
+
+With --grid many recordings are simulated into a folder, with grid.json, which tells the values of each. They wait in
+OUT.parts until all are there, and the same command goes on after any interruption."""
 EPILOG = """\
 examples:
   tactile simulate scenes/press_roll_slide/scene.toml --seed 1 --out press_roll_slide.h5
   tactile simulate scenes/press --keep electrodes --out press.h5          the BioTac alone
-  tactile simulate scenes/press_roll_slide --isaac-like skin.tet --core core.obj --out isaac.h5"""
+  tactile simulate scenes/press_roll_slide --isaac-like skin.tet --core core.obj --out isaac.h5
+  tactile simulate scenes/press_roll_slide --grid force_n=0.2:1:5 --grid recording.tilt_deg=0,10 --out many"""
 LEAVES = NOTHING
 
 
@@ -46,12 +51,27 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         help="for --isaac-like: the rigid core that holds the skin, a closed triangle mesh in metres"
         " (default: our own table of it, which moves forces by 1 %%)",
     )
+    verb.add_argument(
+        "--grid",
+        action="append",
+        metavar="NAME=A:B:N",
+        help="a recording for each of N values from A to B, or NAME=V,V,...; given again, for each combination."
+        " NAME is force_n (the greatest force), x_mm, z_mm (where that is), or a field of the scene such as"
+        " recording.tilt_deg or indenters.0.radius_mm. --out is then a folder; the first recording has --seed, each"
+        " one more than that before it",
+    )
+    engine.parts_arguments(verb)
     progress_argument(verb)
 
 
 def run(options: argparse.Namespace) -> int:
     """Simulate."""
     check_seed(options.seed)
+    if options.grid:
+        return _run_grid(options)
+    for name in ("workers", "cluster", "restart", "plan"):
+        if getattr(options, name):
+            raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
     if options.core and not options.isaac_like:
         raise TactileError("--core", options.core, "--isaac-like FILE.tet beside it", "Our own skin has its core")
     if options.keep is not None and options.isaac_like:
@@ -68,5 +88,25 @@ def run(options: argparse.Namespace) -> int:
 
             keep = ALL if options.keep is None else parse_keep(options.keep)
             simulate_recording(options.scene, options.out, options.seed, shown, keep=keep)
+    tell(options.out)
+    return 0
+
+
+def _run_grid(options: argparse.Namespace) -> int:
+    """Simulate many."""
+    engine.check_counts(options, "workers", "restart")
+    if options.isaac_like:
+        raise TactileError("--grid", "given with --isaac-like", "one of the two")
+    from ..batch import parts
+    from ..mechanics import recording_grid
+    from ..mechanics.recording import ALL, parse_keep
+
+    keep = ALL if options.keep is None else parse_keep(options.keep)
+    job = recording_grid.plan(options.scene, options.grid, options.out, options.seed, keep)
+    if options.plan:
+        tell(str(parts.write(options.out, job)))
+        return 0
+    with bar("simulate", "task", options.progress) as shown:
+        recording_grid.simulate_grid(job, options.out, shown, engine.place_or_none(options))
     tell(options.out)
     return 0

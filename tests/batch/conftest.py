@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tactile_core.batch import inputs, local
+from tactile_core.batch import inputs, local, recipes
 from tactile_core.batch import job as jobs
 from tactile_core.batch import run as runs
 
@@ -32,7 +32,7 @@ def new_job(recordings, tmp_path):
 
     def make(name="out", keep=("latent",), paths=None):
         folder = tmp_path / name
-        recipe = jobs.Recipe(list(keep), "0" * 64, shard_frames=50)
+        recipe = recipes.Translate(list(keep), "0" * 64, shard_frames=50)
         found = inputs.hashed(paths or recordings, lambda done, total: None)
         job = jobs.make(found, recipe, None)
         jobs.write(folder, job)

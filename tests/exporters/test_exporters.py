@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from tactile_core import exporters
-from tactile_core.batch import inputs, local
+from tactile_core.batch import inputs, local, recipes
 from tactile_core.batch import job as jobs
 from tactile_core.batch import run as runs
 from tactile_core.errors import TactileError
@@ -33,7 +33,7 @@ def job(tmp_path_factory):
         noise = np.random.default_rng(frames).normal(0, 1, (frames, 19))
         paths.append(folder.parent / f"{name}.npz")
         np.savez(paths[-1], electrodes=np.rint(3000 + press + noise), time=np.arange(frames) / 100)
-    recipe = jobs.Recipe(["latent", "image"], "0" * 64, shard_frames=40)
+    recipe = recipes.Translate(["latent", "image"], "0" * 64, shard_frames=40)
     made = jobs.make(inputs.hashed(paths, lambda done, total: None), recipe, None)
     jobs.write(folder, made)
     with runs.opened(folder, None):

@@ -36,7 +36,7 @@ from tactile_core import (  # noqa: E402
     translate,
     weights,
 )
-from tactile_core.batch import dask_place, inputs, prepared, sealed  # noqa: E402
+from tactile_core.batch import dask_place, inputs, prepared, recipes, sealed  # noqa: E402
 from tactile_core.batch import job as jobs  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.indenters import mesh_file  # noqa: E402
@@ -132,7 +132,7 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
               "b": {"dtype": "F16", "shape": [4], "data_offsets": [16, 24]}}  # fmt: skip
     text = json.dumps(header).encode()
     safetensors = struct.pack("<Q", len(text)) + text + bytes(24)
-    job = jobs.make([jobs.Input("00000_a", "/a", "0" * 64, 1)], jobs.Recipe(["latent"], "0" * 64), None)
+    job = jobs.make([jobs.Input("00000_a", "/a", "0" * 64, 1)], recipes.Translate(["latent"], "0" * 64), None)
     (folder / "job").mkdir()
     jobs.write(folder / "job", job)
     sensor_file.write(folder / "sensor.toml", sensor_file.Sensor(sensor_file.FORMAT, "made up", [1.0] * 19, [0.0] * 19))

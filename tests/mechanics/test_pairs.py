@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
+from tactile_core.batch import parts
+from tactile_core.batch import run as runs
+from tactile_core.batch.here import Here
+from tactile_core.batch.kinds.pairs import wanted
 from tactile_core.errors import TactileError
 from tactile_core.indenters import Sphere
 from tactile_core.mechanics import pair_file
@@ -14,7 +18,7 @@ from tactile_core.mechanics.compliance import compliance_of
 from tactile_core.mechanics.corrected_press import CorrectedPress
 from tactile_core.mechanics.pair_card import card, card_path
 from tactile_core.mechanics.pair_rows import pair_row, press_rows
-from tactile_core.mechanics.pairs import make_pairs
+from tactile_core.mechanics.pairs import make_pairs, plan
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.scene import load_scene
 
@@ -66,8 +70,9 @@ def test_the_card_lies_beside_the_file(made):
 def interrupt(scene, out):
     """Start to make pairs and stop after the first block."""
 
-    def stop(done, count):
-        raise KeyboardInterrupt
+    def stop(done, known):
+        if list(out.with_name(out.name + ".parts").glob("shards/*.h5")):
+            raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         make_pairs(scene, 40, 7, out, progress=stop)
@@ -81,6 +86,38 @@ def test_two_workers_and_a_resumed_run_make_the_same_bytes(made, scene, tmp_path
     make_pairs(scene, 40, 7, resumed, workers=2)
     assert resumed.read_bytes() == made.read_bytes()
     assert not resumed.with_name("resumed.h5.parts").exists()
+
+
+def test_parts_of_an_array_make_the_same_bytes(made, scene, tmp_path):
+    """Two runners share the job of a plan, and a third puts together what they made."""
+    out = tmp_path / "pairs.h5"
+    job, _, _ = plan(scene, 40, 7, out)
+    with parts.begun(out, job) as folder:
+        pass
+    shards = []
+    for part in ((1, 2), (0, 2)):
+        with runs.opened(folder, part):
+            shards.append(runs.run(folder, job, Here(folder), part, lambda done, known: None).made)
+    assert min(shards) >= 1
+    before = len(list(folder.glob("shards/*.h5")))
+    make_pairs(scene, 40, 7, out, progress=lambda done, known: before <= known)
+    assert out.read_bytes() == made.read_bytes() and not folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("counts", "count", "expected"),
+    [
+        ({}, 40, 1), ({0: 10}, 40, 4), ({0: 10}, 400, 9), ({0: 0}, 40, 9), ({0: 30, 1: 30}, 40, 2),
+        ({1: 10, 2: 10}, 40, 4), ({0: 50}, 40, 1),
+    ],
+)  # fmt: skip
+def test_as_many_blocks_are_wanted_as_the_count_asks_for(counts, count, expected):
+    assert wanted(counts, count, "here") == expected
+
+
+def test_a_scene_that_touches_nothing_is_given_up():
+    with pytest.raises(TactileError, match="84 presses made no contact"):
+        wanted(dict.fromkeys(range(21), 0), 40, "here")
 
 
 def test_another_seed_makes_other_contacts(made, scene, tmp_path):
@@ -159,7 +196,7 @@ def test_a_block_cut_short_is_made_again(scene, made, tmp_path):
     out = tmp_path / "pairs.h5"
 
     interrupt(scene, out)
-    block = next(out.with_name("pairs.h5.parts").glob("block_*.npz"))
+    block = next(out.with_name("pairs.h5.parts").glob("shards/*.h5"))
     block.write_bytes(block.read_bytes()[:1000])
     make_pairs(scene, 40, 7, out)
     assert out.read_bytes() == made.read_bytes()

@@ -1,0 +1,63 @@
+"""Recordings to translated frames: the signals of each are prepared once, then its shards are made of them."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import TactileError
+from ...frame_pass import Tools
+from .. import job as jobs
+from .. import prepared, shard
+from ..inputs import unit_hash
+from . import Seen
+
+if TYPE_CHECKING:
+    from ..job import Job
+
+GROWS = False
+
+
+def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+    """Prepare a recording."""
+    frames, made = prepared.make(folder, job, index)
+    return shard.count(frames, job), made
+
+
+def make(folder: Path, job: Job, index: int, number: int) -> bool:
+    """Translate some frames."""
+    recipe = job.recipe
+    unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant)
+    return shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit))
+
+
+def seen(folder: Path, job: Job, index: int) -> Seen | None:
+    """Shards, frames and warnings of a prepared recording."""
+    file = jobs.prepared_file(folder, job.inputs[index].name)
+    if not file.exists():
+        return None
+    about = prepared.Prepared(file).about()
+    return Seen(shard.count(about["frames"], job), about["frames"], tuple(about["warnings"]))
+
+
+@functools.lru_cache(maxsize=2)
+def _tools(
+    weights: str | None, sha256: str, calibration: str | None, unit_sha256: str, preset: str, variant: str
+) -> Tools:
+    """The networks and the unit, once a process. Raises TactileError where they are not those of the job."""
+    from ...convert import load_tools
+
+    check_unit(calibration, unit_sha256)
+    tools = load_tools(weights, calibration, preset, variant or None)
+    if tools.sha256 != sha256:
+        found, advice = f"sha256 {tools.sha256[:12]}...", "Use the weights that the job was made with"
+        raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)
+    return tools
+
+
+def check_unit(calibration: str | None, sha256: str) -> None:
+    """Raises TactileError for a calibration that is not the one the job was made with."""
+    if calibration is not None and unit_hash(Path(calibration)) != sha256:
+        advice = "Use the calibration that the job was made with"
+        raise TactileError(calibration, "another content", f"sha256 {sha256[:12]}..., as in the job", advice)
