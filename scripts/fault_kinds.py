@@ -10,17 +10,16 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-import msgspec
 from fault_bench import MOST, SMALL_DISK, TACTILE, Bench, Lost, call, contents, start, workers_of
 
 from tactile_core.batch import job as jobs
 from tactile_core.batch import run as runs
 from tactile_core.batch import tasks
-from tactile_core.batch.tasks import Reply, Task
+from tactile_core.batch.here import Here
 
 
 def killed_workers(bench: Bench) -> Lost:
@@ -68,29 +67,6 @@ def array_runners(bench: Bench) -> Lost:
     call([*TACTILE, "--out", str(out), "--array", "0/2"])
     call([*TACTILE, "--out", str(out)])
     return bench.lost(out), blows
-
-
-class Here:
-    """Tasks in this process."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.todo = folder, []
-
-    def submit(self, task: Task) -> None:
-        """Have a task done."""
-        self.todo.append(task)
-
-    def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """One after another."""
-        while count():
-            task = self.todo.pop(0)
-            yield task, msgspec.convert(tasks.run(str(self.folder), msgspec.to_builtins(task)), Reply)
-
-    def __enter__(self) -> Here:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.todo.clear()
 
 
 def in_child(folder: Path, cut: int | None) -> bool:
