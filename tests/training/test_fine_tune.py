@@ -18,6 +18,7 @@ from tactile_core.training.labelled import read_labelled  # noqa: E402
 
 PAIRS = Path(__file__).resolve().parents[2] / "scenes" / "training" / "test_contacts.h5"
 HELD, PAUSE = 6, 4  # frames a contact is held, and without contact before it
+BALANCED = 200  # presses from here on are of box and ring alone, in a part of the pad
 MM = 1e3
 
 
@@ -25,6 +26,7 @@ MM = 1e3
 def arrays():
     """Readings of a sensor whose gains differ by 40 %, with places (mm, SynTouch's frame) and forces."""
     pairs = read_pairs(PAIRS)
+    pairs = pairs.some(np.flatnonzero(pairs.press < BALANCED))
     random = np.random.default_rng(5)
     gain = np.exp(0.4 * random.standard_normal(19))
     frame = networks.load().frames["MVB"]
