@@ -64,6 +64,7 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder of the results")
         verb.add_argument("--pictures", action="store_true", help="render every frame too")
         verb.add_argument("--preset", default="fast", help="of the pictures (default: fast)")
+        verb.add_argument("--error", default="", help="largest error to add: 50um (tier), 0.6levels (preset), or both")
         verb.add_argument("--tare", default="auto", help="of recordings: auto, none or frames A:B")
         verb.add_argument("--frames", default=":", help="of recordings: A:B:STEP")
         verb.add_argument("--seed", type=int, default=0, help="of simulated noise")
@@ -110,6 +111,7 @@ def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
     bpy.ops.tactile.import_scene(filepath=str(file.resolve()))
     _claimed(folder, options)
     bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
+    bpy.context.scene.tactile_render.error = options.error
     bpy.ops.tactile.simulate(seed=options.seed)
     _finish(folder, options, options.pictures)
 
@@ -139,7 +141,7 @@ def _fresh() -> None:
 
 def _finish(folder: Path, options: argparse.Namespace, pictures: bool) -> None:
     bpy.ops.tactile.set_up_render()
-    bpy.context.scene.tactile_render.preset = options.preset
+    bpy.context.scene.tactile_render.preset, bpy.context.scene.tactile_render.error = options.preset, options.error
     bpy.context.scene.render.filepath = "//images/"
     bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
     if pictures:
@@ -149,7 +151,7 @@ def _finish(folder: Path, options: argparse.Namespace, pictures: bool) -> None:
 def _pictures(folder: Path, options: argparse.Namespace) -> None:
     scene = bpy.context.scene
     bpy.ops.tactile.set_up_render()
-    scene.tactile_render.preset = options.preset
+    scene.tactile_render.preset, scene.tactile_render.error = options.preset, options.error
     scene.render.filepath = str((folder / "images").resolve()) + "/"
     bpy.ops.render.render(animation=True)
 

@@ -85,6 +85,7 @@ class TACTILE_PT_author(_Panel, bpy.types.Panel):
                 column.prop(thing.tactile, "force")
             if thing.tactile.spec:
                 column.prop(thing.tactile, "spec")
+        layout.prop(context.scene.tactile_render, "error")
         layout.operator(TACTILE_OT_simulate.bl_idname, icon="PHYSICS")
         row = layout.row(align=True)
         row.operator(TACTILE_OT_import_scene.bl_idname, text="Import Scene", icon="IMPORT")

@@ -48,13 +48,14 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         share = scene.render.resolution_percentage / 100
         width, height = (int(size * share) for size in (scene.render.resolution_x, scene.render.resolution_y))
         unit = render_settings.calibration_of(scene, (width, height))
-        self.update_stats("", f"Frame {scene.frame_current}: {scene.tactile_render.preset}")
+        preset = render_settings.preset_of(scene)
+        self.update_stats("", f"Frame {scene.frame_current}: {preset}")
         heights = height_map(digit_objects.displacement_of(gel, depsgraph), unit.camera)
         self.update_progress(0.1)
-        if scene.tactile_render.preset == "fast":
+        if preset == "fast":
             return pictures.shader_of(unit)(heights)
         reports.require("mitsuba")
-        return tracer.tracer_for(unit, scene.tactile_render.preset).draw(heights, self.test_break)
+        return tracer.tracer_for(unit, preset).draw(heights, self.test_break)
 
 
 def _told(error: Exception) -> str:

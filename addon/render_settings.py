@@ -5,7 +5,7 @@ import importlib.util
 
 import bpy
 
-from ..tactile_core import calibration_file
+from ..tactile_core import calibration_file, error_budget
 from ..tactile_core.calibration import Calibration
 
 _FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
@@ -28,6 +28,10 @@ class TactileRender(bpy.types.PropertyGroup):
         name="Calibration", description="File of one DIGIT unit (tactile calibrate); empty: the one that ships",
         subtype="FILE_PATH", options=_RELATIVE,
     )  # fmt: skip
+    error: bpy.props.StringProperty(
+        name="Error", description="Largest error that the toolkit itself may add: 50um of a simulated surface,"
+        " 0.6levels of a picture, or both with a comma. Picks tier and preset; empty: the fast tier, the preset above",
+    )  # fmt: skip
     lights: bpy.props.FloatVectorProperty(
         name="Lights", description="Strength of the red, green and blue LED, times that of the calibration", size=3,
         default=(1.0, 1.0, 1.0), min=0.01, soft_max=2.0,
@@ -36,6 +40,23 @@ class TactileRender(bpy.types.PropertyGroup):
         name="Coating", description="Share of light that the coating scatters back; negative: the calibration's."
         " Seen by the presets in which light bounces", default=-1.0, min=-1.0, max=1.0,
     )  # fmt: skip
+
+
+def budget_of(scene: bpy.types.Scene) -> error_budget.Budget:
+    """The bound that a scene's panel holds. Raises TactileError for anything else than bounds."""
+    text = scene.tactile_render.error.strip()
+    return error_budget.parse(text) if text else error_budget.Budget()
+
+
+def preset_of(scene: bpy.types.Scene) -> str:
+    """What a scene renders with: the preset, or the cheapest within its bound on pictures. Raises TactileError."""
+    levels = budget_of(scene).levels
+    if levels is None:
+        return scene.tactile_render.preset
+    from ..tactile_core.optics import presets, variant
+
+    # Their order by cost is the same with LLVM and without: Mitsuba need not be looked for in Blender's own process.
+    return presets.cheapest(levels, variant.LLVM)
 
 
 def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) -> Calibration:

@@ -82,6 +82,7 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     layout.use_property_split = True
     layout.operator(TACTILE_OT_set_up_render.bl_idname, icon="RESTRICT_RENDER_OFF")
     layout.prop(settings, "preset")
+    layout.prop(settings, "error")
     if settings.preset != "fast" and reports.missing("mitsuba"):
         layout.label(text="mitsuba is missing: see Preferences", icon="ERROR")
     layout.prop(settings, "calibration")

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..tactile_core.errors import TactileError
-from . import properties, scene_bridge, simulation_result
+from . import properties, render_settings, scene_bridge, simulation_result
 from .jobs import Job, JobFolder
 from .reports import Refused, TactileOperator, reported, require
 
@@ -41,7 +41,8 @@ class TACTILE_OT_simulate(TactileOperator):
         write_scene(self._folder.path, found.scene, found.meshes)
         if found.apexes is not None:
             np.savez(self._folder.path / "heights.npz", apex=found.apexes)
-        self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(context.scene))
+        bound = render_settings.budget_of(context.scene).um
+        self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(context.scene), um=bound)
 
     def _bake(self, context: bpy.types.Context) -> None:
         thing = context.scene.objects.get(self._thing)

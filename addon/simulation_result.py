@@ -19,6 +19,7 @@ class Result:
     """seconds (T,), force (T, 3) N; apex (T, 3) m, turn (T, 3, 3): where the indenter stood, on the DIGIT if any.
 
     moved : displacement (T, n, 3) m of each sensor that was solved, by ``"biotac"`` and ``"digit"``
+    picked : which tiers, in words, where a bound was given
     """
 
     seconds: np.ndarray
@@ -26,13 +27,15 @@ class Result:
     apex: np.ndarray
     turn: np.ndarray
     moved: dict[str, np.ndarray]
+    picked: tuple[str, ...]
 
 
 def read(folder: Path) -> Result:
     """The result in a job's folder."""
     with np.load(folder / "result.npz") as stored:
         moved = {sensor: stored[sensor] for sensor in ("biotac", "digit") if sensor in stored}
-        return Result(stored["seconds"], stored["force"], stored["apex"], stored["axes"], moved)
+        picked = tuple(str(text) for text in stored["picked"])
+        return Result(stored["seconds"], stored["force"], stored["apex"], stored["axes"], moved, picked)
 
 
 def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) -> str:
@@ -43,7 +46,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
     seconds = result.seconds - result.seconds[0]
     # The mechanics run at the sensor's 100 Hz: each frame shows the nearest of its samples.
     sample = np.abs((frames - scene.frame_start)[:, None] / rate - seconds[None, :]).argmin(axis=1)
-    told = []
+    told = [*result.picked]
     force = result.force[sample][:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
     for role, surface, moved in (
         ("BIOTAC", sensors.biotac_surface(), result.moved.get("biotac")),

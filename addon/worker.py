@@ -47,15 +47,19 @@ def say(**message: Any) -> None:
 def simulate(folder: Path, job: dict, progress: Progress) -> None:
     """FOLDER/scene.toml -> recording.h5, and result.npz: its truth, and where the indenter stands on each frame.
 
-    job["keep"] : outputs, so that a sensor that is not in the scene is not solved. With heights.npz in the folder the
-    scene's forces are first found from how deep the indenter has been moved.
+    job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None.
+    With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
     """
-    from tactile_core.mechanics.recording import simulate_recording
+    from tactile_core.mechanics.recording import sensors_of, simulate_recording
+    from tactile_core.mechanics.tier_choice import choose_for_scene
 
     if (folder / "heights.npz").exists():
         _forces_from_heights(folder, progress)
-    simulate_recording(folder / "scene.toml", folder / "recording.h5", job["seed"], progress, keep=job["keep"])
-    _result(folder)
+    choices = {} if job["um"] is None else choose_for_scene(folder, sensors_of(job["keep"]), job["um"])
+    tiers = {sensor: choice.tier for sensor, choice in choices.items()}
+    scene, out = folder / "scene.toml", folder / "recording.h5"
+    simulate_recording(scene, out, job["seed"], progress, keep=job["keep"], tiers=tiers)
+    _result(folder, [choice.told(sensor) for sensor, choice in choices.items()])
 
 
 def _forces_from_heights(folder: Path, progress: Progress) -> None:
@@ -89,10 +93,10 @@ def _forces_from_heights(folder: Path, progress: Progress) -> None:
     (folder / "scene.toml").write_text(to_toml(msgspec.structs.replace(text, recording=recording)), encoding="utf-8")
 
 
-def _result(folder: Path) -> None:
-    """The truth; and apex (T, 3) m and axes (T, 3, 3) of the indenter: it has sunk until it touches the dented gel.
+def _result(folder: Path, picked: list[str]) -> None:
+    """The truth; what was picked, in words; and apex (T, 3) m and axes (T, 3, 3) of the indenter.
 
-    It stands on the DIGIT, or on the BioTac where that alone was solved.
+    It has sunk until it touches the dented gel: on the DIGIT, or on the BioTac where that alone was solved.
     """
     from tactile_core import sensors
     from tactile_core.mechanics.placement import Placement, pose_at
@@ -120,6 +124,7 @@ def _result(folder: Path) -> None:
             pose = pose.moved(float(pose.distance(indenter, nodes)[0].min()))
         apex.append(pose.apex), axes.append(pose.axes)
     arrays = {"apex": np.array(apex), "axes": np.array(axes), "seconds": seconds, "force": truth.force}
+    arrays["picked"] = np.array(picked, np.str_)
     np.savez(folder / "result.npz", **arrays, **moved)
 
 

@@ -17,6 +17,7 @@ from .frame_pass import FramePass, Tools
 from .stopwatch import Stopwatch
 
 if TYPE_CHECKING:
+    from .error_budget import Budget
     from .recordings import PrepareOptions, Recording
     from .recordings.sensor_file import Sensor
 
@@ -27,7 +28,7 @@ class Options:
 
     frames : part of it, the same for every recording; keep : words of results.KEEPABLE
     prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
-    sensor : gains and offsets to take off, as `tactile adapt` finds them
+    sensor : gains and offsets to take off, as `tactile adapt` finds them; error : the bound asked for, as written
     """
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
@@ -35,6 +36,7 @@ class Options:
     prepare: PrepareOptions | None = None
     overwrite: bool = False
     sensor: Sensor | None = None
+    error: str | None = None
 
 
 def load_tools(
@@ -60,7 +62,29 @@ def load_tools(
         from .optics.renderer import Renderer
 
         shade = Renderer(unit, preset, variant)
-    return Tools(translator, translator.card, translator.sha256, mapper, shade)
+    return Tools(translator, translator.card, translator.sha256, mapper, shade, preset)
+
+
+def within(tools: Tools, budget: Budget, keep: tuple[str, ...]) -> tuple[Tools, list[str]]:
+    """Tools that add no more than a budget to the translation, and in words what was chosen, and why.
+
+    Raises TactileError where none do.
+    """
+    from . import sampling_error
+
+    told = []
+    if budget.um is not None:
+        told.append(sampling_error.check_translation(budget.um, "height" in keep or "image" in keep))
+    if budget.levels is not None:
+        from .optics import presets
+
+        chosen = presets.fitting(budget.levels)
+        told.append(presets.told(chosen, budget.levels))
+        if chosen != presets.FAST:
+            from .optics.renderer import Renderer
+
+            tools = dataclasses.replace(tools, shade=Renderer(preset=chosen), preset=chosen)
+    return tools, told
 
 
 def parse_frames(text: str) -> slice:
@@ -90,10 +114,14 @@ def frames_text(frames: slice) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Done:
-    """A finished conversion. folder : the result; warnings : what the user should know of it."""
+    """A finished conversion. folder : the result; warnings : what the user should know of it.
+
+    left : what the translation itself leaves, in words
+    """
 
     folder: Path
     warnings: tuple[str, ...]
+    left: str
 
 
 def convert(
@@ -132,7 +160,7 @@ def convert(
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
         found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
-    return Done(Path(folder), made.warnings())
+    return Done(Path(folder), made.warnings(), made.left())
 
 
 def _silent(done: int, total: int) -> None:
@@ -149,7 +177,8 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
             "layout": recording.layout, "frames": len(recording), "simulated": recording.simulated,
             "about": recording.about,
         },
-        "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare},
+        "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
+                    "error": options.error, "preset": tools.preset},
         "frames_converted": len(made.frames),
         "prepared": made.signals.report,
         "warnings": list(made.warnings()),

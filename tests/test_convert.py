@@ -14,11 +14,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tactile_core import convert, results
+from tactile_core import cli, convert, results, sampling_error
+from tactile_core.error_budget import Budget
 from tactile_core.errors import TactileError
 from tactile_core.flags import Flag
 from tactile_core.frame_pass import CHUNK
 from tactile_core.frames_file import ALWAYS, KEPT
+from tactile_core.optics import presets, renderer
+from tactile_core.optics.variant import SCALAR, Choice
 
 FRAMES = 150  # of slide_csv: more than two chunks
 
@@ -230,3 +233,45 @@ def test_an_interrupted_run_leaves_nothing_and_a_killed_one_is_cleared_by_the_ne
     assert len(list(out.iterdir())) == 2  # its half result and its lock, both hidden
     run(slide_csv("other", frames=5))
     assert [child.name for child in out.iterdir()] == ["other"]
+
+
+@pytest.fixture
+def sampled(monkeypatch):
+    """Heights between nodes add 2 um to 20 % of the thickness, 3 um deeper; rounding 0.001 um."""
+    bins = [{"depth_share_to": 0.2, "rms_95_m": 2e-6}, {"depth_share_to": 0.6, "rms_95_m": 3e-6}]
+    monkeypatch.setattr(sampling_error, "measured", lambda: {"bins": bins, "float32_m": 1e-9})
+
+
+def test_heights_are_as_exact_as_they_are(sampled):
+    assert sampling_error.height_error(0.1) == pytest.approx(2) and sampling_error.height_error(0.9) == pytest.approx(3)
+    _, told = convert.within(fake_tools.tools(), Budget(um=3.5), ("image",))
+    assert "heights between nodes adds 3 um" in told[0]
+    with pytest.raises(TactileError, match="3 or more, which heights between nodes adds"):
+        convert.within(fake_tools.tools(), Budget(um=2.9), ("height",))
+    _, told = convert.within(fake_tools.tools(), Budget(um=0.1), ("displacement",))
+    assert "float32" in told[0]
+
+
+def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(renderer, "Renderer", lambda preset: drawn.append(preset) or str)
+    monkeypatch.setattr(presets, "choose_variant", lambda wanted: Choice(SCALAR, ""))
+    tools, told = convert.within(fake_tools.tools(), Budget(levels=5), ("image",))
+    assert (tools.preset, drawn) == ("fast", []) and "fast" in told[0]
+    exact = presets.measured()["presets"]["quality"]["error"]
+    tools, told = convert.within(fake_tools.tools(), Budget(levels=exact), ("image",))
+    assert (tools.preset, tools.shade, drawn) == ("quality", str, ["quality"]) and "quality" in told[0]
+
+
+def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    line = ["convert", str(slide_csv()), "--out", str(tmp_path / "out"), "--error"]
+    assert cli.main([*line, "5levels"]) == 0
+    err = capsys.readouterr().err
+    # fake_tools: in contact beyond 5 counts, off by a fifth of the dent's depth, 1 um a count.
+    assert "pictures: fast" in err and "the translation itself" in err and "0.01 mm" in err
+    note = json.loads((tmp_path / "out" / "touch" / "note.json").read_text(encoding="utf-8"))
+    assert note["options"]["error"] == "5levels" and note["options"]["preset"] == "fast"
+    for bound, words in (("1e-6levels", "reference has"), ("1e-9um", "or more"), ("much", "5um,0.6levels")):
+        assert cli.main([*line, bound, "--overwrite"]) == 2
+        assert words in capsys.readouterr().err

@@ -90,19 +90,57 @@ class Arrays(NamedTuple):
 @functools.cache
 def biotac_compliance() -> Compliance:
     """The BioTac's skin over incompressible fluid; built in about a minute, then read from the cache."""
-    return _cached("biotac", sensors.biotac_surface(), _touchable_skin(), skin_mesh(), sensors.BIOTAC_SKIN)
+    return _cached(_solid("biotac"))
 
 
 @functools.cache
 def digit_compliance() -> Compliance:
     """The DIGIT's gel; built in about a minute, then read from the cache."""
-    lattice = sensors.digit_surface()
-    return _cached("digit", lattice, np.arange(len(lattice.rest)), gel_mesh(), sensors.DIGIT_GEL)
+    return _cached(_solid("digit"))
 
 
 def compliance_of(sensor: str) -> Compliance:
     """That of ``"biotac"`` or ``"digit"``."""
     return biotac_compliance() if sensor == "biotac" else digit_compliance()
+
+
+class _Solid(NamedTuple):
+    """What a compliance is made of; touchable : (m,) surface nodes."""
+
+    name: str
+    lattice: Lattice
+    touchable: np.ndarray
+    mesh: HexMesh
+    material: Material
+
+
+def _solid(sensor: str) -> _Solid:
+    if sensor == "biotac":
+        return _Solid(sensor, sensors.biotac_surface(), _touchable_skin(), skin_mesh(), sensors.BIOTAC_SKIN)
+    lattice = sensors.digit_surface()
+    return _Solid(sensor, lattice, np.arange(len(lattice.rest)), gel_mesh(), sensors.DIGIT_GEL)
+
+
+class Stored(NamedTuple):
+    """Where a sensor's matrices are kept, or will be: bytes on disk, 0 before they are built.
+
+    surface, touchable, volume : how many nodes the surface has, can be touched, and the solid has
+    """
+
+    folder: pathlib.Path
+    bytes: int
+    surface: int
+    touchable: int
+    volume: int
+
+
+def stored(sensor: str) -> Stored:
+    """Of ``"biotac"`` or ``"digit"``; builds and loads nothing."""
+    solid = _solid(sensor)
+    folder = _folder(solid)
+    files = [folder / f"{array}.npy" for array in Arrays._fields]
+    size = sum(file.stat().st_size for file in files) if all(file.is_file() for file in files) else 0
+    return Stored(folder, size, len(solid.lattice.rest), len(solid.touchable), len(solid.mesh.nodes))
 
 
 def _touchable_skin() -> np.ndarray:
@@ -121,14 +159,21 @@ def cache_folder() -> pathlib.Path:
     return (pathlib.Path(base) if base else pathlib.Path.home() / ".cache") / "tactile"
 
 
-def _cached(name: str, lattice: Lattice, touchable: np.ndarray, mesh: HexMesh, material: Material) -> Compliance:
+def _folder(solid: _Solid) -> pathlib.Path:
+    """Named by all that decides the arrays."""
+    name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
     watched = _watched(mesh)
     # Rounded, and without a minus before zero, which differ between versions of numpy and scipy.
     places = watched.rows, watched.columns, *(np.round(each * 1e9) + 0.0 for each in (watched.weights, watched.gap))
     for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, *places):
         digest.update(np.ascontiguousarray(array).tobytes())
-    folder = cache_folder() / f"compliance-{name}-{digest.hexdigest()[:16]}"
+    return cache_folder() / f"compliance-{name}-{digest.hexdigest()[:16]}"
+
+
+def _cached(solid: _Solid) -> Compliance:
+    name, lattice, touchable, mesh, material = solid
+    folder = _folder(solid)
     try:
         loaded = _load(folder)
     except (OSError, ValueError):  # not built yet, or cut short

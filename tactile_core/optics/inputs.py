@@ -50,14 +50,21 @@ class Frames:
                 yield self.displacement[row] * self.scale
 
 
-def read_frames(path: str | os.PathLike, progress: Progress = nullcontext) -> Frames:
+def is_scene(path: Path) -> bool:
+    """Whether an input is a scene, which is simulated first."""
+    return path.is_dir() or path.suffix == ".toml"
+
+
+def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier: str = "fast") -> Frames:
     """What is in a file or folder; a scene is simulated, under `progress`, which yields a callback (done, in all).
+
+    tier : of a scene's contacts
 
     Raises TactileError for anything else, or what cannot be read.
     """
     path = Path(path)
-    if path.is_dir() or path.suffix == ".toml":
-        return _of_scene(path, progress)
+    if is_scene(path):
+        return _of_scene(path, progress, tier)
     if not path.is_file():
         raise TactileError(path, "there is no such file", EXPECTED)
     if path.suffix == ".npz":
@@ -111,10 +118,11 @@ def _of_npz(path: Path) -> Frames:
     return Frames("height map", np.arange(len(heights)), heights=heights)
 
 
-def _of_scene(path: Path, progress: Progress) -> Frames:
+def _of_scene(path: Path, progress: Progress, tier: str) -> Frames:
     from ..mechanics.recording import simulate_recording
 
     with tempfile.TemporaryDirectory() as folder, progress() as shown:
         simulated = Path(folder) / "scene.h5"
-        simulate_recording(path, simulated, progress=shown, keep=("displacement_digit",))
+        tiers = {"digit": tier}
+        simulate_recording(path, simulated, progress=shown, keep=("displacement_digit",), tiers=tiers)
         return dataclasses.replace(_of_hdf5(simulated), kind="scene")

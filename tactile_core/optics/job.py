@@ -23,14 +23,14 @@ from ..calibration import Calibration
 from ..calibration_file import SHIPPED, load_calibration
 from ..camera import COLOURS
 from ..convert import frames_text, select
+from ..error_budget import Budget
 from ..errors import TactileError
 from ..height_map import digit_mapper
 from ..png_file import write_png
 from ..stopwatch import Stopwatch
-from .inputs import read_frames
-from .presets import DEFAULT, FAST, PRESETS, cheapest, measured
+from .inputs import is_scene, read_frames
+from .presets import DEFAULT, FAST, PRESETS, fitting, measured, told
 from .renderer import Renderer
-from .variant import SCALAR, choose_variant
 
 EXR, EXR_NAME, REST = "exr", "{:05d}.exr", "rest.exr"
 UNITS = (
@@ -41,18 +41,22 @@ UNITS = (
 Progress = Callable[[int, int], None]
 
 
+def _silent(text: str) -> None:
+    """For callers that do not ask what was picked."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Options:
     """How to render.
 
-    preset : its name, None to choose by error; error : grey levels rms that will do, None for the default preset
+    preset : its name, None to choose by error; error : what will do, None for the default preset and the fast tier
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
     frames : part of the input; exr : whether to write OpenEXR too; variant : None for the faster one
     noise : whether PNG pictures have the camera's noise, the same in every run
     """
 
     preset: str | None = None
-    error: float | None = None
+    error: Budget | None = None
     calibration: str | os.PathLike | None = None
     size: tuple[int, int] | None = None
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
@@ -62,18 +66,28 @@ class Options:
     overwrite: bool = False
 
 
-def render(path: str | os.PathLike, out: str | os.PathLike, options: Options, progress: Callable[[str], Any]) -> Path:
+def render(
+    path: str | os.PathLike,
+    out: str | os.PathLike,
+    options: Options,
+    progress: Callable[[str], Any],
+    say: Callable[[str], None] = _silent,
+) -> Path:
     """Render an input into the folder `out`, which appears whole or not at all; returns it.
 
-    progress : given a word, a context that yields a callback (done, in all)
+    progress : given a word, a context that yields a callback (done, in all); say : told what was picked, and why
     Raises TactileError for a bad input, calibration or option, and a disk that cannot be written.
     """
     clock = Stopwatch()
     out = Path(out)
     load_calibration(options.calibration)
     preset = claimed(out, options)
+    bound = options.error or Budget()
+    if bound.levels is not None:
+        say(told(preset, bound.levels))
+    tier = "fast" if bound.um is None else _tier(Path(path), bound.um, say)
     with clock.stage("read"):
-        frames = read_frames(path, lambda: progress("simulate"))
+        frames = read_frames(path, lambda: progress("simulate"), tier)
     shape = None if frames.heights is None else frames.heights.shape[1:]
     rows = select(options.frames, len(frames.numbers))
     with clock.stage("prepare"):
@@ -88,6 +102,8 @@ def render(path: str | os.PathLike, out: str | os.PathLike, options: Options, pr
                 made.write_frame(folder, int(frames.numbers[row]), values)
                 shown(done, len(rows))
             note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
+            if bound.um is not None and is_scene(Path(path)):
+                note["input"]["tier"] = tier
             atomic.write_json(folder / results.NOTE, note)
             timings = {"ms_a_frame": clock.per_frame(len(rows)), "frames": len(rows), "machine": results.machine()}
             atomic.write_json(folder / results.TIMINGS, timings)
@@ -110,15 +126,29 @@ def choose_preset(options: Options) -> str:
 
     Raises TactileError for both, or an error that no preset has.
     """
-    if options.preset is not None and options.error is not None:
+    levels = None if options.error is None else options.error.levels
+    if options.preset is not None and levels is not None:
         raise TactileError("--error", "given with --preset", "one of the two")
-    if options.error is None:
-        return options.preset or DEFAULT
-    try:
-        variant = choose_variant(options.variant).name
-    except ModuleNotFoundError:
-        variant = SCALAR
-    return cheapest(options.error, variant)
+    return options.preset or DEFAULT if levels is None else fitting(levels, options.variant)
+
+
+def _tier(path: Path, um: float, say: Callable[[str], None]) -> str:
+    """Of contact, for a scene; of other inputs it is told what the height map adds. Raises TactileError."""
+    from .. import sampling_error
+
+    if not is_scene(path):
+        say(sampling_error.check_translation(um, pictured=True))
+        return "fast"
+    from ..mechanics import tier_choice
+
+    share = tier_choice.choose_for_scene(path, ("digit",), None)["digit"].share
+    sampled = sampling_error.height_error(share)
+    if um <= sampled:
+        expected = f"more than {sampled:.3g}, which heights between nodes add alone"
+        raise TactileError("--error", f"{um:g} um", expected, "Allow more")
+    choice = tier_choice.choose("digit", share, um - sampled)
+    say(f"{choice.told('digit')}; heights between nodes add {sampled:.2g} um")
+    return choice.tier
 
 
 def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:

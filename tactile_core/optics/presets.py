@@ -8,9 +8,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from .. import error_budget
+from ..error_budget import Candidate
 from ..errors import TactileError
 from .gel_mesh import SPACING
 from .interreflection import Gather
+from .variant import SCALAR, choose_variant
 
 TABLE = Path(__file__).parent.parent / "data" / "optics_presets.json"
 
@@ -68,12 +71,25 @@ def cheapest(error: float, variant: str) -> str:
     Raises TactileError where none is.
     """
     table = measured()["presets"]
-    good = [name for name in NAMES if table[name]["error"] <= error]
-    if not good:
-        best = min(NAMES, key=lambda name: table[name]["error"])
-        found = f"{error:g} levels"
-        raise TactileError("--error", found, f"{table[best]['error']:g} or more, which {best} has", "Allow more")
-    return min(good, key=lambda name: _ms(table[name]["ms"], variant))
+    rows = [Candidate(name, table[name]["error"], _ms(table[name]["ms"], variant)) for name in NAMES]
+    return error_budget.cheapest(rows, error, "levels").name
+
+
+def fitting(error: float, variant: str | None = None) -> str:
+    """`cheapest` by the variant asked for or the one that works here; where Mitsuba is missing, as without LLVM."""
+    if measured()["presets"][FAST]["error"] <= error:
+        return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
+    try:
+        chosen = choose_variant(variant).name
+    except ModuleNotFoundError:
+        chosen = SCALAR
+    return cheapest(error, chosen)
+
+
+def told(name: str, error: float) -> str:
+    """Why a preset was picked for a bound, in words."""
+    found = measured()["presets"][name]
+    return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"
 
 
 def _ms(ms: dict[str, float], variant: str) -> float:

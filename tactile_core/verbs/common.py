@@ -40,6 +40,11 @@ def prepare_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--no-drift", action="store_true", help="do not remove drift")
 
 
+def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
+    """``--error``; what : the units that mean something here, in words."""
+    verb.add_argument("--error", metavar="BOUND", help=f"the largest error that the toolkit itself may add: {what}")
+
+
 def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
     """``--seed``; ``same`` : what the same seed makes again."""
     verb.add_argument("--seed", type=int, default=0, metavar="S", help=f"same seed, same {same} (default: 0)")

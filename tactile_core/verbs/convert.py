@@ -6,7 +6,7 @@ import argparse
 
 from ..errors import TactileError
 from ..terminal import bar, complain, say, tell
-from .common import NOTHING, prepare_arguments, prepare_words, progress_argument
+from .common import NOTHING, error_argument, prepare_arguments, prepare_words, progress_argument
 
 BRIEF = "recordings to DIGIT pictures"
 TEXT = """\
@@ -17,7 +17,11 @@ Read, tare, translate and shade recordings. Each gets the folder DIR/<file name 
   contact_sheet.png  a few frames to look at
   note.json          versions, weights, options, warnings
   timings.json       ms a frame of each stage
-One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all."""
+One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all.
+
+--error bounds what the toolkit adds to its networks' answer: levels, of a picture, picks the cheapest preset of
+`tactile render` that was measured to meet it (fast without it); um, of heights and displacements, is what is added
+anyway, or refused. What the networks themselves leave is told beside it, and is no part of it."""
 # 4 B a number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
 # noisy real one), packed height maps at 200 kB.
 SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
@@ -53,20 +57,26 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     prepare_arguments(verb)
     verb.add_argument("--sensor", metavar="FILE", help="gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+    error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
     progress_argument(verb)
 
 
 def run(options: argparse.Namespace) -> int:
     """Convert; one bad recording does not stop the others."""
-    from .. import convert, results
+    from .. import convert, error_budget, results
     from ..recordings import PrepareOptions, sensor_file
 
     prepare = PrepareOptions(**prepare_words(options))
     keep, frames = results.parse_keep(options.keep), convert.parse_frames(options.frames)
     sensor = None if options.sensor is None else sensor_file.read(options.sensor)
-    job = convert.Options(frames=frames, keep=keep, prepare=prepare, overwrite=options.overwrite, sensor=sensor)
+    budget = None if options.error is None else error_budget.parse(options.error)
+    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, options.error)
     folders = results.result_folders(options.recordings, options.out, options.overwrite)
     tools = convert.load_tools(options.weights)
+    if budget is not None:
+        tools, why = convert.within(tools, budget, keep)
+        for line in why:
+            say(line)
     failed = 0
     for path, folder in zip(options.recordings, folders, strict=True):
         try:
@@ -78,6 +88,8 @@ def run(options: argparse.Namespace) -> int:
             continue
         for warning in done.warnings:
             say(f"warning: {folder.name}: {warning}")
+        if budget is not None:
+            say(f"{folder.name}: {done.left}")
         tell(str(done.folder))
     if failed and len(folders) > 1:
         complain(f"{failed} of {len(folders)} recordings were not converted")

@@ -7,9 +7,9 @@ import re
 from typing import TYPE_CHECKING
 
 from ..errors import TactileError
-from ..terminal import bar, tell
+from ..terminal import bar, say, tell
 from . import engine
-from .common import NOTHING, PRESETS, progress_argument
+from .common import NOTHING, PRESETS, error_argument, progress_argument
 
 if TYPE_CHECKING:
     from ..optics.job import Options
@@ -33,13 +33,17 @@ Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (pi
   quality    and the light of one bounce           reference  everything, seconds a frame
 A picture is the same with LLVM and without it, but for rounding; `tactile doctor` says which runs here.
 
+--error 0.6levels picks the cheapest preset whose measured error, rms from the full model of the same gel, is at most
+that; --error 50um, for a scene, the tier of contact as `tactile simulate` does. It says what it picked, and why.
+
 With --workers, --cluster or --plan frames are rendered in other processes, by the same bytes. They wait in OUT.parts
 until all are there, and the same command goes on after any interruption; no timings.json is written."""
 EPILOG = """\
 examples:
   tactile render results/touch/frames.h5 --out pictures --frames 100:200
   tactile render scenes/press_roll_slide --out pictures --preset quality --exr
-  tactile render heights.npz --out pictures --error 0.5 --calibration unit.toml"""
+  tactile render heights.npz --out pictures --error 0.5levels --calibration unit.toml
+  tactile render scenes/press --out pictures --error 50um,0.6levels"""
 LEAVES = NOTHING
 
 
@@ -48,12 +52,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="INPUT")
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
     verb.add_argument("--preset", choices=PRESETS, help="how exactly (default: standard)")
-    verb.add_argument(
-        "--error",
-        type=float,
-        metavar="LEVELS",
-        help="instead: the cheapest preset whose measured error, grey levels rms from the full model, is at most that",
-    )
+    error_argument(verb, "levels of the picture (picks the preset), um of the gel (picks a scene's tier), or both")
     verb.add_argument("--calibration", metavar="UNIT.toml", help="of your sensor (default: the one that ships)")
     verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="only these, counted from 0 as in Python")
     verb.add_argument("--size", metavar="WxH", help="pixels, such as 480x640 (default: the calibration's)")
@@ -67,17 +66,15 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Render."""
-    if options.error is not None and not options.error > 0:
-        raise TactileError("--error", f"{options.error:g}", "grey levels above 0")
     engine.check_counts(options, "workers", "restart")
     size = _size(options.size)
-    from .. import convert
+    from .. import convert, error_budget
     from ..optics import job, variant
 
     wanted = {None: None, "llvm": variant.LLVM, "scalar": variant.SCALAR}[options.variant]
     asked = job.Options(
         preset=options.preset,
-        error=options.error,
+        error=None if options.error is None else error_budget.parse(options.error),
         calibration=options.calibration,
         size=size,
         frames=convert.parse_frames(options.frames),
@@ -87,8 +84,10 @@ def run(options: argparse.Namespace) -> int:
         overwrite=options.overwrite,
     )
     if options.plan or options.workers or options.cluster:
+        if asked.error is not None:
+            asked.error.only("levels", "Simulate the scene first, with --error, and render that")
         return _run_in_parts(options, asked)
-    done = job.render(options.input, options.out, asked, lambda word: bar(word, "frame", options.progress))
+    done = job.render(options.input, options.out, asked, lambda word: bar(word, "frame", options.progress), say)
     tell(str(done))
     return 0
 

@@ -7,12 +7,15 @@ import argparse
 from ..errors import TactileError
 from ..terminal import bar, say, tell
 from . import engine
-from .common import NOTHING, check_seed, progress_argument, seed_argument
+from .common import NOTHING, check_seed, error_argument, progress_argument, seed_argument
 
 BRIEF = "simulate a recording"
 TEXT = """\
 Simulate the recording that a scene describes, marked so and with its true meshes. A sensor that nothing of --keep
 needs is not solved: electrodes and displacement_biotac need the BioTac, displacement_digit the DIGIT.
+
+--error 50um picks for each sensor the cheapest tier of contact whose measured error (rms of the surface; 95 of 100
+contacts stay below), to the depth that the scene reaches, is at most that, and says which; fast without it.
 
 With --isaac-like the scene's motion presses a BioTac skin of your own, as Isaac Gym computed it: linear tetrahedra,
 E 1.552 MPa, nu 0.316, no fluid, hence no electrodes, and no friction. Ten frames a second of displacement, force and
@@ -24,6 +27,7 @@ EPILOG = """\
 examples:
   tactile simulate scenes/press_roll_slide/scene.toml --seed 1 --out press_roll_slide.h5
   tactile simulate scenes/press --keep electrodes --out press.h5          the BioTac alone
+  tactile simulate scenes/press --error 50um --out press.h5
   tactile simulate scenes/press_roll_slide --isaac-like skin.tet --core core.obj --out isaac.h5
   tactile simulate scenes/press_roll_slide --grid force_n=0.2:1:5 --grid recording.tilt_deg=0,10 --out many"""
 LEAVES = NOTHING
@@ -39,6 +43,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         metavar="WORDS",
         help="what the file holds, out of electrodes,displacement_biotac,displacement_digit (default: all)",
     )
+    error_argument(verb, "um of the surface, such as 50um")
     verb.add_argument(
         "--isaac-like",
         metavar="FILE.tet",
@@ -74,8 +79,10 @@ def run(options: argparse.Namespace) -> int:
             raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
     if options.core and not options.isaac_like:
         raise TactileError("--core", options.core, "--isaac-like FILE.tet beside it", "Our own skin has its core")
-    if options.keep is not None and options.isaac_like:
-        raise TactileError("--keep", options.keep, "no --isaac-like beside it, whose file has no electrodes")
+    for name in ("keep", "error"):
+        if getattr(options, name) is not None and options.isaac_like:
+            raise TactileError(f"--{name}", getattr(options, name), "no --isaac-like beside it, which has its own way")
+    bound = None if options.error is None else _bound(options.error)
     with bar("simulate", "frame", options.progress) as shown:
         if options.isaac_like:
             from ..mechanics.isaac_recording import simulate_isaac_like
@@ -87,16 +94,35 @@ def run(options: argparse.Namespace) -> int:
             from ..mechanics.recording import ALL, parse_keep, simulate_recording
 
             keep = ALL if options.keep is None else parse_keep(options.keep)
-            simulate_recording(options.scene, options.out, options.seed, shown, keep=keep)
+            tiers = {} if bound is None else _tiers(options.scene, keep, bound)
+            simulate_recording(options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers)
     tell(options.out)
     return 0
+
+
+def _bound(text: str) -> float:
+    from .. import error_budget
+
+    return error_budget.parse(text).only("um", "Pictures are drawn by `tactile render`")
+
+
+def _tiers(scene: str, keep: tuple[str, ...], bound: float) -> dict[str, str]:
+    """The cheapest within the bound, um, and why."""
+    from ..mechanics.recording import sensors_of
+    from ..mechanics.tier_choice import choose_for_scene
+
+    found = choose_for_scene(scene, sensors_of(keep), bound)
+    for sensor, choice in found.items():
+        say(choice.told(sensor))
+    return {sensor: choice.tier for sensor, choice in found.items()}
 
 
 def _run_grid(options: argparse.Namespace) -> int:
     """Simulate many."""
     engine.check_counts(options, "workers", "restart")
-    if options.isaac_like:
-        raise TactileError("--grid", "given with --isaac-like", "one of the two")
+    for name in ("isaac_like", "error"):
+        if getattr(options, name):
+            raise TactileError("--grid", f"given with --{name.replace('_', '-')}", "one of the two")
     from ..batch import parts
     from ..mechanics import recording_grid
     from ..mechanics.recording import ALL, parse_keep

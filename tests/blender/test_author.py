@@ -270,3 +270,44 @@ def test_a_cancelled_worker_is_gone(part, tmp_path):
     job = jobs.Job("simulate", tmp_path, seed=0)
     job.cancel()
     assert job._process.poll() is not None
+
+
+def test_a_digit_alone_is_simulated_without_a_biotac(scene, part, nodes_of):
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    assert part("addon.simulate")._outputs(scene) == ["displacement_digit"]
+    _press(scene)
+    assert bpy.ops.tactile.simulate() == {"FINISHED"}
+    scene.frame_set(3)
+    gel = scene.objects["DIGIT gel"]
+    rest = part("addon.axes").to_blender(part("tactile_core.sensors").digit_surface().rest, 1000)
+    # 0.1 N of a 7 mm ball dents the gel by 0.1 mm; the force points into it.
+    assert 0.02 < np.abs(nodes_of(gel) - rest).max() < 0.5 and gel["force"][2] == pytest.approx(-0.1, rel=0.05)
+
+
+def test_a_biotac_alone_is_simulated_without_a_digit(scene, part):
+    bpy.ops.tactile.add_sensor(sensor="BIOTAC")
+    assert part("addon.simulate")._outputs(scene) == ["electrodes", "displacement_biotac"]
+    _press(scene)
+    assert bpy.ops.tactile.simulate() == {"FINISHED"}
+    scene.frame_set(3)
+    assert np.linalg.norm(scene.objects["BioTac skin"]["force"]) == pytest.approx(0.1, rel=0.05)
+
+
+def test_a_bound_picks_the_tiers_or_is_refused(scene):
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    _press(scene)
+    scene.tactile_render.error = "500um"  # far above any tier's error
+    assert bpy.ops.tactile.simulate() == {"FINISHED"}
+    for bound, words in (("0.001um", "reference tier has"), ("much", "5um,0.6levels")):
+        scene.tactile_render.error = bound
+        with pytest.raises(RuntimeError, match=words):
+            bpy.ops.tactile.simulate()
+
+
+def _press(scene):
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
+    ball = bpy.context.object
+    ball.tactile.press_by = "FORCE"
+    scene.render.fps, scene.frame_start, scene.frame_end = 100, 1, 3
+    for frame, force in ((1, 0.0), (3, 0.1)):
+        _key(ball, frame, force=force)

@@ -198,3 +198,17 @@ def test_live_picture_and_render_are_of_the_same_unit(ready, part):
     ready.tactile_render.lights = (0.2, 1, 1)
     after = part("addon.pictures").fast_picture(ready, displacement)[0].astype(float)
     assert np.abs(after - before)[..., 0].max() > 20
+
+
+def test_a_bound_on_pictures_picks_the_preset(ready, part):
+    settings, scene = part("addon.render_settings"), bpy.context.scene
+    table = part("tactile_core.optics.presets").measured()["presets"]
+    scene.tactile_render.preset = "standard"
+    assert settings.preset_of(scene) == "standard"
+    for preset in ("fast", "reference"):
+        bound = f"9um,{table[preset]['error']}levels"
+        scene.tactile_render.error = bound
+        assert settings.preset_of(scene) == preset
+    scene.tactile_render.error = "1e-9levels"
+    with pytest.raises(part("tactile_core.errors").TactileError, match="reference has"):
+        settings.preset_of(scene)

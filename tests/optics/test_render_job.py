@@ -86,13 +86,13 @@ def test_a_scene_is_simulated_first(render, tmp_path, monkeypatch):
 
     asked = []
 
-    def simulated(scene, out, progress, keep):
-        asked.append((Path(scene), keep))
+    def simulated(scene, out, progress, keep, tiers):
+        asked.append((Path(scene), keep, tiers))
         shutil.copy(RECORDING, out)
 
     monkeypatch.setattr(recording, "simulate_recording", simulated)
     assert render(SCENES / "press_roll_slide", "--frames", "300:301")[0] == 0
-    assert asked == [(SCENES / "press_roll_slide", ("displacement_digit",))]
+    assert asked == [(SCENES / "press_roll_slide", ("displacement_digit",), {"digit": "fast"})]
     note = json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))
     assert note["input"]["kind"] == "scene" and note["input"]["file"] == "scene.toml"
 
@@ -154,7 +154,7 @@ def test_mitsuba_draws_where_it_is(render, heights, tmp_path, any_variant):
 
 
 def test_an_error_chooses_the_preset(render, heights, tmp_path):
-    assert render(heights, "--error", "50")[0] == 0
+    assert render(heights, "--error", "50levels")[0] == 0
     assert json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))["preset"]["name"] == "fast"
 
 
@@ -230,10 +230,10 @@ def test_a_bad_input_ends_in_one_message_and_leaves_nothing(name, write, words, 
         (["--size", "large"], "--size"),
         (["--size", "120x160"], "the height map"),
         (["--frames", "7:"], "none of the 3 frames"),
-        (["--error", "0"], "--error"),
-        (["--error", "nan"], "--error"),
-        (["--error", "1e-9"], "reference has"),
-        (["--error", "1", "--preset", "fast"], "one of the two"),
+        (["--error", "0levels"], "--error"),
+        (["--error", "0.5"], "--error"),
+        (["--error", "1e-9levels"], "reference has"),
+        (["--error", "1levels", "--preset", "fast"], "one of the two"),
         (["--calibration", "absent.toml"], "absent.toml"),
     ],
 )

@@ -1,0 +1,236 @@
+"""What a scene or a recording will build, and what that will cost, before it is run; from measured tables.
+
+A plan is rows: what is built, by which verb, how much of it, and its expected time, memory and disk. Times are of one
+thread of the machine that the tables were measured on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import os
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from . import network_sizes
+from .error_budget import Budget
+from .errors import TactileError
+
+COSTS = Path(__file__).parent / "data" / "costs.json"
+TIERS = Path(__file__).parent / "data" / "mechanics_tiers.json"
+OF_SCENE = ("electrodes", "displacement_biotac", "displacement_digit", "translation", "image")
+OF_RECORDING = ("latent", "displacement", "height", "image")
+NAMES = {"biotac": "BioTac", "digit": "DIGIT"}
+# Once, where matrices are not cached: measured on one busy core; `docs/simulate.md` states the sizes too.
+BUILD_S, BUILD_MB, MATRICES_MB = 60.0, 2000.0, {"biotac": 270.0, "digit": 145.0}
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """One thing that is built. verb : which builds it; told : how much of it; seconds; memory, disk : MB it adds."""
+
+    what: str
+    verb: str
+    told: str
+    seconds: float = 0.0
+    memory: float = 0.0
+    disk: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """parts in the order they are built; left_out : what no output asked for needs."""
+
+    of: str
+    parts: tuple[Part, ...]
+    left_out: tuple[str, ...]
+
+    @property
+    def seconds(self) -> float:
+        """In all."""
+        return sum(part.seconds for part in self.parts)
+
+    @property
+    def memory(self) -> float:
+        """MB of the hungriest verb, as they run one after another."""
+        verbs = {part.verb for part in self.parts}
+        return max(sum(part.memory for part in self.parts if part.verb == verb) for verb in verbs)
+
+    @property
+    def disk(self) -> float:
+        """MB in all."""
+        return sum(part.disk for part in self.parts)
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it, fit for JSON."""
+        whole = {"of": self.of, "parts": [dataclasses.asdict(part) for part in self.parts]}
+        totals = {"seconds": self.seconds, "memory_mb": self.memory, "disk_mb": self.disk}
+        return whole | {"left_out": list(self.left_out)} | {key: round(value, 3) for key, value in totals.items()}
+
+    def lines(self) -> list[str]:
+        """All of it, to read."""
+        found = [self.of, f"{'verb':9}{'what':22}{'s':>9}{'MB':>7}{'disk MB':>9}  of"]
+        for part in self.parts:
+            numbers = f"{part.seconds:9.2f}{part.memory:7.0f}{part.disk:9.1f}"
+            found.append(f"{part.verb:9}{part.what:22}{numbers}  {part.told}")
+        found.append(f"in all about {self.seconds:.3g} s, {self.memory:.0f} MB of memory, {self.disk:.3g} MB on disk")
+        return [*found, f"not built: {', '.join(self.left_out) or 'nothing'}"]
+
+
+@functools.cache
+def costs() -> dict[str, Any]:
+    """What ``scripts/measure_costs.py`` found."""
+    return json.loads(COSTS.read_text(encoding="utf-8"))
+
+
+def parse_words(text: str | None, known: tuple[str, ...]) -> tuple[str, ...]:
+    """``"electrodes,image"`` as known words in their order; None: all. Raises TactileError for others, or none."""
+    words = known if text is None else [word.strip() for word in text.split(",") if word.strip()]
+    for word in words:
+        if word not in known:
+            raise TactileError("--keep", repr(word), f"words out of {', '.join(known)}", "Separate them by commas")
+    if not words:
+        raise TactileError("--keep", "nothing", f"one or more of {', '.join(known)}")
+    return tuple(word for word in known if word in words)
+
+
+def plan(path: str | os.PathLike, keep: str | None, budget: Budget, preset: str | None) -> Plan:
+    """Of a scene (a folder or a .toml) or a recording. keep : its outputs as text, None for all that there are.
+
+    Raises TactileError for what cannot be read, another word, or a bound that nothing meets.
+    """
+    path = Path(path)
+    if path.is_dir() or path.suffix == ".toml":
+        return of_scene(path, parse_words(keep, OF_SCENE), budget, preset)
+    return of_recording(path, parse_words(keep, OF_RECORDING), budget, preset)
+
+
+def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:
+    """`tactile simulate`, then `tactile convert` for a translation and `tactile render` for pictures."""
+    from .mechanics import recording, tier_choice
+    from .scene import load_scene
+
+    scene, _ = load_scene(path)
+    spec = recording.recording_of(scene, path)
+    time, _, force = recording.motion(spec)
+    frames, contacts = len(time), int((force > 0).sum())
+    needed = set(keep) & set(recording.OUTPUTS)
+    needed |= {"electrodes"} if "translation" in keep else set()
+    needed |= {"displacement_digit"} if "image" in keep else set()
+    used = recording.sensors_of(needed)
+    choices = tier_choice.choose_for_scene(path, used, budget.um)
+    start, told = _part("simulate_nothing"), f"{frames} frames, {contacts} in contact; indenter {spec.indenter}"
+    parts = [Part("start", "simulate", told, start["start"], start["mb"])]
+    for sensor in used:
+        kept = f"displacement_{sensor}" in needed
+        parts += [*_matrices(sensor), _contacts(sensor, choices[sensor], contacts, kept)]
+    if "electrodes" in needed:
+        disk = _part("simulate_electrodes")["kb"] * frames / 1e3
+        parts.append(Part("electrodes", "simulate", "19, from the film over each; noise and drift", disk=disk))
+    parts += _translation(frames, "latent", "convert") if "translation" in keep else []
+    parts += _rendered(frames, budget, preset) if "image" in keep else []
+    left = [f"{NAMES[sensor]} and its matrices" for sensor in NAMES if sensor not in used]
+    left += [] if "translation" in keep else ["networks"]
+    left += [] if "image" in keep else ["height maps, LEDs and pictures"]
+    return Plan(f"scene {scene.name}: {', '.join(keep)}", tuple(parts), tuple(left))
+
+
+def of_recording(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:
+    """`tactile convert --keep`."""
+    from . import recordings
+
+    found = recordings.read(path)
+    frames = len(found)
+    whole = _translation(frames, "displacement" if "displacement" in keep else "latent", "convert")
+    if "height" in keep:
+        whole.append(_each("height maps", "convert", "240 x 320, packed", frames, "convert_height", "convert_latent"))
+    if "image" in keep:
+        name = _preset(budget, preset or "fast")
+        extra = _preset_ms(name) - _preset_ms("fast")
+        drawn = _each("pictures", "convert", _lit(name), frames, "convert_image", "convert_latent")
+        whole.append(dataclasses.replace(drawn, seconds=drawn.seconds + extra * frames / 1e3))
+    left = [] if {"height", "image"} & set(keep) else ["height maps and pictures but those of the contact sheet"]
+    return Plan(f"recording {path.name}: {', '.join(keep)}", tuple(whole), (*left, "contact mechanics"))
+
+
+def _part(name: str) -> dict[str, float]:
+    return costs()["parts"][name]
+
+
+def _each(what: str, verb: str, told: str, frames: int, name: str, beside: str) -> Part:
+    """What one output costs a frame beyond what is done beside it anyway."""
+    own, other = _part(name), _part(beside)
+    seconds, disk = (max(own[key] - other[key], 0) * frames / 1e3 for key in ("ms", "kb"))
+    return Part(what, verb, told, seconds, max(own["mb"] - other["mb"], 0), disk)
+
+
+def _matrices(sensor: str) -> list[Part]:
+    """Surface compliance, and its building where it is not cached."""
+    from .mechanics.compliance import stored
+
+    found = stored(sensor)
+    nodes = f"{found.surface} surface nodes, {found.touchable} of them touchable; solid of {found.volume} nodes"
+    if found.bytes:
+        return [Part(f"{NAMES[sensor]} matrices", "simulate", f"{found.bytes / 1e6:.0f} MB, cached; {nodes}")]
+    told = f"to be built once in {found.folder}; {nodes}"
+    return [Part(f"{NAMES[sensor]} matrices", "simulate", told, BUILD_S, BUILD_MB, MATRICES_MB[sensor])]
+
+
+def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
+    """The solves of one sensor, in its tier."""
+    part, start = _part(f"simulate_{sensor}"), _part("simulate_nothing")
+    ms = part["ms"]
+    if choice.tier != "fast":
+        tiers = json.loads(TIERS.read_text(encoding="utf-8"))["tiers"]
+        full = costs()["full_ms"][sensor]
+        ms += full * tiers[choice.tier][sensor]["ms"] / tiers["full"][sensor]["ms"]
+    once = max(part["start"] - start["start"], 0)
+    told = f"{contacts} contacts; {choice.told(sensor)}"
+    disk = part["kb"] * contacts / 1e3 if kept else 0.0
+    seconds, memory = once + ms * contacts / 1e3, max(part["mb"] - start["mb"], 0)
+    return Part(f"{NAMES[sensor]} contacts", "simulate", told, seconds, memory, disk)
+
+
+def _translation(frames: int, keep: str, verb: str) -> list[Part]:
+    part = _part(f"convert_{keep}")
+    nets = ", ".join(("SVB", "S2MPN", "MVB", "M2MPN", "MVD", "force", "error"))
+    told = f"{frames} frames; {nets}; surfaces {' and '.join(network_sizes.SURFACES)}; contact sheet"
+    seconds = part["start"] + part["ms"] * frames / 1e3
+    return [Part("networks", verb, told, seconds, part["mb"], part["kb"] * frames / 1e3)]
+
+
+def _rendered(frames: int, budget: Budget, preset: str | None) -> list[Part]:
+    """Height maps and pictures by `tactile render`."""
+    from .optics.presets import DEFAULT
+
+    name = _preset(budget, preset or DEFAULT)
+    part = _part("render_fast")
+    seconds = part["start"] + (part["ms"] + _preset_ms(name) - _preset_ms("fast")) * frames / 1e3
+    return [Part("pictures", "render", f"{frames}; {_lit(name)}", seconds, part["mb"], part["kb"] * frames / 1e3)]
+
+
+def _preset(budget: Budget, preset: str) -> str:
+    from .optics.presets import NAMES as PRESET_NAMES
+    from .optics.presets import fitting
+
+    if preset not in PRESET_NAMES:
+        raise TactileError("--preset", repr(preset), f"one of {', '.join(PRESET_NAMES)}")
+    return preset if budget.levels is None else fitting(budget.levels)
+
+
+def _preset_ms(name: str) -> float:
+    """ms a picture by LLVM, or as it was measured at all."""
+    from .optics.presets import measured
+
+    ms = measured()["presets"][name]["ms"]
+    return ms.get("numpy", ms.get("llvm_ad_rgb", max(ms.values())))
+
+
+def _lit(name: str) -> str:
+    from .optics.presets import measured
+
+    found = measured()["presets"][name]
+    needs = "numpy alone" if name == "fast" else "Mitsuba, by LLVM where there is one"
+    return f"3 LEDs, preset {name}: {found['says']}; {found['error']:.2g} levels; {needs}; PNG by Huffman coding"
