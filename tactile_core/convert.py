@@ -28,7 +28,7 @@ class Options:
 
     frames : part of it, the same for every recording; keep : words of results.KEEPABLE
     prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
-    sensor : gains and offsets to take off, as `tactile adapt` finds them; error : the bound asked for, as written
+    sensor : gains and offsets to take off, as `tactile adapt` finds them; error : what the toolkit may add
     """
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
@@ -36,7 +36,7 @@ class Options:
     prepare: PrepareOptions | None = None
     overwrite: bool = False
     sensor: Sensor | None = None
-    error: str | None = None
+    error: Budget | None = None
 
 
 def load_tools(
@@ -65,26 +65,19 @@ def load_tools(
     return Tools(translator, translator.card, translator.sha256, mapper, shade, preset)
 
 
-def within(tools: Tools, budget: Budget, keep: tuple[str, ...]) -> tuple[Tools, list[str]]:
-    """Tools that add no more than a budget to the translation, and in words what was chosen, and why.
+def within(tools: Tools, levels: float) -> tuple[Tools, str]:
+    """Tools whose pictures are within a bound, grey levels, and in words what was chosen, and why.
 
-    Raises TactileError where none do.
+    Raises TactileError where none are.
     """
-    from . import sampling_error
+    from .optics import presets
 
-    told = []
-    if budget.um is not None:
-        told.append(sampling_error.check_translation(budget.um, "height" in keep or "image" in keep))
-    if budget.levels is not None:
-        from .optics import presets
+    chosen = presets.fitting(levels)
+    if chosen != presets.FAST:
+        from .optics.renderer import Renderer
 
-        chosen = presets.fitting(budget.levels)
-        told.append(presets.told(chosen, budget.levels))
-        if chosen != presets.FAST:
-            from .optics.renderer import Renderer
-
-            tools = dataclasses.replace(tools, shade=Renderer(preset=chosen), preset=chosen)
-    return tools, told
+        tools = dataclasses.replace(tools, shade=Renderer(preset=chosen), preset=chosen)
+    return tools, presets.told(chosen, levels)
 
 
 def parse_frames(text: str) -> slice:
@@ -116,11 +109,13 @@ def frames_text(frames: slice) -> str:
 class Done:
     """A finished conversion. folder : the result; warnings : what the user should know of it.
 
+    added : what the toolkit added to displacements or heights, in words, where a bound was given
     left : what the translation itself leaves, in words
     """
 
     folder: Path
     warnings: tuple[str, ...]
+    added: str
     left: str
 
 
@@ -151,6 +146,7 @@ def convert(
         with atomic.new_folder(folder, overwrite=options.overwrite) as partial:
             made = FramePass(recording, signals, frames, options.keep, tools, clock)
             made.write(partial, progress or _silent)
+            added = _added(options, made)
             with clock.stage("sheet"):
                 made.draw_sheet(partial / results.SHEET)
             atomic.write_json(partial / results.NOTE, note(recording, made, options, tools))
@@ -160,7 +156,16 @@ def convert(
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
         found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
-    return Done(Path(folder), made.warnings(), made.left())
+    return Done(Path(folder), made.warnings(), added, made.left())
+
+
+def _added(options: Options, made: FramePass) -> str:
+    """What the toolkit added to displacements or heights; raises TactileError where that is more than allowed."""
+    if options.error is None or options.error.um is None:
+        return ""
+    from . import sampling_error
+
+    return sampling_error.check(options.error.um, made.share if {"height", "image"} & set(options.keep) else None)
 
 
 def _silent(done: int, total: int) -> None:
@@ -178,7 +183,7 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
             "about": recording.about,
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
-                    "error": options.error, "preset": tools.preset},
+                    "error": None if options.error is None else str(options.error), "preset": tools.preset},
         "frames_converted": len(made.frames),
         "prepared": made.signals.report,
         "warnings": list(made.warnings()),

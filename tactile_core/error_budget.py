@@ -27,6 +27,11 @@ class Budget:
     um: float | None = None
     levels: float | None = None
 
+    def __str__(self) -> str:
+        """As `parse` reads it."""
+        given = {"um": self.um, "levels": self.levels}
+        return ",".join(f"{value:g}{unit}" for unit, value in given.items() if value is not None)
+
     def only(self, unit: str, why: str) -> float:
         """The bound in one unit, where the other has no meaning. Raises TactileError where it is asked for."""
         other = "levels" if unit == "um" else "um"

@@ -13,6 +13,7 @@ from . import flags, results
 from .contact_sheet import choose_frames, contact_sheet
 from .frames_file import FramesFile
 from .png_file import write_png
+from .sampling_error import depth_share
 from .stopwatch import Stopwatch
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ class FramePass:
         self.tools, self.clock = tools, clock
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._errors: list[np.ndarray] = []
+        self.share = 0.0  # the deepest move of a node so far, over the gel's thickness
         chosen = choose_frames(np.abs(signals.change[frames]).mean(axis=1))
         self.shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
 
@@ -88,7 +90,7 @@ class FramePass:
                 with self.clock.stage("hdf5"):
                     file.write(start, arrays)
                 self._count_flags(arrays["flags"])
-                self._keep_errors(arrays)
+                self._keep_measures(arrays)
                 self._remember(frames, arrays)
                 progress(start + len(frames), len(self.frames))
             file.annotate("time", start_time=self.recording.start_time)
@@ -113,9 +115,10 @@ class FramePass:
             f"such contacts, by less than {bound:.2f} mm in 95 of 100"
         )
 
-    def _keep_errors(self, arrays: dict[str, np.ndarray]) -> None:
+    def _keep_measures(self, arrays: dict[str, np.ndarray]) -> None:
         touching = np.isfinite(arrays["contact_center"][:, 0])
         self._errors.append(np.stack([arrays[name][touching] for name in LEFT]))
+        self.share = max(self.share, depth_share(arrays["displacement_digit"]))
 
     def _translate(self, frames: np.ndarray) -> dict[str, np.ndarray]:
         """All arrays of some frames, T first, by the names of frames.h5."""

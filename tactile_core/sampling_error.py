@@ -7,6 +7,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from .digit_shape import THICKNESS
 from .errors import TactileError
 
 TABLE = Path(__file__).parent / "data" / "sampling.json"
@@ -36,13 +39,18 @@ def rounding() -> float:
     return 1e6 * measured()["float32_m"]
 
 
-def check_translation(bound: float, pictured: bool) -> str:
-    """What `tactile convert` adds to its networks' answer, in words; pictured : whether there are heights or pictures.
+def check(bound: float, share: float | None) -> str:
+    """What is added to a gel, in words; share : the depth over the thickness of its heights, None without heights.
 
     Raises TactileError where that is more than the bound, um: there is nothing more exact to choose.
     """
-    added = height_error(1.0) if pictured else rounding()
-    what = "heights between nodes" if pictured else "rounding to float32"
+    added = rounding() if share is None else height_error(share)
+    what = "rounding to float32" if share is None else f"heights between nodes, {share:.0%} of the thickness deep,"
     if added > bound:
         raise TactileError("--error", f"{bound:g} um", f"{added:.3g} or more, which {what} adds", "Allow more")
-    return f"{what} adds {added:.2g} um to what the networks say, at most {bound:g} um: nothing to choose"
+    return f"{what} adds {added:.2g} um, at most {bound:g}: nothing to choose"
+
+
+def depth_share(displacement: np.ndarray) -> float:
+    """The largest move of a gel's node in displacements (..., M, 3) m, over the gel's thickness."""
+    return float(np.sqrt(np.square(displacement, dtype=np.float32).sum(-1).max(initial=0))) / THICKNESS

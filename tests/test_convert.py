@@ -244,23 +244,30 @@ def sampled(monkeypatch):
 
 def test_heights_are_as_exact_as_they_are(sampled):
     assert sampling_error.height_error(0.1) == pytest.approx(2) and sampling_error.height_error(0.9) == pytest.approx(3)
-    _, told = convert.within(fake_tools.tools(), Budget(um=3.5), ("image",))
-    assert "heights between nodes adds 3 um" in told[0]
-    with pytest.raises(TactileError, match="3 or more, which heights between nodes adds"):
-        convert.within(fake_tools.tools(), Budget(um=2.9), ("height",))
-    _, told = convert.within(fake_tools.tools(), Budget(um=0.1), ("displacement",))
-    assert "float32" in told[0]
+    assert "adds 3 um" in sampling_error.check(3.5, 0.3) and "float32" in sampling_error.check(0.1, None)
+    with pytest.raises(TactileError, match=r"3 or more, which heights between nodes, 30% of the thickness deep, adds"):
+        sampling_error.check(2.9, 0.3)
+
+
+def test_a_conversion_is_as_deep_as_its_deepest_node(sampled, run, slide_csv, tmp_path):
+    """fake_tools: 1 um a count of the mean change, 120 counts at the end, of a gel of 4 mm: 3 %."""
+    path = slide_csv()
+    run(path, error=Budget(um=2.1))
+    with pytest.raises(TactileError, match=r"2 or more, which heights between nodes, 3% of the thickness deep"):
+        run(path, out="other", error=Budget(um=1.9))
+    assert list((tmp_path / "other").iterdir()) == []
+    run(path, out="other", error=Budget(um=0.1), keep=("displacement",))
 
 
 def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
     drawn = []
     monkeypatch.setattr(renderer, "Renderer", lambda preset: drawn.append(preset) or str)
     monkeypatch.setattr(presets, "choose_variant", lambda wanted: Choice(SCALAR, ""))
-    tools, told = convert.within(fake_tools.tools(), Budget(levels=5), ("image",))
-    assert (tools.preset, drawn) == ("fast", []) and "fast" in told[0]
+    tools, told = convert.within(fake_tools.tools(), 5)
+    assert (tools.preset, drawn) == ("fast", []) and "fast" in told
     exact = presets.measured()["presets"]["quality"]["error"]
-    tools, told = convert.within(fake_tools.tools(), Budget(levels=exact), ("image",))
-    assert (tools.preset, tools.shade, drawn) == ("quality", str, ["quality"]) and "quality" in told[0]
+    tools, told = convert.within(fake_tools.tools(), exact)
+    assert (tools.preset, tools.shade, drawn) == ("quality", str, ["quality"]) and "quality" in told
 
 
 def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys):

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import atomic, results
+from .. import atomic, results, sampling_error
 from ..calibration import Calibration
 from ..calibration_file import SHIPPED, load_calibration
 from ..camera import COLOURS
@@ -85,9 +85,13 @@ def render(
     bound = options.error or Budget()
     if bound.levels is not None:
         say(told(preset, bound.levels))
-    tier = "fast" if bound.um is None else _tier(Path(path), bound.um, say)
+    scene = is_scene(Path(path))
+    tier = _tier(Path(path), bound.um, say) if scene and bound.um is not None else "fast"
     with clock.stage("read"):
         frames = read_frames(path, lambda: progress("simulate"), tier)
+    if bound.um is not None and frames.displacement is not None and not scene:
+        share = sampling_error.depth_share(frames.displacement) * frames.scale
+        say(sampling_error.check(bound.um, share))
     shape = None if frames.heights is None else frames.heights.shape[1:]
     rows = select(options.frames, len(frames.numbers))
     with clock.stage("prepare"):
@@ -102,7 +106,7 @@ def render(
                 made.write_frame(folder, int(frames.numbers[row]), values)
                 shown(done, len(rows))
             note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
-            if bound.um is not None and is_scene(Path(path)):
+            if bound.um is not None and scene:
                 note["input"]["tier"] = tier
             atomic.write_json(folder / results.NOTE, note)
             timings = {"ms_a_frame": clock.per_frame(len(rows)), "frames": len(rows), "machine": results.machine()}
@@ -133,12 +137,7 @@ def choose_preset(options: Options) -> str:
 
 
 def _tier(path: Path, um: float, say: Callable[[str], None]) -> str:
-    """Of contact, for a scene; of other inputs it is told what the height map adds. Raises TactileError."""
-    from .. import sampling_error
-
-    if not is_scene(path):
-        say(sampling_error.check_translation(um, pictured=True))
-        return "fast"
+    """Of contact, for a scene: within the bound less what its height map adds. Raises TactileError where none is."""
     from ..mechanics import tier_choice
 
     share = tier_choice.choose_for_scene(path, ("digit",), None)["digit"].share

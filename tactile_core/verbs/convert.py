@@ -70,13 +70,12 @@ def run(options: argparse.Namespace) -> int:
     keep, frames = results.parse_keep(options.keep), convert.parse_frames(options.frames)
     sensor = None if options.sensor is None else sensor_file.read(options.sensor)
     budget = None if options.error is None else error_budget.parse(options.error)
-    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, options.error)
+    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget)
     folders = results.result_folders(options.recordings, options.out, options.overwrite)
     tools = convert.load_tools(options.weights)
-    if budget is not None:
-        tools, why = convert.within(tools, budget, keep)
-        for line in why:
-            say(line)
+    if budget is not None and budget.levels is not None:
+        tools, why = convert.within(tools, budget.levels)
+        say(why)
     failed = 0
     for path, folder in zip(options.recordings, folders, strict=True):
         try:
@@ -89,7 +88,8 @@ def run(options: argparse.Namespace) -> int:
         for warning in done.warnings:
             say(f"warning: {folder.name}: {warning}")
         if budget is not None:
-            say(f"{folder.name}: {done.left}")
+            for told in filter(None, (done.added, done.left)):
+                say(f"{folder.name}: {told}")
         tell(str(done.folder))
     if failed and len(folders) > 1:
         complain(f"{failed} of {len(folders)} recordings were not converted")
