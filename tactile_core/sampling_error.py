@@ -45,10 +45,10 @@ def check(bound: float, share: float | None) -> str:
     Raises TactileError where that is more than the bound, um: there is nothing more exact to choose.
     """
     added = rounding() if share is None else height_error(share)
-    what = "rounding to float32" if share is None else f"heights between nodes, {share:.0%} of the thickness deep,"
+    what = "rounding to float32 adds" if share is None else f"heights between nodes add, {share:.0%} of the gel deep"
     if added > bound:
-        raise TactileError("--error", f"{bound:g} um", f"{added:.3g} or more, which {what} adds", "Allow more")
-    return f"{what} adds {added:.2g} um, at most {bound:g}: nothing to choose"
+        raise TactileError("--error", f"{bound:g} um", f"{added:.3g} or more, which {what}", "Allow more")
+    return f"{what}: {added:.2g} um, at most {bound:g}; there is nothing to choose"
 
 
 def depth_share(displacement: np.ndarray) -> float:

@@ -244,8 +244,8 @@ def sampled(monkeypatch):
 
 def test_heights_are_as_exact_as_they_are(sampled):
     assert sampling_error.height_error(0.1) == pytest.approx(2) and sampling_error.height_error(0.9) == pytest.approx(3)
-    assert "adds 3 um" in sampling_error.check(3.5, 0.3) and "float32" in sampling_error.check(0.1, None)
-    with pytest.raises(TactileError, match=r"3 or more, which heights between nodes, 30% of the thickness deep, adds"):
+    assert "3 um, at most 3.5" in sampling_error.check(3.5, 0.3) and "float32" in sampling_error.check(0.1, None)
+    with pytest.raises(TactileError, match=r"3 or more, which heights between nodes add, 30% of the gel deep"):
         sampling_error.check(2.9, 0.3)
 
 
@@ -253,7 +253,7 @@ def test_a_conversion_is_as_deep_as_its_deepest_node(sampled, run, slide_csv, tm
     """fake_tools: 1 um a count of the mean change, 120 counts at the end, of a gel of 4 mm: 3 %."""
     path = slide_csv()
     run(path, error=Budget(um=2.1))
-    with pytest.raises(TactileError, match=r"2 or more, which heights between nodes, 3% of the thickness deep"):
+    with pytest.raises(TactileError, match=r"2 or more, which heights between nodes add, 3% of the gel deep"):
         run(path, out="other", error=Budget(um=1.9))
     assert list((tmp_path / "other").iterdir()) == []
     run(path, out="other", error=Budget(um=0.1), keep=("displacement",))
