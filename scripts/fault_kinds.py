@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import time
 import traceback
@@ -14,7 +15,20 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from fault_bench import MOST, SMALL_DISK, TACTILE, Bench, Lost, call, contents, start, workers_of
+from fault_bench import (
+    LONG,
+    MOST,
+    SMALL_DISK,
+    TACTILE,
+    Bench,
+    Lost,
+    call,
+    contents,
+    start,
+    workers_of,
+    write_hdf5,
+    write_recording,
+)
 
 from tactile_core.batch import job as jobs
 from tactile_core.batch import run as runs
@@ -209,14 +223,74 @@ def wait_for_address(file: Path) -> str:
     raise AssertionError("the scheduler did not start")
 
 
+def small_disk(bench: Bench) -> Lost | None:
+    """A disk of 2 MB, then a larger one; None where no disk may be mounted."""
+    disk = bench.folder / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2M", "tmpfs", disk], capture_output=True).returncode:
+        return None
+    try:
+        done = call(bench.command(disk / "job"), expected=2)
+        said = "No space left" in done.stderr and len(done.stderr.splitlines()) == 1
+        half = [name for name in contents(disk / "job") if "tactile-partial" in name]
+        subprocess.run(["mount", "-o", "remount,size=256M", disk], check=True)
+        call(bench.command(disk / "job"))
+        return bench.lost(disk / "job") + len(half) + (not said), 1
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def tiny_recordings(bench: Bench) -> Lost:
+    """Very many recordings of three frames; the command is killed half-way and given again."""
+    folder, out = bench.folder / "tiny", bench.folder / "tiny_job"
+    folder.mkdir()
+    write_recording(folder / "0.csv", 3, 0)
+    for number in range(1, bench.tiny):
+        shutil.copy(folder / "0.csv", folder / f"{number}.csv")
+    return _killed_half_way(out, [*TACTILE, str(folder), "--out", str(out), "--keep", "latent"], bench.tiny)
+
+
+def long_recording(bench: Bench) -> Lost:
+    """One recording of very many frames, latents alone; the command is killed half-way and given again."""
+    out, file = bench.folder / "long_job", bench.folder / "long.h5"
+    write_hdf5(file, bench.long)
+    found = _killed_half_way(out, [*TACTILE, str(file), "--out", str(out), "--keep", "latent"], bench.long // 1000)
+    shutil.rmtree(out)
+    return found
+
+
+def _killed_half_way(out: Path, command: list[str], shards: int) -> Lost:
+    """Shards that are missing or damaged at the end, leftovers, and whether the blow struck."""
+    process = start(command)
+    while process.poll() is None and len(list(out.glob("shards/*.h5"))) < shards // 2:
+        time.sleep(0.05)
+    blows = int(process.poll() is None)
+    process.kill()
+    process.wait()
+    call(command, most=LONG)
+    call([*TACTILE, "--out", str(out), "--verify"], most=LONG)
+    files = list(out.glob("shards/*"))
+    told = json.loads((out / "manifest.json").read_text())
+    listed = sum(len(one["shards"]) for one in told["recordings"])
+    left = [file for file in out.rglob(".*") if "lock" not in file.name]
+    return abs(shards - len(files)) + abs(shards - listed) + len(told["aside"]) + len(left), blows
+
+
 FAULTS: dict[str, Callable[[Bench], Lost | None]] = {
     "worker_sigkill": killed_workers,
     "client_kill_9": killed_client,
     "two_array_runners_one_killed": array_runners,
     "power_cut_at_each_write": power_cuts,
     "disk_full": full_disk,
+    "small_disk": small_disk,
     "bit_flips": bit_flips,
     "cut_files_and_leftovers": cut_files,
     "clock_backwards": clock_backwards,
     "dask_worker_dies_another_joins": dask_worker_dies,
+    "tiny_recordings": tiny_recordings,
+    "long_recording": long_recording,
+}
+ABSENT = {  # why a fault was not tried
+    "dask_worker_dies_another_joins": "distributed is absent",
+    "small_disk": "no right to mount a disk",
 }

@@ -1,7 +1,8 @@
 """What `tactile batch` costs: frames a second against workers, overhead a shard, memory, growth with the frames.
 
     python scripts/throughput.py --quick --json FILE      1e3 and 1e4 frames
-    python scripts/throughput.py --most 1000000           up to a million frames of translation (latents alone)
+    python scripts/throughput.py --most 1000000 --pictures 20000
+                                                          up to a million frames of translation (latents alone)
 
 CPU time is that of all processes together, so that a busy machine changes it little; wall time is of this machine as
 it was. Frames a second of more workers than there are cores are not measured: `scaling` says what the overhead allows.
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import os
 import resource
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,6 +21,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from fault_bench import write_hdf5
 
 from tactile_core import atomic
 from tactile_core.batch import job as jobs
@@ -27,7 +30,8 @@ from tactile_core.rows import HEADER, Row, line, row
 
 ROOT = Path(__file__).resolve().parent.parent
 TACTILE = [sys.executable, "-m", "tactile_core", "batch"]
-PICTURES = 300  # frames that the fast picture is measured on
+PICTURES = 300  # frames that the fast picture is measured on first
+FLAT = 100_000  # frames that a worker's memory is watched over
 MANY = 64  # workers that `scaling` speaks of
 
 
@@ -36,32 +40,25 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="small counts alone")
     parser.add_argument("--most", type=int, default=100_000, metavar="N", help="frames of the longest recording")
+    parser.add_argument("--pictures", type=int, default=3000, metavar="N", help="frames of the most fast pictures")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
-    most = 10_000 if options.quick else options.most
+    most, seen = (10_000, 300) if options.quick else (options.most, options.pictures)
     print(HEADER)
     found: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
-        for part in (growth(Path(name), most), pictures(Path(name)), workers(Path(name)), memory(Path(name), most)):
+        for part in (
+            growth(Path(name), most),
+            workers(Path(name)),
+            memory(Path(name), most),
+            pictures(Path(name), seen),
+        ):
             for one in part:
                 found.append(one)
                 print(line(one), flush=True)
     if options.json:
         atomic.write_json(Path(options.json), found)
     return 0
-
-
-def write_recording(path: Path, frames: int) -> None:
-    """Presses that come and go every two seconds, in the HDF5 layout without time stamps."""
-    import h5py
-
-    random = np.random.default_rng(frames)
-    press = 100 * np.clip(np.sin(np.arange(frames) / 30), 0, 1)
-    with h5py.File(path, "w") as file:
-        data = file.create_dataset("electrode_vals/data", (frames, 19), "i2", chunks=(min(frames, 4096), 19))
-        for start in range(0, frames, 100_000):
-            part = press[start : start + 100_000, None] * np.linspace(-1, 1, 19)
-            data[start : start + len(part)] = np.rint(3000 + part + random.normal(0, 1, part.shape))
 
 
 def cost(*words: object) -> tuple[float, float, float]:
@@ -78,7 +75,7 @@ def growth(folder: Path, most: int) -> list[Row]:
     """CPU time of translation alone from a thousand frames on, and what starting costs."""
     found, frames = [], 1000
     while frames <= most:
-        write_recording(folder / "in.h5", frames)
+        write_hdf5(folder / "in.h5", frames)
         out = folder / f"grown{frames}"
         cpu, wall, peak = cost(folder / "in.h5", "--out", out, "--keep", "latent")
         of = f"{frames} frames, latents, 1 worker, {wall:.0f} s on the wall, largest process {peak:.0f} MB"
@@ -89,18 +86,23 @@ def growth(folder: Path, most: int) -> list[Row]:
     return [*found, row("batch_resume_cpu", 1e3 * cpu / shards, "ms", of=f"a shard that is there; {shards} shards")]
 
 
-def pictures(folder: Path) -> list[Row]:
-    """CPU time a frame with the fast picture."""
-    write_recording(folder / "pictures.h5", PICTURES)
-    cpu, _, _ = cost(folder / "pictures.h5", "--out", folder / "pictures", "--keep", "image")
-    none, _, _ = cost(folder / "pictures.h5", "--out", folder / "latents", "--keep", "latent")
-    each = 1e3 * (cpu - none) / PICTURES
-    return [row("batch_picture_cpu", each, "ms", of=f"a frame beyond translation; {PICTURES} frames")]
+def pictures(folder: Path, most: int) -> list[Row]:
+    """CPU time a frame with the fast picture, from 300 frames on."""
+    found, frames = [], PICTURES
+    while frames <= most:
+        write_hdf5(folder / "pictures.h5", frames)
+        out = folder / f"pictures{frames}"
+        cpu, wall, peak = cost(folder / "pictures.h5", "--out", out, "--keep", "image", "--shard-frames", PICTURES)
+        shutil.rmtree(out)
+        of = f"{frames} frames, 1 worker, {wall:.0f} s on the wall, largest process {peak:.0f} MB"
+        found.append(row("batch_picture_cpu", 1e3 * cpu / frames, "ms", of=f"a frame with its translation; {of}"))
+        frames = min(most, 10 * frames) if frames < most else most + 1
+    return found
 
 
 def workers(folder: Path) -> list[Row]:
     """Frames a second against workers, and what the client takes of it."""
-    write_recording(folder / "workers.h5", 2000)
+    write_hdf5(folder / "workers.h5", 2000)
     found = []
     for count in (1, 2):
         words = ["--keep", "displacement", "--shard-frames", "100", "--workers", str(count)]
@@ -132,7 +134,7 @@ def memory(folder: Path, most: int) -> list[Row]:
     """A worker's memory after its first shards and after its last ones, without restarts."""
     import json
 
-    out = folder / f"grown{10 ** (len(str(most)) - 1)}"
+    out = folder / f"grown{min(FLAT, 10 ** (len(str(most)) - 1))}"
     job = jobs.read(out)
     shards = sorted(out.glob("shards/*.h5"))
     for shard in shards:
