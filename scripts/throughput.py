@@ -27,6 +27,7 @@ from tactile_core import atomic
 from tactile_core.batch import job as jobs
 from tactile_core.batch import local
 from tactile_core.rows import HEADER, Row, line, row
+from tactile_core.threads import ONE
 
 ROOT = Path(__file__).resolve().parent.parent
 TACTILE = [sys.executable, "-m", "tactile_core", "batch"]
@@ -64,7 +65,7 @@ def main(arguments: list[str] | None = None) -> int:
 def cost(*words: object) -> tuple[float, float, float]:
     """CPU s, wall s and the largest process's MB of a `tactile batch`."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-    environment = {**os.environ, **dict.fromkeys(local.THREADS, "1")}
+    environment = {**os.environ, **ONE}
     subprocess.run([*TACTILE, *map(str, words)], cwd=ROOT, env=environment, check=True, stdout=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

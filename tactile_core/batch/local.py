@@ -15,11 +15,11 @@ from typing import Any
 
 import msgspec
 
+from ..threads import ONE
 from .tasks import Reply, Task
 
 RESTART = 200  # tasks after which a worker is replaced, so that what libraries leak is given back (assumed)
 KILLS = 3  # times that a task may take its worker with it
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 WORKER_COMMAND = (sys.executable, "-m", f"{__package__}.worker")
 Start = Callable[[], "subprocess.Popen[str]"]
 
@@ -34,7 +34,7 @@ class Local:
         self, folder: Path, workers: int, restart: int = RESTART, command: Sequence[str] | None = None
     ) -> None:
         self._folder, self._workers, self._restart, self._command = folder, workers, restart, command or WORKER_COMMAND
-        self._environment = {**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": _search_path()}
+        self._environment = {**os.environ, **ONE, "PYTHONPATH": _search_path()}
         self._todo: queue.SimpleQueue[Task | None] = queue.SimpleQueue()
         self._done: queue.SimpleQueue[tuple[Task, Reply] | BaseException] = queue.SimpleQueue()
         self._running: set[subprocess.Popen] = set()

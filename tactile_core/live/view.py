@@ -18,12 +18,13 @@ REMEMBERED = 1000  # latencies that figures are taken over
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """frame : its index; picture : (H, W, 3) uint8; force : N; latency : s from rows to picture"""
+    """frame : its index; picture : (H, W, 3) uint8; force : N; latency : s from rows to picture; work : s of them"""
 
     frame: int
     picture: np.ndarray
     force: float
     latency: float
+    work: float
 
 
 class View:
@@ -33,7 +34,7 @@ class View:
         """rate : Hz of the recording."""
         self._tools, self._signals = tools, LiveSignals(rate)
         self.frames, self.passed = 0, 0
-        self.latencies: deque[float] = deque(maxlen=REMEMBERED)
+        self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
     @property
     def rest_found(self) -> str:
@@ -42,6 +43,7 @@ class View:
 
     def show(self, rows: Recording, came: float) -> Shown | None:
         """The picture of the last of some rows that came at `came` (time.perf_counter); None before rest is known."""
+        began = time.thread_time()
         self.frames += len(rows)
         if not self._signals.learn(rows.electrodes):
             return None
@@ -49,15 +51,17 @@ class View:
         translation = self._tools.translate(self._signals.signals(newest(rows)[None]))
         picture = self._tools.shade(self._tools.height_map(translation.displacement_digit)[0])
         force = float(np.linalg.norm(translation.force[0]))
-        shown = Shown(self.frames - 1, picture, force, time.perf_counter() - came)
-        self.latencies.append(shown.latency)
+        latency, work = time.perf_counter() - came, time.thread_time() - began
+        shown = Shown(self.frames - 1, picture, force, latency, work)
+        self.latencies.append((latency, work))
         return shown
 
     def told(self) -> str:
         """The latencies of the last pictures in words."""
         if not self.latencies:
             return "no picture yet: waiting for a quiet part"
-        middle, late = 1e3 * np.percentile(np.array(self.latencies), [50, 99])
+        (middle, work), (late, _) = 1e3 * np.percentile(np.array(self.latencies), [50, 99], axis=0)
         return (
-            f"{middle:.1f} ms from frame to picture (99 of 100 below {late:.1f} ms), {self.passed} frames passed over"
+            f"{middle:.1f} ms from frame to picture (99 of 100 below {late:.1f} ms; {work:.1f} ms of them computing),"
+            f" {self.passed} frames passed over"
         )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from ..errors import TactileError
 from ..terminal import say, tell
+from ..threads import one_thread
 from .common import NOTHING
 
 if TYPE_CHECKING:
@@ -19,14 +21,15 @@ if TYPE_CHECKING:
 BRIEF = "live view of a recording that is being written"
 TEXT = """\
 Follow a CSV recording while another program writes it, and show the newest frame's DIGIT picture: in a window, or in
-a PNG file that is replaced with each picture. With --play a finished recording of any layout, bags too, is played at
-its own pace. Rest is taken from the first quiet part: begin without contact. The time from frame to picture is told
-each second and at the end."""
+a PNG file that is replaced with each picture. With --play or --rosbag-play a finished recording is played at its own
+pace, or --speed times as fast. Rest is taken from the first quiet part: begin without contact. The time from frame to
+picture, and how much of it was computing, is told each second and at the end."""
 EPILOG = """\
 examples:
   tactile watch touch.csv
   tactile watch touch.csv --out now.png --idle 10
-  tactile watch touch.bag --play"""
+  tactile watch touch.csv --play
+  tactile watch --rosbag-play touch.bag --speed 2"""
 LEAVES = NOTHING
 POLL = 0.002  # s between two looks at the file
 TOLD = 1.0  # s between two lines of figures
@@ -34,8 +37,15 @@ TOLD = 1.0  # s between two lines of figures
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Of this verb."""
-    verb.add_argument("recording", metavar="PATH", help="a CSV file that grows; with --play any recording")
-    verb.add_argument("--play", action="store_true", help="play a finished recording at its own pace")
+    verb.add_argument("recording", nargs="?", metavar="PATH", help="a CSV file that grows; with --play any recording")
+    verb.add_argument("--play", action="store_true", help="play a finished recording, of any layout, bags too")
+    verb.add_argument("--rosbag-play", metavar="FILE", help="play this ROS 1 or 2 bag or MCAP file (bag#2: a finger)")
+    verb.add_argument(
+        "--speed",
+        type=float,
+        metavar="X",
+        help="of playing: times the recording's own pace; 0: every frame, as fast as pictures come (default: 1)",
+    )
     verb.add_argument("--out", metavar="FILE", help="write each picture to this PNG file instead of a window")
     verb.add_argument("--idle", type=float, metavar="S", help="end when no frame came for S seconds (default: never)")
     verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the recording (default: 100)")
@@ -44,14 +54,18 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Show until the recording ends, the window is closed, or Ctrl-C."""
+    one_thread()  # before numpy is imported
     from .. import live
     from ..convert import load_tools
 
+    _check(options)
     if not 1 <= options.rate <= 1e4:
         raise TactileError("--rate", f"{options.rate:g}", "1 to 10,000 Hz")
-    source = _played(options) if options.play else _followed(options)
+    path = options.rosbag_play or options.recording
+    playing = options.play or options.rosbag_play
+    source = _played(path, 1.0 if options.speed is None else options.speed) if playing else _followed(options)
     view = live.View(load_tools(options.weights), options.rate)
-    draw = _window(options.recording) if options.out is None else _file(options.out)
+    draw = _window(path) if options.out is None else _file(options.out)
     told = time.perf_counter()
     try:
         for rows, came in source:
@@ -65,6 +79,22 @@ def run(options: argparse.Namespace) -> int:
         say(f"rest from {view.rest_found}" if view.rest_found else "rest was not found")
         tell(f"{view.frames} frames: {view.told()}")
     return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Raises TactileError for words that do not go together."""
+    if (options.recording is None) == (options.rosbag_play is None):
+        raise TactileError("tactile watch", "no recording, or two", "PATH or --rosbag-play FILE")
+    if options.speed is not None:
+        if not (options.play or options.rosbag_play):
+            raise TactileError("--speed", f"{options.speed:g}", "--play or --rosbag-play beside it")
+        if not 0 <= options.speed <= 1000:
+            raise TactileError("--speed", f"{options.speed:g}", "0 to 1000")
+    if options.rosbag_play is not None:
+        from ..recordings.readers import container_of
+
+        if container_of(options.rosbag_play) != "bag":
+            raise TactileError(options.rosbag_play, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
 
 
 def _followed(options: argparse.Namespace) -> Iterator[tuple[Recording | None, float]]:
@@ -82,23 +112,25 @@ def _followed(options: argparse.Namespace) -> Iterator[tuple[Recording | None, f
         yield rows, came
 
 
-def _played(options: argparse.Namespace) -> Iterator[tuple[Recording | None, float]]:
-    """The rows of a finished recording when their time has come."""
-    import dataclasses
+def _played(path: str, speed: float) -> Iterator[tuple[Recording | None, float]]:
+    """The rows of a finished recording when their time has come, a part of it in memory; speed 0: one after another."""
+    from ..recordings.parts import read_parts
 
-    import numpy as np
+    began = time.perf_counter()
+    for part in read_parts(path):
+        recording, done = part.recording, part.repeated
+        while done < len(recording):
+            due = done + 1 if speed == 0 else _due(recording, speed * (time.perf_counter() - began))
+            if due <= done:
+                time.sleep(POLL)
+                continue
+            yield dataclasses.replace(recording, electrodes=recording.electrodes[done:due]), time.perf_counter()
+            done = due
 
-    from .. import recordings
 
-    whole = recordings.read(options.recording)
-    began, done = time.perf_counter(), 0
-    while done < len(whole):
-        due = int(np.searchsorted(whole.time, time.perf_counter() - began, side="right"))
-        if due <= done:
-            time.sleep(POLL)
-            continue
-        yield dataclasses.replace(whole, electrodes=whole.electrodes[done:due]), time.perf_counter()
-        done = due
+def _due(recording: Recording, passed: float) -> int:
+    """Frames whose time is within `passed` s of the first."""
+    return int(recording.time.searchsorted(passed, side="right"))
 
 
 def _file(path: str) -> Callable[[np.ndarray], bool]:

@@ -1,0 +1,18 @@
+"""One thread a process: for workers beside each other, and where a frame is waited for."""
+
+from __future__ import annotations
+
+import os
+
+VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+ONE = dict.fromkeys(VARIABLES, "1")
+
+
+def one_thread() -> None:
+    """Keep numpy, if it is not imported yet, from computing in several threads, unless the user said how many.
+
+    A single frame is too small to gain by them, and on a busy machine they wait for each other while computing (a live
+    picture took four times the processor time).
+    """
+    for name, count in ONE.items():
+        os.environ.setdefault(name, count)
