@@ -11,6 +11,7 @@ import numpy as np
 from ..batch import job as jobs
 from ..batch import manifest, sealed, shard
 from ..batch.prepared import Prepared
+from ..batch.recipes import Translate
 from ..errors import TactileError
 
 BLOCK = 32  # frames in memory at a time: 7 MB of pictures, 10 MB of heights
@@ -57,6 +58,8 @@ class Finished:
 def load(folder: Path) -> Finished:
     """The job of a folder. Raises TactileError where a shard is missing or not as it was written."""
     job = jobs.read(folder)
+    if not isinstance(job.recipe, Translate):
+        raise TactileError(folder, "a job of another verb", "one of `tactile batch`", "Give the verb's command again")
     status = manifest.status(folder, job)
     unread = [one for one in job.inputs if one.name in status.aside]
     if status.there < status.shards or status.prepared + len(unread) < status.recordings or not status.there:

@@ -7,17 +7,19 @@ import argparse
 from ..terminal import bar, tell
 from .common import NOTHING, progress_argument
 
-BRIEF = "a finished batch job as NPZ, PNG or LeRobot data set"
+BRIEF = "a finished batch job as NPZ, PNG, OpenEXR or LeRobot data set"
 TEXT = """\
 Write the shards of a finished job (see `tactile batch`) as
   npz      one NPZ file a recording, all arrays
   png      a folder of pictures a recording (the job must have kept image)
+  exr      a folder of OpenEXR files a recording: heights in metres and pictures, as far as they were kept
+           (needs OpenEXR: pip install "tactile-core[render]")
   lerobot  a LeRobot v3.0 data set: one recording is one episode (needs pyarrow: pip install "tactile-core[batch]")"""
 EPILOG = """\
 example:
   tactile export job --to lerobot --out dataset"""
 LEAVES = NOTHING
-LAYOUTS = ("npz", "png", "lerobot")
+LAYOUTS = ("npz", "png", "exr", "lerobot")
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:

@@ -33,7 +33,7 @@ def job(tmp_path_factory):
         noise = np.random.default_rng(frames).normal(0, 1, (frames, 19))
         paths.append(folder.parent / f"{name}.npz")
         np.savez(paths[-1], electrodes=np.rint(3000 + press + noise), time=np.arange(frames) / 100)
-    recipe = recipes.Translate(["latent", "image"], "0" * 64, shard_frames=40)
+    recipe = recipes.Translate(["latent", "height", "image"], "0" * 64, shard_frames=40)
     made = jobs.make(inputs.hashed(paths, lambda done, total: None), recipe, None)
     jobs.write(folder, made)
     with runs.opened(folder, None):
@@ -47,7 +47,7 @@ def silent(done, total):
 
 
 def test_every_layout_has_a_test_here():
-    assert set(exporters.layouts()) == {"npz", "png", "lerobot"} == set(verb.LAYOUTS)
+    assert set(exporters.layouts()) == {"npz", "png", "exr", "lerobot"} == set(verb.LAYOUTS)
 
 
 def test_npz_holds_every_array_whole_and_the_same_bytes_each_time(job, tmp_path):
@@ -70,6 +70,21 @@ def test_png_pictures_are_those_of_the_shards(job, tmp_path):
         assert [file.name for file in files] == [f"{frame:06d}.png" for frame in range(one.frames)]
         pictures = np.concatenate([block["image"] for block in one.blocks()])
         np.testing.assert_array_equal(np.asarray(Image.open(files[-1])), pictures[-1])
+
+
+def test_exr_holds_heights_and_pictures(job, tmp_path):
+    pytest.importorskip("OpenEXR", reason="OpenEXR is absent: pip install tactile-core[render]")
+    from tactile_core.optics.exr import read_exr
+
+    source = exporters.export(job, "exr", tmp_path / "a", silent)
+    for one in source.recordings:
+        files = sorted((tmp_path / "a" / one.name).iterdir())
+        assert [file.name for file in files] == [f"{frame:06d}.exr" for frame in range(FRAMES[one.name])]
+        block = next(one.blocks())
+        planes, about = read_exr(files[30])
+        np.testing.assert_array_equal(planes["height"], block["height_map"][30])
+        np.testing.assert_array_equal(np.stack([planes[c] for c in "RGB"], -1), block["image"][30])
+        assert about["frame"] == "30" and about["recording"] == one.name
 
 
 def test_lerobot_reads_back_with_plain_pyarrow(job, tmp_path):
