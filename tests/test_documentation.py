@@ -29,6 +29,7 @@ MEASURES = "evaluate_translation.py"  # exits with 1 where a target is missed, a
 # The same command on less: what a page says, what is run here.
 LESS = [
     ("--count 50000", "--count 200"),
+    ("--count 20000", "--count 5"),
     ("tactile train pairs.h5", "tactile train pairs.h5 --effort 0.001"),
     ("tactile train s2mpn", "tactile train s2mpn --effort 0.01"),
     ("evaluate_translation.py", "evaluate_translation.py --quick"),
@@ -39,6 +40,8 @@ LESS = [
 ]
 # What needs a machine of its own -> the file that runs it, and the words it is run by.
 ELSEWHERE = {
+    "tactile simulate scenes/press_roll_slide --grid": ("tests/batch/test_batch_kinds.py", "--grid"),
+    "tactile render frames.h5": ("tests/batch/test_batch_kinds.py", "--workers"),
     "python3 scripts/dev.py demo": (".ci/run", "dev.py demo"),
     "python3 scripts/dev.py test-blender": (".ci/run", "dev.py test-blender"),
     "python3 scripts/dev.py test": (".ci/run", "dev.py test"),
