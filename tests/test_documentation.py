@@ -55,7 +55,7 @@ ELSEWHERE = {
     "DASK_DISTRIBUTED": ("tests/batch/test_batch_dask.py", "tls"),
     "OMP_NUM_THREADS=1 dask worker": ("tests/batch/test_batch_dask.py", "tls"),
     "tactile batch day1 --out /shared/job --cluster": ("tests/batch/test_batch_dask.py", "tls"),
-    "sbatch ": ("docs/batch.md", "Not tried on a real cluster"),
+    "sbatch ": ("tests/batch/test_batch_slurm.py", "sbatch"),
 }
 
 
