@@ -25,6 +25,8 @@ dual integral equations of a bonded layer) it is 0.2 % low at sqrt(R d) / h = 0.
 at 0.6 (nu = .5). The solver follows the exact solution, so the formula is asked for 1 % up to 0.15 only.
 The contact's edge falls between nodes: a force at a small depth scatters with the spacing (0.2 % at 0.1 mm), the shape
 does not.
+What each tier is off by on many contacts, by depth, is in `tactile_core/data/mechanics_tiers.json`, made by
+`scripts/measure_tiers.py`; [benchmark](benchmark.md) tells how well its bounds hold.
 """
 
 

@@ -38,12 +38,13 @@ def rows(quick: bool) -> Iterator[Row]:
 
 def _deepest(sensor: Sensor) -> tuple[FiniteStrainSolid, np.ndarray]:
     """The full tier's solid and displacement under the ball at 60 % of the sensor's thickness."""
-    found = solve(sensor, _BALL, _PLACE, depth=_DEEPEST * _thickness(sensor), tier="full")
+    found = solve(sensor, _BALL, _PLACE, depth=_DEEPEST * thickness_of(sensor), tier="full")
     solid, state = found.volume
     return solid, state.displacement
 
 
-def _thickness(sensor: Sensor) -> float:
+def thickness_of(sensor: Sensor) -> float:
+    """The thickness, m, under the ball."""
     return thickness_under(sensor, _BALL, pose_at(sensor, _BALL, _PLACE))
 
 
@@ -58,7 +59,7 @@ def _sensor(sensor: Sensor, depths: list[float], friction: float) -> Iterator[Ro
         for tier in TIERS[:-1]:
             found, took = solved[tier][k]
             where = f"{sensor}_{tier}_{depth * 1e3:.1f}mm{rubbed}"
-            yield from _compare(where, tier, found, exact, depth / _thickness(sensor))
+            yield from _compare(where, tier, found, exact, depth / thickness_of(sensor))
             if sensor == "digit":
                 yield from _normal_error(where, found, exact)
             target = TIME_TARGETS[tier, sensor] if not friction else None
