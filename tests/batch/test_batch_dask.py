@@ -6,8 +6,10 @@ import asyncio
 import shutil
 import subprocess
 import time
+from contextlib import nullcontext
 
 import fake_tools
+import numpy as np
 import pytest
 
 from tactile_core import convert
@@ -15,6 +17,8 @@ from tactile_core.batch import run as runs
 from tactile_core.batch.dask_loop import CONFIGURED, loop
 from tactile_core.batch.dask_place import Cluster, QueueFile, _read
 from tactile_core.errors import TactileError
+from tactile_core.optics.job import Options, render
+from tactile_core.optics.parts import render_in_parts
 
 distributed = pytest.importorskip("distributed", reason="distributed is absent: pip install tactile-core[batch]")
 
@@ -42,6 +46,20 @@ def test_dask_makes_the_same_bytes(new_job, do, content):
         assert run_on(other, same, cluster.scheduler_address).made == 5
         assert run_on(other, same, cluster.scheduler_address).kept == 5
     assert content(folder) == content(other)
+
+
+def test_dask_renders(tmp_path):
+    random = np.random.default_rng(1)
+    np.savez(tmp_path / "heights.npz", height_map=1e-4 * random.random((60, 8, 6)))
+    asked = Options(preset="fast")
+    one = render(tmp_path / "heights.npz", tmp_path / "one", asked, lambda word: nullcontext(lambda done, total: None))
+    with workers(protocol="tcp://") as cluster:
+        address = cluster.scheduler_address
+        other = render_in_parts(
+            tmp_path / "heights.npz", tmp_path / "dask", asked, lambda folder: Cluster(folder, address), print
+        )
+    names = [*(f"images/{frame:05d}.png" for frame in range(60)), "note.json"]
+    assert [(one / name).read_bytes() for name in names] == [(other / name).read_bytes() for name in names]
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates with")

@@ -25,6 +25,7 @@ from tactile_core.errors import TactileError
 from tactile_core.indenters import mesh_file
 from tactile_core.optics.inputs import read_frames
 from tactile_core.recordings import parts
+from tactile_core.small_text import MOST
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows limits no process's memory")
 BOUND = 512 * 2**20  # bytes beyond what the process has: two unpacked chunks of HDF5 of the largest size that is taken
@@ -293,7 +294,7 @@ def test_scenes_name_no_files_outside_of_their_folder(way, tmp_path):
 
 def test_scenes_and_calibrations_that_are_long(tmp_path):
     for load in (scene.load_scene, load_calibration):
-        for content in (b"a = " + b"[" * 10**7, b"#" * 10**8, b"a" + b".a" * 10**6 + b" = 1"):
+        for content in (b"a = " + b"[" * 10**7, b"#" * (2 * MOST), b"a" + b".a" * 10**6 + b" = 1"):
             path = tmp_path / "a.toml"
             path.write_bytes(content)
             refused(load, path, str(path))
@@ -319,5 +320,5 @@ def test_lists_of_inputs(tmp_path):
     (tmp_path / "list.txt").write_bytes(b"\xff\xfe" * 1000)
     refused(lambda path: inputs.find([f"@{path}"], tmp_path / "out"), tmp_path / "list.txt", "list.txt")
     with open(tmp_path / "list.txt", "wb") as file:
-        file.truncate(2**31)
+        file.truncate(2 * MOST)
     refused(lambda path: inputs.find([f"@{path}"], tmp_path / "out"), tmp_path / "list.txt", "list.txt")
