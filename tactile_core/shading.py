@@ -31,7 +31,8 @@ class Shader:
     calibration : None for the one that ships
     background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the calibration's
     rest : (H, W) heights of the undeformed gel, m, that height maps rise from; None for the DIGIT's
-    Raises TactileError for arrays of another shape, values that are not finite, or LEDs over the picture.
+    Raises TactileError for arrays of another shape, values that are not finite, LEDs over the picture, or a gel that
+    reaches an LED or the camera.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class Shader:
         self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
         self._gain = np.ascontiguousarray(calibration.gain.matrices(camera).transpose(2, 3, 0, 1), np.float32)
         self._view = View(camera, rest)
+        check_reach(rest, calibration, "rest height map")
         self.rest = self._view(rest)
         self._lamps = [Lamp(camera, led) for led in calibration.leds]
         self._rest_radiance = self._seen_radiance(self.rest)
@@ -78,7 +80,9 @@ class Shader:
 
     def _radiance(self, height_map: np.ndarray) -> np.ndarray:
         heights = camera_array(height_map, self.camera.shape, "height map")
-        return self._seen_radiance(self._view(of_unit(heights, self.calibration) if self._dome else heights))
+        heights = of_unit(heights, self.calibration) if self._dome else heights
+        check_reach(heights, self.calibration, "height map")
+        return self._seen_radiance(self._view(heights))
 
     def _seen_radiance(self, seen: np.ndarray) -> np.ndarray:
         """Radiance (3, H, W) of heights (H, W) that the pixels see."""
@@ -177,3 +181,13 @@ def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.nd
     if not np.isfinite(values).all():
         raise TactileError(name, "values that are not finite", "finite numbers", "Repair the frame first")
     return values.astype(np.float32)
+
+
+def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
+    """Raises TactileError for heights (H, W) m that reach an LED's middle or the camera."""
+    lowest = min(unit.leds, key=lambda led: led.position[2])
+    limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
+    for what, limit in limits.items():
+        if float(height.max()) >= limit:
+            found = f"{height.max() * 1e3:.2f} mm high, {what} {limit * 1e3:.2f} mm"
+            raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")

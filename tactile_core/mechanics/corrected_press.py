@@ -12,6 +12,7 @@ from .contact import Contact, ContactProblem, fluid_pressure
 from .correction import Corrected, correct, force_factor
 from .first_touch import fall
 from .pose_path import same_line
+from .sunk import check_follows
 
 FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
 _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
@@ -26,7 +27,7 @@ class FastContact:
     """A contact of the linear model, and what its correction makes of it. Forces N, by the indenter on the sensor.
 
     linear : as solved; corrected : shape and factor; force : (3,); axial_force : along the motion
-    pressure : Pa, rise of the fluid's
+    pressure : Pa, rise of the fluid's; depth : m, from first touch where the indenter has slid to
     """
 
     linear: Contact
@@ -34,6 +35,7 @@ class FastContact:
     force: np.ndarray
     axial_force: float
     pressure: float
+    depth: float
 
 
 class CorrectedPress:
@@ -51,7 +53,10 @@ class CorrectedPress:
         self._last_power = 1.0
 
     def at_depth(self, depth: float, pose: Pose | None = None) -> FastContact:
-        """The contact at a depth, m, of the press's pose or of another one; it may not have converged."""
+        """The contact at a depth, m, of the press's pose or of another one; it may not have converged.
+
+        Raises TactileError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
+        """
         pose = pose or self.pose
         contact = self.problem.at_pose(pose.moved(depth), self.last)
         if contact.converged:
@@ -107,8 +112,18 @@ class CorrectedPress:
 
     def _with_correction(self, contact: Contact, fall: float) -> FastContact:
         made = correct(self.compliance, _from_touch(contact, fall))
+        if contact.converged:
+            self._check_follows(contact)
         pressure = made.factor * fluid_pressure(self.compliance, contact)
-        return FastContact(contact, made, made.factor * contact.force, made.factor * contact.axial_force, pressure)
+        force, axial = made.factor * contact.force, made.factor * contact.axial_force
+        return FastContact(contact, made, force, axial, pressure, contact.depth - fall)
+
+    def _check_follows(self, contact: Contact) -> None:
+        surface = self.compliance.surface
+        rows, columns = surface.shape
+        grid = surface.grid(surface.rest + contact.displacement)
+        where, closed = f"fast tier, {self.compliance.name}", len(surface.rest) > rows * columns
+        check_follows(where, grid, self.problem.indenter, contact.pose, contact.depth, closed=closed)
 
 
 def _from_touch(contact: Contact, fall: float) -> Contact:

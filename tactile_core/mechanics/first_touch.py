@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .. import biotac_shape
+from ..errors import TactileError
 from ..indenters import Indenter, Pose
 from ..lattice import Lattice
 from .pose_path import same_line
@@ -19,26 +20,41 @@ _CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no in
 _FARTHEST = 30e-3  # m, past all of a sensor from wherever the motion starts
 _LEAST_RATE = 0.5  # of approach: where the body slides past a point its distance says little about the way to it
 _NEAREST = 16  # nodes with which the motion is tried first
+_NARROW = 2e-3  # m, four spacings of the coarser lattice, the BioTac's: a body this thin may pass between nodes
+_BESIDE = 1e-3  # m, at most from the line that a body's foremost point moves on to the node nearest to it
+_FRONT = 4e-3  # m, what lies this much behind the front is the far side of the sensor
+_MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
 
 
 def fall(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
-    """How much farther in, m, than at ``pose``, itself at first touch, an indenter touches where it has slid."""
+    """How much farther in, m, than at ``pose``, itself at first touch, an indenter touches where it has slid.
+
+    Where it has slid off the sensor, as far as its motion is followed.
+    """
     if same_line(pose, slid):
         return 0.0
-    return float((first_touch(lattice, indenter, slid).apex - pose.apex) @ slid.direction)
+    try:
+        return float((first_touch(lattice, indenter, slid).apex - pose.apex) @ slid.direction)
+    except TactileError:
+        return _FARTHEST
 
 
 def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     """The pose moved along its direction, in or out, until the indenter just touches the resting surface.
 
-    Between nodes the surface is the lattice's cubic (Catmull-Rom) interpolation.
+    Between nodes the surface is the lattice's cubic (Catmull-Rom) interpolation. Raises TactileError for an indenter
+    that passes the sensor by.
     """
-    pose, nodes = _on_nodes(lattice.rest, indenter, pose)
     rows, columns = lattice.shape
-    nodes = nodes[nodes < rows * columns]
     grid = lattice.grid(lattice.rest)
     closed = len(lattice.rest) > rows * columns  # a surface with poles closes round its axis
-    places = np.stack([nodes // columns, nodes % columns], -1).astype(float)
+    met = in_front(grid, indenter, pose, closed=closed) if _narrow(indenter) else None
+    points = lattice.rest if met is None else np.concatenate([lattice.rest, met[1]])
+    pose, nodes = _on_nodes(points, indenter, pose)
+    before_tip = nodes < len(lattice.rest)
+    tip = np.empty((0, 2)) if before_tip.all() else met[0]
+    nodes = nodes[nodes < rows * columns]
+    places = np.concatenate([np.stack([nodes // columns, nodes % columns], -1).astype(float), tip])
     around = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij"), -1).reshape(1, -1, 2)
     for finer in _FINER if len(places) else ():
         tried = places[:, None] + around / finer
@@ -49,6 +65,41 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
         places, first = np.unique(tried.reshape(-1, 2)[best], axis=0, return_index=True)
         pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), points[best[first]])
     return pose
+
+
+def _narrow(indenter: Indenter) -> bool:
+    lower, upper = indenter.bounds()
+    return bool((upper - lower).min() < _NARROW)
+
+
+def in_front(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
+    """Where a body's foremost point meets a surface, which it may do between nodes: place (1, 2) and point (1, 3) m.
+
+    grid : (rows, columns, 3) m, the surface's nodes; closed : whether its last column joins the first
+    None where no node lies near its way.
+    """
+    foremost = pose.support(indenter, pose.direction)
+    along, beside = _off_line(grid.reshape(-1, 3), foremost, pose.direction)
+    near = beside < _BESIDE
+    if not near.any():
+        return None
+    near &= along < along[near].min() + _FRONT
+    node = int(np.argmin(np.where(near, beside, np.inf)))
+    place = np.array([divmod(node, grid.shape[1])], float)
+    around = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij"), -1).reshape(-1, 2)
+    for finer in _FINER:
+        tried = place + around / finer
+        points = _on_surface(grid, tried, closed=closed)
+        best = int(np.argmin(_off_line(points, foremost, pose.direction)[1]))
+        place, point = tried[best : best + 1], points[best : best + 1]
+    return place, point
+
+
+def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far along (n,) and beside (n,) m a line points (n, 3) m lie."""
+    arm = points - start
+    along = arm @ direction
+    return along, np.linalg.norm(arm - along[:, None] * direction, axis=1)
 
 
 def _on_nodes(rest: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
@@ -63,6 +114,8 @@ def _on_nodes(rest: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, n
         pose = _advance(indenter, away, rest[some])
         if pose.distance(indenter, rest[some])[0].min() > _TOUCHES:  # it slides past them
             pose, some = _advance(indenter, away, rest), np.arange(len(rest))
+            if pose.distance(indenter, rest)[0].min() > _MISSED:
+                raise TactileError("indenter", "it passes the sensor by", "a place and a lean that meet its surface")
         travel = np.linalg.norm(pose.apex - away.apex)
         reached = np.flatnonzero(gap < travel + _CLOSE)  # no distance falls faster than the indenter moves
         now, _ = pose.distance(indenter, rest[reached])
@@ -85,7 +138,7 @@ def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
         if abs(smallest) < _TOUCHES:
             break
         if smallest > 0:
-            step = float((gap / np.maximum(-(normal @ pose.direction), _LEAST_RATE)).min())
+            step = float((gap / np.maximum(normal @ pose.direction, _LEAST_RATE)).min())
         step = min(step, left)
         left -= step
         pose = pose.moved(step)

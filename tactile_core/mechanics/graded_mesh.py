@@ -51,6 +51,11 @@ class GradedMesh:
     to_rows: np.ndarray
     to_columns: np.ndarray
 
+    def grid(self, values: np.ndarray) -> np.ndarray:
+        """Values (n_surface, k) at the mesh's surface nodes as a grid (rows, columns, k); poles left out."""
+        columns = self.to_columns.shape[1]
+        return values[: len(values) // columns * columns].reshape(-1, columns, values.shape[1])
+
     def on_lattice(self, values: np.ndarray) -> np.ndarray:
         """Values (n_surface, k) at the mesh's surface nodes, at the lattice's nodes (n, k): twice differentiable."""
         return self._carry(values, self.to_rows, self.to_columns)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
+from . import stated_error
 from .compliance import compliance_of
 from .corrected_press import CorrectedPress
 from .expected_error import expected_error
@@ -17,13 +18,20 @@ from .finite_strain import FiniteStrainSolid, State
 from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Body, Sensor, graded_body
 from .newton import FiniteStrainContact, Touch
 from .placement import FRICTION, Placement, on_gel, pose_at
+from .sharpness import sharpest
+from .sunk import check_follows
 from .thickness import DEPTH_LIMIT, thickness_under
 
 Tier = Literal["fast", "full", "reference"]
 TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
 
 _FORCE_TOLERANCE = 1e-4  # relative, of the search for a force
-_SEARCH_STEPS = 20
+_SEARCH_STEPS = 30
+_LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less cannot be told from rounding and the lattice's own roughness
+_REACHED = 1 / 3  # of the depth that a mesh is made for: contacts less deep are too small for it (assumed)
+_ROOM = 1.5  # times the depth at the largest force, for which a mesh is made: places on a path differ (assumed)
+_MOST_MESHES = 3
+_ROUGH = 0.1  # relative, of the force and the depth that a mesh is made for
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,6 +132,8 @@ def _check(step: Step, limit: float) -> None:
     name, value, unit = ("depth", step.depth, "m") if step.force is None else ("force", step.force, "N")
     if not (np.isfinite(value) and value >= 0):
         raise TactileError(f"solve, {name}", f"{value!r} {unit}", "zero or more, and finite")
+    if step.force is not None and 0 < step.force < _LEAST_FORCE:
+        raise TactileError("solve, force", f"{step.force:g} N", f"0, or at least {_LEAST_FORCE:g} N", "Press more")
     if step.depth is not None and step.depth > limit:
         expected = f"at most {limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
         raise TactileError("solve, depth", f"{step.depth * 1e3:g} mm", expected, "Press less")
@@ -145,8 +155,7 @@ class _Path:
         self.sensor, self.indenter, self.pose, self.tier, self.friction = sensor, indenter, pose, tier, friction
         self.thickness, self.limit = thick, DEPTH_LIMIT * thick
         self.deepest = max((step.depth for step in steps if step.depth is not None), default=0.0)
-        if any(step.force for step in steps):
-            self.deepest = self.limit
+        self.hardest = max((step.force for step in steps if step.force), default=0.0)
 
     def errors(self, depth: float) -> tuple[float, float]:
         """Of a contact at a depth, m: see ``Solution``."""
@@ -154,8 +163,10 @@ class _Path:
 
     def unreachable(self, force: float) -> TactileError:
         """What is said where no depth within the limit gives a force."""
-        expected = f"a force that is reached within {self.limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
-        return TactileError(f"solve, {self.sensor}, {self.tier} tier", f"force {force:g} N", expected, "Press less")
+        expected = f"a force that is found within {self.limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
+        return TactileError(
+            f"solve, {self.sensor}, {self.tier} tier", f"force {force:g} N", expected, "Press less, or to a depth"
+        )
 
 
 class _Fast(_Path):
@@ -175,9 +186,11 @@ class _Fast(_Path):
         contact, corrected = found.linear, found.corrected
         patch = np.zeros(len(compliance.surface.rest), bool)
         patch[compliance.touchable[contact.nodes]] = True
+        radius = sharpest(self.indenter, contact.pose, compliance.surface.rest + contact.displacement)
+        stated = stated_error.of_fast(self.errors(contact.depth), found.depth, len(contact.nodes), radius)
         return Solution(
             "fast", contact.converged, contact.iterations, corrected.displacement, patch, found.force, contact.depth,
-            found.pressure, *self.errors(contact.depth), contact.penetration,
+            found.pressure, *stated, contact.penetration,
             float(contact.slipping.mean()) if len(contact.slipping) and self.friction else 0.0, len(contact.core_nodes),
         )  # fmt: skip
 
@@ -188,9 +201,30 @@ class _FiniteStrain(_Path):
 
     def __init__(self, *arguments) -> None:  # noqa: ANN002
         super().__init__(*arguments)
-        self.body = graded_body(self.sensor, self.indenter, self.pose, self.deepest, self.tier)
-        self.problem = self.body.contact(self.indenter, self.pose, self.deepest, self.friction)
-        self.step = FRICTION_STEP if self.friction else ONE_STEP
+        self._make(self._reach(), self.friction)
+
+    def _reach(self) -> float:
+        """The depth, m, that the mesh is to be made for: for forces found without friction, on meshes that were made
+        for greater depths, and are coarser."""
+        if not self.hardest:
+            return self.deepest
+        reach = self.limit
+        for _ in range(_MOST_MESHES):
+            self._make(reach, 0.0)
+            try:
+                depth = self._at_force(self.pose, self.hardest, _ROUGH).depth
+            except TactileError:  # with friction there may be an equilibrium
+                break
+            if depth > _REACHED * reach:
+                break
+            reach = _ROOM * depth
+        return max(reach, self.deepest)
+
+    def _make(self, deepest: float, friction: float) -> None:
+        """The mesh for contacts of a depth, m, with nothing pressed yet."""
+        self.body = graded_body(self.sensor, self.indenter, self.pose, deepest, self.tier)
+        self.problem = self.body.contact(self.indenter, self.pose, deepest, friction)
+        self.step = FRICTION_STEP if friction else ONE_STEP
         self.last = self.problem.start()
 
     def to(self, step: Step) -> Solution:
@@ -202,33 +236,80 @@ class _FiniteStrain(_Path):
             self.last = self.problem.move(pose.moved(step.depth or 0.0), self.last, self.step)
         return self._solution(self.last)
 
-    def _at_force(self, pose: Pose, force: float) -> Touch:
-        """The contact at a force along the motion, by regula falsi on F^(2/3), nearly straight in the depth."""
-        direction, goal = pose.direction, force ** (2 / 3)
-        before, at = self.last, (self.last.depth, max(float(self.last.force @ self.pose.direction), 0.0) ** (2 / 3))
-        depth = max(at[0], self.limit / 8)
-        for _ in range(_SEARCH_STEPS):
+    def _at_force(self, pose: Pose, force: float, tolerance: float = _FORCE_TOLERANCE) -> Touch:
+        """The contact at a force along the motion, by secants of F^(2/3), nearly straight in the depth, and halving.
+
+        tolerance : relative, of the force; where it is rough a depth as well known will do
+        """
+        direction, goal, before = pose.direction, _root(force), self.last
+        low, high = (before.depth, _root(before.force @ direction)), None
+        lets_go = low[1] > goal
+        if lets_go:
+            low, high = (0.0, 0.0), low
+        depth = _next_depth(low, high, goal, self.limit) if lets_go else max(low[0], self.limit / 8)
+        for attempt in range(_SEARCH_STEPS):
             if depth > self.limit:
                 raise self.unreachable(force)
             touch = self.problem.move(pose.moved(depth), before, self.step)
-            found = max(float(touch.force @ direction), 0.0)
-            if abs(found - force) <= _FORCE_TOLERANCE * force:
+            found = float(touch.force @ direction)
+            if abs(found - force) <= tolerance * force:
                 return touch
-            root = found ** (2 / 3)
-            slope = max((root - at[1]) / (depth - at[0]) if depth != at[0] else 0.0, 1e-6)
-            if root < goal:
-                before, at = touch, (depth, root)
-                depth += float(np.clip((goal - root) / slope, 0, self.limit / 4))
+            if found < force:
+                before, low = before if lets_go else touch, (depth, _root(found))
             else:
-                depth = at[0] + float(np.clip((goal - at[1]) / slope, 0, depth - at[0]))
-        raise self.unreachable(force)
+                high = (depth, _root(found))
+            if tolerance >= _ROUGH and high and high[0] - low[0] < tolerance * high[0]:
+                return touch
+            depth = _next_depth(low, high, goal, self.limit, halve=attempt % 3 == 2)
+        found = f"force {force:g} N, between depths {low[0] * 1e3:.4f} and {depth * 1e3:.4f} mm"
+        raise TactileError(f"solve, {self.sensor}, {self.tier} tier", found, "one that a search finds", "Give a depth")
 
     def _solution(self, touch: Touch) -> Solution:
+        self._check_follows(touch)
         gap = touch.outer.gaps(self.body.solid.mesh.nodes + touch.state.displacement)
+        table, across = self.errors(touch.depth), self._nodes_across(touch)
+        stated = stated_error.of_finite_strain(table, touch.depth, int((touch.pressing > 0).sum()), across)
         slips = touch.outer.slipping[touch.outer.active]
         return Solution(
             self.tier, True, touch.iterations, self.body.displacement(touch), self.body.contact_patch(touch),
-            touch.force, touch.depth, touch.fluid, *self.errors(touch.depth), float(-gap.min(initial=0.0)),
+            touch.force, touch.depth, touch.fluid, *stated, float(-gap.min(initial=0.0)),
             float(slips.mean()) if len(slips) and self.friction else 0.0, len(touch.inner.nodes), touch.steps,
             (self.body.solid, touch.state),
         )  # fmt: skip
+
+    def _nodes_across(self, touch: Touch) -> float:
+        """How many nodes of the full tier's mesh lie across the contact where the indenter is sharpest."""
+        mesh = self.body.solid.mesh
+        rest = mesh.nodes[mesh.surface]
+        nearest = rest[int(np.argmin(touch.pose.distance(self.indenter, rest)[0]))]
+        spacing = float(np.partition(np.linalg.norm(rest - nearest, axis=1), 1)[1])
+        radius = sharpest(self.indenter, touch.pose, rest + touch.state.displacement[mesh.surface])
+        spacing *= 1 if self.tier == "full" else 2
+        return float(2 * np.sqrt(min(radius, 1.0) * max(touch.depth, 0.0)) / spacing)
+
+    def _check_follows(self, touch: Touch) -> None:
+        mesh = self.body.solid.mesh
+        surface = self.body.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
+        where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"
+        check_follows(where, surface, self.indenter, touch.pose, touch.depth, closed=closed)
+
+
+def _root(force: float) -> float:
+    """F^(2/3), which grows nearly straight with depth."""
+    return max(float(force), 0.0) ** (2 / 3)
+
+
+def _next_depth(
+    low: tuple[float, float], high: tuple[float, float] | None, goal: float, limit: float, *, halve: bool = False
+) -> float:
+    """The depth, m, to try next for a root of the force, between the (depth, root) below and above it, or beyond."""
+    if high is None:
+        slope = low[1] / low[0] if low[0] else 0.0
+        return low[0] + min((goal - low[1]) / slope if slope else np.inf, limit / 4)
+    if halve and not low[1]:  # first touch of a node lies anywhere between them, however small
+        return float(np.sqrt(max(low[0], _LEAST_SHARE * high[0]) * high[0]))
+    share = 0.5 if halve else (goal - low[1]) / (high[1] - low[1])
+    return low[0] + float(np.clip(share, _LEAST_SHARE, 1 - _LEAST_SHARE)) * (high[0] - low[0])
+
+
+_LEAST_SHARE = 1e-3  # of the way between two depths, that a search goes

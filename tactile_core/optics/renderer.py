@@ -9,9 +9,8 @@ import numpy as np
 from ..background import background_picture
 from ..calibration import LARGEST_LEVEL, Calibration
 from ..calibration_file import load_calibration
-from ..errors import TactileError
 from ..height_map import of_unit, rest_height_map
-from ..shading import Shader, camera_array
+from ..shading import Shader, camera_array, check_reach
 from ..view import slopes
 from .direct_light import Hits, direct_light
 from .gel_mesh import GelMesh
@@ -147,13 +146,3 @@ class MitsubaLight:
         place, seen = self._tracer.trace(np.concatenate(points), shift)
         hits = Hits.on_map(place, tilt, self.unit.camera)
         return direct_light(hits, seen, points, leds, soften=self.preset.passes == 1), hits
-
-
-def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
-    """Raises TactileError for heights (H, W) m that reach an LED's middle or the camera."""
-    lowest = min(unit.leds, key=lambda led: led.position[2])
-    limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
-    for what, limit in limits.items():
-        if float(height.max()) >= limit:
-            found = f"{height.max() * 1e3:.2f} mm high, {what} {limit * 1e3:.2f} mm"
-            raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")

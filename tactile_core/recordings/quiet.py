@@ -21,6 +21,7 @@ LEVEL, LEVEL_RATE = (
 )  # counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts an hour = 0.024/s)
 LEVEL_PDC, LEVEL_PDC_RATE = 15.0, 0.2  # the same where PDC confirms both (assumed: skin creep after a contact)
 PDC_RATE = 0.1  # counts/s of drift allowed to PDC itself (assumed as for electrodes)
+TRACKED = 60.0  # s; over longer times drift is followed, or it would come to be as large as a press (assumed)
 TARED_LEVEL = 15.0  # counts that rest may have drifted from a tared file's own zero (assumed)
 TARED_PDC = 500.0  # counts; a lower median PDC has been tared too, so that its zero means no contact (assumed)
 NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is preferred as rest
@@ -152,9 +153,31 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
     apart = np.abs(windows.middle - windows.middle[anchor])
     off = np.abs(windows.mean - windows.mean[anchor]).max(axis=1)
     if windows.pdc is None:
-        return possible & (off <= LEVEL + LEVEL_RATE * apart)
+        agree = possible & (off <= LEVEL + LEVEL_RATE * apart)
+        return agree & _tracked(windows.mean, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
     pressure = windows.pdc - windows.pdc[anchor]
-    return possible & (pressure < QUIET_PDC + PDC_RATE * apart) & (off <= LEVEL_PDC + LEVEL_PDC_RATE * apart)
+    agree = possible & (pressure < QUIET_PDC + PDC_RATE * apart) & (off <= LEVEL_PDC + LEVEL_PDC_RATE * apart)
+    agree &= _tracked(windows.mean, windows.middle, agree, anchor, LEVEL_PDC, LEVEL_PDC_RATE)
+    return agree & _tracked(windows.pdc[:, None], windows.middle, agree, anchor, QUIET_PDC, PDC_RATE)
+
+
+def _tracked(
+    values: np.ndarray, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
+) -> np.ndarray:
+    """(W,) bool, windows whose values (W, C) lie near a level that follows them from the anchor on, at ``rate`` a
+    second at most: what drift may have done in an hour is more than a press."""
+    accepted = np.ones(len(values), bool)
+    if np.abs(middle - middle[anchor]).max() <= TRACKED:
+        return accepted
+    candidates = np.flatnonzero(possible)
+    for way in (candidates[candidates >= anchor], candidates[candidates < anchor][::-1]):
+        now, last = values[anchor].copy(), middle[anchor]
+        for k in way:
+            since, off = abs(middle[k] - last), values[k] - now
+            accepted[k] = np.abs(off).max() <= level + rate * (since + TRACKED)
+            if accepted[k]:
+                now, last = now + np.clip(off, -rate * since, rate * since), middle[k]
+    return accepted
 
 
 def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> int:

@@ -21,6 +21,7 @@ SCALED_PEAK = (
     150.0  # counts that the 95th percentile of a scaled recording's largest changes is stretched to (networks.md)
 )
 DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
+NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 counts of noise (assumed: half of it)
 SHOWN = 8  # bad places spelled out one by one in the warnings
 
 
@@ -245,11 +246,36 @@ def _saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: 
 
 
 def _dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """(T,) flags, all set when an electrode never changes in a recording of at least 1 s."""
-    still = (readings == readings[0]).all(axis=0) & (len(readings) >= DEAD_FRAMES)
-    if still.any():
-        warnings.append(f"{_electrodes(still)} never changes: dead channel")
-    return np.full(len(readings), Flag.DEAD_CHANNEL if still.any() else 0, np.uint16)
+    """(T,) flags where an electrode stands still for 1 s or more; none in recordings that are shorter."""
+    still = _still(readings)
+    whole = still.all(axis=0)
+    if whole.any():
+        warnings.append(f"{_electrodes(whole)} never changes: dead channel")
+    for j in np.flatnonzero(still.any(axis=0) & ~whole):
+        frames = np.flatnonzero(still[:, j])
+        warnings.append(
+            f"E{j + 1} stands still in {len(frames)} frames, first in {recording.row_word} "
+            f"{recording.rows[frames[0]]}: dead channel"
+        )
+    return np.where(still.any(axis=1), Flag.DEAD_CHANNEL, 0).astype(np.uint16)
+
+
+def _still(readings: np.ndarray) -> np.ndarray:
+    """(T, 19) bool: samples of runs of equal readings of ``DEAD_FRAMES`` or more.
+
+    An electrode that is quiet elsewhere too has no noise to miss: there only a run over the whole recording counts.
+    """
+    still = np.zeros(readings.shape, bool)
+    changes = np.diff(readings, axis=0) != 0
+    for j, change in enumerate(changes.T):
+        bounds = np.r_[0, np.flatnonzero(change) + 1, len(readings)]
+        for first, last in zip(bounds, bounds[1:], strict=False):
+            if last - first >= DEAD_FRAMES:
+                still[first:last, j] = True
+        moving = ~still[1:, j]
+        if moving.any() and change[moving].mean() < NOISY:
+            still[:, j] = False
+    return still
 
 
 def _electrodes(mask: np.ndarray) -> str:

@@ -1,0 +1,27 @@
+"""How sharp an indenter is where a surface lies: no correction was learned on edges too fine for the lattices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..indenters import Indenter, Pose
+
+# m, of the sharpest edges that the correction was learned on (``random_contacts``, scenes/training). With sharper ones
+# errors are taken to grow as the radius falls (assumed; 0.1 mm, a quarter, made 1.8 to 2.7 times the stated error).
+LEARNED_RADIUS = 0.4e-3
+_LEAST_RADIUS = 10e-6  # m, below which no edge tells itself from one of this radius
+_NEAR = 0.5e-3  # m, from the indenter: farther off it may be as sharp as it likes
+
+
+def sharpest(indenter: Indenter, pose: Pose, points: np.ndarray) -> float:
+    """Least radius of curvature, m, of an indenter at its tip and near points (n, 3) m that lie outside it."""
+    points = np.concatenate([points, pose.support(indenter, pose.direction)[None]])  # no node may be near a blade's
+    gap, _ = pose.distance(indenter, points)
+    near = (gap > -_LEAST_RADIUS) & (gap < _NEAR)
+    if not near.any():
+        return np.inf
+    bend = pose.curvature(indenter, points[near])  # of the level surface through each point
+    total, square = np.einsum("kii->k", bend), np.einsum("kij,kij->k", bend, bend)
+    larger = (total + np.sqrt(np.maximum(2 * square - total**2, 0.0))) / 2  # of the two principal curvatures
+    radius = 1 / np.maximum(larger, 1e-9) - np.maximum(gap[near], 0.0)
+    return max(float(radius.min()), _LEAST_RADIUS)

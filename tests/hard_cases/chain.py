@@ -1,0 +1,74 @@
+"""Hard contacts through the whole translation: from the counts that they make to the gel's nodes."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from tactile_core import metrics
+from tactile_core.flags import Flag
+from tactile_core.mechanics.compliance import biotac_compliance
+from tactile_core.mechanics.electrodes import electrode_gaps, signal_of_gaps
+
+from .case import TRANSLATION, Found, case
+from .contacts import press
+from .shapes import CONTACTS, SUNK
+from .signals import prepared, translator
+
+WORDS = Flag.OUT_OF_RANGE | Flag.BEYOND_DIGIT
+
+
+def _translated(name: str, share: float) -> Found:
+    """A contact of the BioTac at a share of its depth and the DIGIT's at the same force, against the translation."""
+    _, indenter, place, depth, friction = CONTACTS[name]
+    biotac = press("biotac", indenter, place, friction).at_depth(share * depth)
+    digit = press("digit", indenter, place, friction).at_force(biotac.axial_force)
+    if digit is None:
+        return Found(1.0, "said", 1.0, at_least=True, words="the fast tier says that it finds no contact of this force")
+    change = signal_of_gaps(electrode_gaps(biotac_compliance(), biotac.linear))[None]
+    signals = dataclasses.replace(
+        prepared()[1], change=change, electrodes=3300 + change, quiet=np.zeros(1, bool), flags=np.zeros(1, np.uint16)
+    )
+    found = translator()(signals)
+    worst, words = 0.0, []
+    for sensor, truth in (("biotac", biotac), ("digit", digit)):
+        error = float(
+            metrics.max_error(getattr(found, f"displacement_{sensor}"), truth.corrected.displacement[None])[0]
+        )
+        bound = float(getattr(found, f"error_bound_{sensor}")[0])
+        worst = max(worst, error / bound)
+        words.append(f"{sensor} {error * 1e6:.0f} um (bound {bound * 1e6:.0f})")
+    flagged = Flag(int(found.flags[0]) & int(WORDS))
+    words.append(f"confidence {found.confidence[0]:.2f}" + (f", flagged {flagged!r}" if flagged else ""))
+    finite = () if np.isfinite(found.displacement_digit).all() else ("nodes that are not finite",)
+    if flagged:
+        return Found(1.0, "said", 1.0, at_least=True, words=", ".join(words), broken=finite)
+    return Found(worst, "of stated", 1.0, words=", ".join(words), broken=finite)
+
+
+for _name, (_hard, *_rest) in CONTACTS.items():
+    if not {("digit", _name), ("biotac", _name)} & set(SUNK):
+        case(f"{_name}_translated", _hard, TRANSLATION,
+             "the largest node error lies below the bound that holds for 95 of 100 frames, or the frame is flagged")(
+            functools.partial(_translated, _name, 1.0)
+        )  # fmt: skip
+
+
+@case("nothing_touches_translated", "zero contact", TRANSLATION, "no force, no place, and the gel at rest to 20 um")
+def still() -> Found:
+    """Counts that do not change at all."""
+    signals = dataclasses.replace(
+        prepared()[1], change=np.zeros((1, 19)), electrodes=np.full((1, 19), 3300.0), quiet=np.ones(1, bool),
+        flags=np.zeros(1, np.uint16),
+    )  # fmt: skip
+    found = translator()(signals)
+    broken = () if not found.force.any() and np.isnan(found.contact_center).all() else ("a force or a place",)
+    return Found(float(np.abs(found.displacement_digit).max()) * 1e6, "um", 20.0, broken=broken)
+
+
+case("faint_touch_translated", "tiny depth (0.1 um)", TRANSLATION,
+     "a twentieth of a light press: the bound holds, or the frame is flagged")(
+    functools.partial(_translated, "deep", 0.01)
+)  # fmt: skip
