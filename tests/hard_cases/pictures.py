@@ -128,7 +128,7 @@ def _faint(preset: str) -> Found:
 
 
 for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
-    case(f"depth_0.1um_{_preset}", "tiny depth (0.1 um)", _stage, "less than half a level anywhere")(
+    case(f"depth_0.1um_{_preset}_picture", "tiny depth (0.1 um)", _stage, "less than half a level anywhere")(
         functools.partial(_faint, _preset)
     )
 

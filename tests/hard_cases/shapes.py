@@ -37,7 +37,6 @@ LIMITS = {
     "edge_digit_fast": "no wedge is among the indenters that stated errors were measured on: its line of contact lies "
     "between nodes 0.35 mm apart; docs/mechanics.md says 'far more' of single nodes at sharp edges",
     "concave_digit_fast": "bumps and the face between them touch at once, which nothing that was learned from does",
-    "deep_digit_fast": "its bin of depth was measured on a single contact",
 }
 # Blades between the nodes of lattices 0.35 and 0.5 mm apart, and of meshes 0.5 and 0.8 mm.
 SUNK = (("digit", "sharp_edge"), ("biotac", "sharp_edge"), ("biotac", "edge"))

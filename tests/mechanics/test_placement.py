@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core import digit_shape, sensors, surface
+from tactile_core.errors import TactileError
 from tactile_core.indenters import Box, Cylinder, Pose, Ring, Sphere, pose_on
 from tactile_core.mechanics.first_touch import first_touch
 from tactile_core.mechanics.placement import Placement, digit_pose
@@ -39,6 +40,21 @@ def test_first_touch_does_not_depend_on_where_the_motion_starts(lattice):
     there = pose_on(ball, centre, np.array([0.0, -1.0, 0.0]), 0.2, 1.0)
     places = [first_touch(lattice, ball, there.moved(by)).apex for by in (-0.5e-3, 0.0, 0.7e-3)]
     np.testing.assert_allclose(places, places[:1] * 3, atol=20e-9)
+
+
+@pytest.mark.parametrize("radius", [0.3e-3, 0.05e-3])
+@pytest.mark.parametrize("place", PLACES)
+def test_a_ball_that_fits_between_nodes_touches_the_surface_between_them(radius, place):
+    """Looked for among nodes alone, its first touch once lay 147 mm behind the gel."""
+    pose = digit_pose(Sphere(radius), place)
+    at = dome(pose.apex, 0.4e-3)
+    assert abs(pose.distance(Sphere(radius), at)[0].min()) < 0.5e-6  # m, as above
+
+
+def test_an_indenter_that_meets_nothing_is_refused():
+    aside = pose_on(Sphere(1e-3), np.array([0.0, -8e-3, 50e-3]), np.array([0.0, -1.0, 0.0]))
+    with pytest.raises(TactileError, match="passes the sensor by"):
+        first_touch(sensors.digit_surface(), Sphere(1e-3), aside)
 
 
 def test_an_edge_that_slides_past_the_nearest_nodes_touches_others():
