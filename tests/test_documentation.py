@@ -41,6 +41,7 @@ LESS = [
 # What needs a machine of its own -> the file that runs it, and the words it is run by.
 ELSEWHERE = {
     "tactile simulate scenes/press_roll_slide --grid": ("tests/batch/test_batch_kinds.py", "--grid"),
+    "tactile watch --rosbag-play": ("tests/live/test_live.py", "--rosbag-play"),
     "tactile render frames.h5": ("tests/batch/test_batch_kinds.py", "--workers"),
     "python3 scripts/dev.py demo": (".ci/run", "dev.py demo"),
     "python3 scripts/dev.py test-blender": (".ci/run", "dev.py test-blender"),
