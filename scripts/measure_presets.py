@@ -91,10 +91,10 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
             yield speed(large, name, best, large_heights, quick)
 
 
-def fields(unit: Calibration, count: int) -> list[np.ndarray]:
+def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
     """Height maps (H, W) m of random contacts in the picture, up to ``DEEPEST`` deep, solved by the fast tier."""
     camera, found = unit.camera, []
-    for contact in random_contacts(40 * count, SEED):
+    for contact in random_contacts(40 * count, seed):
         row, column = camera.to_pixel(contact.place.x, contact.place.z)
         if not (0 <= row < camera.height and 0 <= column < camera.width):
             continue
