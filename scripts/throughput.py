@@ -48,13 +48,12 @@ def main(arguments: list[str] | None = None) -> int:
     print(HEADER)
     found: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
-        for part in (
-            growth(Path(name), most),
-            workers(Path(name)),
-            memory(Path(name), most),
-            pictures(Path(name), seen),
-        ):
-            for one in part:
+        folder = Path(name)
+        for part in (  # one after another, so that what was measured stands there whatever comes next
+            lambda: growth(folder, most), lambda: workers(folder), lambda: memory(folder, most),
+            lambda: pictures(folder, seen),
+        ):  # fmt: skip
+            for one in part():
                 found.append(one)
                 print(line(one), flush=True)
     if options.json:
