@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from labelled_recording import labelled_arrays, write_labelled
 from plain_unit import plain_unit
 from pressed_unit import write_photographs
 
@@ -31,7 +32,6 @@ LESS = [
     ("--count 50000", "--count 200"),
     ("--count 20000", "--count 5"),
     ("tactile train pairs.h5", "tactile train pairs.h5 --effort 0.001"),
-    ("tactile train s2mpn", "tactile train s2mpn --effort 0.01"),
     ("evaluate_translation.py", "evaluate_translation.py --quick"),
     ("source .venv/bin/activate", "true"),
     ("/shared/job", "shared_job"),
@@ -92,6 +92,8 @@ def inputs(tmp_path_factory) -> Path:
     unit = plain_unit()
     write_photographs(folder / "presses", unit)
     shutil.copytree(folder / "presses", folder / "other_presses")
+    if TORCH:
+        write_labelled(folder / "labelled.hdf5", labelled_arrays())
     return folder
 
 

@@ -2,55 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from labelled_recording import labelled_arrays, write_labelled
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 h5py = pytest.importorskip("h5py")
 
 from tactile_core import cli, networks, sensors  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.paired_contacts import read_pairs  # noqa: E402
 from tactile_core.training.fine_tune import fine_tune, on_skin  # noqa: E402
 from tactile_core.training.labelled import read_labelled  # noqa: E402
-
-PAIRS = Path(__file__).resolve().parents[2] / "scenes" / "training" / "test_contacts.h5"
-HELD, PAUSE = 6, 4  # frames a contact is held, and without contact before it
-BALANCED = 200  # presses from here on are of box and ring alone, in a part of the pad
-MM = 1e3
 
 
 @pytest.fixture(scope="module")
 def arrays():
-    """Readings of a sensor whose gains differ by 40 %, with places (mm, SynTouch's frame) and forces."""
-    pairs = read_pairs(PAIRS)
-    pairs = pairs.some(np.flatnonzero(pairs.press < BALANCED))
-    random = np.random.default_rng(5)
-    gain = np.exp(0.4 * random.standard_normal(19))
-    frame = networks.load().frames["MVB"]
-    skin = on_skin(frame, frame.place(pairs.displacement_biotac.astype(np.float32)))
-    place = np.column_stack([-MM * skin[:, 0] - 13.97, MM * skin[:, 2], MM * skin[:, 1]])
-    held = np.r_[np.zeros(PAUSE), np.ones(HELD)]
-    frames = len(pairs.press) * len(held)
-    change = (held[None, :, None] * (gain * pairs.signal)[:, None]).reshape(frames, 19)
-    return {
-        "electrode_vals": np.round(3300 + change + 1.5 * random.standard_normal(change.shape)),
-        "contact_loc": np.repeat(place, len(held), 0),
-        "force_vec": (held[None, :, None] * pairs.force[:, None]).reshape(frames, 3),
-    }
-
-
-def write(path, arrays):
-    with h5py.File(path, "w") as file:
-        for name, values in arrays.items():
-            file[f"{name}/data"] = values
-    return path
+    return labelled_arrays()
 
 
 def test_it_learns_the_sensor(arrays, tmp_path, capsys):
-    path = write(tmp_path / "labelled.hdf5", arrays)
+    path = write_labelled(tmp_path / "labelled.hdf5", arrays)
     assert cli.main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
     assert "real_force_percent" in capsys.readouterr().out
     before, after = networks.load(), networks.load(tmp_path / "tuned" / "weights")
@@ -66,7 +37,7 @@ def test_it_learns_the_sensor(arrays, tmp_path, capsys):
 
 
 def test_same_bytes_again(arrays, tmp_path):
-    path = write(tmp_path / "labelled.hdf5", arrays)
+    path = write_labelled(tmp_path / "labelled.hdf5", arrays)
     for name in ("a", "b"):
         fine_tune(path, tmp_path / name)
     first, second = ((tmp_path / name / "weights" / "card.json").read_bytes() for name in ("a", "b"))
@@ -91,9 +62,9 @@ def changed(arrays, **values):
 
 def test_metres_read_as_millimetres(arrays, tmp_path):
     frame = networks.load().frames["MVB"]
-    first = read_labelled(write(tmp_path / "mm.hdf5", arrays), frame, 0)
+    first = read_labelled(write_labelled(tmp_path / "mm.hdf5", arrays), frame, 0)
     metres = changed(arrays, contact_loc=1e-3 * arrays["contact_loc"])
-    second = read_labelled(write(tmp_path / "m.hdf5", metres), frame, 0)
+    second = read_labelled(write_labelled(tmp_path / "m.hdf5", metres), frame, 0)
     np.testing.assert_array_equal(first.place, second.place)
     assert not set(first.split.train) & set(first.split.test)
 
@@ -111,7 +82,7 @@ def test_metres_read_as_millimetres(arrays, tmp_path):
 )
 def test_refusals(arrays, tmp_path, spoil, said):
     with pytest.raises(TactileError, match=said):
-        fine_tune(write(tmp_path / "labelled.hdf5", spoil(arrays)), tmp_path / "out")
+        fine_tune(write_labelled(tmp_path / "labelled.hdf5", spoil(arrays)), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

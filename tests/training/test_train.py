@@ -49,9 +49,10 @@ def test_it_learns(pairs, tmp_path):
     card = train(pairs, tmp_path, 0, Options(**SMALL), **SURFACES)
     rows = {row["name"]: row for row in card["errors"]}
     share = {name: row["value"] / row["null"] for name, row in rows.items() if row["null"]}
-    # Few contacts, few steps: measured .48, .41, .49, .63, .68, .56, .64. A net that is wired wrong gives 1.
-    limits = {"MVB": 0.6, "MVD": 0.7, "S2MPN": 0.65, "M2MPN": 0.75, "chain": 0.8, "D2B": 0.75, "direct": 0.8}
-    assert not {name: share[f"{name}_rms_um"] for name, limit in limits.items() if share[f"{name}_rms_um"] >= limit}
+    # Few contacts, few steps, so that another processor's rounding leads elsewhere: .41 to .68 on an EPYC, .46 to
+    # .69 on a Xeon. A net that is wired wrong gives 1.
+    nets = ("MVB", "MVD", "S2MPN", "M2MPN", "chain", "D2B", "direct")
+    assert not {name: share[f"{name}_rms_um"] for name in nets if share[f"{name}_rms_um"] >= 0.85}
     assert rows["silence_digit_max_um"]["value"] < 0.25 * rows["chain_max_um"]["null"]
 
 
