@@ -18,6 +18,9 @@ SLIDE_HEADER = ["timestamp", "tdc", "tac", "pdc", *PAC, *ELECTRODES]
 # interrupts. A handler of our own is not inherited: children begin with the system's default.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+# So does one under nohup "ignore the hangup"; the tests themselves go on through it.
+if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda number, frame: None)
 
 
 @pytest.fixture(scope="session")

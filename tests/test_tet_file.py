@@ -94,7 +94,7 @@ def test_a_file_that_is_not_there_or_too_large_is_refused(tmp_path, write, monke
     with pytest.raises(TactileError, match="cannot be read"):
         read_tet(tmp_path)
     monkeypatch.setattr(tet_file, "MAX_CELLS", 1)
-    with pytest.raises(TactileError, match="more than 1 tetrahedra"):
+    with pytest.raises(TactileError, match="more than 1 vertices"):
         read_tet(write(text()))
     monkeypatch.setattr(tet_file, "MAX_BYTES", 10)
     with pytest.raises(TactileError, match="MB"):

@@ -17,7 +17,11 @@ def tiny(tmp_path, monkeypatch):
     x = np.linspace(-2e-3, 2e-3, 5)
     mesh, lattice = slab_mesh(x, x, np.linspace(0, -1e-3, 3))
     touchable = np.arange(len(lattice.rest))
-    return lambda youngs=1e6: compliance._cached("tiny", lattice, touchable, mesh, Material(youngs, 0.45))
+
+    def load(youngs=1e6):
+        return compliance._cached(compliance._Solid("tiny", lattice, touchable, mesh, Material(youngs, 0.45)))
+
+    return load
 
 
 def test_second_load_reads_the_first_ones_files(tiny, tmp_path, monkeypatch):

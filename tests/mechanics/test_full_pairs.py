@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tactile_core import digit_shape, sensors
+from tactile_core.batch import pack
 from tactile_core.errors import TactileError
 from tactile_core.indenters import Sphere
 from tactile_core.mechanics import full_pairs, pair_file
@@ -186,8 +187,7 @@ def test_solved_presses_are_kept_and_merge_to_the_same_bytes(script, tmp_path):
         assert file.attrs["digit_nodes_sha256"] == sensors.digit_surface().sha256
         assert file.attrs["unseen_region_x"] == REGION_X
         stored, scale = file["displacement_digit"][0], file["displacement_digit"].attrs["scale"]
-    (solved,) = (tmp_path / "one").glob("*.npz")
-    with np.load(solved) as press:
-        found = press["displacement_digit"][0] * pair_file.SCALE
+    (solved,) = (tmp_path / "one").glob("*.h5")
+    found = pack.read(solved)["displacement_digit"][0] * pair_file.SCALE
     assert scale == script.STEP and stored.any()
     np.testing.assert_allclose(stored * scale, found, atol=0.5 * scale * (1 + 1e-6))  # rounded to the nearest step
