@@ -75,16 +75,21 @@ def _lines(file: Path) -> list[str]:
 
 def _of_folder(folder: Path) -> Iterator[Path]:
     """Recordings in a folder and below it, by name; links to folders are not followed."""
-    if (folder / MARK).is_file():
+    if _is_bag(folder):
         yield folder
         return
     for place, folders, names in os.walk(folder):
-        bags = [name for name in folders if (Path(place) / name / MARK).is_file()]
+        bags = [name for name in folders if _is_bag(Path(place, name))]
         folders[:] = sorted(name for name in folders if name not in bags and not name.startswith("."))
         slides = [name for name in names if name.endswith(SLIDE)]
         plain = [name for name in names if name.lower().endswith(SUFFIXES) and not name.startswith(".")]
         for name in sorted([*bags, *(slides or plain)]):
             yield Path(place) / name
+
+
+def _is_bag(folder: Path) -> bool:
+    """Whether a folder is a ROS 2 bag; one that may not be read is none."""
+    return os.path.isfile(folder / MARK)
 
 
 def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[Input]:

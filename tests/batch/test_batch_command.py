@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import pytest
 
@@ -54,6 +55,18 @@ def test_inputs_are_files_folders_globs_and_lists(recordings, tmp_path):
         with pytest.raises(TactileError, match="names no recording"):
             (tmp_path / "out").mkdir(exist_ok=True)
             inputs.find([word], out)
+
+
+def test_a_folder_that_may_not_be_read_is_no_bag(recordings, tmp_path, monkeypatch):
+    def refused(path, *words, **more):
+        if "closed" in str(path):
+            raise PermissionError(13, "Permission denied", str(path))
+        return stat(path, *words, **more)
+
+    (recordings[0].parent / "closed").mkdir()
+    stat = os.stat
+    monkeypatch.setattr(os, "stat", refused)
+    assert inputs.find([str(recordings[0].parent)], tmp_path / "out") == recordings
 
 
 @pytest.mark.parametrize(
