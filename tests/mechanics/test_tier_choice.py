@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from tactile_core import cli
@@ -53,9 +55,11 @@ def test_a_bound_that_no_tier_meets_names_the_best(table):
         tier_choice.choose("biotac", 0.5, 0.3)
 
 
-def test_a_scene_is_as_deep_as_its_deepest_point(scene, table):
-    for sensor in ("biotac", "digit"):
-        compliance.compliance_of(sensor)  # without its matrices nobody knows how deep a force goes
+def test_a_scene_is_as_deep_as_its_deepest_point(scene, table, monkeypatch):
+    def loaded(sensor):  # whatever folder other tests have matrices kept in by now
+        return SimpleNamespace(bytes=compliance.compliance_of(sensor).move.nbytes)
+
+    monkeypatch.setattr(tier_choice, "stored", loaded)
     found = tier_choice.choose_for_scene(scene, ("biotac", "digit"), 35)
     assert 0.05 < found["digit"].share < found["biotac"].share < DEPTH_LIMIT  # 0.6 N on 7 mm: the skin is softer
     assert found["biotac"].tier == "fast" and "35" not in found["biotac"].told("biotac")
