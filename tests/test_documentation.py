@@ -1,4 +1,7 @@
-"""Every command that README and the pages show is run here, page by page, in a folder with small files to work on."""
+"""The commands that README and the pages show are run here, page by page, in a folder with small files to work on.
+
+What a test of its own runs, or what none can run, is listed below with its place or its reason.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import importlib.util
 import os
 import re
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +17,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from conftest import SLIDE_HEADER
 from labelled_recording import labelled_arrays, write_labelled
 from plain_unit import plain_unit
 from pressed_unit import write_photographs
@@ -38,7 +43,7 @@ LESS = [
     ("seq 0 7 | parallel -j 8", "seq 0 7 | xargs -P 2 -I{}"),
     ("--workers 8", "--workers 2"),
 ]
-# What needs a machine of its own -> the file that runs it, and the words it is run by.
+# What is run by another test -> its file, and the words it is run by.
 ELSEWHERE = {
     "tactile simulate scenes/press_roll_slide --grid": ("tests/batch/test_batch_kinds.py", "--grid"),
     "tactile watch --rosbag-play": ("tests/live/test_live.py", "--rosbag-play"),
@@ -48,16 +53,14 @@ ELSEWHERE = {
     "python3 scripts/dev.py test": (".ci/run", "dev.py test"),
     "python -m pip install": ("scripts/dev.py", '"install"'),
     "python3 scripts/build_extension.py": ("tests/blender/test_extension_zip.py", "build_extension"),
-    "python3 scripts/fetch_blender.py": ("scripts/fetch_blender.py", "--suite"),
     "blender ": ("tests/blender/test_command_line.py", "tactile"),
-    "openssl ": ("tests/batch/test_batch_dask.py", "openssl"),
-    "T=": ("tests/batch/test_batch_dask.py", "tls"),
-    "export DASK": ("tests/batch/test_batch_dask.py", "tls"),
-    "DASK_DISTRIBUTED": ("tests/batch/test_batch_dask.py", "tls"),
-    "OMP_NUM_THREADS=1 dask worker": ("tests/batch/test_batch_dask.py", "tls"),
-    "tactile batch day1 --out /shared/job --cluster": ("tests/batch/test_batch_dask.py", "tls"),
     "sbatch ": ("tests/batch/test_batch_slurm.py", "sbatch"),
 }
+# What no test runs, and why.
+NOT_RUN = {"python3 scripts/fetch_blender.py": "needs root, and 1.7 GB of Debian's packages"}
+# The lines of batch.md's TLS recipe: the whole block is run as one below.
+RECIPE = "openssl ", "T=", "DASK_DISTRIBUTED__SCHEDULER", "OMP_NUM_THREADS=1 dask worker", "export DASK"
+RECIPE_JOB = "tactile batch day1 --out /shared/job --cluster"
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
@@ -71,8 +74,8 @@ def commands(page: Path) -> list[str]:
     return [found for line in lines if (found := re.sub(r"(^|\s{2,})#.*", "", line).strip())]
 
 
-def elsewhere(command: str) -> tuple[str, str] | None:
-    return next((where for start, where in ELSEWHERE.items() if command.startswith(start)), None)
+def runs_here(command: str) -> bool:
+    return not command.startswith((*ELSEWHERE, *NOT_RUN, *RECIPE, RECIPE_JOB))
 
 
 def shown(pages: list[Path], language: str) -> list[pytest.param]:
@@ -99,13 +102,20 @@ def inputs(tmp_path_factory) -> Path:
 
 def write_touch(path: Path, frames: int | None) -> None:
     """The first frames of the recording that ships, as raw readings in CSV."""
-    header = ["timestamp", "tdc", "tac", "pdc", *(f"pac{i}" for i in range(1, 23)), *(f"ele{i}" for i in range(1, 20))]
     with h5py.File(ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5", "r") as file:
         electrodes = file["electrodes"][:frames]
-    rows = np.full((len(electrodes), len(header)), 2000.0)
+    rows = np.full((len(electrodes), len(SLIDE_HEADER)), 2000.0)
     rows[:, 0] = 1.6e9 + np.arange(len(rows)) / 100
     rows[:, 26:] = electrodes
-    np.savetxt(path, rows, fmt=["%.6f"] + ["%d"] * 44, delimiter=",", header=",".join(header), comments="")
+    formats = ["%.6f"] + ["%d"] * (len(SLIDE_HEADER) - 1)
+    np.savetxt(path, rows, fmt=formats, delimiter=",", header=",".join(SLIDE_HEADER), comments="")
+
+
+@pytest.fixture
+def free_port() -> int:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
 
 
 @pytest.fixture
@@ -120,10 +130,14 @@ def run(command: str, folder: Path) -> subprocess.CompletedProcess:
     """A line of a page, in bash, with this Python's tools first."""
     for page, here in LESS:
         command = command.replace(page, here)
+    return in_bash(command, folder)
+
+
+def in_bash(text: str, folder: Path) -> subprocess.CompletedProcess:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
     return subprocess.run(
-        ["bash", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, timeout=SECONDS
+        ["bash", "-c", text], cwd=folder, env=environment, capture_output=True, text=True, timeout=SECONDS
     )
 
 
@@ -134,13 +148,30 @@ def test_commands_work(page, user):
     if not TORCH and any(command.startswith("tactile train") for command in every):
         pytest.skip("torch is not installed: dev.py test --train")
     for command in every:
-        if elsewhere(command) is None:
+        if runs_here(command):
             done = run(command, user)
             assert done.returncode <= (MEASURES in command), f"{command}\n{done.stdout}\n{done.stderr}"
 
 
-def test_what_is_run_elsewhere_is_run_there():
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates with")
+def test_the_tls_recipe_works(user, free_port):
+    """The page's block as one script: what runs on the head and on each machine runs here, behind it."""
+    pytest.importorskip("distributed", reason="distributed is absent: pip install tactile-core[batch]")
+    lines = [line for line in commands(ROOT / "docs" / "batch.md") if line.startswith((*RECIPE, RECIPE_JOB))]
+    kept = [re.sub(r"^(?=DASK|OMP)", "exec env ", line) for line in lines]
+    behind = [f"({line}) 2>>dask.log &" if line.startswith("exec") else line for line in kept]
+    text = "\n".join(["trap 'kill $(jobs -p)' EXIT", *behind])
+    text = text.replace("head:8786", f"127.0.0.1:{free_port}").replace("8786", f"{free_port} --no-dashboard")
+    done = in_bash(text.replace("/shared/job", "tls_job"), user)
+    assert done.returncode == 0, f"{text}\n{done.stdout}\n{done.stderr}\n{(user / 'dask.log').read_text()}"
+    assert len(lines) == 7 and list((user / "tls_job").rglob("*.h5"))
+    assert f"tls://127.0.0.1:{free_port}" in (user / "dask.log").read_text()
+
+
+def test_what_is_not_run_here_is_shown_and_run_there():
     every = [command for page in PAGES for command in commands(page)]
+    for start in (*NOT_RUN, *RECIPE, RECIPE_JOB):
+        assert any(command.startswith(start) for command in every), f"no page shows {start}"
     for start, (file, word) in ELSEWHERE.items():
         assert any(command.startswith(start) for command in every), f"no page shows {start}"
         assert word in (ROOT / file).read_text(encoding="utf-8"), f"{file} does not run {start}"
