@@ -23,8 +23,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 SCENE = ROOT / "scenes" / "training"
 
-from tactile_core import atomic  # noqa: E402
-from tactile_core.batch import pack  # noqa: E402
+from tactile_core import atomic, pack  # noqa: E402
 from tactile_core.mechanics import full_pairs, pair_file  # noqa: E402
 from tactile_core.mechanics.pair_card import card, card_path  # noqa: E402
 from tactile_core.scene import load_scene  # noqa: E402

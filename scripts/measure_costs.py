@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from profile_verbs import RECORDING, ROOT, Case, run
+from profile_verbs import RECORDING, ROOT, Case, run, write_scene
 
 from tactile_core import atomic, results
 from tactile_core.indenters import Sphere
@@ -71,29 +71,9 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def write_scene(path: Path, contacts: int, force: float) -> Path:
-    """A 7 mm ball that presses at constant force and moves over the pad, one frame free of it."""
-    path.mkdir(exist_ok=True)
-    last = contacts / 100
-    (path / "scene.toml").write_text(
-        f"""format = "tactile-scene-1"
-name = "cost"
-description = "A ball moves over the pad."
-[[indenters]]
-kind = "sphere"
-name = "ball"
-radius_mm = 3.5
-[recording]
-indenter = "ball"
-points = [
-    {{ time_s = 0.0, x_mm = -10.0, z_mm = -2.0, force_n = 0.0 }},
-    {{ time_s = 0.01, x_mm = -10.0, z_mm = -2.0, force_n = {force} }},
-    {{ time_s = {last}, x_mm = -6.0, z_mm = 2.0, force_n = {force} }},
-]
-""",
-        encoding="utf-8",
-    )
-    return path
+def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:
+    """A ball that presses at constant force and moves over the pad, one frame free of it."""
+    return [(0.0, -10.0, -2.0, 0.0), (0.01, -10.0, -2.0, force), (contacts / 100, -6.0, 2.0, force)]
 
 
 def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
@@ -106,8 +86,10 @@ def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
 def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
     """Of `tactile simulate --keep`."""
     costs, sizes = [], []
+    scene, out = folder / "scene", folder / "out.h5"
+    scene.mkdir(exist_ok=True)
     for contacts in (FEW, MANY):
-        scene, out = write_scene(folder / "scene", contacts, force), folder / "out.h5"
+        write_scene(scene, *ball_way(contacts, force))
         costs.append(run(Case("simulate", f"simulate {scene} --keep {keep} --out {out}"), folder))
         sizes.append(out.stat().st_size)
         out.unlink()

@@ -59,21 +59,6 @@ stats = pstats.Stats(profile).stats
 found = [[name, at, line, time] for (at, line, name), (_, _, time, _, _) in stats.items()]
 open(sys.argv[1], "w").write(json.dumps(sorted(found, key=lambda one: -one[3])))
 """
-SCENE = """
-format = "tactile-scene-1"
-name = "short"
-description = "One press."
-[[indenters]]
-kind = "sphere"
-name = "ball"
-radius_mm = 3.5
-[recording]
-indenter = "ball"
-points = [
-    { time_s = 0.0, x_mm = -8.0, z_mm = 0.0, force_n = 0.0 },
-    { time_s = 0.1, x_mm = -8.0, z_mm = 0.0, force_n = 0.3 },
-]
-"""
 
 
 class Case(NamedTuple):
@@ -148,12 +133,32 @@ def main(arguments: list[str] | None = None) -> int:
 
 def write_inputs(folder: Path) -> None:
     """touch.csv, the first 100 frames of the shipped recording; scene.toml, one press of 11 frames."""
-    (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
+    write_scene(folder, (0.0, -8.0, 0.0, 0.0), (0.1, -8.0, 0.0, 0.3))
     electrodes = recordings.read(RECORDING).electrodes[:100]
     names = ["timestamp", "tdc", "tac", "pdc", *(f"pac{i}" for i in range(1, 23)), *(f"ele{i}" for i in range(1, 20))]
     rows = np.full((len(electrodes), len(names)), 2000.0)
     rows[:, 0], rows[:, -19:] = 1.6e9 + np.arange(len(electrodes)) / 100, electrodes
     np.savetxt(folder / "touch.csv", rows, fmt="%.10g", delimiter=",", header=",".join(names), comments="")
+
+
+def write_scene(folder: Path, *points: tuple[float, float, float, float]) -> None:
+    """scene.toml of a 7 mm ball; points : its way, (time s, x mm, z mm, force N)."""
+    lines = ["    {{ time_s = {}, x_mm = {}, z_mm = {}, force_n = {} }},\n".format(*point) for point in points]
+    (folder / "scene.toml").write_text(
+        f"""format = "tactile-scene-1"
+name = "ball"
+description = "A ball."
+[[indenters]]
+kind = "sphere"
+name = "ball"
+radius_mm = 3.5
+[recording]
+indenter = "ball"
+points = [
+{"".join(lines)}]
+""",
+        encoding="utf-8",
+    )
 
 
 def run(case: Case, folder: Path) -> Cost:

@@ -14,7 +14,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from . import network_sizes
+from . import keep_words, network_sizes
 from .error_budget import Budget
 from .errors import TactileError
 
@@ -86,17 +86,6 @@ def costs() -> dict[str, Any]:
     return json.loads(COSTS.read_text(encoding="utf-8"))
 
 
-def parse_words(text: str | None, known: tuple[str, ...]) -> tuple[str, ...]:
-    """``"electrodes,image"`` as known words in their order; None: all. Raises TactileError for others, or none."""
-    words = known if text is None else [word.strip() for word in text.split(",") if word.strip()]
-    for word in words:
-        if word not in known:
-            raise TactileError("--keep", repr(word), f"words out of {', '.join(known)}", "Separate them by commas")
-    if not words:
-        raise TactileError("--keep", "nothing", f"one or more of {', '.join(known)}")
-    return tuple(word for word in known if word in words)
-
-
 def plan(path: str | os.PathLike, keep: str | None, budget: Budget, preset: str | None) -> Plan:
     """Of a scene (a folder or a .toml) or a recording. keep : its outputs as text, None for all that there are.
 
@@ -104,8 +93,8 @@ def plan(path: str | os.PathLike, keep: str | None, budget: Budget, preset: str 
     """
     path = Path(path)
     if path.is_dir() or path.suffix == ".toml":
-        return of_scene(path, parse_words(keep, OF_SCENE), budget, preset)
-    return of_recording(path, parse_words(keep, OF_RECORDING), budget, preset)
+        return of_scene(path, keep_words.parse(keep, OF_SCENE), budget, preset)
+    return of_recording(path, keep_words.parse(keep, OF_RECORDING), budget, preset)
 
 
 def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:

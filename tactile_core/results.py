@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import __version__, atomic
+from . import __version__, atomic, keep_words
 from .errors import TactileError
 
 FORMAT = "tactile-result-1"
@@ -31,11 +31,7 @@ def parse_keep(text: str) -> tuple[str, ...]:
 
     Raises TactileError for an unknown word.
     """
-    words = [word.strip() for word in text.split(",") if word.strip()]
-    for word in words:
-        if word not in KEEPABLE:
-            raise TactileError("--keep", repr(word), f"words out of {', '.join(KEEPABLE)}", "Separate them by commas")
-    return tuple(word for word in KEEPABLE if word in words)
+    return keep_words.parse(text, KEEPABLE, least=0)
 
 
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import os
 import subprocess
 import sys
@@ -87,6 +88,32 @@ def test_torch_stays_in_training_and_bpy_out_of_the_core():
         or ("torch" in imported(path) and PACKAGE / "training" not in path.parents)
     ]
     assert offenders == []  # tactile_core: only relative imports, because inside Blender it has another name
+
+
+def room_of(path: Path) -> str:
+    """The folder of the package that a file lies in; "" at the top."""
+    return path.relative_to(PACKAGE).parts[0] if path.parent != PACKAGE else ""
+
+
+def rooms_imported(path: Path) -> set[str]:
+    """Other rooms that a file imports from, anywhere in it; the top-level modules are everybody's."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            above = path.parents[node.level - 1].relative_to(PACKAGE).parts
+            names = [*above, *(node.module or "").split(".")] if node.module else [*above]
+            found |= {names[0]} if names else {name.name for name in node.names}
+    return {name for name in found if (PACKAGE / name / "__init__.py").exists()} - {room_of(path)}
+
+
+def test_no_two_rooms_import_each_other():
+    """Not even by way of others: data flows one way, so that `batch` knows the mechanics and never the reverse."""
+    knows = {}
+    for path in PACKAGE.rglob("*.py"):
+        if room_of(path):
+            knows.setdefault(room_of(path), set()).update(rooms_imported(path))
+    order = list(graphlib.TopologicalSorter(knows).static_order())  # raises CycleError, which names the rooms
+    assert {"mechanics", "optics"} <= set(order[: order.index("batch")])
 
 
 def lint(path: str, code: str) -> str:

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .. import atomic
+from .. import atomic, sealed
 from . import job as jobs
-from . import kinds, sealed
+from . import kinds
 from .job import Job
 
 FORMAT = "tactile-batch-1"

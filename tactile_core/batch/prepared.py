@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import atomic
+from .. import atomic, sealed
 from ..errors import TactileError
 from ..hdf5_disk import Disk
 from ..recordings import Recording, Signals, prepare, sensor_file
 from ..recordings.parts import read_parts
 from . import job as jobs
-from . import sealed
 from .inputs import content_hash
 
 if TYPE_CHECKING:

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import atomic
+from .. import atomic, sealed
 from ..frame_pass import CHUNK, Tools, translated
 from ..frames_file import FramesFile
 from . import job as jobs
-from . import sealed
 from .prepared import Prepared
 
 if TYPE_CHECKING:

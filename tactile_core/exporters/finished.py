@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import sealed
 from ..batch import job as jobs
-from ..batch import manifest, sealed, shard
+from ..batch import manifest, shard
 from ..batch.prepared import Prepared
 from ..batch.recipes import Translate
 from ..errors import TactileError

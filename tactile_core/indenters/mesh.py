@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import atomic
+from ..cache import cache_folder
 from ..errors import TactileError
 from . import mesh_file, mesh_grid
 from .indenter import Indenter
@@ -120,8 +121,6 @@ def _hull(mesh: Any) -> np.ndarray:
 
 
 def _cache_file(digest: str) -> pathlib.Path:
-    from ..mechanics.compliance import cache_folder
-
     return cache_folder() / f"indenter-{digest[:16]}.npz"
 
 

@@ -11,13 +11,13 @@ import functools
 import hashlib
 import json
 import logging
-import os
 import pathlib
 from typing import NamedTuple
 
 import numpy as np
 
 from .. import atomic, biotac_shape, digit_shape, sensors, surface
+from ..cache import cache_folder
 from ..errors import TactileError
 from ..lattice import Lattice
 from ..sensors import Material
@@ -148,15 +148,6 @@ def _touchable_skin() -> np.ndarray:
     x, z = rolled.T
     near = (x > digit_shape.X_TIP - _BESIDE_GEL) & (x < digit_shape.X_BASE + _BESIDE_GEL)
     return np.flatnonzero(near & (np.abs(z) < digit_shape.HALF_WIDTH + _BESIDE_GEL))
-
-
-def cache_folder() -> pathlib.Path:
-    """Where matrices are kept: ``$TACTILE_CACHE``, else ``~/.cache/tactile`` (``%LOCALAPPDATA%`` on Windows)."""
-    chosen = os.environ.get("TACTILE_CACHE")
-    if chosen:
-        return pathlib.Path(chosen)
-    base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
-    return (pathlib.Path(base) if base else pathlib.Path.home() / ".cache") / "tactile"
 
 
 def _folder(solid: _Solid) -> pathlib.Path:

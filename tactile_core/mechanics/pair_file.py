@@ -7,8 +7,7 @@ import pathlib
 
 import numpy as np
 
-from .. import __version__, atomic, sensors
-from ..batch import pack
+from .. import __version__, atomic, pack, sensors
 from ..errors import TactileError
 from ..hdf5_disk import Disk
 

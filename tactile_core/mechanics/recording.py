@@ -37,32 +37,18 @@ def simulate_recording(
     *,
     keep: Collection[str] = ALL,
     tiers: Mapping[str, str] | None = None,
+    loaded: tuple[Scene, str] | None = None,
 ) -> None:
     """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
 
     The motion is linear between the scene's points; rolling and sliding differ in nothing else, for contact is without
     friction here. progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
     keep : words of OUTPUTS; a sensor that none of them needs is not solved. tiers : of each sensor, fast by default.
+    loaded : a scene and its text in place of the file's, which is then named in messages alone.
     Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked, or
     tared wiring: this kind of file holds raw counts.
     """
-    scene, text = load_scene(scene_path)
-    simulate_scene(scene, text, scene_path, out, seed, progress, wiring, keep=keep, tiers=tiers)
-
-
-def simulate_scene(
-    scene: Scene,
-    text: str,
-    scene_path: str | os.PathLike,
-    out: str | os.PathLike,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-    wiring: Wiring | None = None,
-    *,
-    keep: Collection[str] = ALL,
-    tiers: Mapping[str, str] | None = None,
-) -> None:
-    """As ``simulate_recording``, of a scene that is loaded; text : of it; scene_path : for messages."""
+    scene, text = loaded or load_scene(scene_path)
     spec = recording_of(scene, scene_path)
     sensors_used = sensors_of(keep)
     wiring = wiring or _wiring(spec)
@@ -89,17 +75,6 @@ def simulate_scene(
         made_by=f"tactile {__version__}, mechanics.recording{_tiers_told(tiers)}",
         note=f"Simulated, not measured: {scene.description}{told}",
     )  # fmt: skip
-
-
-def parse_keep(text: str) -> tuple[str, ...]:
-    """``"electrodes,displacement_digit"`` as words of OUTPUTS, in its order. Raises TactileError for other words."""
-    words = [word.strip() for word in text.split(",") if word.strip()]
-    for word in words:
-        if word not in OUTPUTS:
-            raise TactileError("--keep", repr(word), f"words out of {', '.join(OUTPUTS)}", "Separate them by commas")
-    if not words:
-        raise TactileError("--keep", "nothing", f"one or more of {', '.join(OUTPUTS)}")
-    return tuple(word for word in OUTPUTS if word in words)
 
 
 def sensors_of(keep: Collection[str]) -> tuple[str, ...]:

@@ -37,8 +37,7 @@ def run(options: argparse.Namespace) -> int:
     """Make the pairs."""
     engine.check_counts(options, "workers", "restart")
     check_seed(options.seed)
-    from ..batch import parts
-    from ..mechanics import pairs
+    from ..batch import pairs, parts
 
     if options.plan:
         job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out)

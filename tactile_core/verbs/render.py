@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
 def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
     """Render in other processes, or write the plan of that."""
     from ..batch import parts
-    from ..optics.parts import plan, render_in_parts
+    from ..batch.render import plan, render_in_parts
 
     if options.plan:
         tell(str(parts.write(options.out, plan(options.input, options.out, asked))))

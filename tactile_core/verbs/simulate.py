@@ -91,9 +91,10 @@ def run(options: argparse.Namespace) -> int:
             if missed:
                 say(f"warning: {missed} frames did not reach their force and are marked (converged is false)")
         else:
-            from ..mechanics.recording import ALL, parse_keep, simulate_recording
+            from .. import keep_words
+            from ..mechanics.recording import ALL, simulate_recording
 
-            keep = ALL if options.keep is None else parse_keep(options.keep)
+            keep = keep_words.parse(options.keep, ALL)
             tiers = {} if bound is None else _tiers(options.scene, keep, bound)
             simulate_recording(options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers)
     tell(options.out)
@@ -123,11 +124,11 @@ def _run_grid(options: argparse.Namespace) -> int:
     for name in ("isaac_like", "error"):
         if getattr(options, name):
             raise TactileError("--grid", f"given with --{name.replace('_', '-')}", "one of the two")
-    from ..batch import parts
-    from ..mechanics import recording_grid
-    from ..mechanics.recording import ALL, parse_keep
+    from .. import keep_words
+    from ..batch import parts, recording_grid
+    from ..mechanics.recording import ALL
 
-    keep = ALL if options.keep is None else parse_keep(options.keep)
+    keep = keep_words.parse(options.keep, ALL)
     job = recording_grid.plan(options.scene, options.grid, options.out, options.seed, keep)
     if options.plan:
         tell(str(parts.write(options.out, job)))

@@ -16,9 +16,9 @@ from tactile_core import convert
 from tactile_core.batch import run as runs
 from tactile_core.batch.dask_loop import CONFIGURED, loop
 from tactile_core.batch.dask_place import Cluster, QueueFile, _read
+from tactile_core.batch.render import render_in_parts
 from tactile_core.errors import TactileError
 from tactile_core.optics.job import Options, render
-from tactile_core.optics.parts import render_in_parts
 
 distributed = pytest.importorskip("distributed", reason="distributed is absent: pip install tactile-core[batch]")
 

@@ -7,31 +7,16 @@ import json
 import h5py
 import numpy as np
 import pytest
+from ball_scene import ball_scene
 
-from tactile_core import cli
+from tactile_core import cli, pack, sealed
 from tactile_core.batch import job as jobs
-from tactile_core.batch import pack, sealed
 from tactile_core.errors import TactileError
-
-SCENE = """format = "tactile-scene-1"
-name = "short"
-description = "A press."
-[[indenters]]
-kind = "sphere"
-name = "ball"
-radius_mm = 3.5
-[recording]
-indenter = "ball"
-points = [
-    { time_s = 0.0, x_mm = -8.0, z_mm = 0.0, force_n = 0.0 },
-    { time_s = 0.02, x_mm = -8.0, z_mm = 0.0, force_n = 0.5 },
-]
-"""
 
 
 @pytest.fixture
 def scene(tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "scene.toml").write_text(ball_scene((0.0, -8.0, 0.0, 0.0), (0.02, -8.0, 0.0, 0.5)))
     return tmp_path / "scene.toml"
 
 

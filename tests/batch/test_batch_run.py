@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from tactile_core import convert, results
+from tactile_core import convert, results, sealed
 from tactile_core.batch import job as jobs
-from tactile_core.batch import manifest, sealed
+from tactile_core.batch import manifest
 from tactile_core.batch import run as runs
 from tactile_core.errors import TactileError
 

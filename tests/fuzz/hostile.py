@@ -32,11 +32,12 @@ from tactile_core import (  # noqa: E402
     paired_contacts,
     recordings,
     scene,
+    sealed,
     tet_file,
     translate,
     weights,
 )
-from tactile_core.batch import dask_place, inputs, prepared, recipes, sealed  # noqa: E402
+from tactile_core.batch import dask_place, inputs, prepared, recipes  # noqa: E402
 from tactile_core.batch import job as jobs  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.indenters import mesh_file  # noqa: E402

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from tactile_core.cache import cache_folder
 from tactile_core.indenters import Box, MeshIndenter, Sphere, mesh, pose_on
-from tactile_core.mechanics.compliance import cache_folder
 
 BALL = Sphere(2.5e-3)
 SPACING = 0.2e-3

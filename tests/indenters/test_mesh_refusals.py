@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from tactile_core.cache import cache_folder
 from tactile_core.errors import TactileError
 from tactile_core.indenters import MeshIndenter, mesh_file
 from tactile_core.indenters.mesh_inside import OverlapError, inside
-from tactile_core.mechanics.compliance import cache_folder
 
 
 def sphere(radius=2.0, at=(0, 0, 0)):

@@ -10,8 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from tactile_core import digit_shape, sensors
-from tactile_core.batch import pack
+from tactile_core import digit_shape, pack, sensors
 from tactile_core.errors import TactileError
 from tactile_core.indenters import Sphere
 from tactile_core.mechanics import full_pairs, pair_file
@@ -191,3 +190,12 @@ def test_solved_presses_are_kept_and_merge_to_the_same_bytes(script, tmp_path):
     found = pack.read(solved)["displacement_digit"][0] * pair_file.SCALE
     assert scale == script.STEP and stored.any()
     np.testing.assert_allclose(stored * scale, found, atol=0.5 * scale * (1 + 1e-6))  # rounded to the nearest step
+
+
+def test_what_a_press_lost_is_told(script, tmp_path):
+    nothing = {"wanted": np.int32(4), "lost": np.frombuffer(b"no equilibrium", np.uint8), "count": np.int32(0)}
+    pack.write(script.file_of(tmp_path, 1, 4), nothing)
+    script.solve_one((tmp_path, 1, 0))
+    card = script.merge(tmp_path, 1, tmp_path / "set.h5")
+    assert card["contacts"] == 1 and card["contacts_wanted"] == 5 and card["presses_solved"] == 2
+    assert card["lost"] == {"press_1_00004": "no equilibrium"}

@@ -3,29 +3,12 @@
 import h5py
 import numpy as np
 import pytest
+from ball_scene import ball_scene
 
 from tactile_core import biotac_shape, sensors
 from tactile_core.errors import TactileError
 from tactile_core.mechanics import isaac_recording
 from tactile_core.mechanics.isaac_recording import simulate_isaac_like
-
-SCENE = """\
-format = "tactile-scene-1"
-name = "short"
-description = "A press that rolls."
-[[indenters]]
-kind = "sphere"
-name = "ball"
-radius_mm = 7.0
-[recording]
-indenter = "ball"
-points = [
-    { time_s = 0.0, x_mm = -8.0, z_mm = 0.0, force_n = 0.0 },
-    { time_s = 0.1, x_mm = -8.0, z_mm = 0.0, force_n = 0.2 },
-    { time_s = 0.2, x_mm = -8.0, z_mm = 1.0, force_n = FORCE },
-    { time_s = 0.3, x_mm = -8.0, z_mm = 1.0, force_n = 0.1 },
-]
-"""
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +40,8 @@ def files(tmp_path, skin_text, monkeypatch):
     monkeypatch.setattr(isaac_recording, "attached_to", rims)
 
     def write(force=0.2):
-        (tmp_path / "scene.toml").write_text(SCENE.replace("FORCE", str(force)))
+        rolls = (0.0, -8.0, 0.0, 0.0), (0.1, -8.0, 0.0, 0.2), (0.2, -8.0, 1.0, force), (0.3, -8.0, 1.0, 0.1)
+        (tmp_path / "scene.toml").write_text(ball_scene(*rolls, radius_mm=7.0))
         return tmp_path / "scene.toml", tmp_path / "skin.tet", tmp_path / "out.h5"
 
     return write

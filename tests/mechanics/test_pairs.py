@@ -11,6 +11,7 @@ from tactile_core.batch import parts
 from tactile_core.batch import run as runs
 from tactile_core.batch.here import Here
 from tactile_core.batch.kinds.pairs import wanted
+from tactile_core.batch.pairs import make_pairs, plan
 from tactile_core.errors import TactileError
 from tactile_core.indenters import Sphere
 from tactile_core.mechanics import pair_file
@@ -18,7 +19,6 @@ from tactile_core.mechanics.compliance import compliance_of
 from tactile_core.mechanics.corrected_press import CorrectedPress
 from tactile_core.mechanics.pair_card import card, card_path
 from tactile_core.mechanics.pair_rows import pair_row, press_rows
-from tactile_core.mechanics.pairs import make_pairs, plan
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.scene import load_scene
 

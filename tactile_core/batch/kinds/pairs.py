@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ... import pack, sealed
 from ...errors import TactileError
 from ...scene import Scene
 from .. import job as jobs
-from .. import pack, sealed
 from ..scene_input import load
 from . import Seen
 

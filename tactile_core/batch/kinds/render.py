@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ... import pack, sealed
 from ...errors import TactileError
 from .. import job as jobs
-from .. import pack, sealed
 from ..inputs import content_hash
 from . import Seen
 from .batch import check_unit

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from ... import pack, sealed
 from ...scene import Scene
 from ...scene_grid import with_values
 from ...scene_text import to_toml
 from .. import job as jobs
-from .. import pack, sealed
 from ..scene_input import load
 from . import Seen
 
@@ -29,7 +29,7 @@ def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
 
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
     """Simulate a recording."""
-    from ...mechanics.recording import simulate_scene
+    from ...mechanics.recording import simulate_recording
 
     one = job.inputs[index]
     file = jobs.shard_file(folder, one.name, number)
@@ -41,7 +41,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     scene = with_values(scene, values, one.path)
     with tempfile.TemporaryDirectory() as name:
         out, seed = Path(name) / f"{one.name}.h5", job.recipe.seed + index
-        simulate_scene(scene, to_toml(told), one.path, out, seed, keep=job.recipe.keep)
+        simulate_recording(one.path, out, seed, keep=job.recipe.keep, loaded=(scene, to_toml(told)))
         pack.write_files(file, Path(name))
     return True
 

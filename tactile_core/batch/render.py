@@ -6,18 +6,18 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from .. import atomic, results
-from ..batch import inputs, pack, parts
-from ..batch import job as jobs
-from ..batch import run as runs
-from ..batch.job import Job
-from ..batch.kinds import render as kind
-from ..batch.recipes import Render
-from ..batch.run import Place
+from .. import atomic, pack, results
 from ..convert import frames_text
 from ..errors import TactileError
-from .job import Options, claimed, note_of, pictures
-from .variant import variant_for
+from ..optics.job import Options, claimed, note_of, pictures
+from ..optics.variant import variant_for
+from . import inputs, parts
+from . import job as jobs
+from . import run as runs
+from .job import Job
+from .kinds import render as kind
+from .recipes import Render
+from .run import Place
 
 
 def render_in_parts(
@@ -27,10 +27,10 @@ def render_in_parts(
     place: Callable[[Path], Place],
     progress: Callable[[int, int], None],
 ) -> Path:
-    """As ``job.render``; the job is in ``<out>.parts`` until all frames are there, and the same call goes on with it.
+    """As ``optics.job.render``; the job is in ``<out>.parts`` until all is there, and the same call goes on with it.
 
     place : where frames are rendered, from the job's folder; progress : (tasks done, known so far)
-    Raises what ``job.render`` raises.
+    Raises what ``optics.job.render`` raises.
     """
     out = Path(out)
     job = plan(path, out, options)

@@ -10,18 +10,18 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from .. import atomic
-from ..batch import job as jobs
-from ..batch import pack, parts, scene_input
-from ..batch import run as runs
-from ..batch.here import Here
-from ..batch.job import Job
-from ..batch.recipes import Simulate
-from ..batch.run import Place
+from .. import atomic, pack
 from ..errors import TactileError
+from ..mechanics.compliance import biotac_compliance, digit_compliance
+from ..mechanics.recording import ALL, check_places, recording_of
 from ..scene_grid import combinations, name_of, with_values
-from .compliance import biotac_compliance, digit_compliance
-from .recording import ALL, check_places, recording_of
+from . import job as jobs
+from . import parts, scene_input
+from . import run as runs
+from .here import Here
+from .job import Job
+from .recipes import Simulate
+from .run import Place
 
 GRID = "grid.json"
 FORMAT = "tactile-grid-1"

@@ -11,18 +11,18 @@ import pathlib
 from collections.abc import Callable
 
 from .. import atomic, sensors
-from ..batch import job as jobs
-from ..batch import parts, scene_input
-from ..batch import run as runs
-from ..batch.here import Here
-from ..batch.kinds import pairs as blocks
-from ..batch.local import Local
-from ..batch.recipes import Pairs
-from ..batch.run import Place
 from ..errors import TactileError
-from .compliance import biotac_compliance, digit_compliance
-from .pair_card import card, card_path
-from .pair_file import merge
+from ..mechanics.compliance import biotac_compliance, digit_compliance
+from ..mechanics.pair_card import card, card_path
+from ..mechanics.pair_file import merge
+from . import job as jobs
+from . import parts, scene_input
+from . import run as runs
+from .here import Here
+from .kinds import pairs as blocks
+from .local import Local
+from .recipes import Pairs
+from .run import Place
 
 
 def make_pairs(

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import atomic
-from ..errors import TactileError
-from . import sealed
+from . import atomic, sealed
+from .errors import TactileError
 
 
 def write(file: Path, arrays: Mapping[str, np.ndarray]) -> None:

@@ -1,0 +1,15 @@
+"""Where what takes long to compute is kept from run to run."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+
+
+def cache_folder() -> pathlib.Path:
+    """``$TACTILE_CACHE``, else ``~/.cache/tactile`` (``%LOCALAPPDATA%`` on Windows); it need not exist."""
+    chosen = os.environ.get("TACTILE_CACHE")
+    if chosen:
+        return pathlib.Path(chosen)
+    base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
+    return (pathlib.Path(base) if base else pathlib.Path.home() / ".cache") / "tactile"
