@@ -7,9 +7,11 @@ import os
 
 import numpy as np
 
-from . import digit_shape, metrics, network_sizes, networks, sensors, surface
+from . import digit_shape, error_bounds, metrics, networks, sensors, surface
+from .error_bounds import KINDS
 from .errors import TactileError
 from .flags import Flag
+from .network_sizes import SURFACES
 from .networks import Networks
 from .recordings import Signals
 from .weights import ADVICE
@@ -51,6 +53,13 @@ class Translation:
     flags: np.ndarray
 
 
+def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
+    """(T, 2) float32 m, (x, z) of the dent in a gel at ``rest``; NaN where no node moves by ``silent`` m."""
+    center = metrics.dent_center(displacement, rest).astype(np.float32)
+    center[metrics.lengths(displacement).max(axis=1) < silent] = np.nan
+    return center
+
+
 class Translator:
     """Verified networks, ready to translate. card : what they are; sha256 : of the card, which names all weights."""
 
@@ -68,7 +77,7 @@ class Translator:
         latent_biotac = nets.s2m(latent_signal, rectified)
         latent_digit = nets.m2m(latent_biotac)
         biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
-        center = self._contact_center(digit)
+        center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m"))
         # Without its sign a weak signal leaves the dent undecided, but not the force: strength would stutter.
         silent = np.isnan(center[:, 0]) & ~rectified
         confidence = self._confidence(change, signals.flags, rectified)
@@ -79,28 +88,25 @@ class Translator:
             latent_signal, latent_biotac, latent_digit, biotac, digit,
             force=np.where(silent[:, None], np.float32(0), nets.force(latent_biotac)),
             contact_center=center,
-            confidence=confidence, **self._errors(change, rectified), flags=flags,
+            confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
         )  # fmt: skip
 
-    def _contact_center(self, displacement: np.ndarray) -> np.ndarray:
-        """(T, 2) m, NaN where the gel moves no more than noise alone makes it."""
-        center = metrics.dent_center(displacement, sensors.digit_surface().rest).astype(np.float32)
-        center[metrics.lengths(displacement).max(axis=1) < self._silent("digit_m")] = np.nan
-        return center
-
-    def _silent(self, quantity: str) -> float:
+    def silent(self, quantity: str) -> float:
         """The most that 99 of 100 frames of noise without contact make of a quantity of the card."""
         return float(np.interp(0.99, self.card["silence"]["levels"], self.card["silence"][quantity]))
 
-    def _errors(self, change: np.ndarray, rectified: np.ndarray) -> dict[str, np.ndarray]:
-        """Expected largest errors and their bounds by the names of `Translation`."""
-        expected, bounds = self.nets.expected_error(change, rectified), self.card["error_bounds"]
-        found = {}
-        for index, name in enumerate(network_sizes.SURFACES):
-            factor = np.where(rectified, bounds["rectified"][name], bounds["signed"][name])
+    def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
+        """Expected largest errors and their bounds by the names of `Translation`; x : (T,) m of the contact's middle"""
+        expected, found = self.nets.expected_error(change, rectified), {}
+        for index, name in enumerate(SURFACES):
+            kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
             found[f"expected_error_{name}"] = expected[:, index]
-            found[f"error_bound_{name}"] = (factor * expected[:, index]).astype(np.float32)
+            found[f"error_bound_{name}"] = np.where(rectified, kinds["rectified"], kinds["signed"])
         return found
+
+    def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
+        """(T,) m, what 95 of 100 largest errors stay below, by `error_bounds.bound`."""
+        return error_bounds.bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """(T,) bool, whether changes (T, 19) counts lie outside those of the training, by any distance's quantile."""
@@ -136,15 +142,12 @@ class Translator:
         """Whether the BioTac is touched (T,) where the gel has no counterpart: the dent's centre rolls off the gel."""
         moved = metrics.lengths(displacement)
         peak = moved.max(axis=1, keepdims=True)
-        core = (moved > metrics.CORE * peak) & (peak > self._silent("biotac_m"))
+        core = (moved > metrics.CORE * peak) & (peak > self.silent("biotac_m"))
         weight = np.where(core & np.isfinite(self._unrolled[:, 0]), moved, 0)
         total = weight.sum(axis=1)
         center = weight @ np.nan_to_num(self._unrolled) / np.where(total > 0, total, 1)[:, None]
         outside = digit_shape.outline_distance(center[:, 0], center[:, 1]) <= 0
         return core.any(axis=1) & (outside | (total == 0))
-
-
-KINDS = ("signed", "rectified")
 
 
 def _check_quantiles(card: dict, where: str) -> None:
@@ -165,18 +168,6 @@ def _check_table(table: object, names: tuple[str, ...], where: str) -> None:
             raise TactileError(f"{where}.{name}", f"{values!r:.80}", expected, ADVICE)
 
 
-def _check_bounds(card: dict, where: str) -> None:
-    """What expected errors are multiplied by: positive numbers for signed and rectified signals and both surfaces."""
-    bounds = card.get("error_bounds")
-    for kind in KINDS:
-        for name in network_sizes.SURFACES:
-            kinds = bounds.get(kind) if isinstance(bounds, dict) else None
-            value = kinds.get(name) if isinstance(kinds, dict) else None
-            if type(value) not in (int, float) or not 0 < value < 1e6:
-                entry = f"{where}, error_bounds.{kind}.{name}"
-                raise TactileError(entry, f"{value!r:.80}", "a factor above 0", ADVICE)
-
-
 def _grows(values: object) -> bool:
     numbers = isinstance(values, list) and len(values) > 0 and all(type(v) in (int, float) for v in values)
     return numbers and bool(np.isfinite(values).all()) and values == sorted(values) and values[0] >= 0
@@ -190,7 +181,7 @@ def load_translator(folder: str | os.PathLike | None = None) -> Translator:
     nets = networks.load(folder)
     card_file = f"{folder or networks.WEIGHTS_FOLDER}, card.json"
     _check_quantiles(nets.card, card_file)
-    _check_bounds(nets.card, card_file)
+    error_bounds.check(nets.card, card_file)
     for key, here in (
         ("biotac_nodes_sha256", sensors.biotac_surface().sha256),
         ("digit_nodes_sha256", sensors.digit_surface().sha256),

@@ -15,7 +15,7 @@ from tactile_core.calibration_file import load_calibration
 from tactile_core.evaluation.contact_tiers import SENSORS, by_depth, fast_misses
 from tactile_core.evaluation.readings import as_read
 from tactile_core.evaluation.test_set import SEED
-from tactile_core.evaluation.translation import error_columns, joined, parts
+from tactile_core.evaluation.translation import error_columns, joined, our_bodies, parts
 from tactile_core.mechanics.recording import simulate_recording
 from tactile_core.network_sizes import SURFACES
 from tactile_core.optics.presets import measured as measured_presets
@@ -28,7 +28,6 @@ from tactile_core.translate import Translator, load_translator
 from .mechanics import EVERY
 from .method import ROOT, TEST_SET, TRAINING
 from .promise import TABLE, Promise
-from .recalibrated import recalibrated
 
 FOLDS = 5
 EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/measure_tiers.py has them
@@ -65,17 +64,11 @@ the region, grey levels.
 """
 
 
-def promised(rows: Sequence[Row], quick: bool, fresh: Path | None) -> tuple[list[Row], str, bytes]:
-    """Rows, Markdown and PNG.
-
-    rows : of the pictures and photographs that were measured in this run; fresh : pairs of another seed
-    """
+def promised(rows: Sequence[Row], quick: bool) -> tuple[list[Row], str, bytes]:
+    """Rows, Markdown and PNG; rows : of the pictures and photographs that were measured in this run."""
     promises = [*of_mechanics(quick), *of_translation(quick)]
     text = TEXT + "\n".join([TABLE, *(line for promise in promises for line in promise.lines()), ""])
     found = [promise.row() for promise in promises]
-    if fresh:
-        anew, told = recalibrated(fresh)
-        found, text = [*found, *anew], text + told
     pictures = list(of_pictures(rows))
     text += PICTURES + "\n".join([*pictures, ""]) if pictures else ""
     if not quick:
@@ -119,13 +112,14 @@ def of_translation(quick: bool) -> Iterator[Promise]:
     if quick:
         pairs = pairs.some(np.flatnonzero(pairs.press % EVERY == 0))
     change, rows = as_read(pairs.signal, SEED), np.arange(len(pairs.press))
+    silent, bodies = translator.silent("digit_m"), our_bodies()
     columns = joined(
-        error_columns(translator.nets, pairs, rows[part], change[part], False) for part in parts(len(rows))
+        error_columns(translator.nets, pairs, rows[part], change[part], bodies, silent) for part in parts(len(rows))
     )
     names = [pairs.indenter_names[number] for number in pairs.indenter]
     order = np.argsort(names, kind="stable")
     for surface in SURFACES:
-        bound = translator.card["error_bounds"]["signed"][surface] * columns[f"{surface}_expected_m"]
+        bound = translator.bound(columns[f"{surface}_expected_m"], columns["x_m"], surface)
         found, groups = columns[f"{surface}_max_m"], [names[number] for number in order]
         of = f"{len(rows)} test contacts, largest node error"
         yield Promise(f"translation_{surface}", "um", 1e6 * bound[order], 1e6 * found[order], groups, of)

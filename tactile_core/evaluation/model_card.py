@@ -21,7 +21,7 @@ PICTURE = "translation_cases.png"
 SWEEP = """\
 ## Sweep
 
-Other latent sizes and KL weights, each a training of its own on the same fewer pairs, against the same test contacts
+Other latent sizes and KL weights, each a training of its own on the same fewer pairs, against the test contacts
 (`scripts/sweep_networks.py`): to be compared with each other, not with the rows above. `published` has the latents and
 the KL weight of the method's authors.
 """

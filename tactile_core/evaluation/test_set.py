@@ -42,15 +42,16 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
         for step, body in (("S2MPN", "biotac"), ("M2MPN", "digit"), ("chain", "digit")):
             value, null = (metrics.mean(columns[f"{each}_rms_um"][mask]) for each in (step, f"null_{body}"))
             found.append(figure_row(f"{step}_rms_um", value, null, None, name))
-        if mask.any():
-            place = float(np.nanmedian(columns["S2MPN_position_mm"][mask]))
-            found.append(figure_row("S2MPN_position_mm", place, None, None, name))
+        for figure in ("S2MPN_position_mm", "force_percent"):
+            known = columns[figure][mask & np.isfinite(columns[figure])]
+            if known.size:
+                found.append(figure_row(figure, float(np.median(known)), None, None, name))
     for number, name in enumerate(pairs.indenter_names):
         at = pairs.indenter == number
         each = {figure: np.where(at, columns[figure], np.nan) for figure in (*EACH_INDENTER, *NULL_FIGURES)}
         found += [one for one in figure_rows(each, pairs, rows, name, {}) if one["value"] is not None]
     found += window_rows(translator, pairs, bodies)
-    return [*found, *expected_error_rows(translator, pairs, rows, change, "seen indenters")]
+    return [*found, *expected_error_rows(translator, pairs, rows, change, bodies, "seen indenters")]
 
 
 def window_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
@@ -77,22 +78,22 @@ def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Ro
             target = UNSEEN.get(name.removeprefix("unseen "))
             targets = {} if target is None else {"M2MPN_rms_um": target}
             found += figure_rows(columns, pairs, rows, name, targets)
-            found += expected_error_rows(translator, pairs, rows, change, name)
+            found += expected_error_rows(translator, pairs, rows, change, bodies, name)
     return found
 
 
 def expected_error_rows(
-    translator: Translator, pairs: Pairs, rows: np.ndarray, change: np.ndarray, name: str
+    translator: Translator, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies, name: str
 ) -> list[Row]:
     """Rank correlation of expected and true largest error, share below the bound, share flagged as out of range."""
-    nets = translator.nets
-    columns = joined(error_columns(nets, pairs, rows[part], change[part], False) for part in parts(len(rows)))
+    nets, silent = translator.nets, translator.silent("digit_m")
+    columns = joined(error_columns(nets, pairs, rows[part], change[part], bodies, silent) for part in parts(len(rows)))
     flagged = translator.out_of_range(change)
     seen = name.startswith("seen")
     found = []
     for surface in SURFACES:
         expected, true = columns[f"{surface}_expected_m"], columns[f"{surface}_max_m"]
-        covered = true <= translator.card["error_bounds"]["signed"][surface] * expected
+        covered = true <= translator.bound(expected, columns["x_m"], surface)
         rank = rank_correlation(expected, true)
         found.append(_share_row(f"{surface}_error_rank", rank, 0.6 if seen else None, None, name))
         low, high = (0.9, 0.98) if seen else (None, None)

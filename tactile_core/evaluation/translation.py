@@ -13,6 +13,7 @@ from ..network_sizes import SURFACES
 from ..networks import Networks
 from ..paired_contacts import Pairs
 from ..patch_of_dent import contact_patch
+from ..translate import contact_center
 
 ROWS = 128  # contacts at a time, to bound memory
 LEAST_PATCH = 20  # nodes: on smaller patches a share says little
@@ -92,14 +93,26 @@ def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bo
     return found
 
 
-def error_columns(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, rectified: bool) -> Columns:
-    """Largest node error (m) of signal to BioTac mesh and to DIGIT mesh, and what the error head expects."""
+def error_columns(
+    nets: Networks,
+    pairs: Pairs,
+    rows: np.ndarray,
+    change: np.ndarray,
+    bodies: Bodies,
+    silent: float,
+    rectified: bool = False,
+) -> Columns:
+    """Largest node error (m) of signal to BioTac mesh and to DIGIT mesh, what the error head expects, and where.
+
+    ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m.
+    """
     biotac = nets.s2m(nets.encode_signal(change, rectified), rectified)
     answers = {"biotac": nets.decode_biotac(biotac), "digit": nets.decode_digit(nets.m2m(biotac))}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}
     found = {f"{name}_max_m": metrics.max_error(answer, truth[name]) for name, answer in answers.items()}
     expected = nets.expected_error(change, rectified)
-    return found | {f"{name}_expected_m": expected[:, index] for index, name in enumerate(SURFACES)}
+    found |= {f"{name}_expected_m": expected[:, index] for index, name in enumerate(SURFACES)}
+    return found | {"x_m": contact_center(answers["digit"], bodies.digit.rest, silent)[:, 0]}
 
 
 FORCE_FROM = 0.2  # N: below, the share of an error says nothing (issue 4)

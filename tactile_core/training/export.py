@@ -15,7 +15,7 @@ from ..networks import Networks, load
 from ..weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
 from .modules import compress
-from .report import QUANTILES, Measure, distance_quantiles, error_bounds, error_rows, silence_quantiles
+from .report import QUANTILES, Measure, distance_quantiles, error_rows, fit_error_bounds, silence_quantiles
 from .stages import FORCE_BLOCKS, FORCE_WIDTH, Model
 from .surface import Surface
 
@@ -55,7 +55,7 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
         "digit_nodes_sha256": contacts.pairs.attributes["digit_nodes_sha256"],
         "distance": {"levels": list(QUANTILES), **distance_quantiles(measure)},
         "silence": {"levels": list(QUANTILES), **silence_quantiles(measure)},
-        "error_bounds": error_bounds(measure),
+        "error_bounds": fit_error_bounds(measure),
         "errors": error_rows(measure, model),
     }
     write_bytes(folder / CARD_NAME, card_bytes(card))

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .. import metrics
+from .. import error_bounds, metrics
+from ..error_bounds import KINDS
 from ..evaluation.summary import figure_row, figure_rows
 from ..evaluation.translation import (
     Bodies,
@@ -24,7 +25,6 @@ from ..evaluation.translation import (
 from ..network_sizes import SURFACES
 from ..networks import DISTANCES, Networks
 from ..rows import Row
-from ..translate import KINDS
 from ..weights import write_bytes
 from .data import Contacts
 from .stages import Model
@@ -33,7 +33,6 @@ from .surface import SILENT
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 0.999)
 # The shapes that networks.md's prototype was trained on, in its words three spheres and a flat cylinder.
 PROTOTYPE = ("sphere_3.5mm", "sphere_7mm", "sphere_14mm", "short_cylinder_7mm")
-COVER = 0.95  # share of validation contacts whose largest error stays below the bound
 SHARES = dict(zip(KINDS, (0.0, 1.0), strict=True))  # of frames that lose their sign
 SILENT_FRAMES = 2048  # two of them lie above the outermost quantile
 
@@ -128,21 +127,18 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
     return found
 
 
-def error_bounds(measure: Measure) -> dict[str, dict[str, float]]:
-    """What the expected error is multiplied by to bound the largest error in COVER of validation's contacts.
-
-    Split conformal prediction with the ratio as score (Lei et al. 2018, section 5.2); signed and rectified apart.
-    """
+def fit_error_bounds(measure: Measure) -> dict[str, dict[str, list[float]]]:
+    """The factors of `error_bounds.fit` on the validation presses; signed and rectified apart."""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
-    bounds = {}
+    silent, bounds = float(np.quantile(silence(measure)["digit_m"], 0.99)), {}
     for kind, share in SHARES.items():
         signal = contacts.read(rows, np.random.default_rng([measure.seed, 6]), share)
         columns = joined(
-            error_columns(nets, contacts.pairs, rows[part], signal[part, :-1], bool(share)) for part in parts(len(rows))
+            error_columns(nets, contacts.pairs, rows[part], signal[part, :-1], measure.bodies, silent, bool(share))
+            for part in parts(len(rows))
         )
-        level = min(1.0, COVER * (1 + 1 / len(rows)))
         ratios = {name: columns[f"{name}_max_m"] / columns[f"{name}_expected_m"] for name in SURFACES}
-        bounds[kind] = {name: float(f"{np.quantile(ratio, level):.4g}") for name, ratio in ratios.items()}
+        bounds[kind] = {name: error_bounds.fit(ratio, columns["x_m"]) for name, ratio in ratios.items()}
     return bounds
 
 

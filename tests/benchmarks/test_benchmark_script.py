@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactile_core.errors import TactileError
+
 SCRIPTS = Path(__file__).parents[2] / "scripts"
 
 
@@ -45,8 +47,31 @@ def test_a_promise_counts_what_stayed_below(script):
     from benchmarks.promise import Promise
 
     promise = Promise("x", "um", np.array([2.0, 2, 2, 2]), np.array([1.0, 1, 1, 3]), list("aabb"), "four")
-    assert promise.covered() == 0.75 and promise.row()["ok"] is False
+    assert promise.covered() == 0.75 and promise.row()["ok"] is None
+    many = Promise("x", "um", np.full(400, 2.0), np.tile([1.0, 1, 1, 3], 100), ["a"] * 400, "four hundred")
+    assert many.row()["ok"] is False and many.row()["value"] == 0.75
     assert [line.split(" | ")[-1] for line in promise.lines()] == ["75.0% |", "100.0% |", "50.0% |"]
+
+
+def test_readme_gets_the_table(script, tmp_path):
+    from benchmarks.method import Method
+    from benchmarks.readme import HEADER, write_readme
+
+    file = tmp_path / "README.md"
+    file.write_text(f"before\n\n{HEADER}\n| old | a | 1 | 2 | 3 | 4 |\n\nafter\n")
+    drawn = [Method("pictures", name, ms, 100.0, 2.0, "levels", 9.0, "set")
+             for name, ms in (("fast", 1.26), ("standard_llvm_ad_rgb", 30.4), ("quality_scalar_rgb", 123.0),
+                              ("reference_llvm_ad_rgb", 9876.0))]  # fmt: skip
+    write_readme(file, [Method("chain", "fast", 2.0, 50.0, 1.0, "levels", 3.0, "set"), *drawn])
+    assert file.read_text() == (
+        f"before\n\n{HEADER}\n"
+        "| picture of a known gel | fast / standard / quality / reference | 1.3 / 30 / 120 / 9,900 | 100"
+        " | 2 levels | 9 levels |\n"
+        "| signals → picture | fast | 2 | 50 | 1 levels | 3 levels |\n\nafter\n"
+    )
+    (tmp_path / "other.md").write_text("no table\n")
+    with pytest.raises(TactileError, match=r"other\.md"):
+        write_readme(tmp_path / "other.md", drawn)
 
 
 def test_the_report_that_ships_can_be_read_and_draws(script):

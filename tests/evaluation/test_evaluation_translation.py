@@ -89,7 +89,7 @@ def test_half_of_it_is_half_an_error(pairs):
     np.testing.assert_allclose(found["M2MPN_rms_um"], 0.5 * found["null_digit_rms_um"], rtol=1e-5)
     peaks = found["M2MPN_peak_depth_percent"]
     np.testing.assert_allclose(peaks[np.isfinite(peaks)], 50, rtol=1e-5)
-    errors = error_columns(Answers(pairs, 0.5), pairs, np.arange(len(pairs.press)), pairs.signal, False)
+    errors = error_columns(Answers(pairs, 0.5), pairs, np.arange(len(pairs.press)), pairs.signal, bodies(), 0.0)
     deepest = np.linalg.norm(true_displacement(pairs, "digit", np.arange(len(pairs.press))), axis=-1).max(1)
     np.testing.assert_allclose(errors["digit_max_m"], 0.5 * deepest, rtol=1e-5)
 
@@ -169,11 +169,15 @@ def test_a_file_that_is_no_test_set_is_refused(request, tmp_path, capsys):
 def test_what_was_kept_apart_is_measured_alone(pairs):
     """The one indenter that is unseen where the pad is seen, and both where it is not, each contact in one set."""
     nets = Answers(pairs, 1.0)
-    bounds = {"error_bounds": {"signed": {"biotac": 2.0, "digit": 2.0}}}
 
     def apart(without, below):
-        card = {**bounds, "options": {"without": without, "without_below_x": below}}
-        fake = SimpleNamespace(nets=nets, card=card, out_of_range=lambda change: np.zeros(len(change), bool))
+        fake = SimpleNamespace(
+            nets=nets,
+            card={"options": {"without": without, "without_below_x": below}},
+            out_of_range=lambda change: np.zeros(len(change), bool),
+            silent=lambda quantity: 0.0,
+            bound=lambda expected, x, surface: 2.0 * expected,
+        )
         return {row["set"] for row in test_set.unseen_rows(fake, pairs, bodies())}
 
     assert apart(["sphere"], None) == {"unseen sphere"}

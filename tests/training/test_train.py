@@ -13,7 +13,7 @@ from small_pairs import bodies, frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from tactile_core import network_sizes, networks, weights  # noqa: E402
+from tactile_core import error_bounds, network_sizes, networks, weights  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.paired_contacts import read_pairs  # noqa: E402
 from tactile_core.training.checkpoint import read  # noqa: E402
@@ -65,9 +65,7 @@ def test_result_is_complete_and_loads(quick, pairs):
     assert len(card["pairs"]["sha256"]) == 64
     assert card["pairs"]["contacts"] == {"train": 256, "validation": 32, "test": 32}
     assert all(row["null"] is not None for row in card["errors"] if row["name"].endswith(("um", "counts", "_N")))
-    assert all(
-        card["error_bounds"][kind][name] > 0 for kind in ("signed", "rectified") for name in network_sizes.SURFACES
-    )
+    error_bounds.check(card, "card.json")
     for net, entry in card["nets"].items():
         shapes = {name: list(array.shape) for name, array in loaded.tensors[net].items()}
         assert shapes == entry["shapes"]
