@@ -5,17 +5,16 @@
     python3 scripts/fetch_blender.py --no-tests             only the screenshots, in out/screenshots
 
 Needs Linux, root (it makes a Debian tree and changes into it) and apt-get with Debian's packages; nothing is installed
-on the machine itself. The checkout and /tmp are mounted into the tree while this runs.
+on the machine itself. The checkout, /tmp, /dev and /proc are mounted into the tree for its Blender alone.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,6 +33,18 @@ PACKAGES = [
 EXTRA = {"sid": ["python3-cattr", "python3-requests"]}
 STAGES = ("imported", "translated", "rendered", "authored")
 MIRROR = "http://deb.debian.org/debian"
+WRAPPER = """\
+#!/bin/sh
+# Runs the tree's Blender with these arguments; after --inside, another command.
+set -e
+[ -n "$MOUNTED_FOR_BLENDER" ] || exec env MOUNTED_FOR_BLENDER=1 unshare --mount --propagation private "$0" "$@"
+for place in {root} /tmp /dev /proc; do
+    mkdir -p {tree}"$place"
+    mount --bind "$place" {tree}"$place"
+done
+if [ "$1" = --inside ]; then shift; else set -- blender "$@"; fi
+exec chroot {tree} /usr/bin/env LIBGL_ALWAYS_SOFTWARE=1 "$@"
+"""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -50,12 +61,11 @@ def main(arguments: list[str] | None = None) -> int:
     tree = (options.folder or ROOT / "out" / f"blender-{options.suite}").resolve()
     try:
         fetch(tree, options.suite)
-        with mounted(tree):
-            binary = wrapper(tree)
-            tests = [sys.executable, str(ROOT / "scripts" / "dev.py"), "test-blender", "--binary", str(binary), "-q"]
-            status = 0 if options.no_tests else subprocess.call(tests)
-            if not options.no_screenshots:
-                photograph(tree, binary)
+        binary = wrapper(tree)
+        tests = [sys.executable, str(ROOT / "scripts" / "dev.py"), "test-blender", "--binary", str(binary), "-q"]
+        status = 0 if options.no_tests else subprocess.call(tests)
+        if not options.no_screenshots:
+            photograph(binary)
     except subprocess.CalledProcessError as error:
         print(f"fetch_blender.py: error: {error}", file=sys.stderr)
         return 2
@@ -78,31 +88,19 @@ def fetch(tree: Path, suite: str) -> None:
     subprocess.run(["chroot", str(tree), *install], check=True)
 
 
-@contextmanager
-def mounted(tree: Path) -> Iterator[None]:
-    """The checkout, /tmp, /dev and /proc inside the tree; taken away again."""
-    done = []
-    try:
-        for place in (str(ROOT), "/tmp", "/dev", "/proc"):
-            inside = tree / place.lstrip("/")
-            inside.mkdir(parents=True, exist_ok=True)
-            subprocess.run(["mount", "--bind", place, str(inside)], check=True)
-            done.append(inside)
-        yield
-    finally:
-        for inside in reversed(done):
-            subprocess.run(["umount", "--lazy", str(inside)], check=False)
-
-
 def wrapper(tree: Path) -> Path:
-    """A program that runs the tree's Blender on the paths of this machine."""
+    """A program that runs a command inside the tree, on the paths of this machine; the tree's Blender without one.
+
+    The checkout, /tmp, /dev and /proc are mounted in a namespace of that process alone: whoever deletes the tree while
+    it runs, or after it was killed, deletes nothing else.
+    """
     path = tree.parent / f"{tree.name}.sh"
-    path.write_text(f'#!/bin/sh\nexec chroot "{tree}" /usr/bin/env LIBGL_ALWAYS_SOFTWARE=1 blender "$@"\n')
+    path.write_text(WRAPPER.format(tree=shlex.quote(str(tree)), root=shlex.quote(str(ROOT))))
     path.chmod(0o755)
     return path
 
 
-def photograph(tree: Path, binary: Path) -> None:
+def photograph(binary: Path) -> None:
     """The window at each stage, out/screenshots/<stage>.png."""
     out = ROOT / "out" / "screenshots"
     out.mkdir(parents=True, exist_ok=True)
@@ -112,13 +110,13 @@ def photograph(tree: Path, binary: Path) -> None:
     build = [sys.executable, str(ROOT / "scripts" / "build_extension.py"), "--python", python, "--out", str(out)]
     packed = subprocess.run(build, check=True, capture_output=True, text=True).stdout.rsplit(" (", 1)[0].strip()
     for stage in STAGES:
-        known = {"STAGE": stage, "OUT": str(out / f"{stage}.png"), "ZIP": packed, "LIBGL_ALWAYS_SOFTWARE": "1",
+        known = {"STAGE": stage, "OUT": str(out / f"{stage}.png"), "ZIP": packed,
                  "BLENDER_USER_RESOURCES": str(out / f"user-{stage}"), "HOME": "/root"}  # fmt: skip
         variables = [f"{name}={value}" for name, value in known.items()]
         window = ["blender", "--factory-startup", "--window-geometry", "0", "0", "1600", "900", "--python"]
         script = ROOT / "tests" / "blender" / "screenshot.py"
         run = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24", *window, str(script)]
-        subprocess.run(["chroot", str(tree), "env", *variables, *run], check=True, timeout=300)
+        subprocess.run([str(binary), "--inside", "env", *variables, *run], check=True, timeout=300)
         print(out / f"{stage}.png")
 
 
