@@ -16,6 +16,7 @@ from .corrected_press import CorrectedPress
 from .expected_error import expected_error
 from .finite_strain import FiniteStrainSolid, State
 from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Body, Sensor, graded_body
+from .force_search import ROUGH, TOLERANCE, touch_at_force, unreachable
 from .newton import FiniteStrainContact, Touch
 from .placement import FRICTION, Placement, on_gel, pose_at
 from .sharpness import sharpest
@@ -25,13 +26,11 @@ from .thickness import DEPTH_LIMIT, thickness_under
 Tier = Literal["fast", "full", "reference"]
 TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
 
-_FORCE_TOLERANCE = 1e-4  # relative, of the search for a force
-_SEARCH_STEPS = 30
 _LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less cannot be told from rounding and the lattice's own roughness
 _REACHED = 1 / 3  # of the depth that a mesh is made for: contacts less deep are too small for it (assumed)
 _ROOM = 1.5  # times the depth at the largest force, for which a mesh is made: places on a path differ (assumed)
 _MOST_MESHES = 3
-_ROUGH = 0.1  # relative, of the force and the depth that a mesh is made for
+_FARTHEST_SLIDE = 10e-3  # m, half of the gel
 
 
 @dataclasses.dataclass(frozen=True)
@@ -142,9 +141,6 @@ def _check(step: Step, limit: float) -> None:
         raise TactileError("solve, slide", found, f"two lengths of at most {_FARTHEST_SLIDE * 1e3:g} mm")
 
 
-_FARTHEST_SLIDE = 10e-3  # m, half of the gel
-
-
 class _Path:
     """A path of one indenter on one sensor; ``to`` goes on from the step before."""
 
@@ -154,19 +150,13 @@ class _Path:
     ) -> None:  # fmt: skip
         self.sensor, self.indenter, self.pose, self.tier, self.friction = sensor, indenter, pose, tier, friction
         self.thickness, self.limit = thick, DEPTH_LIMIT * thick
+        self.where = f"solve, {sensor}, {tier} tier"
         self.deepest = max((step.depth for step in steps if step.depth is not None), default=0.0)
         self.hardest = max((step.force for step in steps if step.force), default=0.0)
 
     def errors(self, depth: float) -> tuple[float, float]:
         """Of a contact at a depth, m: see ``Solution``."""
         return expected_error(self.tier, self.sensor, depth / self.thickness)
-
-    def unreachable(self, force: float) -> TactileError:
-        """What is said where no depth within the limit gives a force."""
-        expected = f"a force that is found within {self.limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
-        return TactileError(
-            f"solve, {self.sensor}, {self.tier} tier", f"force {force:g} N", expected, "Press less, or to a depth"
-        )
 
 
 class _Fast(_Path):
@@ -180,7 +170,7 @@ class _Fast(_Path):
         if step.force:
             found = self.press.at_force(step.force, pose)
             if found is None:
-                raise self.unreachable(step.force)
+                raise unreachable(self.where, step.force, self.limit)
         else:
             found = self.press.at_depth(step.depth or 0.0, pose)
         contact, corrected = found.linear, found.corrected
@@ -212,7 +202,7 @@ class _FiniteStrain(_Path):
         for _ in range(_MOST_MESHES):
             self._make(reach, 0.0)
             try:
-                depth = self._at_force(self.pose, self.hardest, _ROUGH).depth
+                depth = self._at_force(self.pose, self.hardest, ROUGH).depth
             except TactileError:  # with friction there may be an equilibrium
                 break
             if depth > _REACHED * reach:
@@ -236,33 +226,13 @@ class _FiniteStrain(_Path):
             self.last = self.problem.move(pose.moved(step.depth or 0.0), self.last, self.step)
         return self._solution(self.last)
 
-    def _at_force(self, pose: Pose, force: float, tolerance: float = _FORCE_TOLERANCE) -> Touch:
-        """The contact at a force along the motion, by secants of F^(2/3), nearly straight in the depth, and halving.
+    def _at_force(self, pose: Pose, force: float, tolerance: float = TOLERANCE) -> Touch:
+        """The contact at a force, N, along the motion; tolerance : relative, of the force."""
 
-        tolerance : relative, of the force; where it is rough a depth as well known will do
-        """
-        direction, goal, before = pose.direction, _root(force), self.last
-        low, high = (before.depth, _root(before.force @ direction)), None
-        lets_go = low[1] > goal
-        if lets_go:
-            low, high = (0.0, 0.0), low
-        depth = _next_depth(low, high, goal, self.limit) if lets_go else max(low[0], self.limit / 8)
-        for attempt in range(_SEARCH_STEPS):
-            if depth > self.limit:
-                raise self.unreachable(force)
-            touch = self.problem.move(pose.moved(depth), before, self.step)
-            found = float(touch.force @ direction)
-            if abs(found - force) <= tolerance * force:
-                return touch
-            if found < force:
-                before, low = before if lets_go else touch, (depth, _root(found))
-            else:
-                high = (depth, _root(found))
-            if tolerance >= _ROUGH and high and high[0] - low[0] < tolerance * high[0]:
-                return touch
-            depth = _next_depth(low, high, goal, self.limit, halve=attempt % 3 == 2)
-        found = f"force {force:g} N, between depths {low[0] * 1e3:.4f} and {depth * 1e3:.4f} mm"
-        raise TactileError(f"solve, {self.sensor}, {self.tier} tier", found, "one that a search finds", "Give a depth")
+        def move(depth: float, before: Touch) -> Touch:
+            return self.problem.move(pose.moved(depth), before, self.step)
+
+        return touch_at_force(move, self.last, pose.direction, force, self.limit, self.where, tolerance)
 
     def _solution(self, touch: Touch) -> Solution:
         self._check_follows(touch)
@@ -292,24 +262,3 @@ class _FiniteStrain(_Path):
         surface = self.body.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"
         check_follows(where, surface, self.indenter, touch.pose, touch.depth, closed=closed)
-
-
-def _root(force: float) -> float:
-    """F^(2/3), which grows nearly straight with depth."""
-    return max(float(force), 0.0) ** (2 / 3)
-
-
-def _next_depth(
-    low: tuple[float, float], high: tuple[float, float] | None, goal: float, limit: float, *, halve: bool = False
-) -> float:
-    """The depth, m, to try next for a root of the force, between the (depth, root) below and above it, or beyond."""
-    if high is None:
-        slope = low[1] / low[0] if low[0] else 0.0
-        return low[0] + min((goal - low[1]) / slope if slope else np.inf, limit / 4)
-    if halve and not low[1]:  # first touch of a node lies anywhere between them, however small
-        return float(np.sqrt(max(low[0], _LEAST_SHARE * high[0]) * high[0]))
-    share = 0.5 if halve else (goal - low[1]) / (high[1] - low[1])
-    return low[0] + float(np.clip(share, _LEAST_SHARE, 1 - _LEAST_SHARE)) * (high[0] - low[0])
-
-
-_LEAST_SHARE = 1e-3  # of the way between two depths, that a search goes
