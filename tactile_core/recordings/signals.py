@@ -10,18 +10,15 @@ import numpy as np
 
 from ..errors import TactileError
 from ..flags import Flag
+from .electrode_faults import dead, saturated
 from .kinds import KINDS, detect
 from .quiet import Quiet, baseline, calmest, find_quiet, level, window_frames
 from .recording import Recording
 from .repair import fill, find_glitches, is_time_series
 from .smoothing import LONGEST, RECTIFIED, SIGNED, smooth
 
-FULL_SCALE = 4095.0  # counts of the 12-bit converter
-SCALED_PEAK = (
-    150.0  # counts that the 95th percentile of a scaled recording's largest changes is stretched to (networks.md)
-)
-DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
-NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 counts of noise (assumed: half of it)
+# Counts that the 95th percentile of a scaled recording's largest changes is stretched to (networks.md).
+SCALED_PEAK = 150.0
 SHOWN = 8  # bad places spelled out one by one in the warnings
 
 
@@ -90,7 +87,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     rest = _rest(recording, readings, kind, quiet, options, warnings)
     if not quiet.parts:
         flags |= np.uint16(Flag.NO_QUIET_PART)
-    flags |= _saturated(recording, readings, kind, warnings) | _dead(recording, readings, warnings)
+    flags |= saturated(recording, readings, kind, warnings) | dead(recording, readings, warnings)
     slope = (rest[-1] - rest[0]) / recording.duration if recording.duration > 0 else np.zeros(rest.shape[1])
     frames = _smoothed_over(options, kind)
     report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope) | {"smoothed_frames": frames}
@@ -229,57 +226,6 @@ def _rest(
         return np.broadcast_to(level(readings[guess]), readings.shape).copy()
     warnings.append(f"no quiet part ({quiet.evidence}): the file's own zero is taken for rest")
     return np.zeros(readings.shape)
-
-
-def _saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """(T,) flags of raw readings at an end of the 12-bit range; other kinds do not show it."""
-    if kind != "raw":
-        return np.zeros(len(readings), np.uint16)
-    ends = (readings <= 0) | (readings >= FULL_SCALE)
-    frames = np.flatnonzero(ends.any(axis=1))
-    if len(frames):
-        warnings.append(
-            f"{_electrodes(ends.any(axis=0))} at an end of the 12-bit range in {len(frames)} frames, first in "
-            f"{recording.row_word} {recording.rows[frames[0]]}"
-        )
-    return np.where(ends.any(axis=1), Flag.SATURATED, 0).astype(np.uint16)
-
-
-def _dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """(T,) flags where an electrode stands still for 1 s or more; none in recordings that are shorter."""
-    still = _still(readings)
-    whole = still.all(axis=0)
-    if whole.any():
-        warnings.append(f"{_electrodes(whole)} never changes: dead channel")
-    for j in np.flatnonzero(still.any(axis=0) & ~whole):
-        frames = np.flatnonzero(still[:, j])
-        warnings.append(
-            f"E{j + 1} stands still in {len(frames)} frames, first in {recording.row_word} "
-            f"{recording.rows[frames[0]]}: dead channel"
-        )
-    return np.where(still.any(axis=1), Flag.DEAD_CHANNEL, 0).astype(np.uint16)
-
-
-def _still(readings: np.ndarray) -> np.ndarray:
-    """(T, 19) bool: samples of runs of equal readings of ``DEAD_FRAMES`` or more.
-
-    An electrode that is quiet elsewhere too has no noise to miss: there only a run over the whole recording counts.
-    """
-    still = np.zeros(readings.shape, bool)
-    changes = np.diff(readings, axis=0) != 0
-    for j, change in enumerate(changes.T):
-        bounds = np.r_[0, np.flatnonzero(change) + 1, len(readings)]
-        for first, last in zip(bounds, bounds[1:], strict=False):
-            if last - first >= DEAD_FRAMES:
-                still[first:last, j] = True
-        moving = ~still[1:, j]
-        if moving.any() and change[moving].mean() < NOISY:
-            still[:, j] = False
-    return still
-
-
-def _electrodes(mask: np.ndarray) -> str:
-    return ", ".join(f"E{j + 1}" for j in np.flatnonzero(mask))
 
 
 def _report(
