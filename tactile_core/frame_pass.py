@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import flags, results
-from .contact_sheet import choose_frames, contact_sheet
+from .contact_sheet import Contents, choose_frames, contact_sheet
 from .frames_file import FramesFile
 from .png_file import write_png
 from .sampling_error import depth_share
@@ -164,8 +164,7 @@ class FramePass:
         columns = {name: np.stack([at[name] for at in self.shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
         truth = self.recording.truth
         skin = None if truth is None else truth.displacement_biotac
-        contact_sheet(
-            path,
+        contents = Contents(
             name=self.recording.name,
             time=self.recording.time[self.frames],
             electrodes=self.signals.change[self.frames],
@@ -175,3 +174,4 @@ class FramePass:
             warnings=self.warnings(),
             **columns,
         )
+        contact_sheet(path, contents)

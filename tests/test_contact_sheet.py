@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.contact_sheet import choose_frames, contact_sheet
+from tactile_core.contact_sheet import Contents, choose_frames, contact_sheet
 
 
 @pytest.fixture
@@ -37,8 +37,8 @@ def size(path: Path) -> tuple[int, int]:
 
 def test_same_input_makes_the_same_bytes_without_a_date(tmp_path: Path, columns: dict) -> None:
     first, second = tmp_path / "a.png", tmp_path / "b.png"
-    contact_sheet(first, **columns)
-    contact_sheet(second, **columns)
+    contact_sheet(first, Contents(**columns))
+    contact_sheet(second, Contents(**columns))
     assert first.read_bytes() == second.read_bytes()
     assert b"Software" not in first.read_bytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]  # no half file is left
@@ -48,30 +48,30 @@ def test_own_matplotlib_settings_change_nothing(tmp_path: Path, columns: dict) -
     import matplotlib
 
     first, second = tmp_path / "a.png", tmp_path / "b.png"
-    contact_sheet(first, **columns)
+    contact_sheet(first, Contents(**columns))
     with matplotlib.rc_context({"font.size": 20, "lines.linewidth": 5}):
-        contact_sheet(second, **columns)
+        contact_sheet(second, Contents(**columns))
         assert matplotlib.rcParams["font.size"] == 20
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_truth_adds_a_row_and_warnings_add_lines(tmp_path: Path, columns: dict) -> None:
     path = tmp_path / "a.png"
-    contact_sheet(path, **columns)
+    contact_sheet(path, Contents(**columns))
     width, plain = size(path)
     assert width == 1600
-    contact_sheet(path, **columns, true_displacement_biotac=columns["displacement_biotac"], simulated=True)
+    contact_sheet(path, Contents(**columns, true_displacement_biotac=columns["displacement_biotac"], simulated=True))
     with_truth = size(path)[1]
     assert with_truth > plain + 200
-    contact_sheet(path, **columns, warnings=["rectified: the sign is lost", "no quiet part"])
+    contact_sheet(path, Contents(**columns, warnings=["rectified: the sign is lost", "no quiet part"]))
     assert plain + 30 < size(path)[1] < plain + 60
-    contact_sheet(path, **columns, warnings=["many words " * 40] * 30)  # cut off, with a line that says so
+    contact_sheet(path, Contents(**columns, warnings=["many words " * 40] * 30))  # cut off, with a line that says so
     assert size(path)[1] < plain + 120
 
 
 @pytest.mark.parametrize("name", ["$\\alpha", "名前", "a\udcff\nb", "x" * 300])
 def test_any_name_can_be_drawn(tmp_path: Path, columns: dict, name: str, recwarn: pytest.WarningsRecorder) -> None:
-    contact_sheet(tmp_path / "a.png", **columns | {"name": name})
+    contact_sheet(tmp_path / "a.png", Contents(**columns | {"name": name}))
     assert not recwarn.list
 
 
@@ -80,14 +80,14 @@ def test_one_frame_without_contact(tmp_path: Path, columns: dict) -> None:
     for what in (*given, "contact_center"):
         columns[what] = 0 * columns[what][:1]
     columns |= {"frames": np.array([0]), "time": np.zeros(1), "electrodes": np.full((1, 19), np.nan)}
-    contact_sheet(tmp_path / "a.png", **columns)
+    contact_sheet(tmp_path / "a.png", Contents(**columns))
     assert size(tmp_path / "a.png")[0] == 1600
 
 
 def test_columns_must_count_alike(tmp_path: Path, columns: dict) -> None:
     columns["force"] = columns["force"][:1]
     with pytest.raises(ValueError, match="1 of force for 2 frames"):
-        contact_sheet(tmp_path / "a.png", **columns)
+        contact_sheet(tmp_path / "a.png", Contents(**columns))
     assert not list(tmp_path.iterdir())
 
 
