@@ -25,6 +25,7 @@ class Disk(io.RawIOBase):
             raise OSError(self._failure.errno, self._failure.strerror, str(self._path)) from self._failure
 
     def write(self, data: Any) -> int:
+        """As of any file, but all of it, and no error: `check` raises that."""
         rest = memoryview(data).cast("B")
         count = len(rest)
         try:
@@ -35,6 +36,7 @@ class Disk(io.RawIOBase):
         return count
 
     def truncate(self, size: int | None = None) -> int:
+        """As of any file, but no error: `check` raises that."""
         try:
             return self._file.truncate(size)
         except OSError as error:

@@ -33,6 +33,7 @@ def loop() -> Any:
     began, found = threading.Event(), []
 
     async def run() -> None:
+        """Tell the loop, then keep it running for good."""
         found.append(IOLoop.current())
         began.set()
         await asyncio.Event().wait()

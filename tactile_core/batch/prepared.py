@@ -161,6 +161,7 @@ class Prepared:
         """Times (T,) s and signals of the frames from `start` up to `stop`; `rest` is that of the first of them."""
 
         def read(file: h5py.File) -> tuple[np.ndarray, Signals]:
+            """The same of an open file."""
             arrays = {name: file[name][start:stop] for name in COLUMNS}
             part = int(np.searchsorted(file["part"][()], start, side="right")) - 1
             rest = file["rest"][part]

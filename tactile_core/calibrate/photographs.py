@@ -61,6 +61,7 @@ class Photographs:
 
     @property
     def shape(self) -> tuple[int, int]:
+        """(H, W) of each photograph, pixels."""
         return self.background.shape[:2]
 
 

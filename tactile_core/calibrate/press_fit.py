@@ -29,6 +29,7 @@ class Ball:
 
     @property
     def numbers(self) -> tuple[float, float, float, float]:
+        """right, down, depth, radius, all m."""
         return self.right, self.down, self.depth, self.radius
 
 
@@ -73,6 +74,7 @@ class _PressProblem:
         return (self._bench.change(ball) - self._sight.change)[self._sight.counts].ravel()
 
     def cost(self, x: np.ndarray) -> float:
+        """Half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off the picture and the table."""
         radius = x[3] if len(x) > 3 else self._radius
         inside = np.abs(x[0]) < -2 * self._bench.right[0, 0] and np.abs(x[1]) < -2 * self._bench.down[0, 0]
         if not (inside and SHALLOWEST <= x[2] <= DEEPEST * radius / 3e-3 and SMALLEST_BALL <= radius <= LARGEST_BALL):
@@ -81,6 +83,7 @@ class _PressProblem:
         return float(np.square(self._last).sum() / 2)
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """J^T J (n, n), levels squared / m2, and J^T r (n,), levels squared / m, of n unknowns, at x."""
         last = self._missed(x)
         jacobian = np.stack([(self._missed(x + step) - last) / STEP for step in STEP * np.eye(len(x))], -1)
         return jacobian.T @ jacobian, jacobian.T @ last

@@ -30,7 +30,8 @@ _EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
 class Light(Protocol):
     """Gives radiance (H, W, 3) of height maps (H, W) m."""
 
-    def radiance(self, height_map: np.ndarray) -> np.ndarray: ...
+    def radiance(self, height_map: np.ndarray) -> np.ndarray:
+        """(H, W, 3) of heights (H, W) m."""
 
 
 class Renderer:

@@ -23,6 +23,7 @@ VERSIONS = [
 
 
 def score(keys: Collection[str]) -> float:
+    """1 where a topic carries the message, else 0."""
     return float(MESSAGE in keys)
 
 

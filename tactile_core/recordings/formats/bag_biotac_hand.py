@@ -44,6 +44,7 @@ biotac_sensors/BioTacTime bt_time
 
 
 def score(keys: Collection[str]) -> float:
+    """1 where a topic carries the message, else 0."""
     return float(MESSAGE in keys)
 
 

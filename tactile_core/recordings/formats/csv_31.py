@@ -39,10 +39,15 @@ def canonical(names: Sequence[str]) -> list[str]:
 
 
 def score(keys: Collection[str]) -> float:
+    """Share of the time and the electrodes among the columns, however they are written."""
     return share(canonical(list(keys)), ["time", *ELECTRODE_NAMES])
 
 
 def read(table: Table) -> Recording:
+    """(T, 19) counts with place and force (T, 3), in the file's own units.
+
+    Raises TactileError for a column that is missing, more electrodes, or too many lines that cannot be read.
+    """
     names = canonical(table.header)
     called = dict(zip(table.header, names, strict=False))
     table = replace(

@@ -15,9 +15,11 @@ COLUMN = re.compile(r"(ff|mf|rf|lf|th)_(e|biotac_)\d+$")
 
 
 def score(keys: Collection[str]) -> float:
+    """1 for a finger's electrodes, but for a few that may be missing, else 0."""
     return float(sum(bool(COLUMN.match(key)) for key in keys) >= 20)
 
 
 def read(table: Table) -> Recording:
+    """Raises TactileError: a BioTac SP has 24 electrodes."""
     check_electrodes(table.path, 24, "line 1")
     raise AssertionError("24 electrodes are refused")

@@ -16,10 +16,15 @@ ELECTRODE_NAMES = [f"ele{i}" for i in range(1, ELECTRODES + 1)]
 
 
 def score(keys: Collection[str]) -> float:
+    """Share of the time and the electrodes among the columns."""
     return share(keys, ["timestamp", *ELECTRODE_NAMES])
 
 
 def read(table: Table) -> Recording:
+    """(T, 19) counts with pdc, tac, tdc and 22 samples of pac a line.
+
+    Raises TactileError for a column that is missing, more electrodes, or too many lines that cannot be read.
+    """
     held = sum(name.startswith("ele") and name[3:].isdigit() for name in table.header)
     if held > ELECTRODES:
         check_electrodes(table.path, held, "line 1")

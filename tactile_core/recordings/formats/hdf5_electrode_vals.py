@@ -20,10 +20,15 @@ NAME = "HDF5 with electrode_vals/data, contact_loc/data, force_vec/data, indente
 
 
 def score(keys: Collection[str]) -> float:
+    """1 where the electrodes' array is there, else 0."""
     return float("electrode_vals/data" in keys)
 
 
 def read(store: Store) -> Recording:
+    """(T, 19) electrodes with place and force (T, 3), in the file's own units, and the indenters' numbers.
+
+    Raises TactileError for arrays of other shapes.
+    """
     shape, _ = store.shapes["electrode_vals/data"]
     if len(shape) == 2 and shape[1] != ELECTRODES:
         check_electrodes(store.path, shape[1], "electrode_vals/data")

@@ -13,10 +13,12 @@ NAME = "NPZ with electrodes (T, 19), optional time, pdc, tac, tdc, pac, position
 
 
 def score(keys: Collection[str]) -> float:
+    """1 where the electrodes' array is there, else 0."""
     return float("electrodes" in keys)
 
 
 def read(store: Store) -> Recording:
+    """(T, 19) electrodes and what else there is. Raises TactileError for arrays of other shapes."""
     shape, _ = store.shapes["electrodes"]
     if len(shape) == 2 and shape[1] != ELECTRODES:
         check_electrodes(store.path, shape[1], "electrodes")
