@@ -13,7 +13,7 @@ ABOUT = {
     "pdc": "Fluid pressure as recorded, counts",
     "force": "Force of the object on the BioTac, N, along the finger, across it, and into the pad (negative Z)",
     "confidence": "1: signals like those of the training, 0: far from them",
-    "expected_error_um": "Largest node error of the skin that half of such frames stay below, micrometres",
+    "expected_error_um": "Largest node error of this surface that half of such frames stay below, micrometres",
 }
 
 

@@ -38,7 +38,7 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
 
 
 def _numbers(layout: bpy.types.UILayout, skin: bpy.types.Object | None) -> None:
-    """The current frame's force and confidence."""
+    """The current frame's force, confidence, and how far a node may be off."""
     if skin is None or "force" not in skin:
         return
     force = skin["force"]
@@ -48,6 +48,8 @@ def _numbers(layout: bpy.types.UILayout, skin: bpy.types.Object | None) -> None:
     if "confidence" in skin:
         trusted = skin["confidence"] >= timeline.LOW
         column.label(text=f"Confidence {skin['confidence']:.2f}", icon="CHECKMARK" if trusted else "ERROR")
+    if "expected_error_um" in skin:
+        column.label(text=f"Expected error {skin['expected_error_um']:.0f} µm", icon="BLANK1")
 
 
 class TACTILE_PT_picture(_Panel, bpy.types.Panel):

@@ -53,7 +53,9 @@ class TACTILE_OT_translate(TactileOperator):
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0
         patch_nodes.add_patch(gel, patch_of_dent.contact_patch(moved, surface), frames[0], step)
         values = custom_properties.columns(found)
-        custom_properties.write(gel, {name: values[name] for name in ("force", "confidence")}, frames)
+        told_of_gel = {"expected_error_um": 1e6 * found.translation.expected_error_digit}
+        told_of_gel |= {name: values[name] for name in ("force", "confidence")}
+        custom_properties.write(gel, told_of_gel, frames)
         low = timeline.mark_low_confidence(context.scene, found.translation.confidence, frames)
         view.show(context, [skin, gel])
         pictures.update(gel, context.evaluated_depsgraph_get())

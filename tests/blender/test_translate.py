@@ -40,6 +40,13 @@ def test_the_displacement_can_be_read_back(gel, part):
     np.testing.assert_allclose(found, _translation(part).displacement_digit[40], atol=1e-3 * TOLERANCE)
 
 
+def test_the_gel_says_how_far_it_may_be_off(gel, part):
+    bpy.context.scene.frame_set(80)
+    shown = gel.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    expected = 1e6 * _translation(part).expected_error_digit[40]
+    assert shown["expected_error_um"] == pytest.approx(expected, rel=1e-5)
+
+
 def test_the_contact_patch_is_an_attribute_of_every_frame(gel, part):
     surface = part("tactile_core.sensors").digit_surface()
     patch = part("tactile_core.patch_of_dent").contact_patch(_translation(part).displacement_digit, surface)
