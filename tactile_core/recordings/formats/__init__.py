@@ -13,7 +13,44 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import numpy as np
+
+from ..assemble import assemble, check_electrodes
+from ..recording import ELECTRODES, Recording
+from ..store import Store
+from ..table import Table
+
 
 def share(keys: Collection[str], wanted: Collection[str]) -> float:
     """Share of the wanted names that are among the keys."""
     return sum(name in keys for name in wanted) / len(wanted)
+
+
+def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
+    """The recording of a table with pdc, tac and tdc; time, electrodes, channels : the names of their columns.
+
+    Raises TactileError for a column that is missing, and what ``assemble`` raises.
+    """
+    return assemble(
+        table.path,
+        layout,
+        electrodes=table.columns(electrodes),
+        stamps=table.column(time),
+        rows=table.lines,
+        problems=table.essential([time, *electrodes]),
+        row_word="line",
+        warnings=table.warnings,
+        names=electrodes,
+        pdc=table.column("pdc"),
+        tac=table.column("tac"),
+        tdc=table.column("tdc"),
+        **{channel: table.columns(names) for channel, names in channels.items()},
+    )
+
+
+def electrodes_of(store: Store, name: str) -> np.ndarray:
+    """(T, 19), the array of that name. Raises TactileError for another sensor's, or another shape."""
+    shape, _ = store.shapes[name]
+    if len(shape) == 2 and shape[1] != ELECTRODES:
+        check_electrodes(store.path, shape[1], name)
+    return store.array(name, (None, ELECTRODES))

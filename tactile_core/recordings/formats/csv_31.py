@@ -11,10 +11,10 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
-from ..assemble import assemble, check_electrodes
+from ..assemble import check_electrodes
 from ..recording import ELECTRODES, Recording
 from ..table import Table
-from . import share
+from . import of_table, share
 
 CONTAINER = "csv"
 NAME = "CSV with time, position (3), force (3), pac0, pac1, pdc, tac, tdc, electrodes0..18"
@@ -59,20 +59,5 @@ def read(table: Table) -> Recording:
     if held > ELECTRODES:
         check_electrodes(table.path, held, "line 1")
     table.columns(COLUMNS)  # names the first column that is missing
-    return assemble(
-        table.path,
-        NAME,
-        electrodes=table.columns(ELECTRODE_NAMES),
-        stamps=table.column("time"),
-        rows=table.lines,
-        problems=table.essential(["time", *ELECTRODE_NAMES]),
-        row_word="line",
-        warnings=table.warnings,
-        names=ELECTRODE_NAMES,
-        pdc=table.column("pdc"),
-        tac=table.column("tac"),
-        tdc=table.column("tdc"),
-        pac=table.columns(["pac0", "pac1"]),
-        position=table.columns(VECTORS[:3]),
-        force=table.columns(VECTORS[3:]),
-    )
+    vectors = {"position": VECTORS[:3], "force": VECTORS[3:]}
+    return of_table(table, NAME, "time", ELECTRODE_NAMES, pac=["pac0", "pac1"], **vectors)

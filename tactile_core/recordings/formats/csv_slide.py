@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from ..assemble import assemble, check_electrodes
+from ..assemble import check_electrodes
 from ..recording import ELECTRODES, Recording
 from ..table import Table
-from . import share
+from . import of_table, share
 
 CONTAINER = "csv"
 NAME = "CSV with timestamp, tdc, tac, pdc, pac1..22, ele1..19"
@@ -28,19 +28,4 @@ def read(table: Table) -> Recording:
     held = sum(name.startswith("ele") and name[3:].isdigit() for name in table.header)
     if held > ELECTRODES:
         check_electrodes(table.path, held, "line 1")
-    needed = ["timestamp", *ELECTRODE_NAMES]
-    return assemble(
-        table.path,
-        NAME,
-        electrodes=table.columns(ELECTRODE_NAMES),
-        stamps=table.column("timestamp"),
-        rows=table.lines,
-        problems=table.essential(needed),
-        row_word="line",
-        warnings=table.warnings,
-        names=ELECTRODE_NAMES,
-        pdc=table.column("pdc"),
-        tac=table.column("tac"),
-        tdc=table.column("tdc"),
-        pac=table.columns(PAC),
-    )
+    return of_table(table, NAME, "timestamp", ELECTRODE_NAMES, pac=PAC)

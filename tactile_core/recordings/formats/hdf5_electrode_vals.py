@@ -10,9 +10,10 @@ from collections.abc import Collection
 import numpy as np
 
 from ...errors import TactileError
-from ..assemble import assemble, check_electrodes
-from ..recording import ELECTRODES, Recording
+from ..assemble import assemble
+from ..recording import Recording
 from ..store import Store
+from . import electrodes_of
 
 CONTAINER = "hdf5"
 ELECTRODES_NAME = "electrode_vals/data"
@@ -21,7 +22,7 @@ NAME = "HDF5 with electrode_vals/data, contact_loc/data, force_vec/data, indente
 
 def score(keys: Collection[str]) -> float:
     """1 where the electrodes' array is there, else 0."""
-    return float("electrode_vals/data" in keys)
+    return float(ELECTRODES_NAME in keys)
 
 
 def read(store: Store) -> Recording:
@@ -29,10 +30,7 @@ def read(store: Store) -> Recording:
 
     Raises TactileError for arrays of other shapes.
     """
-    shape, _ = store.shapes["electrode_vals/data"]
-    if len(shape) == 2 and shape[1] != ELECTRODES:
-        check_electrodes(store.path, shape[1], "electrode_vals/data")
-    electrodes = store.array("electrode_vals/data", (None, ELECTRODES))
+    electrodes = electrodes_of(store, ELECTRODES_NAME)
     frames = len(electrodes)
     return assemble(
         store.path,
@@ -52,5 +50,5 @@ def _indenters(store: Store, frames: int) -> dict[str, list[float]]:
         return {}
     shape, _ = store.shapes[name]
     if not shape or shape[0] != frames:
-        raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"{frames} frames as in electrode_vals/data")
+        raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"{frames} frames as in {ELECTRODES_NAME}")
     return {"indenter_types": np.unique(store.array(name, (frames, *shape[1:]))).tolist()}

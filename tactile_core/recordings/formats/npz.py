@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from ..assemble import assemble, check_electrodes
-from ..recording import ELECTRODES, Recording
+from ..assemble import assemble
+from ..recording import Recording
 from ..store import Store
+from . import electrodes_of
 
 CONTAINER = "npz"
 NAME = "NPZ with electrodes (T, 19), optional time, pdc, tac, tdc, pac, position, force"
@@ -19,10 +20,7 @@ def score(keys: Collection[str]) -> float:
 
 def read(store: Store) -> Recording:
     """(T, 19) electrodes and what else there is. Raises TactileError for arrays of other shapes."""
-    shape, _ = store.shapes["electrodes"]
-    if len(shape) == 2 and shape[1] != ELECTRODES:
-        check_electrodes(store.path, shape[1], "electrodes")
-    electrodes = store.array("electrodes", (None, ELECTRODES))
+    electrodes = electrodes_of(store, "electrodes")
     frames = len(electrodes)
     columns = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
     columns |= {name: store.optional(name, (frames, 3)) for name in ("position", "force")}
