@@ -10,8 +10,8 @@ from conftest import SLIDE_HEADER
 
 from tactile_core import adapt, cli, typical_signals, weights
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.compliance import electrode_feet
 from tactile_core.mechanics.electrodes import signal_of_gaps
+from tactile_core.mechanics.watched import electrode_feet
 from tactile_core.recordings import prepare, read, sensor_file
 from tactile_core.recordings.sensor_file import Sensor
 from tactile_core.sensors import electrodes

@@ -16,22 +16,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import atomic, biotac_shape, digit_shape, sensors, surface
+from .. import atomic, digit_shape, sensors, surface
 from ..cache import cache_folder
 from ..errors import TactileError
 from ..lattice import Lattice
 from ..sensors import Material
 from .condense import condense, mirror_nodes
-from .core import Core, facing_core
 from .hex_mesh import HexMesh, gel_mesh, inner_faces, skin_mesh
 from .mirrored_halves import MirroredHalves, axes_of
 from .quadratic_cavity import QuadraticCavity
+from .watched import ON_PLANE, electrode_feet, images, watched_of
 
 log = logging.getLogger(__name__)
 _FORMAT = 5  # raise when the meaning of the cached arrays changes
 
 # Skin nodes that can be touched: those that unroll onto the gel or up to this far beside it, m.
-_ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 _BESIDE_GEL = 2.0e-3
 
 
@@ -71,7 +70,7 @@ class Compliance:
         """Row of ``move`` (m,) for each touchable node, whether it is the image's (m,) bool, and all images (n,)."""
         image = mirror_nodes(self.surface.rest)
         answered = answered_nodes(self.surface, self.touchable, image)
-        mirrored = self.surface.rest[self.touchable, 2] < -_ON_PLANE
+        mirrored = self.surface.rest[self.touchable, 2] < -ON_PLANE
         return np.searchsorted(answered, np.where(mirrored, image[self.touchable], self.touchable)), mirrored, image
 
 
@@ -154,7 +153,7 @@ def _folder(solid: _Solid) -> pathlib.Path:
     """Named by all that decides the arrays."""
     name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
-    watched = _watched(mesh)
+    watched = watched_of(mesh)
     # Rounded, and without a minus before zero, which differ between versions of numpy and scipy.
     places = watched.rows, watched.columns, *(np.round(each * 1e9) + 0.0 for each in (watched.weights, watched.gap))
     for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, *places):
@@ -209,15 +208,15 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
     touchable : (m,) surface nodes that may carry force. Raises ValueError for a solid without mirror symmetry or held
     nowhere, TactileError where the memory does not suffice.
     """
-    watched = _watched(mesh)
+    watched = watched_of(mesh)
     watch, watch_gap = watched.dense(3 * len(mesh.nodes)), watched.gap
-    source, mirrored = _images(mesh, watch.shape[1])
+    source, mirrored = images(mesh, watch.shape[1])
     kept = np.unique(source)
     loads, column, sign = watch[:, kept], np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
     if len(mesh.inner):
         loads = np.column_stack([loads, _volume_gradient(mesh)])
         column, sign = np.r_[column, len(kept)], np.r_[sign, 1.0]
-    half = np.flatnonzero(lattice.rest[:, 2] >= -_ON_PLANE)
+    half = np.flatnonzero(lattice.rest[:, 2] >= -ON_PLANE)
     try:
         even, odd = (condense(mesh, material, mesh.surface[half], loads, parity) for parity in (1, -1))
         image = mirror_nodes(lattice.rest)
@@ -246,90 +245,9 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
     """Surface nodes (r,) with z >= 0 whose answers also serve their mirror images: of every touchable node one."""
-    return np.unique(np.where(lattice.rest[touchable, 2] >= -_ON_PLANE, touchable, image[touchable]))
+    return np.unique(np.where(lattice.rest[touchable, 2] >= -ON_PLANE, touchable, image[touchable]))
 
 
 def _volume_gradient(mesh: HexMesh) -> np.ndarray:
     """d(fluid volume) / d(node) (3 n_nodes,), m2, at rest."""
     return QuadraticCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)
-
-
-class Watched(NamedTuple):
-    """What turns a displacement into the change of w watched gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
-
-    rows, columns : (k,) int; weights : (k,); gap : (w,) m
-    """
-
-    rows: np.ndarray
-    columns: np.ndarray
-    weights: np.ndarray
-    gap: np.ndarray
-
-    def dense(self, size: int) -> np.ndarray:
-        """The matrix (size, w): 700 MB of the skin's, which only a build needs."""
-        matrix = np.zeros((size, len(self.gap)))
-        matrix[self.rows, self.columns] = self.weights
-        return matrix
-
-
-def _watched(mesh: HexMesh) -> Watched:
-    """The electrodes' feet, three nodes each, then the inner nodes over the core."""
-    if not len(mesh.inner):
-        return Watched(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
-    feet = electrode_feet()
-    corners = biotac_shape.skin_surface("inner").faces[feet.face]
-    core_nodes, core_out, core_gap = _over_core(mesh)
-    nodes = mesh.inner[np.r_[corners.ravel(), core_nodes]]
-    columns = np.r_[np.repeat(np.arange(len(feet.gap)), 3), len(feet.gap) + np.arange(len(core_nodes))]
-    out = np.concatenate([(feet.weights[..., None] * feet.outward[:, None]).reshape(-1, 3), core_out])
-    return Watched(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap])
-
-
-@dataclasses.dataclass(frozen=True)
-class ElectrodeFeet:
-    """Where the film over each electrode ends on the inner skin: face, weights, direction (19, 3), gap (19,) m."""
-
-    face: np.ndarray
-    weights: np.ndarray
-    outward: np.ndarray
-    gap: np.ndarray
-
-
-@functools.cache
-def electrode_feet() -> ElectrodeFeet:
-    """The nearest point of the resting inner skin to each electrode; gaps 0.49 to 1.76 mm (published: 0.51 to 1.76)."""
-    positions = sensors.electrodes()
-    face, weights, place = surface.closest_on_triangles(biotac_shape.skin_surface("inner"), positions)
-    gap = np.linalg.norm(place - positions, axis=1)
-    return ElectrodeFeet(face, weights, (place - positions) / gap[:, None], gap)
-
-
-def _over_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m; even in
-    z."""
-    inner = biotac_shape.skin_surface("inner")
-    nodes = _facing(mesh)
-    image = mirror_nodes(inner.rest)
-    mirrored = inner.rest[nodes, 2] < -_ON_PLANE
-    gap, outward = Core().distance(inner.rest[np.where(mirrored, image[nodes], nodes)])
-    return nodes, np.where(mirrored[:, None], outward * [1.0, 1.0, -1.0], outward), gap
-
-
-def _facing(mesh: HexMesh) -> np.ndarray:
-    """Inner nodes that may come to press on the core, each with its mirror image."""
-    inner = biotac_shape.skin_surface("inner")
-    faces = facing_core(inner.rest) & ~mesh.clamped[mesh.inner]
-    return np.flatnonzero(faces & faces[mirror_nodes(inner.rest)])
-
-
-def _images(mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """For each of ``count`` watched points the one whose mirror image it is, else itself; and whether it is an
-    image."""
-    source, mirrored = np.arange(count), np.zeros(count, bool)
-    if count:
-        nodes, rest = _facing(mesh), biotac_shape.skin_surface("inner").rest
-        first = count - len(nodes)
-        image = mirror_nodes(rest)[nodes]
-        mirrored[first:] = rest[nodes, 2] < -_ON_PLANE
-        source[first:] = first + np.where(mirrored[first:], np.searchsorted(nodes, image), np.arange(len(nodes)))
-    return source, mirrored

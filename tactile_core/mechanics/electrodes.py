@@ -12,8 +12,9 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
-from .compliance import Compliance, electrode_feet
+from .compliance import Compliance
 from .contact import Contact, watched_gaps
+from .watched import electrode_feet
 
 FILM_FLOOR = 20e-6  # m, thinnest film the law knows (networks.md: s = 1 / max(gap, 0.02 mm))
 # counts m: assumed. No gap law is published (mechanics.md); this one puts the 95th percentile of the largest change a

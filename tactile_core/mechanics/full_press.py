@@ -10,11 +10,11 @@ import numpy as np
 from .. import biotac_shape, sensors
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
-from .compliance import electrode_feet
 from .finite_strain_tier import Body, Sensor, graded_body
 from .first_touch import fall
 from .newton import Tolerance, Touch
 from .pose_path import same_line
+from .watched import electrode_feet
 
 Tier = Literal["full", "reference"]
 

@@ -5,8 +5,8 @@ import pytest
 
 from tactile_core import biotac_shape, sensors
 from tactile_core.mechanics.biotac_sheet import biotac_sheet, divider_counts, excitation_electrodes
-from tactile_core.mechanics.compliance import electrode_feet
 from tactile_core.mechanics.electrodes import FILM_FLOOR
+from tactile_core.mechanics.watched import electrode_feet
 
 MIRROR = np.r_[10:16, 6, 8, 7, 9, 0:6, 16:19]  # E1..E6 and E11..E16, E8 and E9 are images of each other (sensors.md)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tactile_core.mechanics.compliance import electrode_feet
 from tactile_core.mechanics.electrodes import FILM_CONSTANT, signal_of_gaps
 from tactile_core.mechanics.validation.electrode_law import _law_rows
+from tactile_core.mechanics.watched import electrode_feet
 
 GAPS = electrode_feet().gap * np.random.default_rng(0).uniform(0.3, 1.1, (40, 19))
 

@@ -7,8 +7,8 @@ import pytest
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.compliance import electrode_feet
 from tactile_core.mechanics.electrodes import FILM_FLOOR, Wiring, readings, signal_of_gaps
+from tactile_core.mechanics.watched import electrode_feet
 
 IDEAL = Wiring(rest_spread=0, gain_error=0, drift=0, noise=0)
 TIME = np.arange(400) / sensors.SAMPLE_RATE

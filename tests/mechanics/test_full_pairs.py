@@ -14,12 +14,13 @@ from tactile_core import digit_shape, pack, sensors
 from tactile_core.errors import TactileError
 from tactile_core.indenters import Sphere
 from tactile_core.mechanics import full_pairs, pair_file
-from tactile_core.mechanics.compliance import biotac_compliance, electrode_feet
+from tactile_core.mechanics.compliance import biotac_compliance
 from tactile_core.mechanics.contact import ContactProblem
 from tactile_core.mechanics.electrodes import electrode_gaps, signal_of_gaps
 from tactile_core.mechanics.full_pairs import REGION_X, draw_press, full_rows
 from tactile_core.mechanics.full_press import FORCE_TOLERANCE, FullPress, on_line
 from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.watched import electrode_feet
 from tactile_core.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
