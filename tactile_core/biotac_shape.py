@@ -89,11 +89,14 @@ def catmull_rom(t: np.ndarray | float) -> np.ndarray:
 
 def _around(values: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Periodic cubic (Catmull-Rom) interpolation of values (..., 72) on the table's angles, at angles (n,)."""
+    return sum(weight * values[..., column] for column, weight in zip(*_columns(at), strict=True))
+
+
+def _columns(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The table's columns (4, n) next to angles (n,), and their weights (4, n)."""
     position = (at + np.pi) / (2 * np.pi) * 72
     cell = np.floor(position + 1e-9).astype(int)
-    t = position - cell
-    weights = catmull_rom(t)
-    return sum(weights[k] * values[..., (cell + k - 1) % 72] for k in range(4))
+    return (cell + np.arange(-1, 3)[:, None]) % 72, catmull_rom(position - cell)
 
 
 @functools.cache
@@ -122,11 +125,11 @@ def _meridians(layer: str) -> np.ndarray:
 def core_radius(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Radius of the rigid core, m, about the axis at stations x (n,) m and angles theta (n,) rad; nan off the core."""
     table = _table()
-    at_angle = _around(table["core"], theta)  # (60, n)
     row = np.clip(np.searchsorted(table["x"], x) - 1, 0, 58)
     t = (x - table["x"][row]) / (table["x"][row + 1] - table["x"][row])
-    index = np.arange(len(x))
-    return at_angle[row, index] * (1 - t) + at_angle[row + 1, index] * t
+    columns, weights = _columns(theta)
+    lower, upper = ((weights * table["core"][at, columns]).sum(axis=0) for at in (row, row + 1))
+    return lower * (1 - t) + upper * t
 
 
 @functools.cache

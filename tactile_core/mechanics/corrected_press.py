@@ -128,4 +128,5 @@ class CorrectedPress:
 
 def _from_touch(contact: Contact, fall: float) -> Contact:
     """A contact with its depth measured from first touch where the indenter has slid to, as the correction knows it."""
-    return dataclasses.replace(contact, depth=max(contact.depth - fall, _LEAST_DEPTH))
+    depth = max(contact.depth - fall, _LEAST_DEPTH)
+    return contact if depth == contact.depth else dataclasses.replace(contact, depth=depth)

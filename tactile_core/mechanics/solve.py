@@ -176,7 +176,8 @@ class _Fast(_Path):
         contact, corrected = found.linear, found.corrected
         patch = np.zeros(len(compliance.surface.rest), bool)
         patch[compliance.touchable[contact.nodes]] = True
-        radius = sharpest(self.indenter, contact.pose, compliance.surface.rest + contact.displacement)
+        near = compliance.touchable[self.press.problem.near]
+        radius = sharpest(self.indenter, contact.pose, compliance.surface.rest[near] + contact.displacement[near])
         stated = stated_error.of_fast(self.errors(contact.depth), found.depth, len(contact.nodes), radius)
         return Solution(
             "fast", contact.converged, contact.iterations, corrected.displacement, patch, found.force, contact.depth,
