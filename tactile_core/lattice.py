@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 
 import numpy as np
+
+from .lattice_blocks import LatticeBlocks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +37,11 @@ class Lattice:
         """Name of this surface in files: hash of the rest nodes rounded to 1 nm, so that two builds agree."""
         rounded = np.round(self.rest * 1e9).astype("<i8")
         return hashlib.sha256(rounded.tobytes()).hexdigest()
+
+    @functools.cached_property
+    def blocks(self) -> LatticeBlocks:
+        """Finds the resting nodes near an indenter."""
+        return LatticeBlocks(self.rest, self.shape)
 
     def grid(self, values: np.ndarray) -> np.ndarray:
         """Values at nodes (..., n_nodes, k) as a grid (..., rows, columns, k); poles left out."""

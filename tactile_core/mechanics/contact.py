@@ -20,7 +20,6 @@ from .frictional import Frictional
 from .frictionless import Frictionless, Try
 from .landing import landing, meeting
 from .near_block import NearBlock
-from .near_nodes import NearNodes
 from .near_rows import NearRows
 from .pose_path import between, same_place
 from .solved_contact import Contact
@@ -58,7 +57,6 @@ class ContactProblem:
         self.compliance, self.indenter, self.pose, self.friction = compliance, indenter, pose, friction
         self._rest = compliance.surface.rest[compliance.touchable]
         self._block: NearBlock | None = None
-        self._nodes = NearNodes(indenter, self._rest)
         self._rows = NearRows(compliance, np.empty(0, int))
         self._look_near(pose.moved(reach))
 
@@ -80,13 +78,19 @@ class ContactProblem:
 
     def _look_near(self, pose: Pose, start: Contact | None = None) -> None:
         """Follow the nodes that the indenter may reach at a pose, and those that ``start`` touched."""
-        wanted = self._nodes.within(pose, _REACH)
+        wanted = self._within(pose, _REACH)
         touched = np.empty(0, int) if start is None else start.nodes
         if len(self.near) > _LARGE * len(wanted) or not (
             _among(wanted, self.near).all() and _among(touched, self.near).all()
         ):
-            near = wanted if start is None else np.union1d(self._nodes.within(pose, _REACH + _SPARE), touched)
+            near = wanted if start is None else np.union1d(self._within(pose, _REACH + _SPARE), touched)
             self._rows = NearRows(self.compliance, near)
+
+    def _within(self, pose: Pose, reach: float) -> np.ndarray:
+        """Sorted touchable indices (k,) of the resting nodes that lie less than ``reach`` m outside the indenter."""
+        nodes, _ = self.compliance.surface.blocks.near(self.indenter, pose, reach)
+        touchable = self.compliance.touchable
+        return np.searchsorted(touchable, nodes[_among(nodes, touchable)])
 
     @property
     def near(self) -> np.ndarray:

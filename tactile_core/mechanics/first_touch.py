@@ -49,8 +49,7 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     grid = lattice.grid(lattice.rest)
     closed = len(lattice.rest) > rows * columns  # a surface with poles closes round its axis
     met = in_front(grid, indenter, pose, closed=closed) if _narrow(indenter) else None
-    points = lattice.rest if met is None else np.concatenate([lattice.rest, met[1]])
-    pose, nodes = _on_nodes(points, indenter, pose)
+    pose, nodes = _on_nodes(lattice, np.empty((0, 3)) if met is None else met[1], indenter, pose)
     before_tip = nodes < len(lattice.rest)
     tip = np.empty((0, 2)) if before_tip.all() else met[0]
     nodes = nodes[nodes < rows * columns]
@@ -102,28 +101,44 @@ def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> t
     return along, np.linalg.norm(arm - along[:, None] * direction, axis=1)
 
 
-def _on_nodes(rest: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
-    """The pose that just touches the first of the nodes (n, 3) m, and the nodes that are close then, nearest first."""
+def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
+    """The pose that just touches the first of the nodes, or of ``more`` points (j, 3) m, and those that are close then,
+    nearest first."""
+    rest = np.concatenate([lattice.rest, more]) if len(more) else lattice.rest
     for clear in _CLEAR:
-        away = pose.moved(-clear)
-        gap, _ = away.distance(indenter, rest)
-        if gap.min() > 0:
+        away, reach = pose.moved(-clear), 2 * clear
+        nodes, gap = _near(lattice, more, indenter, away, reach)
+        if gap.min(initial=np.inf) > 0:
             break
-    some = np.argsort(gap, kind="stable")[:_NEAREST]
+    if len(nodes) < _NEAREST:
+        nodes, gap = _near(lattice, more, indenter, away, np.inf)
+    some = nodes[np.argsort(gap, kind="stable")[:_NEAREST]]
     while True:
         pose = _advance(indenter, away, rest[some])
         if pose.distance(indenter, rest[some])[0].min() > _TOUCHES:  # it slides past them
             pose, some = _advance(indenter, away, rest), np.arange(len(rest))
             if pose.distance(indenter, rest)[0].min() > _MISSED:
                 raise TactileError("indenter", "it passes the sensor by", "a place and a lean that meet its surface")
-        travel = np.linalg.norm(pose.apex - away.apex)
-        reached = np.flatnonzero(gap < travel + _CLOSE)  # no distance falls faster than the indenter moves
+        travel = float(np.linalg.norm(pose.apex - away.apex))
+        if travel + _CLOSE > reach:
+            reach = travel + _CLOSE
+            nodes, gap = _near(lattice, more, indenter, away, reach)
+        reached = nodes[gap < travel + _CLOSE]  # no distance falls faster than the indenter moves
         now, _ = pose.distance(indenter, rest[reached])
         missed = np.setdiff1d(reached[now < -_TOUCHES], some)
         if not len(missed):
             order = np.argsort(now, kind="stable")[:_MOST_PLACES]
             return pose, reached[order[now[order] < now[order[0]] + _CLOSE]]
         some = np.r_[some, missed]
+
+
+def _near(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose, reach: float) -> tuple:
+    """Nodes (k,) and points after them that lie less than ``reach`` m outside an indenter, and distances (k,) m."""
+    nodes, gap = lattice.blocks.near(indenter, pose, reach)
+    if len(more):
+        nodes = np.concatenate([nodes, len(lattice.rest) + np.arange(len(more))])
+        gap = np.concatenate([gap, pose.distance(indenter, more)[0]])
+    return nodes, gap
 
 
 def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:

@@ -12,6 +12,7 @@ from ..indenters import Indenter, Pose
 DEPTH_LIMIT = 0.6  # of the thickness: as deep as MECHANICS is asked to go
 _DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
 _STEP = 20e-6  # m, of the march through the BioTac; the last step is divided linearly
+_TOUCHES = 0.1e-3  # m: at first touch a node is mostly this near
 _FARTHEST = 8e-3  # m, more than from the pad to the finger's axis
 
 
@@ -26,9 +27,12 @@ def thickness(sensor: str, point: np.ndarray) -> float:
         return float((digit_shape.BACK_Y - on_dome[1]) / -outward[1])
     if sensor != "biotac":
         raise ValueError(f"the thickness of a {sensor!r} is not known")
-    lattice = sensors.biotac_surface()
-    node = int(np.argmin(((lattice.rest - point) ** 2).sum(axis=1)))
-    outward = _outward()[node]
+    node = int(np.argmin(((sensors.biotac_surface().rest - point) ** 2).sum(axis=1)))
+    return _to_core(point, _outward()[node])
+
+
+def _to_core(point: np.ndarray, outward: np.ndarray) -> float:
+    """Distance, m, from a point (3,) m of the BioTac's skin along its inward normal to the core, or to the axis."""
     distance = np.arange(0, _FARTHEST, _STEP)
     x, y, z = (point - distance[:, None] * outward).T
     radius = np.hypot(y - biotac_shape.AXIS_Y, z)
@@ -44,8 +48,15 @@ def thickness(sensor: str, point: np.ndarray) -> float:
 
 def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
     """The thickness, m, at the node of the resting surface nearest to an indenter at first touch."""
-    rest = sensors.sensor_surface(sensor).rest
-    return thickness(sensor, rest[int(np.argmin(pose.distance(indenter, rest)[0]))])
+    surface, reach = sensors.sensor_surface(sensor), _TOUCHES
+    nodes, gap = surface.blocks.near(indenter, pose, reach)
+    while not len(nodes):
+        reach *= 4
+        nodes, gap = surface.blocks.near(indenter, pose, reach)
+    node = int(nodes[np.argmin(gap)])
+    if sensor == "biotac":
+        return _to_core(surface.rest[node], _outward()[node])
+    return thickness(sensor, surface.rest[node])
 
 
 def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:

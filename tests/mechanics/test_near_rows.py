@@ -6,10 +6,10 @@ import pytest
 from tactile_core.mechanics import surface_answer
 from tactile_core.mechanics.compliance import compliance_of
 from tactile_core.mechanics.contact import ContactProblem
-from tactile_core.mechanics.near_nodes import NearNodes
 from tactile_core.mechanics.near_rows import NearRows
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.random_contacts import INDENTERS
+from tactile_core.sensors import sensor_surface
 
 
 @pytest.mark.parametrize("sensor", ["biotac", "digit"])
@@ -31,16 +31,17 @@ def test_near_nodes_move_as_on_the_whole_surface(sensor):
         )
 
 
+@pytest.mark.parametrize("sensor", ["biotac", "digit"])
 @pytest.mark.parametrize("name", INDENTERS)
-def test_no_near_node_is_ruled_out(name):
-    compliance, indenter = compliance_of("digit"), INDENTERS[name]
-    rest = compliance.surface.rest[compliance.touchable]
-    pose = pose_at("digit", indenter, Placement(-8e-3, 1e-3, 0.3, 1.0))
-    nodes = NearNodes(indenter, rest)
-    nodes.within(pose, 0.8e-3)
+def test_no_near_node_is_ruled_out(name, sensor):
+    surface, indenter = sensor_surface(sensor), INDENTERS[name]
+    pose = pose_at(sensor, indenter, Placement(-8e-3, 1e-3, 0.3, 1.0))
     for other in (pose.moved(0.7e-3), pose.moved(0.3e-3).slid(0.4e-3, -0.2e-3), pose.moved(1.8e-3)):
-        every = np.flatnonzero(other.distance(indenter, rest)[0] < 0.8e-3)
-        np.testing.assert_array_equal(nodes.within(other, 0.8e-3), every)
+        every, _ = other.distance(indenter, surface.rest)
+        for reach in (0.0, 0.8e-3, np.inf):
+            nodes, gap = surface.blocks.near(indenter, other, reach)
+            np.testing.assert_array_equal(nodes, np.flatnonzero(every < reach))
+            np.testing.assert_allclose(gap, every[nodes], rtol=0, atol=1e-15)  # m, of products of fewer points
 
 
 def test_nodes_are_followed_as_the_indenter_slides_on():
