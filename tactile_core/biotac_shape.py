@@ -79,11 +79,13 @@ def _meridian(layer: str, column: int) -> np.ndarray:
 
 def catmull_rom(t: np.ndarray | float) -> np.ndarray:
     """Weights (4, ...) of the nodes -1, 0, 1, 2 at places t between 0 and 1: cubic, once differentiable."""
-    return np.stack([
-        -t / 2 + t**2 - t**3 / 2,
-        1 - 2.5 * t**2 + 1.5 * t**3,
-        t / 2 + 2 * t**2 - 1.5 * t**3,
-        (t**3 - t**2) / 2,
+    square = t * t
+    cube = square * t  # numpy's general power takes ten times as long
+    return np.array([
+        -t / 2 + square - cube / 2,
+        1 - 2.5 * square + 1.5 * cube,
+        t / 2 + 2 * square - 1.5 * cube,
+        (cube - square) / 2,
     ])  # fmt: skip
 
 

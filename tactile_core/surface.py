@@ -7,9 +7,11 @@ import functools
 import numpy as np
 
 from . import biotac_shape
+from .grid_surface import on_grid
 from .lattice import Lattice
 
 PAD_RADIUS = 7.065e-3  # m, cross-section of the pad about biotac_shape.AXIS_Y, rms 4 um (sensors.md)
+_STENCIL = 1e-3 * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])  # of (row, column), for differences
 ROLL_ORIGIN_X = -8.0e-3  # m, the place in the middle of the pad where both sensors share x (sensors.md, "unfolding")
 
 
@@ -66,25 +68,10 @@ def roll_up(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     stations, angles = _rolled_x(), biotac_shape.angles()
     row = np.interp(point[0], stations, np.arange(len(stations)))
     column = np.interp(point[1] / PAD_RADIUS, angles, np.arange(len(angles)))
-    grid = biotac_shape.skin_grid("outer")
-    position = _cubic(grid, row, column)
-    along = _cubic(grid, row + 1e-3, column) - _cubic(grid, row - 1e-3, column)
-    around = _cubic(grid, row, column + 1e-3) - _cubic(grid, row, column - 1e-3)
-    normal = np.cross(along, around)
+    places = np.array([[row], [column]]) + _STENCIL
+    position, above, below, right, left = on_grid(biotac_shape.skin_grid("outer"), places, closed=True)
+    normal = np.cross(above - below, right - left)
     return position, normal / np.linalg.norm(normal)
-
-
-def _cubic(grid: np.ndarray, row: float, column: float) -> np.ndarray:
-    """Catmull-Rom interpolation of grid (rows, columns, k) at a fractional place, clamped at its ends along."""
-    i, j = int(np.clip(np.floor(row), 0, len(grid) - 2)), int(np.floor(column))
-    rows = np.clip(np.arange(i - 1, i + 3), 0, len(grid) - 1)
-    columns = np.arange(j - 1, j + 3) % grid.shape[1]
-    return np.einsum(
-        "a,b,abk->k",
-        biotac_shape.catmull_rom(row - i),
-        biotac_shape.catmull_rom(column - j),
-        grid[np.ix_(rows, columns)],
-    )
 
 
 def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Protocol
 
 import numpy as np
@@ -37,6 +38,12 @@ class Indenter(Protocol):
         lower = [self.support(-axis)[k] for k, axis in enumerate(np.eye(3))]
         upper = [self.support(axis)[k] for k, axis in enumerate(np.eye(3))]
         return np.array(lower), np.array(upper)
+
+    @functools.cached_property
+    def least_side(self) -> float:
+        """The least side, m, of the box of ``bounds``."""
+        lower, upper = self.bounds()
+        return float((upper - lower).min())
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:

@@ -64,16 +64,25 @@ class Learned:
         return float(np.exp(self._trusted(features, 1) * (near @ self.force_weights)))
 
     def _near(self, features: np.ndarray) -> np.ndarray:
-        return kernel(((features - self.shift) / self.scale)[None], self.supports, self.width)[0]
+        scaled = ((features - self.shift) / self.scale)[None]
+        return kernel(scaled, self.supports, self.width, self._support_squares)[0]
+
+    @functools.cached_property
+    def _support_squares(self) -> np.ndarray:
+        return (self.supports**2).sum(axis=1)
 
     def _trusted(self, features: np.ndarray, column: int) -> float:
         return float(np.interp(features[0], self.trust[:, 0], self.trust[:, column]))
 
 
-def kernel(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
-    """Inverse multiquadric and linear kernel (n, m) of scaled features (n, f) and (m, f): smooth, and tame far out."""
+def kernel(a: np.ndarray, b: np.ndarray, width: float, b_squares: np.ndarray | None = None) -> np.ndarray:
+    """Inverse multiquadric and linear kernel (n, m) of scaled features (n, f) and (m, f): smooth, and tame far out.
+
+    b_squares : (m,), sums of squares of the second ones, where they are known
+    """
     products = a @ b.T
-    squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * products
+    b_squares = (b**2).sum(axis=1) if b_squares is None else b_squares
+    squares = (a**2).sum(axis=1)[:, None] + b_squares - 2 * products
     return 1 / np.sqrt(1 + np.maximum(squares, 0) / width**2) + 0.1 * (products / a.shape[1] + 1)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import biotac_shape
 from ..errors import TactileError
+from ..grid_surface import on_grid
 from ..indenters import Indenter, Pose
 from ..lattice import Lattice
 from .pose_path import same_line
@@ -15,6 +15,7 @@ _TOUCHES = 1e-9  # m, smallest distance at which the body is taken to touch
 _CLOSE = 60e-6  # m: nodes this little farther than the first one may hide the true first place between them
 _MOST_PLACES = 12
 _FINER = (4, 16, 64, 256)  # of a lattice spacing: 1.4 um at last, which hides less than 1 nm of a ball of 1 mm
+_AROUND = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij")).reshape(2, -1)
 _HIDDEN = 6e-6  # m, more than a quarter of a spacing hides: (0.045 mm)^2 / 2 over the smallest edge radius, 0.2 mm
 _CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no indenter reaches the sensor
 _FARTHEST = 30e-3  # m, past all of a sensor from wherever the motion starts
@@ -48,27 +49,23 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     rows, columns = lattice.shape
     grid = lattice.grid(lattice.rest)
     closed = len(lattice.rest) > rows * columns  # a surface with poles closes round its axis
-    met = in_front(grid, indenter, pose, closed=closed) if _narrow(indenter) else None
+    met = in_front(grid, indenter, pose, closed=closed) if indenter.least_side < _NARROW else None
     pose, nodes = _on_nodes(lattice, np.empty((0, 3)) if met is None else met[1], indenter, pose)
     before_tip = nodes < len(lattice.rest)
     tip = np.empty((0, 2)) if before_tip.all() else met[0]
     nodes = nodes[nodes < rows * columns]
-    places = np.concatenate([np.stack([nodes // columns, nodes % columns], -1).astype(float), tip])
-    around = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij"), -1).reshape(1, -1, 2)
-    for finer in _FINER if len(places) else ():
-        tried = places[:, None] + around / finer
-        points = _on_surface(grid, tried.reshape(-1, 2), closed=closed)
+    places = np.concatenate([np.array(np.divmod(nodes, columns), float), tip.T], axis=1)
+    for finer in _FINER if places.size else ():
+        tried = (places[:, :, None] + _AROUND[:, None] / finer).reshape(2, -1)
+        points = on_grid(grid, tried, closed=closed)
         gap, _ = pose.distance(indenter, points)
-        best = np.argmin(gap.reshape(len(places), -1), axis=1) + np.arange(len(places)) * around.shape[1]
+        best = np.argmin(gap.reshape(-1, _AROUND.shape[1]), axis=1) + np.arange(0, len(gap), _AROUND.shape[1])
         best = best[gap[best] < gap[best].min() + _HIDDEN]
-        places, first = np.unique(tried.reshape(-1, 2)[best], axis=0, return_index=True)
-        pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), points[best[first]])
+        if len(best) > 1:  # neighbours find the same place
+            best = best[np.unique(tried[:, best], axis=1, return_index=True)[1]]
+        places = tried[:, best]
+        pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), points[best])
     return pose
-
-
-def _narrow(indenter: Indenter) -> bool:
-    lower, upper = indenter.bounds()
-    return bool((upper - lower).min() < _NARROW)
 
 
 def in_front(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
@@ -84,14 +81,13 @@ def in_front(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) 
         return None
     near &= along < along[near].min() + _FRONT
     node = int(np.argmin(np.where(near, beside, np.inf)))
-    place = np.array([divmod(node, grid.shape[1])], float)
-    around = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij"), -1).reshape(-1, 2)
+    place = np.array([divmod(node, grid.shape[1])], float).T
     for finer in _FINER:
-        tried = place + around / finer
-        points = _on_surface(grid, tried, closed=closed)
+        tried = place + _AROUND / finer
+        points = on_grid(grid, tried, closed=closed)
         best = int(np.argmin(_off_line(points, foremost, pose.direction)[1]))
-        place, point = tried[best : best + 1], points[best : best + 1]
-    return place, point
+        place, point = tried[:, best : best + 1], points[best : best + 1]
+    return place.T, point
 
 
 def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -158,22 +154,3 @@ def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
         left -= step
         pose = pose.moved(step)
     return pose
-
-
-def _on_surface(grid: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray:
-    """Points (n, 3) of the interpolated surface at fractional (row, column) places (n, 2)."""
-    rows, columns = grid.shape[:2]
-    row = np.minimum(np.maximum(places[:, 0], 0), rows - 1)
-    column = places[:, 1] if closed else np.minimum(np.maximum(places[:, 1], 0), columns - 1)
-    i = np.minimum(np.floor(row).astype(int), rows - 2)
-    j = np.floor(column).astype(int)
-    if not closed:
-        j = np.minimum(j, columns - 2)
-    across, along = biotac_shape.catmull_rom(row - i), biotac_shape.catmull_rom(column - j)
-    steps = np.arange(-1, 3)
-    at_row = np.minimum(np.maximum(i[:, None] + steps, 0), rows - 1)
-    at_column = j[:, None] + steps
-    at_column = at_column % columns if closed else np.minimum(np.maximum(at_column, 0), columns - 1)
-    nodes = grid.reshape(-1, 3).take(at_row[:, :, None] * columns + at_column[:, None], axis=0)
-    weights = across.T[:, :, None] * along.T[:, None]
-    return (weights.reshape(-1, 1, 16) @ nodes.reshape(-1, 16, 3))[:, 0]
