@@ -24,5 +24,5 @@ def test_places_beyond_the_ends_lie_on_them():
 
 def test_a_closed_grid_goes_on_round():
     grid = bowl(ROW, np.cos(2 * np.pi * COLUMN / 9))
-    once, again = (on_grid(grid, PLACES + [[0], [turn]], closed=True) for turn in (-9.0, 9.0))
+    once, again = (on_grid(grid, np.add(PLACES, [[0], [turn]]), closed=True) for turn in (-9.0, 9.0))
     np.testing.assert_allclose(once, again, atol=1e-12)
