@@ -231,8 +231,8 @@ class ContactProblem:
 def _single(nodes: np.ndarray, state: Try) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Nodes (k,) that carry force, each once, their forces (k, 3) N, and whether they slip (k,)."""
     force, slipping = state.force, state.slipping
-    first = np.flatnonzero(np.diff(nodes, prepend=-1))
-    if len(first) < len(nodes):
+    if (nodes[1:] == nodes[:-1]).any():
+        first = np.flatnonzero(np.diff(nodes, prepend=-1))
         nodes, force, slipping = nodes[first], np.add.reduceat(force, first), slipping[first]
     carries = force.any(axis=1)
     return nodes[carries], force[carries], slipping[carries]

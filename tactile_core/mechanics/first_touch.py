@@ -16,6 +16,7 @@ _CLOSE = 60e-6  # m: nodes this little farther than the first one may hide the t
 _MOST_PLACES = 12
 _FINER = (4, 16, 64, 256)  # of a lattice spacing: 1.4 um at last, which hides less than 1 nm of a ball of 1 mm
 _AROUND = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij")).reshape(2, -1)
+_MANY = 2**20  # more than a grid has columns: one number tells a place (exactly, for they are sums of halves)
 _HIDDEN = 6e-6  # m, more than a quarter of a spacing hides: (0.045 mm)^2 / 2 over the smallest edge radius, 0.2 mm
 _CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no indenter reaches the sensor
 _FARTHEST = 30e-3  # m, past all of a sensor from wherever the motion starts
@@ -62,7 +63,8 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
         best = np.argmin(gap.reshape(-1, _AROUND.shape[1]), axis=1) + np.arange(0, len(gap), _AROUND.shape[1])
         best = best[gap[best] < gap[best].min() + _HIDDEN]
         if len(best) > 1:  # neighbours find the same place
-            best = best[np.unique(tried[:, best], axis=1, return_index=True)[1]]
+            row, column = tried[:, best]
+            best = best[np.unique(_MANY * row + column, return_index=True)[1]]
         places = tried[:, best]
         pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), points[best])
     return pose
@@ -121,7 +123,9 @@ def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose
             nodes, gap = _near(lattice, more, indenter, away, reach)
         reached = nodes[gap < travel + _CLOSE]  # no distance falls faster than the indenter moves
         now, _ = pose.distance(indenter, rest[reached])
-        missed = np.setdiff1d(reached[now < -_TOUCHES], some)
+        missed = reached[now < -_TOUCHES]
+        if len(missed):
+            missed = np.setdiff1d(missed, some)
         if not len(missed):
             order = np.argsort(now, kind="stable")[:_MOST_PLACES]
             return pose, reached[order[now[order] < now[order[0]] + _CLOSE]]

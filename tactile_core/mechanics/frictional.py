@@ -117,10 +117,12 @@ class Frictional:
             pressing = dot(guess.force[s], normal[s])
             leans = guess.force[s] - pressing[:, None] * normal[s]
             long = lengths(leans)
-            guess.slips[s[long == 0]] = False
-            s, leans = s[long > 0], leans[long > 0] / long[long > 0, None]
+            if long.min() == 0:
+                guess.slips[s[long == 0]] = False
+                s, pressing, leans, long = (each[long > 0] for each in (s, pressing, leans, long))
+            leans /= long[:, None]
             lean[s] = leans
-            guess.force[s] = np.maximum(pressing[long > 0], 0.0)[:, None] * (normal[s] + self.friction * leans)
+            guess.force[s] = np.maximum(pressing, 0.0)[:, None] * (normal[s] + self.friction * leans)
         moved, core_moved = self.block.respond(guess.force, guess.core)
         moves = moved - place
         onto = dot(normal, moves)

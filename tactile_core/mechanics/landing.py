@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..indenters import Indenter, Pose
+from ..indenters.indenter import lengths
 
 _LANDED = 1e-8  # m, at which a point has landed
 _TRACE_STEPS = 6  # of sphere tracing: the start of an iteration needs no more
@@ -35,12 +36,16 @@ def meeting(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarr
     Points that it does not meet are given as they stand at the end.
     """
     way = last - first
-    length = np.maximum(np.linalg.norm(way, axis=1), 1e-12)
     share, on_way = np.zeros(len(first)), np.arange(len(first))
+    start, ahead, gone, length = first, way, share.copy(), np.maximum(lengths(way), 1e-12)  # of those on their way
     for _ in range(_SPOT_STEPS):
-        gap, _ = indenter.distance(first[on_way] + share[on_way, None] * way[on_way])
-        share[on_way] = np.minimum(share[on_way] + np.maximum(gap, 0) / length[on_way], 1)
-        on_way = on_way[(gap > _MET) & (share[on_way] < 1)]
-        if not len(on_way):
+        gap, _ = indenter.distance(start + gone[:, None] * ahead)
+        gone = np.minimum(gone + np.maximum(gap, 0) / length, 1)
+        share[on_way] = gone
+        left = np.flatnonzero((gap > _MET) & (gone < 1))
+        if not len(left):
             break
+        if len(left) < len(on_way):
+            on_way, start, ahead = on_way[left], start.take(left, axis=0), ahead.take(left, axis=0)
+            gone, length = gone[left], length[left]
     return first + share[:, None] * way

@@ -38,8 +38,9 @@ class NearRows:
     def _rows(self, nodes: np.ndarray) -> np.ndarray:
         """Rows (3 k, 3 n) of nodes (k,)."""
         at = np.searchsorted(self.near, nodes)
-        new = np.unique(at[~self._known[at]])
+        new = at[~self._known[at]]
         if len(new):
+            new = np.unique(new)  # a node may stand twice
             self._known[new] = True
             mirrored = self._mirrored[new]
             direct, turned = new[~mirrored], new[mirrored]

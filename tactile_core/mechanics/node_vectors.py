@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def dot(left: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -14,7 +14,9 @@ def dot(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 def cross(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Cross products (n, 3)."""
-    return left[:, _NEXT] * right[:, _LAST] - left[:, _LAST] * right[:, _NEXT]
+    turned = left.take(_NEXT, axis=1) * right.take(_LAST, axis=1)
+    turned -= left.take(_LAST, axis=1) * right.take(_NEXT, axis=1)
+    return turned
 
 
 def weighted(parts: np.ndarray, weights: np.ndarray) -> np.ndarray:

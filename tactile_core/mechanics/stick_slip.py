@@ -122,7 +122,8 @@ class Step:
         and new forces (s, 3) N of slipping nodes."""
         found = self._answer[:, 0] + step * self._answer[:, 1]
         slipping = self._slipping
-        pressing, turn, motion = np.split(found[self._whole :], [len(slipping.at), 2 * len(slipping.at)])
+        s, unknown = len(slipping.at), found[self._whole :]
+        pressing, turn, motion = unknown[:s], unknown[s : 2 * s], unknown[2 * s :]
         forces = slipping.forces(slipping.pressing + pressing, turn / slipping.limit, motion.reshape(-1, 3))
         return found[: self._stuck].reshape(-1, 3), found[self._stuck : self._whole], forces
 
