@@ -9,21 +9,24 @@ from .biotac_shape import catmull_rom
 _STEPS = np.arange(-1, 3)[:, None]
 
 
-def on_grid(grid: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray:
-    """Points (n, 3) m of the surface through ``grid`` (rows, columns, 3) m at fractional (row, column) places (2, n).
+def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray:
+    """Points (n, 3) m of the surface through nodes ``axes`` (3, rows, columns) m at (row, column) places (2, n).
 
+    axes : contiguous; sums over many places at a time are faster axis by axis
     closed : whether the last column joins the first; places beyond other ends lie on them
     """
-    rows, columns = grid.shape[:2]
-    row, column = np.minimum(np.maximum(places[0], 0), rows - 1), places[1]
+    rows, columns = axes.shape[1:]
+    ends = np.array([[rows - 1], [columns - 1]])
+    held = np.minimum(np.maximum(places, 0), ends)
+    if closed:
+        held[1] = places[1]
+    cell = np.floor(held).astype(int)
+    cell[0] = np.minimum(cell[0], rows - 2)
     if not closed:
-        column = np.minimum(np.maximum(column, 0), columns - 1)
-    i, j = np.minimum(row.astype(int), rows - 2), np.floor(column).astype(int)
-    if not closed:
-        j = np.minimum(j, columns - 2)
-    weights = catmull_rom(row - i)[:, None] * catmull_rom(column - j)
-    at_row = np.minimum(np.maximum(i + _STEPS, 0), rows - 1)
-    at_column = (j + _STEPS) % columns if closed else np.minimum(np.maximum(j + _STEPS, 0), columns - 1)
-    axes = np.ascontiguousarray(grid.reshape(-1, 3).T)  # axis by axis: sums over many places at a time are faster
-    nodes = axes.take(at_row[:, None] * columns + at_column, axis=1)
-    return (weights * nodes).reshape(3, 16, -1).sum(axis=1).T
+        cell[1] = np.minimum(cell[1], columns - 2)
+    along, across = catmull_rom(held - cell).swapaxes(0, 1)
+    at_row = np.minimum(np.maximum(cell[0] + _STEPS, 0), rows - 1)
+    at_column = cell[1] + _STEPS
+    at_column = at_column % columns if closed else np.minimum(np.maximum(at_column, 0), columns - 1)
+    nodes = axes.reshape(3, -1).take(at_row[:, None] * columns + at_column, axis=1)
+    return np.einsum("ijp,cijp->pc", along[:, None] * across, nodes)

@@ -43,6 +43,11 @@ class Lattice:
         """Finds the resting nodes near an indenter."""
         return LatticeBlocks(self.rest, self.shape)
 
+    @functools.cached_property
+    def axes(self) -> np.ndarray:
+        """The resting nodes of the grid axis by axis, (3, rows, columns) m."""
+        return np.ascontiguousarray(np.moveaxis(self.grid(self.rest), 2, 0))
+
     def grid(self, values: np.ndarray) -> np.ndarray:
         """Values at nodes (..., n_nodes, k) as a grid (..., rows, columns, k); poles left out."""
         rows, columns = self.shape

@@ -59,6 +59,12 @@ def unrolled_nodes() -> np.ndarray:
     return np.concatenate([rolled.reshape(-1, 2), np.full((2, 2), np.nan)])
 
 
+@functools.cache
+def _skin_axes() -> np.ndarray:
+    """The outer skin's stations axis by axis, (3, stations, columns) m."""
+    return np.ascontiguousarray(np.moveaxis(biotac_shape.skin_grid("outer"), 2, 0))
+
+
 def roll_up(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The place on the BioTac's resting skin that an unrolled point (x, z) m belongs to.
 
@@ -69,7 +75,7 @@ def roll_up(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     row = np.interp(point[0], stations, np.arange(len(stations)))
     column = np.interp(point[1] / PAD_RADIUS, angles, np.arange(len(angles)))
     places = np.array([[row], [column]]) + _STENCIL
-    position, above, below, right, left = on_grid(biotac_shape.skin_grid("outer"), places, closed=True)
+    position, above, below, right, left = on_grid(_skin_axes(), places, closed=True)
     normal = np.cross(above - below, right - left)
     return position, normal / np.linalg.norm(normal)
 

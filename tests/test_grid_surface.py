@@ -9,17 +9,17 @@ PLACES = np.random.default_rng(0).uniform((1, 1), (5, 7), size=(40, 2)).T  # awa
 
 
 def bowl(row, column):
-    return np.stack([row, column, 0.3 * row**2 - row * column + 0.1 * column**2], -1)
+    return np.stack([row, column, 0.3 * row**2 - row * column + 0.1 * column**2])
 
 
 def test_quadratics_are_reproduced():
-    np.testing.assert_allclose(on_grid(bowl(ROW, COLUMN), PLACES, closed=False), bowl(*PLACES), atol=1e-12)
+    np.testing.assert_allclose(on_grid(bowl(ROW, COLUMN), PLACES, closed=False), bowl(*PLACES).T, atol=1e-12)
 
 
 def test_places_beyond_the_ends_lie_on_them():
     grid = bowl(ROW, COLUMN)
     beyond = np.array([[-1.0, 9.0], [3.0, 12.0]])
-    np.testing.assert_allclose(on_grid(grid, beyond, closed=False), [grid[0, 3], grid[6, 8]], atol=1e-12)
+    np.testing.assert_allclose(on_grid(grid, beyond, closed=False), [grid[:, 0, 3], grid[:, 6, 8]], atol=1e-12)
 
 
 def test_a_closed_grid_goes_on_round():

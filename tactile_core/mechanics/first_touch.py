@@ -48,9 +48,8 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     that passes the sensor by.
     """
     rows, columns = lattice.shape
-    grid = lattice.grid(lattice.rest)
     closed = len(lattice.rest) > rows * columns  # a surface with poles closes round its axis
-    met = in_front(grid, indenter, pose, closed=closed) if indenter.least_side < _NARROW else None
+    met = in_front(lattice.axes, indenter, pose, closed=closed) if indenter.least_side < _NARROW else None
     pose, nodes = _on_nodes(lattice, np.empty((0, 3)) if met is None else met[1], indenter, pose)
     before_tip = nodes < len(lattice.rest)
     tip = np.empty((0, 2)) if before_tip.all() else met[0]
@@ -58,7 +57,7 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     places = np.concatenate([np.array(np.divmod(nodes, columns), float), tip.T], axis=1)
     for finer in _FINER if places.size else ():
         tried = (places[:, :, None] + _AROUND[:, None] / finer).reshape(2, -1)
-        points = on_grid(grid, tried, closed=closed)
+        points = on_grid(lattice.axes, tried, closed=closed)
         gap, _ = pose.distance(indenter, points)
         best = np.argmin(gap.reshape(-1, _AROUND.shape[1]), axis=1) + np.arange(0, len(gap), _AROUND.shape[1])
         best = best[gap[best] < gap[best].min() + _HIDDEN]
@@ -70,23 +69,23 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     return pose
 
 
-def in_front(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
+def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
     """Where a body's foremost point meets a surface, which it may do between nodes: place (1, 2) and point (1, 3) m.
 
-    grid : (rows, columns, 3) m, the surface's nodes; closed : whether its last column joins the first
+    axes : (3, rows, columns) m, the surface's nodes; closed : whether its last column joins the first
     None where no node lies near its way.
     """
     foremost = pose.support(indenter, pose.direction)
-    along, beside = _off_line(grid.reshape(-1, 3), foremost, pose.direction)
+    along, beside = _off_line(axes.reshape(3, -1).T, foremost, pose.direction)
     near = beside < _BESIDE
     if not near.any():
         return None
     near &= along < along[near].min() + _FRONT
     node = int(np.argmin(np.where(near, beside, np.inf)))
-    place = np.array([divmod(node, grid.shape[1])], float).T
+    place = np.array([divmod(node, axes.shape[2])], float).T
     for finer in _FINER:
         tried = place + _AROUND / finer
-        points = on_grid(grid, tried, closed=closed)
+        points = on_grid(axes, tried, closed=closed)
         best = int(np.argmin(_off_line(points, foremost, pose.direction)[1]))
         place, point = tried[:, best : best + 1], points[best : best + 1]
     return place.T, point

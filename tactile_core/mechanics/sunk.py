@@ -24,7 +24,7 @@ def sunk(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> f
     foremost = pose.support(indenter, pose.direction)
     met = None
     if abs(pose.distance(indenter, foremost[None])[0][0]) < _ON_BODY:
-        met = in_front(grid, indenter, pose, closed=closed)
+        met = in_front(np.ascontiguousarray(np.moveaxis(grid, 2, 0)), indenter, pose, closed=closed)
     return 0.0 if met is None else float((foremost - met[1][0]) @ pose.direction)
 
 
