@@ -27,9 +27,12 @@ def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
 
 def _arms(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Distance (n,) m from the axis, direction from it (n, 2), arm from the circle (n, 2) m, its length (n,) m."""
-    around = np.sqrt(np.einsum("ni,ni->n", points[:, :2], points[:, :2]))
-    radial = points[:, :2] / np.maximum(around, NEAREST)[:, None]
-    if around.min(initial=np.inf) < NEAREST:
+    across = points[:, :2]
+    around = np.sqrt(np.einsum("ni,ni->n", across, across))
+    if around.min(initial=np.inf) >= NEAREST:
+        radial = across / around[:, None]
+    else:
+        radial = across / np.maximum(around, NEAREST)[:, None]
         radial[around < NEAREST] = [1.0, 0.0]
     arm = np.empty((len(points), 2))
     arm[:, 0], arm[:, 1] = around - radius, points[:, 2]

@@ -78,4 +78,4 @@ def _polygon(across: np.ndarray, corners: np.ndarray) -> extrusion.Outline:
     reach = np.linalg.norm(arm, axis=1)
     at_corner = ~inside & ((foot <= 0) | (foot >= 1)) & (reach > NEAREST)
     slope = np.where(at_corner[:, None], arm / np.maximum(reach, NEAREST)[:, None], normals[nearest])
-    return extrusion.Outline(np.where(at_corner, reach, value), slope, at_corner / np.maximum(reach, NEAREST))
+    return extrusion.Outline(np.where(at_corner, reach, value), slope, np.where(at_corner, reach, np.inf))

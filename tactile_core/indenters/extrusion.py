@@ -6,33 +6,34 @@ the nearer face counts. The edge radius then inflates the prism evenly.
 
 from __future__ import annotations
 
-import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
 from .indenter import NEAREST
 
 
-@dataclasses.dataclass(frozen=True)
-class Outline:
-    """A two-dimensional signed distance at n places: ``value`` (n,) m, ``slope`` (n, 2), ``bend`` (n,) 1/m.
+class Outline(NamedTuple):
+    """A two-dimensional signed distance at n places: ``value`` (n,) m, ``slope`` (n, 2), ``radius`` (n,) m.
 
-    bend : curvature of the lines of equal distance
+    radius : of curvature of the lines of equal distance
     """
 
     value: np.ndarray
     slope: np.ndarray
-    bend: np.ndarray
+    radius: np.ndarray
 
 
 def disc(across: np.ndarray, radius: float) -> Outline:
     """The outline of a disc about the origin at places (n, 2) m; radius 0 is a point."""
     length = np.sqrt(np.einsum("ni,ni->n", across, across))
+    if length.min(initial=np.inf) >= NEAREST:
+        return Outline(length - radius, across / length[:, None], length)
     centre = length < NEAREST
     length = np.maximum(length, NEAREST)
     slope = across / length[:, None]
     slope[centre] = [0.0, -1.0]
-    return Outline(length - radius, slope, 1 / length)
+    return Outline(length - radius, slope, length)
 
 
 def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float) -> tuple[np.ndarray, np.ndarray]:
@@ -42,9 +43,9 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
     """
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
-    inside = np.flatnonzero(corner == 0)
     found, far = corner - edge, corner
-    if len(inside):
+    if corner.min(initial=np.inf) == 0:
+        inside = np.flatnonzero(corner == 0)
         found[inside] += np.maximum(side[inside], end[inside])
         far = corner.copy()
         far[inside] = 1.0
@@ -67,7 +68,7 @@ def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarr
     hessian = (round_corner / length**3)[:, None, None] * (turn[:, :, None] * turn[:, None, :])
     on_side = np.where(corner > 0, across / np.maximum(corner, NEAREST**2), side > end)
     turn = np.column_stack([-outline.slope[:, 1], outline.slope[:, 0]])
-    hessian[:, :2, :2] += (on_side * outline.bend)[:, None, None] * (turn[:, :, None] * turn[:, None, :])
+    hessian[:, :2, :2] += (on_side / outline.radius)[:, None, None] * (turn[:, :, None] * turn[:, None, :])
     return hessian
 
 

@@ -10,7 +10,7 @@ from ..errors import TactileError
 from . import extrusion
 from .indenter import Indenter, check_length, sign_of
 
-_ACROSS, _OWN = [1, 2], [2, 0, 1]  # extrusions answer in the order y, z, x
+_OWN = np.array([2, 0, 1])  # extrusions answer in the order y, z, x
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,5 +49,7 @@ class LyingCylinder(Indenter):
         return np.array([0.0, 0.0, self.radius]) + inner + self.edge * direction
 
     def _prism(self, points: np.ndarray) -> tuple[extrusion.Outline, np.ndarray, float]:
-        outline = extrusion.disc(points[:, _ACROSS] - [0.0, self.radius], self.radius - self.edge)
+        across = points[:, 1:].copy()
+        across[:, 1] -= self.radius
+        outline = extrusion.disc(across, self.radius - self.edge)
         return outline, points[:, 0], self.length / 2 - self.edge

@@ -29,7 +29,9 @@ class Ring(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
-        length, gradient = circle_distance(points - [0.0, 0.0, self.tube], self.radius)
+        above = points.copy()
+        above[:, 2] -= self.tube
+        length, gradient = circle_distance(above, self.radius)
         return length - self.tube, gradient
 
     def curvature(self, points: np.ndarray) -> np.ndarray:

@@ -34,7 +34,8 @@ class Sphere(Indenter):
 
     def _polar(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance (n,) m from the centre, and the direction away from it (n, 3)."""
-        arm = points - [0.0, 0.0, self.radius]
+        arm = points.copy()
+        arm[:, 2] -= self.radius
         length = lengths(arm)
         if length.min(initial=np.inf) < NEAREST:
             arm[length < NEAREST] = [0.0, 0.0, -NEAREST]
