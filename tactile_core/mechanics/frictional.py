@@ -24,6 +24,7 @@ _LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
 _GAP_NOISE = 1e-9  # m: below what single precision of the compliance resolves
 _BEYOND = 1e-9  # relative, by which a sticking force may pass its limit before the node slips
 _NEARLY_CLOSED = 5e-6  # m, assumed: with larger gaps Newton's step in turning normals leads astray at edges
+_FLAT = np.empty(0, int), np.empty((0, 3, 3))  # no node feels the curvature
 _MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # as without friction: nodes, and curvature x force x compliance
 
 
@@ -43,7 +44,7 @@ class _Seen:
     """What guessed forces do, linearised about a place (k, 3) m: gaps (k,) m at nodes and (c,) m at the core.
 
     normal, lean : (k, 3), of the indenter and of slipping nodes' friction; slip : (k, 3) m, from the spots
-    moves : (k, 3) m, from the place; bend : (s, 3, 3) 1/m, of the slipping nodes, see ``Slipping``
+    moves : (k, 3) m, from the place; curved, bend : of the slipping nodes, see ``Slipping``
     """
 
     normal: np.ndarray
@@ -52,6 +53,7 @@ class _Seen:
     gap: np.ndarray
     core_gap: np.ndarray
     moves: np.ndarray
+    curved: np.ndarray
     bend: np.ndarray
 
 
@@ -127,25 +129,23 @@ class Frictional:
         moves = moved - place
         onto = dot(normal, moves)
         slip = _across(off, normal) + moves - onto[:, None] * normal
-        bend = self._bend(guess, place, there, curved=curved)
-        return _Seen(normal, lean, slip, gap + onto, self.core_gap + core_moved, moves, bend)
+        bend = self._bend(guess, place, there) if curved else _FLAT
+        return _Seen(normal, lean, slip, gap + onto, self.core_gap + core_moved, moves, *bend)
 
     def _off(self, points: np.ndarray, there: Pose) -> np.ndarray:
         """How far points (k, 3) m stand from their spots."""
         return points - there.from_own(self.spots)
 
-    def _bend(self, guess: _Guess, place: np.ndarray, there: Pose, *, curved: bool) -> np.ndarray:
-        """Curvatures (s, 3, 3) 1/m of the indenter at the slipping nodes; 0 but for those that feel them most."""
+    def _bend(self, guess: _Guess, place: np.ndarray, there: Pose) -> tuple[np.ndarray, np.ndarray]:
+        """Which slipping nodes (c,) feel the indenter's curvature most, and that (c, 3, 3) 1/m."""
         at = np.flatnonzero(guess.slips)
-        bend = np.zeros((len(at), 3, 3))
-        if not (curved and len(at)):
-            return bend
+        if not len(at):
+            return _FLAT
         found = there.curvature(self.indenter, self.rest[at] + place[at])
         feels = lengths(guess.force[at]) * self.block.matrix.diagonal()[3 * at] * lengths(found.reshape(-1, 9))
         felt = np.argsort(-feels, kind="stable")[:_MOST_CURVED]
-        felt = felt[feels[felt] > _FEELS_CURVATURE]
-        bend[felt] = found[felt]
-        return bend
+        felt = np.sort(felt[feels[felt] > _FEELS_CURVATURE])
+        return felt, found[felt]
 
     def _step(self, guess: _Guess, seen: _Seen, axial_force: float | None) -> _Guess:
         """The forces with which linearised gaps close and sticking nodes stay, among what touches and slips now."""
@@ -155,7 +155,7 @@ class Frictional:
         s = at[number]
         slipping = Slipping(
             number, seen.normal[s], seen.lean[s], dot(guess.force[s], seen.normal[s]), seen.slip[s], seen.moves[s],
-            seen.bend, self.friction,
+            seen.curved, seen.bend, self.friction,
         )  # fmt: skip
         away = seen.slip[at] + seen.gap[at, None] * seen.normal[at]
         solved = Step(self.block.matrix, at, 3 * k + core_at, away, seen.core_gap[core_at], direction, slipping)

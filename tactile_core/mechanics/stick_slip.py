@@ -29,7 +29,7 @@ class Slipping:
 
     normal, lean : (s, 3) unit vectors, of the indenter and of friction; pressing : (s,) N, normal forces
     slip : (s, 3) m, from their spots; moves : (s, 3) m, from where the normals were found
-    bend : (s, 3, 3) 1/m, second derivatives of the indenter's distance; 0 where the turn of the normal is left out
+    curved : (c,), which of them have normals that turn; bend : (c, 3, 3) 1/m, second derivatives of the distance there
     """
 
     at: np.ndarray
@@ -38,6 +38,7 @@ class Slipping:
     pressing: np.ndarray
     slip: np.ndarray
     moves: np.ndarray
+    curved: np.ndarray
     bend: np.ndarray
     friction: float
 
@@ -51,23 +52,18 @@ class Slipping:
         """(s,) N, of friction."""
         return self.friction * np.maximum(self.pressing, LEAST_FORCE)
 
-    @functools.cached_property
-    def curved(self) -> np.ndarray:
-        """(c,), which of them have normals that turn."""
-        return np.flatnonzero(self.bend.any(axis=(1, 2)))
-
     def turning(self) -> np.ndarray:
         """Change of the forces of the curved nodes (c, 3, 3) N/m with their motion, at the same normal forces."""
         at = self.curved
         follows = np.eye(3) - self.friction * self.normal[at][:, :, None] * self.lean[at][:, None, :]
-        return self.pressing[at, None, None] * (follows @ self.bend[at])
+        return self.pressing[at, None, None] * (follows @ self.bend)
 
     def forces(self, pressing: np.ndarray, turn: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Forces (s, 3) N after a turn (s,) of friction and motion (c, 3) m of the curved nodes."""
         turn = np.minimum(np.maximum(turn, -_LARGEST_TURN), _LARGEST_TURN)[:, None]
         normal, lean = self.normal, np.cos(turn) * self.lean + np.sin(turn) * self.across
         if len(self.curved):
-            tilt = (self.bend[self.curved] @ motion[:, :, None])[:, :, 0]
+            tilt = (self.bend @ motion[:, :, None])[:, :, 0]
             normal = normal.copy()
             normal[self.curved] += tilt * np.minimum(1, _LARGEST_TILT / np.maximum(lengths(tilt), 1e-12))[:, None]
             normal /= lengths(normal)[:, None]
@@ -135,25 +131,26 @@ class Step:
         rows[:, 1] = columns[:, 1] = slipping.across.T
         q = 3 * len(slipping.curved)
         total = n + 2 * s + q
-        among = np.empty((m + q, total), np.float32)  # its last rows are those of the motion
+        among = np.empty((m + q, total), np.float32)  # the rows of the motion come to stand after those of the turn
         among[:m, :n] = matrix[:, :n]
         on_slips = matrix[:, n:].reshape(m, 3, s).swapaxes(0, 1)
         among[:m, n : n + 2 * s].reshape(m, 2, s)[:] = weighted(on_slips[:, :, None], columns)
         carry = np.concatenate([right[:n, 1], self._direction @ columns.reshape(3, -1)])
+        reduced = np.empty((total, 2))
         if q:
             self._add_motion(among, on_slips)
             carry = np.concatenate([carry, (self._direction @ slipping.turning()).ravel()])
-        below = -among[(n + slipping.curved[:, None] + s * np.arange(3)).ravel()]
-        below.reshape(-1)[n + 2 * s :: total + 1] += 1
+            below = -among[(n + slipping.curved[:, None] + s * np.arange(3)).ravel()]
+            below.reshape(-1)[n + 2 * s :: total + 1] += 1
+            reduced[n + 2 * s :, 0] = slipping.moves[slipping.curved].ravel()
+            reduced[n + 2 * s :, 1].reshape(-1, 3)[:] = -self._direction
         among[n : n + 2 * s].reshape(2, s, total)[:] = weighted(among[n:m].reshape(3, 1, s, total), rows[..., None])
-        among[n + 2 * s : total] = below
-        turns = n + s + np.arange(s)
-        among[turns, turns] += np.maximum(-dot(slipping.slip, slipping.lean), 0) / slipping.limit
-        reduced = np.empty((total, 2))
+        if q:
+            among[n + 2 * s : total] = below
+        against = np.maximum(-dot(slipping.slip, slipping.lean), 0) / slipping.limit
+        among.reshape(-1)[(n + s) * (total + 1) : (n + 2 * s) * (total + 1) : total + 1] += against
         reduced[:n] = right[:n]
         reduced[n : n + 2 * s] = (rows[..., None] * right[n:].reshape(3, 1, s, 2)).sum(axis=0).reshape(-1, 2)
-        reduced[n + 2 * s :, 0] = slipping.moves[slipping.curved].ravel()
-        reduced[n + 2 * s :, 1].reshape(-1, 3)[:] = -self._direction
         return among[:total], reduced, carry
 
     def _add_motion(self, among: np.ndarray, on_slips: np.ndarray) -> None:
