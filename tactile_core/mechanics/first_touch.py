@@ -145,15 +145,16 @@ def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
 
     Toward a convex part Newton's steps never go through; where another part lets them, the distance leads back.
     """
-    left = _FARTHEST
+    own, travel, left = pose.to_own(points), 0.0, _FARTHEST  # in its frame points come up along z
     for _ in range(_ADVANCES):
-        gap, normal = pose.distance(indenter, points)
+        gap, normal = indenter.distance(own)
         step = smallest = float(gap.min())
         if abs(smallest) < _TOUCHES:
             break
         if smallest > 0:
-            step = float((gap / np.maximum(normal @ pose.direction, _LEAST_RATE)).min())
+            step = float((gap / np.maximum(-normal[:, 2], _LEAST_RATE)).min())
         step = min(step, left)
         left -= step
-        pose = pose.moved(step)
-    return pose
+        travel += step
+        own[:, 2] += step
+    return pose.moved(travel)

@@ -19,15 +19,16 @@ def landing(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
 
     far : m, how deep points may lie in the indenter. Points that lie in front of it already stay.
     """
-    direction = pose.direction
-    travel, on_way = np.full(len(points), far), np.arange(len(points))
+    own, travel, on_way = pose.to_own(points), np.full(len(points), far), np.arange(len(points))
     for _ in range(_TRACE_STEPS):
-        gap, _ = pose.distance(indenter, points[on_way] + travel[on_way, None] * direction)
+        place = own.take(on_way, axis=0)
+        place[:, 2] -= travel[on_way]  # the motion is along its own -z
+        gap, _ = indenter.distance(place)
         travel[on_way] -= np.maximum(gap, 0)
         on_way = on_way[(gap > _LANDED) & (travel[on_way] > 0)]
         if not len(on_way):
             break
-    return np.maximum(travel, 0)[:, None] * direction
+    return np.maximum(travel, 0)[:, None] * pose.direction
 
 
 def meeting(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
