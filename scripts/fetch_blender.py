@@ -32,16 +32,20 @@ PACKAGES = [
 # sid's Blender needs them for its extensions' command line.
 EXTRA = {"sid": ["python3-cattr", "python3-requests"]}
 STAGES = ("imported", "translated", "rendered", "authored")
+STAGE_SECONDS = 900  # of a photograph: half a minute; a busy machine takes minutes more for a first contact's matrices
 MIRROR = "http://deb.debian.org/debian"
 WRAPPER = """\
 #!/bin/sh
 # Runs the tree's Blender with these arguments; after --inside, another command.
 set -e
-[ -n "$MOUNTED_FOR_BLENDER" ] || exec env MOUNTED_FOR_BLENDER=1 unshare --mount --propagation private "$0" "$@"
-for place in {root} /tmp /dev /proc; do
+[ -n "$MOUNTED_FOR_BLENDER" ] || exec env MOUNTED_FOR_BLENDER=1 \\
+    unshare --mount --propagation private --pid --fork --kill-child "$0" "$@"
+for place in {root} /tmp /dev; do
     mkdir -p {tree}"$place"
     mount --bind "$place" {tree}"$place"
 done
+mkdir -p {tree}/proc
+mount -t proc proc {tree}/proc
 if [ "$1" = --inside ]; then shift; else set -- blender "$@"; fi
 exec chroot {tree} /usr/bin/env LIBGL_ALWAYS_SOFTWARE=1 "$@"
 """
@@ -66,7 +70,7 @@ def main(arguments: list[str] | None = None) -> int:
         status = 0 if options.no_tests else subprocess.call(tests)
         if not options.no_screenshots:
             photograph(binary)
-    except subprocess.CalledProcessError as error:
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
         print(f"fetch_blender.py: error: {error}", file=sys.stderr)
         return 2
     return status
@@ -92,7 +96,7 @@ def wrapper(tree: Path) -> Path:
     """A program that runs a command inside the tree, on the paths of this machine; the tree's Blender without one.
 
     The checkout, /tmp, /dev and /proc are mounted in a namespace of that process alone: whoever deletes the tree while
-    it runs, or after it was killed, deletes nothing else.
+    it runs, or after it was killed, deletes nothing else; and all that it started ends with it.
     """
     path = tree.parent / f"{tree.name}.sh"
     path.write_text(WRAPPER.format(tree=shlex.quote(str(tree)), root=shlex.quote(str(ROOT))))
@@ -116,7 +120,7 @@ def photograph(binary: Path) -> None:
         window = ["blender", "--factory-startup", "--window-geometry", "0", "0", "1600", "900", "--python"]
         script = ROOT / "tests" / "blender" / "screenshot.py"
         run = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24", *window, str(script)]
-        subprocess.run([str(binary), "--inside", "env", *variables, *run], check=True, timeout=300)
+        subprocess.run([str(binary), "--inside", "env", *variables, *run], check=True, timeout=STAGE_SECONDS)
         print(out / f"{stage}.png")
 
 

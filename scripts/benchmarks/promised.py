@@ -37,8 +37,8 @@ TEXT = """\
 
 A bound holds for 95 of 100 contacts. Mechanics: the fast tier against the full tier on the test contacts; the bounds
 are those of a table made, as `mechanics_tiers.json` is, from the other four fifths of the presses. Translation: largest
-node error from signals, bounds as `tactile convert` writes them, found on the training's validation presses for each place
-along the finger. Right is a share between 90 and 98 %.
+node error from signals, bounds as `tactile convert` writes them, found on the training's validation presses for each
+place along the finger. Right is a share between 90 and 98 %.
 
 ![promised against found](promised.png)
 
