@@ -53,6 +53,11 @@ class Translation:
     flags: np.ndarray
 
 
+def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
+    """The most that 99 of 100 frames of noise without contact make of a quantity of a card's ``silence``."""
+    return float(np.interp(0.99, silence["levels"], silence[quantity]))
+
+
 def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
     """(T, 2) float32 m, (x, z) of the dent in a gel at ``rest``; NaN where no node moves by ``silent`` m."""
     center = metrics.dent_center(displacement, rest).astype(np.float32)
@@ -92,8 +97,8 @@ class Translator:
         )  # fmt: skip
 
     def silent(self, quantity: str) -> float:
-        """The most that 99 of 100 frames of noise without contact make of a quantity of the card."""
-        return float(np.interp(0.99, self.card["silence"]["levels"], self.card["silence"][quantity]))
+        """As `silent_level`, of the card."""
+        return silent_level(self.card["silence"], quantity)
 
     def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
         """Expected largest errors and their bounds by the names of `Translation`; x : (T,) m of the contact's middle"""

@@ -42,6 +42,7 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
     sizes = net_sizes(contacts)
     typical = typical_signals.make(contacts.pairs.signal[contacts.split.train], seed)
     measure = Measure(assemble(tensors, sizes), contacts, bodies, seed)
+    silence = silence_quantiles(measure)
     card = {
         "format": CARD_FORMAT,
         "nets": write_nets(folder, tensors, sizes),
@@ -54,8 +55,8 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
         "biotac_nodes_sha256": contacts.pairs.attributes["biotac_nodes_sha256"],
         "digit_nodes_sha256": contacts.pairs.attributes["digit_nodes_sha256"],
         "distance": {"levels": list(QUANTILES), **distance_quantiles(measure)},
-        "silence": {"levels": list(QUANTILES), **silence_quantiles(measure)},
-        "error_bounds": fit_error_bounds(measure),
+        "silence": silence,
+        "error_bounds": fit_error_bounds(measure, silence),
         "errors": error_rows(measure, model),
     }
     write_bytes(folder / CARD_NAME, card_bytes(card))

@@ -25,6 +25,7 @@ from ..evaluation.translation import (
 from ..network_sizes import SURFACES
 from ..networks import DISTANCES, Networks
 from ..rows import Row
+from ..translate import silent_level
 from ..weights import write_bytes
 from .data import Contacts
 from .stages import Model
@@ -105,8 +106,8 @@ def silence_rows(measure: Measure) -> list[Row]:
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Quantiles at QUANTILES of `silence`: what lies below them is no contact."""
-    return {name: quantiles(value) for name, value in silence(measure).items()}
+    """Quantiles at QUANTILES, their levels, of `silence`: what lies below them is no contact."""
+    return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in silence(measure).items()}}
 
 
 def quantiles(values: np.ndarray) -> list[float]:
@@ -127,10 +128,10 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
     return found
 
 
-def fit_error_bounds(measure: Measure) -> dict[str, dict[str, list[float]]]:
-    """The factors of `error_bounds.fit` on the validation presses; signed and rectified apart."""
+def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
+    """The factors of `error_bounds.fit` on the validation presses; signed and rectified apart. silence : the card's"""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
-    silent, bounds = float(np.quantile(silence(measure)["digit_m"], 0.99)), {}
+    silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():
         signal = contacts.read(rows, np.random.default_rng([measure.seed, 6]), share)
         columns = joined(
