@@ -10,6 +10,7 @@ from torch import Tensor
 
 from ..moving_frame import MovingFrame
 from ..paired_contacts import Pairs, Split
+from .mirror import across, image_of_electrodes
 from .options import Options
 from .readings import measured
 from .surface import SILENT, Surface, touching
@@ -19,7 +20,7 @@ from .surface import SILENT, Surface, touching
 class Batch:
     """A few contacts as a step of training sees them.
 
-    rows : (B,) contact numbers, SILENT without contact          signal : (B, 20) what SVB reads
+    rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) what SVB reads
     biotac, digit : (B, K) what the mesh encoders read           force : (B, 3) N
     """
 
@@ -31,7 +32,7 @@ class Batch:
 
 
 class Contacts:
-    """All contacts, their split, both surfaces."""
+    """All contacts, their split, both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror."""
 
     def __init__(
         self, pairs: Pairs, split: Split, options: Options, frames: dict[str, MovingFrame], generator: torch.Generator
@@ -41,6 +42,7 @@ class Contacts:
             Surface(
                 getattr(pairs, f"displacement_{name}"), getattr(pairs, f"scale_{name}"), split.train, frames[name],
                 getattr(options, f"wide_{name}"), getattr(options, f"near_{name}"), generator,
+                mirrored=options.mirrored > 0,
             )
             for name in ("biotac", "digit")
         )  # fmt: skip
@@ -49,12 +51,28 @@ class Contacts:
         """The rows and, behind them, the share of silent samples."""
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
+    def drawn(self, rng: np.random.Generator) -> np.ndarray:
+        """What an epoch trains on, in its order: contacts of the split or their mirror images, and silence."""
+        rows = rng.permutation(self.with_silence(self.split.train))
+        turned = (rng.random(len(rows)) < self.options.mirrored) & (rows != SILENT)
+        return rows + turned * len(self.pairs.press)
+
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0) -> np.ndarray:
         """(B, 20) the signals of the contacts as a sensor would give them: see `readings.measured`."""
-        true = self.pairs.signal[np.maximum(rows, 0)] * (rows != SILENT)[:, None]
+        at, turned = self._which(rows)
+        true = self.pairs.signal[at] * (rows != SILENT)[:, None]
+        true[turned] = true[turned][:, image_of_electrodes()]
         return measured(true, rng, self.options, rectified)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
         """The contacts of these rows with these signals."""
-        force = torch.from_numpy(self.pairs.force[np.maximum(rows, 0)]) * touching(rows)
-        return Batch(rows, torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), force)
+        at, turned = self._which(rows)
+        force = self.pairs.force[at]
+        force[turned] = across(force[turned])
+        load = torch.from_numpy(force) * touching(rows)
+        return Batch(rows, torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load)
+
+    def _which(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (B,) of the pairs, 0 for silent ones, and which (B,) are seen in a mirror."""
+        contacts = len(self.pairs.press)
+        return np.maximum(rows, 0) % contacts, rows >= contacts

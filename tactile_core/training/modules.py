@@ -119,6 +119,10 @@ class MeshVae(Vae):
         cell, left = self.surface.cells(latent[:, :PLACE])
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows, floor)
 
+    def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
+        """How far, in cells, the places of latents (B, L) are from the contacts': see `Surface.astray`."""
+        return self.surface.astray(latent[:, :PLACE], rows)
+
     def field(self, latent: Tensor) -> Tensor:
         """Latent (B, L) -> displacement (B, n, 3) m in the nodes' own frames; carries no gradient."""
         cell, left = self.surface.cells(latent[:, :PLACE])

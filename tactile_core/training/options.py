@@ -14,6 +14,9 @@ class Options:
     half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
     epochs : stage -> passes over the training contacts; `effort` multiplies all of them
     beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: networks.md)
+    astray : weight of a translated place's distance from the true one, in cells, against the same loss. Without it
+        places leave the dent by ten cells and more: windows that meet it at their edge are a way to a smaller loss from
+        which none leads on (10,000 pairs: 30 um with places astray, 25 without, from mesh to mesh)
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (networks.md)
     rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
         rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
@@ -22,6 +25,7 @@ class Options:
         rectified_offset, counts, of the tare before the fold, rectified_missing, share of channels that read nothing.
         Each was chosen among a few values as it let strength follow fluid pressure better on the sample recordings
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
+    mirrored : share of training samples that are seen in a mirror, both sensors being even in z
     without : names of indenters that are kept from the training; without_below_x : m, as much of the pad beyond x
     left_out : stages that are not run; their networks stay as they were drawn
     weight_decay : of AdamW; signal_decay, rectified_decay : of SVB, of R2MPN (rectified signals are over-fitted else)
@@ -46,6 +50,7 @@ class Options:
     signal_decay: float = 0.2
     rectified_decay: float = 0.2
     beta: float = 1e-4
+    astray: float = 0.05
     noise: float = 1.5
     gain: float = 0.1
     rectified: float = 0.25
@@ -55,6 +60,7 @@ class Options:
     rectified_missing: float = 0.2
     rectified_floor: float = 20e-6
     silence: float = 0.05
+    mirrored: float = 0.5
     without: tuple[str, ...] = ()
     without_below_x: float | None = None
     left_out: tuple[str, ...] = ()

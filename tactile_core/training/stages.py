@@ -138,13 +138,15 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
     The autoencoders' own losses stay in at a quarter, so that latents keep their meaning and meshes can be encoded.
     """
     biotac = model.from_signal(batch.signal)
-    across = model.across(model.MVB.mean(batch.biotac))
+    digit, across = model.across(biotac), model.across(model.MVB.mean(batch.biotac))
     given = (model, contacts, batch, options, generator)
     floor = torch.where(batch.signal[:, ELECTRODES] > 0, options.rectified_floor, ROOT_FLOOR)
     return (
         model.MVB.loss(biotac, batch.rows, floor)
-        + model.MVD.loss(model.across(biotac), batch.rows, floor)
+        + model.MVD.loss(digit, batch.rows, floor)
         + model.MVD.loss(across, batch.rows)
+        + options.astray * (model.MVB.astray(biotac, batch.rows) + model.MVD.astray(digit, batch.rows))
+        + options.astray * model.MVD.astray(across, batch.rows)
         + 0.25 * svb_loss(*given)
         + 0.5 * (mvb_loss(*given) + mvd_loss(*given))
     )
@@ -186,12 +188,18 @@ def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, 
     signed = batch.signal[:, ELECTRODES:] == 0
     change = compress(batch.signal)[:, :ELECTRODES]
     error = ((model.to_signal(biotac) - change).square() * signed).mean()
-    return model.MVB.loss(model.back(digit), batch.rows) + error / (change.square() * signed).mean()
+    found = model.back(digit)
+    return (
+        model.MVB.loss(found, batch.rows)
+        + options.astray * model.MVB.astray(found, batch.rows)
+        + error / (change.square() * signed).mean()
+    )
 
 
 def direct_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Signal -> DIGIT in one network, the bar the chain must reach."""
-    return model.direct_decoder.loss(model.directly(batch.signal), batch.rows)
+    found, decoder = model.directly(batch.signal), model.direct_decoder
+    return decoder.loss(found, batch.rows) + options.astray * decoder.astray(found, batch.rows)
 
 
 STAGES = (

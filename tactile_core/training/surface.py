@@ -9,10 +9,12 @@ from torch import Tensor
 from ..metrics import MOVING
 from ..moving_frame import PLACE_UNIT, MovingFrame
 from .basis import ROWS, principal_basis
+from .mirror import across, image_of_nodes
 
 SILENT = -1  # row number of a sample without contact
 FEWEST = 100  # nodes that an error is shared by at least: light touches move few (assumed)
 ROOT_FLOOR = 1e-6  # m, rounds the root of the loss at zero error
+LEAST_AWAY = 0.01  # cells, rounds the distance of places at zero
 BASIS_ROWS = 12_000  # contacts that the bases are drawn from, fifty times as many as fields are taken (assumed)
 SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, but none is blown up without end (assumed)
 
@@ -20,7 +22,7 @@ SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, bu
 class Surface:
     """One sensor's displacements, the frame that moves over them and their linear bases.
 
-    data : (C, n, 3) int16 in the nodes' own frames, times ``unit`` m
+    data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i seen in a mirror
     wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
     place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) nodes that move, at least FEWEST
@@ -29,23 +31,26 @@ class Surface:
 
     def __init__(
         self, data: np.ndarray, unit: float, rows: np.ndarray, frame: MovingFrame, wide: int, near: int,
-        generator: torch.Generator,
+        generator: torch.Generator, *, mirrored: bool = False,
     ) -> None:  # fmt: skip
         self.frame, self.unit = frame, unit
         self.data = np.empty_like(data)
-        self.place = np.empty((len(data), 2), np.float32)
         for part in _parts(len(data)):
-            local = frame.to_local(data[part])
-            self.data[part], self.place[part] = np.rint(local), frame.place(local)
+            self.data[part] = np.rint(frame.to_local(data[part]))
+        self._image, every = None, np.arange(len(data))
+        if mirrored:
+            self._image, every = image_of_nodes(frame), np.arange(2 * len(data))
+            rows = np.concatenate([rows, rows + len(data)])
+        self.place = np.concatenate([frame.place(self._local(every[part])) for part in _parts(len(every))])
         self.cell, self.left = frame.cells(self.place)
         some = rows[:: max(1, len(rows) // BASIS_ROWS)]
         self.wide = principal_basis(self._whole, some, wide, generator)
         self.near = principal_basis(self._tapered, some, near, generator)
-        metres = 1e-3 * torch.cat([self._coefficients(np.arange(len(data))[part]) for part in _parts(len(data))])
+        metres = 1e-3 * torch.cat([self._coefficients(every[part]) for part in _parts(len(every))])
         spread = metres[rows].square().mean(0).sqrt()
         self.scale = spread.clamp(min=max(SMALLEST_SCALE * float(spread.max()), 1e-9))
         self.modes = metres / self.scale
-        sizes = [self._sizes(np.arange(len(data))[part]) for part in _parts(len(data))]
+        sizes = [self._sizes(every[part]) for part in _parts(len(every))]
         self.total, self.moving = (torch.cat(each) for each in zip(*sizes, strict=True))
         self.null = max(float((self.total[rows] / self.moving[rows]).sqrt().mean()), 1e-9)
 
@@ -54,8 +59,15 @@ class Surface:
         """n."""
         return self.data.shape[1]
 
+    def _local(self, rows: np.ndarray) -> np.ndarray:
+        """(B, n, 3) float32 of contacts, in whole units and in the nodes' own frames."""
+        values, turned = self.data[rows % len(self.data)].astype(np.float32), rows >= len(self.data)
+        if turned.any():
+            values[turned] = across(values[turned][:, self._image])
+        return values
+
     def _millimetres(self, rows: np.ndarray) -> Tensor:
-        return torch.from_numpy(self.data[rows].astype(np.float32)) * (1e3 * self.unit)
+        return torch.from_numpy(self._local(rows)) * (1e3 * self.unit)
 
     def _whole(self, rows: np.ndarray) -> Tensor:
         return self._millimetres(rows).flatten(1)
@@ -91,6 +103,11 @@ class Surface:
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
+    def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
+        """Mean distance, in cells, of places (B, 2) from those of the contacts; silent ones have none."""
+        away = PLACE_UNIT * (place - torch.from_numpy(self.place[np.maximum(rows, 0)])) * touching(rows)
+        return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
+
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray, floor: Tensor | float = ROOT_FLOOR) -> Tensor:
         """Mean over contacts of the rms error over moving nodes, for coefficients (B, K + K') round cells (B, 2).
 
@@ -115,7 +132,7 @@ class Surface:
 
     def true(self, rows: np.ndarray) -> Tensor:
         """(B, n, 3) m, in the nodes' own frames."""
-        values = torch.from_numpy(self.data[np.maximum(rows, 0)].astype(np.float32))
+        values = torch.from_numpy(self._local(np.maximum(rows, 0)))
         return values * (self.unit * touching(rows)[:, :, None])
 
     def _at_cells(self, rows: np.ndarray, cell: np.ndarray) -> Tensor:

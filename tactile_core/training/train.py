@@ -185,7 +185,7 @@ def epoch_losses(
     options = contacts.options
     rng = np.random.default_rng([seed, index, epoch])
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
-    rows = rng.permutation(contacts.with_silence(contacts.split.train))
+    rows = contacts.drawn(rng)
     signal = contacts.read(rows, rng, options.rectified)
 
     def loss(step: int) -> torch.Tensor:

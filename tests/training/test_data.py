@@ -15,7 +15,7 @@ from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.readings import measured  # noqa: E402
 from tactile_core.training.surface import SILENT  # noqa: E402
 
-OPTIONS = Options(wide_biotac=10, near_biotac=10, half_biotac=3, wide_digit=10, near_digit=10, half_digit=3)
+OPTIONS = Options(wide_biotac=10, near_biotac=10, half_biotac=3, wide_digit=10, near_digit=10, half_digit=3, mirrored=0)
 FRAMES = {"biotac": frame("biotac", 3), "digit": frame("digit", 3)}
 
 
@@ -117,6 +117,14 @@ def test_loss_is_that_of_the_nodes(contacts, name):
         squares = (surface.field(answer, there) - surface.true(rows)).square().sum((-1, -2))
         expected = (squares / surface.moving[rows] + 1e-12).sqrt().mean() / surface.null
         assert float(surface.loss(answer, there, rows)) == pytest.approx(float(expected), rel=tolerance)
+
+
+def test_places_are_astray_by_cells_and_silence_has_none(contacts):
+    surface, rows = contacts.digit, np.append(contacts.split.train[:9], SILENT)
+    place = torch.from_numpy(surface.place[np.maximum(rows, 0)])
+    assert float(surface.astray(place, rows)) == pytest.approx(0.01, rel=1e-4)  # what rounds it at zero
+    away = place + torch.tensor([0.3, 0.4])  # five cells each
+    assert float(surface.astray(away, rows)) == pytest.approx((9 * 5 + 0.01) / 10, rel=1e-4)
 
 
 def test_statistics_come_from_the_training_presses_alone(contacts):

@@ -22,7 +22,8 @@ from tactile_core.training.stages import STAGES  # noqa: E402
 from tactile_core.training.train import deterministic, train  # noqa: E402
 
 BASES = {"wide_biotac": 8, "near_biotac": 8, "half_biotac": 3, "wide_digit": 8, "near_digit": 8, "half_digit": 3}
-SMALL = {"width": 32, "latent_biotac": 8, "latent_digit": 10, "batch": 32, **BASES}
+# The small surfaces have no mirror images.
+SMALL = {"mirrored": 0.0, "width": 32, "latent_biotac": 8, "latent_digit": 10, "batch": 32, **BASES}
 SURFACES = {"bodies": bodies(), "frame": frame}
 QUICK = Options(**SMALL, effort=0.04, checkpoint_seconds=0.0)
 
