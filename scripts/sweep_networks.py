@@ -4,8 +4,10 @@
 
 Each setting is a whole training but for the networks that are not compared; errors are those of the full tier's test
 contacts that ship, nothing of which was trained on. ``published`` has the latents and the KL weight of the method's
-authors (sensors.md). ``direct`` is trained from three seeds, the bar that the chain must reach. Settings that are done
-are not trained again, so that a stopped sweep goes on. Needs torch; minutes a setting on one core.
+authors (sensors.md). ``direct`` is trained from three seeds, the bar that the chain must reach. ``--prototype`` adds a
+training on pairs of scenes/prototype, the first prototype's set, judged by test presses of its own, as that was.
+Settings that are done are not trained again, so that a stopped sweep goes on. Needs torch; minutes a setting on one
+core.
 """
 
 from __future__ import annotations
@@ -33,6 +35,8 @@ SETTINGS: dict[str, dict[str, float]] = {
     "signal 16": {"latent_signal": 16},
     "mesh 16 and 32": {"latent_biotac": 16, "latent_digit": 32},
     "mesh 128": {"latent_biotac": 128, "latent_digit": 128},
+    "no mirror images": {"mirrored": 0.0},
+    "places astray": {"astray": 0.0},
     "beta 1e-3": {"beta": 1e-3},
     "beta 1e-5": {"beta": 1e-5},
     "published": {"latent_signal": 8, "latent_biotac": 128, "latent_digit": 128, "beta": 0.005},
@@ -49,14 +53,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("pairs", help="HDF5 file of `tactile pairs`")
     parser.add_argument("--out", type=Path, required=True, help="folder for the trainings, which are kept")
     parser.add_argument("--effort", type=float, default=1.0, help="times the usual epochs (default: 1)")
-    parser.add_argument("--only", action="append", choices=[*SETTINGS, "direct"], help="a setting (default: all)")
+    names = [*SETTINGS, *OWN_ROWS]
+    parser.add_argument("--only", action="append", choices=names, help="a setting (default: all there are pairs for)")
+    parser.add_argument("--prototype", metavar="FILE", help="pairs of scenes/prototype, to train on as well")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
     test, rows = read_pairs(TEST_SET), []
     print(HEADER, flush=True)
     try:
-        for name in options.only or [*SETTINGS, "direct"]:
-            found = direct_rows(options) if name == "direct" else setting_rows(name, options, test)
+        for name in options.only or [*SETTINGS, "direct", *["prototype"] * bool(options.prototype)]:
+            found = OWN_ROWS[name](options) if name in OWN_ROWS else setting_rows(name, options, test)
             rows += found
             print("\n".join(map(line, found)), flush=True)
     except TactileError as error:
@@ -77,18 +83,34 @@ def setting_rows(name: str, options: argparse.Namespace, test: Pairs) -> list[Ro
 
 def direct_rows(options: argparse.Namespace) -> list[Row]:
     """Errors of the direct network and of the chain on the trainings' own test presses, each seed and their mean."""
-    cards = [
-        translate.load_translator(trained(f"direct {seed}", seed, {}, NOT_COMPARED, options) / "weights").card
-        for seed in DIRECT_SEEDS
-    ]
+    folders = [trained(f"direct {seed}", seed, {}, NOT_COMPARED, options) for seed in DIRECT_SEEDS]
     found = []
     for figure in ("direct_rms_um", "chain_rms_um"):
-        each = [next(row for row in card["errors"] if row["name"] == figure) for card in cards]
+        each = [own_error(folder, figure) for folder in folders]
         for seed, row in zip(DIRECT_SEEDS, each, strict=True):
             found.append(figure_row(figure, row["value"], row["null"], None, f"seed {seed}"))
         mean, null = (float(np.mean([row[key] for row in each])) for key in ("value", "null"))
         found.append(figure_row(figure, mean, null, None, "mean of seeds"))
     return found
+
+
+def prototype_rows(options: argparse.Namespace) -> list[Row]:
+    """Errors of a training on the prototype's set on its own test presses: the fast tier's truth, equal depths."""
+    if not options.prototype:
+        raise TactileError("--only prototype", "no pairs of scenes/prototype", "--prototype FILE", "`tactile pairs`")
+    pairs = argparse.Namespace(**{**vars(options), "pairs": options.prototype})
+    folder = trained("prototype", 0, {}, NOT_COMPARED, pairs)
+    rows = [own_error(folder, figure) for figure in (*FIGURES, "direct_rms_um")]
+    return [{**row, "set": "the prototype's set"} for row in rows]
+
+
+def own_error(folder: Path, figure: str) -> Row:
+    """A figure of a training on its own test presses."""
+    errors = translate.load_translator(folder / "weights").card["errors"]
+    return next(row for row in errors if row["name"] == figure)
+
+
+OWN_ROWS = {"direct": direct_rows, "prototype": prototype_rows}
 
 
 def trained(

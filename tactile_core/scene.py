@@ -28,6 +28,9 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     friction: Annotated[float, Meta(ge=0, le=5)] = 0.78  # Coulomb's coefficient (sensors.md)
     slide_share: Annotated[float, Meta(ge=0, le=1)] = 0.0  # of the presses end with a slide at constant force
     slide_max_mm: Annotated[float, Meta(ge=0, le=3)] = 0.0  # slides are evenly long up to this
+    depth_steps: Annotated[int, Meta(ge=0, le=100)] = 0  # contacts a press, paired by depth; 0: paired by force
+    depth_min_mm: Annotated[float, Meta(gt=0, le=3)] = 0.05
+    depth_max_mm: Annotated[float, Meta(gt=0, le=3)] = 1.2
 
 
 class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -90,6 +93,8 @@ def check(file: str | os.PathLike, scene: Scene) -> None:
     names = [spec.name for spec in scene.indenters]
     if len(set(names)) < len(names):
         raise TactileError(f"{file}, indenters", f"names {names}", "different names")
+    if scene.pairs is not None and scene.pairs.depth_steps:
+        _check_depths(file, scene.pairs)
     if scene.recording is None:
         return
     if scene.recording.indenter not in names:
@@ -97,6 +102,15 @@ def check(file: str | os.PathLike, scene: Scene) -> None:
     times = [point.time_s for point in scene.recording.points]
     if times != sorted(set(times)):
         raise TactileError(f"{file}, recording.points", f"time_s {times}", "growing times")
+
+
+def _check_depths(file: str | os.PathLike, spec: PairSpec) -> None:
+    if spec.depth_min_mm >= spec.depth_max_mm:
+        expected = f"less than depth_max_mm, {spec.depth_max_mm:g}"
+        raise TactileError(f"{file}, pairs.depth_min_mm", f"{spec.depth_min_mm:g}", expected)
+    if spec.slide_share:
+        advice = "Slides are held at a force: pair by force, or leave them out"
+        raise TactileError(f"{file}, pairs.slide_share", f"{spec.slide_share:g} beside depth_steps", "0", advice)
 
 
 def _numbers(value):  # noqa: ANN001, ANN202 (any nesting of dict, list and numbers)

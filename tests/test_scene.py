@@ -47,6 +47,8 @@ def write(folder, text):
         ("tactile-scene-1", "tactile-scene-9", "tactile-scene-1"),
         ("[pairs]", "[pears]", "pears"),
         ("[pairs]", "[pairs", "end of a table"),
+        ("[pairs]", "[pairs]\ndepth_steps = 5\ndepth_min_mm = 2.0", "depth_min_mm"),
+        ("[pairs]", "[pairs]\ndepth_steps = 5\nslide_share = 0.3", "slide_share"),
     ],
 )
 def test_bad_scene_is_refused(tmp_path, old, new, said):

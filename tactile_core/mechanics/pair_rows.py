@@ -27,7 +27,8 @@ def press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray
     """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
 
     Forces begin log-uniformly within one ratio, so over many presses they are log-uniform. A press that slides ends
-    with its slide, at the force it had reached, by the same way on both sensors.
+    with its slide, at the force it had reached, by the same way on both sensors. A scene with ``depth_steps`` pairs
+    contacts of the same depth in place of those of the same force.
     """
     spec = scene.pairs
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
@@ -36,8 +37,8 @@ def press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray
     place = draw_place(random, spec)
     on_both = [_press(sensor, indenter, place, spec) for sensor in ("biotac", "digit")]
     rows, stood = [], np.array(dataclasses.astuple(place), np.float32)
-    for force, slide in _path(random, spec):
-        biotac, digit = (on_one.at_force(force, on_one.pose.slid(*slide)) for on_one in on_both)
+    path = _by_depth(random, spec, on_both) if spec.depth_steps else _by_force(random, spec, on_both)
+    for (biotac, digit), slide in path:
         if biotac is None or digit is None:
             break
         named = {
@@ -48,6 +49,32 @@ def press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray
         }
         rows.append({**named, **pair_row(biotac, digit)})
     return rows
+
+
+_OnBoth = tuple[FastContact | None, FastContact | None]
+
+
+def _by_force(
+    random: np.random.Generator, spec: PairSpec, on_both: list[CorrectedPress]
+) -> Iterator[tuple[_OnBoth, np.ndarray]]:
+    """Contacts of the same force on both sensors, None where there is none, and slide (2,), m."""
+    for force, slide in _path(random, spec):
+        yield tuple(on_one.at_force(force, on_one.pose.slid(*slide)) for on_one in on_both), slide
+
+
+def _by_depth(
+    random: np.random.Generator, spec: PairSpec, on_both: list[CorrectedPress]
+) -> Iterator[tuple[_OnBoth, np.ndarray]]:
+    """Contacts of the same depth on both sensors: depths evenly apart, from a random start."""
+    least, most, start = 1e-3 * spec.depth_min_mm, 1e-3 * spec.depth_max_mm, random.uniform()
+    for step in range(spec.depth_steps):
+        depth = least + (most - least) * (step + start) / spec.depth_steps
+        yield tuple(_at_depth(on_one, depth) for on_one in on_both), np.zeros(2)
+
+
+def _at_depth(on_one: CorrectedPress, depth: float) -> FastContact | None:
+    found = on_one.at_depth(depth) if depth <= on_one.limit else None
+    return found if found and found.linear.converged and len(found.linear.nodes) else None
 
 
 def _path(random: np.random.Generator, spec: PairSpec) -> Iterator[tuple[float, np.ndarray]]:

@@ -34,8 +34,8 @@ class Surface:
         generator: torch.Generator, *, mirrored: bool = False,
     ) -> None:  # fmt: skip
         self.frame, self.unit = frame, unit
-        self.data = np.empty_like(data)
-        for part in _parts(len(data)):
+        self.data = np.empty_like(data) if frame.turn.any() else data  # nodes that are not turned need no copy
+        for part in _parts(len(data)) if frame.turn.any() else ():
             self.data[part] = np.rint(frame.to_local(data[part]))
         self._image, every = None, np.arange(len(data))
         if mirrored:

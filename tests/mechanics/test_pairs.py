@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from tactile_core import sensors
 from tactile_core.batch import parts
@@ -127,6 +128,17 @@ def test_another_seed_makes_other_contacts(made, scene, tmp_path):
     make_pairs(scene, 5, 8, other)
     with h5py.File(made) as a, h5py.File(other) as b:
         assert not np.array_equal(a["signal"][:5], b["signal"][:5])
+
+
+def test_a_press_may_be_paired_by_depth(scene):
+    spec = structs.replace(load_scene(scene)[0].pairs, depth_steps=4, depth_max_mm=0.85)
+    rows = press_rows(structs.replace(load_scene(scene)[0], pairs=spec), 0, 0)
+    biotac, digit = (np.array([row[f"depth_{name}"] for row in rows]) for name in ("biotac", "digit"))
+    assert len(rows) == 4 and 0.05e-3 <= biotac[0] <= 0.25e-3  # a random start within the first of four steps
+    np.testing.assert_allclose(np.diff(biotac), 0.2e-3, rtol=1e-5)  # float32
+    np.testing.assert_allclose(digit, biotac, rtol=1e-5)
+    along = [np.linalg.norm(row["force"]) / np.linalg.norm(row["force_digit"]) for row in rows]
+    assert max(along) < 0.9  # the same depth takes less force on the thicker, filled BioTac
 
 
 def test_a_press_may_end_with_a_slide_at_constant_force(scene, tmp_path):
