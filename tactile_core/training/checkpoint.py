@@ -36,10 +36,10 @@ class State:
 
 def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: torch.optim.Optimizer | None) -> None:
     """Write the state, with the model and the optimiser as they are now."""
-    arrays = {f"model/{name}": tensor.numpy() for name, tensor in model.state_dict().items()}
+    arrays = {f"model/{name}": tensor.cpu().numpy() for name, tensor in model.state_dict().items()}
     if optimiser is not None:
         for index, values in optimiser.state_dict()["state"].items():
-            arrays |= {f"optimiser/{index}/{name}": tensor.numpy() for name, tensor in values.items()}
+            arrays |= {f"optimiser/{index}/{name}": tensor.cpu().numpy() for name, tensor in values.items()}
     text = {"identity": state.identity, "stage": state.stage, "epoch": state.epoch, "log": state.log}
     arrays["state"] = np.frombuffer(json.dumps(text).encode(), np.uint8)
     buffer = io.BytesIO()

@@ -32,12 +32,17 @@ class Batch:
 
 
 class Contacts:
-    """All contacts, their split, both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror."""
+    """All contacts, their split, both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror.
+
+    device : where batches go; the contacts themselves stay in the host's memory
+    """
 
     def __init__(
-        self, pairs: Pairs, split: Split, options: Options, frames: dict[str, MovingFrame], generator: torch.Generator
-    ) -> None:
+        self, pairs: Pairs, split: Split, options: Options, frames: dict[str, MovingFrame], generator: torch.Generator,
+        device: torch.device | None = None,
+    ) -> None:  # fmt: skip
         self.pairs, self.split, self.options = pairs, split, options
+        self.device = device or torch.device("cpu")
         self.biotac, self.digit = (
             Surface(
                 getattr(pairs, f"displacement_{name}"), getattr(pairs, f"scale_{name}"), split.train, frames[name],
@@ -70,7 +75,8 @@ class Contacts:
         force = self.pairs.force[at]
         force[turned] = across(force[turned])
         load = torch.from_numpy(force) * touching(rows)
-        return Batch(rows, torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load)
+        read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load
+        return Batch(rows, *(each.to(self.device) for each in read))
 
     def _which(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows (B,) of the pairs, 0 for silent ones, and which (B,) are seen in a mirror."""

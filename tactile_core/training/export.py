@@ -14,6 +14,7 @@ from ..network_sizes import ELECTRODES, ERROR_FEATURES, NETS, PLACE, SURFACES
 from ..networks import Networks, load
 from ..weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
+from .device import label
 from .modules import compress
 from .report import QUANTILES, Measure, distance_quantiles, error_rows, fit_error_bounds, silence_quantiles
 from .stages import FORCE_BLOCKS, FORCE_WIDTH, Model
@@ -34,6 +35,7 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
 
     The errors in the card are those of the files: they are computed by `networks.py` from the rounded weights.
     """
+    model.cpu()
     with torch.no_grad():
         for parameter in model.parameters():
             parameter.copy_(parameter.half().float())
@@ -50,7 +52,7 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
         "units": UNITS,
         "seed": seed,
         "options": contacts.options.settings(),
-        "versions": versions(),
+        "versions": versions(contacts.device),
         "pairs": pairs_entry(contacts),
         "biotac_nodes_sha256": contacts.pairs.attributes["biotac_nodes_sha256"],
         "digit_nodes_sha256": contacts.pairs.attributes["digit_nodes_sha256"],
@@ -125,9 +127,10 @@ def assemble(tensors: dict, sizes: dict) -> Networks:
     return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in NETS}})
 
 
-def versions() -> dict[str, str]:
+def versions(device: torch.device) -> dict[str, str]:
     """What the numbers depend on besides data, seed and options."""
     return {
+        "device": label(device),
         "tactile": __version__,
         "torch": torch.__version__,
         "numpy": np.__version__,

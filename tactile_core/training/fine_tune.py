@@ -69,7 +69,7 @@ def fine_tune(
         "contacts": {name: len(rows) for name, rows in vars(data.split).items()},
         "dropped": list(data.dropped),
         "seed": seed,
-        "versions": versions(),
+        "versions": versions(torch.device("cpu")),
         "errors": rows,
     }
     _write(Path(out_folder) / "weights", source, before.card, net, state, note)

@@ -82,7 +82,7 @@ class Vae(nn.Module):
         Kingma and Welling 2014, appendix B.
         """
         mean, logvar = self.posterior(x)
-        noise = torch.randn(mean.shape, generator=generator)
+        noise = torch.randn(mean.shape, generator=generator).to(mean.device)  # the same numbers on any device
         divergence = 0.5 * (mean**2 + logvar.exp() - 1.0 - logvar).sum(-1).mean()
         return mean + noise * (0.5 * logvar).exp(), divergence
 

@@ -178,7 +178,7 @@ def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
     """(B,) m, largest node error of what a latent decodes to, at least ERROR_FLOOR."""
     error = vae.field(latent) - vae.surface.true(rows)
-    return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR)
+    return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR).to(latent.device)
 
 
 def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:

@@ -20,7 +20,7 @@ SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, bu
 
 
 class Surface:
-    """One sensor's displacements, the frame that moves over them and their linear bases.
+    """One sensor's displacements, the frame that moves over them and their linear bases, in the host's memory.
 
     data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i seen in a mirror
     wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
@@ -98,14 +98,15 @@ class Surface:
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
         """As `MovingFrame.cells`: whole cells (B, 2) and what is left, through which gradients flow to the place."""
-        middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0]) / 2
+        middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
         at = place * PLACE_UNIT + middle
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
         """Mean distance, in cells, of places (B, 2) from those of the contacts; silent ones have none."""
-        away = PLACE_UNIT * (place - torch.from_numpy(self.place[np.maximum(rows, 0)])) * touching(rows)
+        true, touched = torch.from_numpy(self.place[np.maximum(rows, 0)]), touching(rows)
+        away = PLACE_UNIT * (place - true.to(place.device)) * touched.to(place.device)
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray, floor: Tensor | float = ROOT_FLOOR) -> Tensor:
@@ -116,28 +117,29 @@ class Surface:
         reach is added, and only the product of errors in both bases is left out (near fields hold next to nothing of
         the wide ones, from which they are what is left).
         """
-        at, touched = np.maximum(rows, 0), touching(rows)
+        at, touched, device = np.maximum(rows, 0), touching(rows), modes.device
         with torch.no_grad():
-            true = self._at_cells(at, cell.numpy()) * touched
+            true = self._at_cells(at, cell) * touched
             beyond = (self.total[at] - true.square().sum(-1)).clamp(min=0.0) * touched[:, 0]
-        squares = (modes * self.scale - true).square().sum(-1) + beyond
-        return (squares / self.moving[at] + floor**2).sqrt().mean() / self.null
+        squares = (modes * self.scale.to(device) - true.to(device)).square().sum(-1) + beyond.to(device)
+        return (squares / self.moving[at].to(device) + floor**2).sqrt().mean() / self.null
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
-        """Coefficients (B, K + K') round cells (B, 2) -> displacement (B, n, 3) m in the nodes' own frames."""
-        metres, wide, width = modes * self.scale, len(self.wide), self.frame.width
+        """Coefficients (B, K + K') round cells (B, 2) -> displacement (B, n, 3) m in the nodes' own frames, in the
+        host's memory."""
+        metres, wide, width = modes.cpu() * self.scale, len(self.wide), self.frame.width
         whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
         near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()
-        return torch.from_numpy(self.frame.add(whole, near, cell.numpy()))
+        return torch.from_numpy(self.frame.add(whole, near, cell.cpu().numpy()))
 
     def true(self, rows: np.ndarray) -> Tensor:
         """(B, n, 3) m, in the nodes' own frames."""
         values = torch.from_numpy(self._local(np.maximum(rows, 0)))
         return values * (self.unit * touching(rows)[:, :, None])
 
-    def _at_cells(self, rows: np.ndarray, cell: np.ndarray) -> Tensor:
-        """(B, K + K') m, the coefficients of contacts in windows round other cells than their own."""
-        metres = self.modes[rows] * self.scale
+    def _at_cells(self, rows: np.ndarray, cells: Tensor) -> Tensor:
+        """(B, K + K') m, the coefficients of contacts in windows round other cells (B, 2) than their own."""
+        metres, cell = self.modes[rows] * self.scale, cells.cpu().numpy()
         moved = (cell != self.cell[rows]).any(-1)
         if moved.any():
             wide = len(self.wide)

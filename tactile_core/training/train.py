@@ -1,7 +1,7 @@
 """Training from a pairs file to a weights folder, from top to bottom: data, model, stages, export, report.
 
-The same pairs, seed, options and machine give the same bytes, interrupted or not: every epoch draws its order, its
-noise and its posterior samples from generators seeded with (seed, stage, epoch), on one thread.
+The same pairs, seed, options, device and machine give the same bytes, interrupted or not: every epoch draws its order,
+its noise and its posterior samples from generators seeded with (seed, stage, epoch), on one thread.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ..paired_contacts import Pairs, Split, read_pairs, split_presses
 from ..sensors import sensor_surface
 from . import checkpoint
 from .data import Contacts
+from .device import device_of
 from .export import export, versions
 from .options import Options
 from .report import draw_losses, write_log
@@ -44,6 +45,7 @@ def train(
     bodies: Bodies | None = None,
     frame: Callable[[str, int], MovingFrame] = frame_of,
     overwrite: bool = False,
+    device: str = "cpu",
 ) -> dict:
     """Train the five networks and the force estimate; returns the card.
 
@@ -52,9 +54,10 @@ def train(
     progress : called with the share done (0..1) and a line of text
     bodies : the surfaces of the pairs; None: those of this version's sensors
     frame : sensor, half a window's cells -> the frame that moves over its surface
-    raises: TactileError if the pairs, the folder or a checkpoint in it cannot be used
+    device : of `device.DEVICES`; contacts stay in the host's memory, networks and batches go there
+    raises: TactileError if the pairs, the folder, the device or a checkpoint in the folder cannot be used
     """
-    options, out = options or Options(), Path(out_folder)
+    options, out, where = options or Options(), Path(out_folder), device_of(device)
     pairs = read_pairs(pairs_path)
     split = without(split_presses(pairs.press, seed, pairs_path), pairs, options, pairs_path)
     if bodies is None:
@@ -64,8 +67,8 @@ def train(
     with deterministic():
         generator = torch.Generator().manual_seed(seed)
         frames = {name: frame(name, getattr(options, f"half_{name}")) for name in ("biotac", "digit")}
-        contacts = Contacts(pairs, split, options, frames, generator)
-        model = Model(options, contacts, generator)
+        contacts = Contacts(pairs, split, options, frames, generator, where)
+        model = Model(options, contacts, generator).to(where)
         history = run_stages(model, contacts, seed, out / "checkpoint.npz", progress or quiet)
         card = export(model, contacts, bodies, seed, out / "weights")
     write_log(out / "log.csv", history)
@@ -135,7 +138,7 @@ def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress
         "pairs": contacts.pairs.sha256,
         "seed": seed,
         "options": contacts.options.settings(),
-        "versions": versions(),
+        "versions": versions(contacts.device),
     }
     state = checkpoint.read(path, identity)
     if state.arrays:

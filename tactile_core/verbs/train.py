@@ -34,6 +34,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="times the usual epochs (default: 1)")
     verb.add_argument("--without", action="append", default=[], metavar="NAME", help="an indenter to keep apart")
     verb.add_argument("--without-below-x", type=float, metavar="MM", help="keep apart what touches the pad below x")
+    what = "auto (default): a GPU when torch sees one; cpu; cuda. The same bytes again on the same device alone"
+    verb.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help=what)
     verb.add_argument("--overwrite", action="store_true", help="train anew over older weights in DIR")
     progress_argument(verb)
 
@@ -61,6 +63,7 @@ def run(options: argparse.Namespace) -> int:
             chosen,
             lambda share, text: shown(round(100 * share), 100),
             overwrite=options.overwrite,
+            device=options.device,
         )
     tell(options.out)
     return 0
@@ -68,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _fine_tune(options: argparse.Namespace) -> int:
     """S2MPN on a labelled recording."""
-    for name, usual in (("effort", 1.0), ("without", []), ("without_below_x", None)):
+    for name, usual in (("effort", 1.0), ("without", []), ("without_below_x", None), ("device", "auto")):
         if getattr(options, name) != usual:
             raise TactileError(f"--{name.replace('_', '-')}", "beside s2mpn", "--real, --weights, --out and --seed")
     if options.real is None:
