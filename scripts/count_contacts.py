@@ -1,10 +1,12 @@
 """Count how many random contacts a tier settles, and how long it takes: nine indenters, tilts to 30 degrees, the whole
 pad, depths to half of the thickness.
 
-    python3 scripts/count_contacts.py digit --count 1000 [--tier fast] [--friction 0] [--seed 0] [--json FILE]
+    python3 scripts/count_contacts.py digit --count 1000 [--tier fast] [--friction 0] [--steps 1] [--json FILE]
 
-A contact counts as silently wrong when it says that it converged although a surface node lies more than 1 um in the
-indenter. Prints a table by indenter; exits 1 when one is silently wrong, or when fewer than 99 % converge.
+With --steps each contact is the end of a path of so many depths, evenly apart, as presses are simulated; times are then
+those of a step, and a contact settles where its whole path does. A contact counts as silently wrong when it says that
+it converged although a surface node lies more than 1 um in the indenter. Prints a table by indenter; exits 1 when one
+is silently wrong, or when fewer than 99 % converge.
 """
 
 from __future__ import annotations
@@ -24,22 +26,26 @@ from tactile_core import atomic  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.mechanics.placement import pose_at  # noqa: E402
 from tactile_core.mechanics.random_contacts import RandomContact, random_contacts  # noqa: E402
-from tactile_core.mechanics.solve import TIERS, Solution, solve  # noqa: E402
+from tactile_core.mechanics.solve import TIERS, Solution, Step, solve_path  # noqa: E402
 from tactile_core.mechanics.thickness import depth_at  # noqa: E402
 from tactile_core.rows import failed, row  # noqa: E402
 
 TARGET, PENETRATION = 99.0, 1e-6  # per cent, m: issue MECHANICS
 
 
-def settle(sensor: str, contact: RandomContact, tier: str, friction: float) -> tuple[Solution | None, float]:
-    """The contact, or None where the tier says that it finds none, and CPU seconds."""
+def settle(
+    sensor: str, contact: RandomContact, tier: str, friction: float, steps: int = 1
+) -> tuple[Solution | None, float]:
+    """The contact at the end of its path, or None where the tier says that it finds none, and CPU seconds a step."""
     depth = depth_at(contact.depth, sensor, contact.indenter, pose_at(sensor, contact.indenter, contact.place))
+    depths = [Step(depth=depth * step / steps) for step in range(1, steps + 1)]
     began = time.process_time()
     try:
-        found = solve(sensor, contact.indenter, contact.place, depth=depth, tier=tier, friction=friction)
+        path = list(solve_path(sensor, contact.indenter, contact.place, depths, tier, friction))
     except TactileError:
-        found = None
-    return (found if found is not None and found.converged else None), time.process_time() - began
+        path = []
+    settled = bool(path) and all(found.converged for found in path)
+    return (path[-1] if settled else None), (time.process_time() - began) / steps
 
 
 def main() -> int:
@@ -49,18 +55,21 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000, help="contacts (1000)")
     parser.add_argument("--tier", choices=TIERS, default="fast", help="(fast)")
     parser.add_argument("--friction", type=float, default=0.0, help="Coulomb's coefficient (0)")
+    parser.add_argument("--steps", type=int, default=1, help="of the path to each contact (1)")
     parser.add_argument("--seed", type=int, default=0, help="(0)")
     parser.add_argument("--json", type=pathlib.Path, help="write the rows here")
     options = parser.parse_args()
+    if options.steps < 1:
+        parser.error(f"--steps {options.steps}: expected at least 1")
     settled, times, wrong = collections.Counter(), collections.defaultdict(list), 0
     for number, contact in enumerate(random_contacts(options.count, options.seed), 1):
-        found, took = settle(options.sensor, contact, options.tier, options.friction)
+        found, took = settle(options.sensor, contact, options.tier, options.friction, options.steps)
         times[contact.name].append(1e3 * took)
         settled[contact.name] += found is not None
         wrong += found is not None and found.penetration > PENETRATION
         if number % 100 == 0:
             print(f"{number}/{options.count}", file=sys.stderr, flush=True)
-    rows, of = [], f"{options.tier} tier, friction {options.friction:g}, seed {options.seed}"
+    rows, of = [], f"{options.tier} tier, friction {options.friction:g}, steps {options.steps}, seed {options.seed}"
     for name, took in times.items():
         label = f"{options.sensor}_{name.replace(' ', '_')}"
         share = 100 * settled[name] / len(took)
