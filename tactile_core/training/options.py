@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class Options:
-    """Sizes and lengths of a training. The defaults took 26 minutes for 50,000 contacts on one busy core.
+    """Sizes and lengths of a training. On one core 0.65 of the defaults took 45 minutes for 120,000 contacts.
 
     latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
@@ -16,7 +16,7 @@ class Options:
     beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: networks.md)
     astray : weight of a translated place's distance from the true one, in cells, against the same loss. Without it
         places leave the dent by ten cells and more: windows that meet it at their edge are a way to a smaller loss from
-        which none leads on (10,000 pairs: 30 um with places astray, 25 without, from mesh to mesh)
+        which none leads on (10,000 pairs: 30 um with places astray, 20 without, from mesh to mesh; docs/train.md)
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (networks.md)
     rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
         rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
