@@ -34,9 +34,7 @@ class Surface:
         generator: torch.Generator, *, mirrored: bool = False,
     ) -> None:  # fmt: skip
         self.frame, self.unit = frame, unit
-        self.data = np.empty_like(data) if frame.turn.any() else data  # nodes that are not turned need no copy
-        for part in _parts(len(data)) if frame.turn.any() else ():
-            self.data[part] = np.rint(frame.to_local(data[part]))
+        self.data = _turned(data, frame)
         self._image, every = None, np.arange(len(data))
         if mirrored:
             self._image, every = image_of_nodes(frame), np.arange(2 * len(data))
@@ -148,6 +146,16 @@ class Surface:
             windows = torch.from_numpy(self.frame.windows(fields, cell[moved])).flatten(1)
             metres[moved, wide:] = 1e-3 * windows @ self.near.T
         return metres
+
+
+def _turned(data: np.ndarray, frame: MovingFrame) -> np.ndarray:
+    """(C, n, 3) int16 in the nodes' own frames; where none is turned the data themselves, which are large."""
+    if not frame.turn.any():
+        return data
+    local = np.empty_like(data)
+    for part in _parts(len(data)):
+        local[part] = np.rint(frame.to_local(data[part]))
+    return local
 
 
 def _parts(count: int) -> list[slice]:
