@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 
+MOST = 800  # characters of what was found that a message quotes; a library's own may hold a whole line of the file
+_HEAD, _TAIL = 600, 150
+
 
 class TactileError(Exception):
     """Bad input or a job that cannot be done; the command line prints it in one line and exits with code 2.
@@ -23,7 +26,8 @@ class TactileError(Exception):
         return type(self), (self.where, self.found, self.expected, self.advice)
 
     def _sentence(self) -> str:
-        text = f"{self.where}: {self.found}"
+        found = self.found if len(self.found) <= MOST else f"{self.found[:_HEAD]} [...] {self.found[-_TAIL:]}"
+        text = f"{self.where}: {found}"
         if self.expected:
             text += f"; expected {self.expected}"
         if self.advice:

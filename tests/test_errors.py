@@ -15,3 +15,10 @@ def test_it_survives_being_handed_over():
     error = TactileError("a", "b", "c", "d")
     again = copy.copy(error)  # goes through __reduce__, as between worker processes
     assert str(again) == str(error) and again.advice == "d"
+
+
+def test_a_message_quotes_a_long_finding_in_part():
+    error = TactileError("cube.off", "begins" + 5000 * "x" + "ends", "a triangle mesh", "Export it again")
+    assert "begins" in str(error) and "ends; expected a triangle mesh. Export it again" in str(error)
+    assert len(str(error)) < 1000
+    assert len(error.found) == 5010
