@@ -13,12 +13,11 @@ def linear(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
     return x @ tensors[f"{name}.weight"].T + tensors[f"{name}.bias"]
 
 
-def normalised(x: np.ndarray) -> np.ndarray:
-    """(T, width) less its mean over its spread: the layer norm of Ba et al. 2016 with torch's biased variance, but for
-    scale and shift."""
+def layer_norm(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
+    """Ba et al. 2016 over the last axis, biased variance as torch."""
     centred = x - _mean(x)
-    centred /= np.sqrt(_mean(np.square(centred)) + np.float32(NORM_EPSILON))
-    return centred
+    spread = np.sqrt(_mean(np.square(centred)) + np.float32(NORM_EPSILON))
+    return centred / spread * tensors[f"{name}.weight"] + tensors[f"{name}.bias"]
 
 
 def _mean(x: np.ndarray) -> np.ndarray:
@@ -28,8 +27,7 @@ def _mean(x: np.ndarray) -> np.ndarray:
 
 def silu(x: np.ndarray) -> np.ndarray:
     """x * sigmoid(x), written with tanh because exp overflows for large negative x."""
-    half = np.float32(0.5) * x
-    return half * np.tanh(half) + half
+    return x * (np.float32(0.5) * (np.float32(1.0) + np.tanh(np.float32(0.5) * x)))
 
 
 def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray:
@@ -39,46 +37,15 @@ def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray
     return x
 
 
-class Residual:
-    """A residual MLP with a linear skip from input to output (networks.md), ready to run.
-
-    Scale and shift of each layer norm are folded into the linear layer after it, and the first layer stands beside the
-    skip: fewer passes over few numbers, which is what a frame alone waits for.
-    tensors : under the names of torch's module, ``name`` before them; blocks : as many as the module has
-    """
-
-    def __init__(self, tensors: Tensors, name: str, blocks: int) -> None:
-        first = tensors[f"{name}.first.weight"]
-        self._width, self._first_bias = len(first), tensors[f"{name}.first.bias"]
-        self._first_and_skip = np.concatenate([first, tensors[f"{name}.skip.weight"]])
-        self._blocks = [
-            (
-                *_folded(tensors, f"{name}.blocks.{block}.norm", f"{name}.blocks.{block}.up"),
-                tensors[f"{name}.blocks.{block}.down.weight"],
-                tensors[f"{name}.blocks.{block}.down.bias"],
-            )
-            for block in range(blocks)
-        ]
-        self._last = _folded(tensors, f"{name}.norm", f"{name}.last")
-
-    def __call__(self, x: np.ndarray) -> np.ndarray:
-        """x (T, inputs) -> (T, outputs)."""
-        both = x @ self._first_and_skip.T
-        hidden, skip = both[:, : self._width] + self._first_bias, both[:, self._width :]
-        for up, up_bias, down, down_bias in self._blocks:
-            inner = normalised(hidden) @ up.T
-            inner += up_bias
-            hidden += silu(inner) @ down.T
-            hidden += down_bias
-        last, last_bias = self._last
-        return normalised(hidden) @ last.T + last_bias + skip
-
-
-def _folded(tensors: Tensors, norm: str, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Weight (outputs, inputs) and bias (outputs,) of a linear layer that takes what a layer norm scales and shifts."""
-    weight = tensors[f"{name}.weight"].astype(np.float64)
-    shift = weight @ tensors[f"{norm}.bias"] + tensors[f"{name}.bias"]
-    return (weight * tensors[f"{norm}.weight"]).astype(np.float32), shift.astype(np.float32)
+def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndarray:
+    """Residual MLP with a linear skip from input to output (networks.md)."""
+    hidden = linear(x, tensors, f"{name}.first")
+    for block in range(blocks):
+        inner = layer_norm(hidden, tensors, f"{name}.blocks.{block}.norm")
+        inner = silu(linear(inner, tensors, f"{name}.blocks.{block}.up"))
+        hidden = hidden + linear(inner, tensors, f"{name}.blocks.{block}.down")
+    out = linear(layer_norm(hidden, tensors, f"{name}.norm"), tensors, f"{name}.last")
+    return out + x @ tensors[f"{name}.skip.weight"].T
 
 
 def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
@@ -90,7 +57,7 @@ def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]
 
 
 def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: int) -> dict[str, tuple[int, ...]]:
-    """Tensor shapes of `Residual`."""
+    """Tensor shapes of `residual`."""
     shapes: dict[str, tuple[int, ...]] = {
         f"{name}.first.weight": (width, inputs),
         f"{name}.last.weight": (outputs, width),

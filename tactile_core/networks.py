@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import TactileError
-from .layers import Residual, Tensors, plain
+from .layers import Tensors, plain, residual
 from .moving_frame import MovingFrame
 from .network_sizes import ELECTRODES, NETS, PLACE, SIGNAL_HIDDEN, card_entry, check_chain, tensor_shapes
 from .weights import ADVICE, CARD_NAME, read_card, read_verified
@@ -85,13 +85,6 @@ class Networks:
             net: {name: np.ascontiguousarray(array, np.float32) for name, array in tensors[net].items()} for net in NETS
         }
         self.frames = {net: self._frame(net) for net in ("MVB", "MVD")}
-        self._maps = {net: self._residual(net, "map") for net in NETS if net not in ("SVB", *self.frames)}
-        self._encoders, self._decoders = (
-            {net: self._residual(net, part) for net in self.frames} for part in ("encoder", "decoder")
-        )
-
-    def _residual(self, net: str, part: str) -> Residual:
-        return Residual(self.tensors[net], part, self.sizes[net]["blocks"])
 
     def _frame(self, net: str) -> MovingFrame:
         sizes = self.sizes[net]
@@ -177,20 +170,22 @@ class Networks:
         rest = self._decode_signal(latent) - change
         features = [np.sqrt(np.square(each).mean(-1, keepdims=True)) for each in (rest, change)]
         seen = np.concatenate([latent, *features, signal[:, ELECTRODES:]], -1)
-        head = self._maps["error"](seen)
+        head = residual(seen, self.tensors["error"], "map", self.sizes["error"]["blocks"])
         return np.float32(ERROR_UNIT) * np.exp(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
     def _force(self, latent: np.ndarray) -> np.ndarray:
-        head = self._maps["force"](latent)
+        head = residual(latent, self.tensors["force"], "map", self.sizes["force"]["blocks"])
         return np.float32(FORCE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
     def _map(self, net: str, latent: np.ndarray) -> np.ndarray:
-        return self._blocks(self._maps[net], latent, (self.sizes[net]["inputs"],), net)
+        tensors, sizes = self.tensors[net], self.sizes[net]
+        return self._blocks(lambda z: residual(z, tensors, "map", sizes["blocks"]), latent, (sizes["inputs"],), net)
 
     def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
         """Through a map that is told, beside the latent, what the whole cell leaves of its place."""
+        tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = self.sizes[vae]["latent"]
-        return self._blocks(lambda z: self._maps[net](self._placed(vae, z)[0]), latent, (size,), net)
+        return self._blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
 
     def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Latent (B, L) with what the whole cell leaves of its place (B, L + 2), and the cells (B, 2)."""
@@ -208,7 +203,7 @@ class Networks:
             rest = local - (wide @ tensors["wide"]).reshape(local.shape)
             near = frame.windows(rest, cells).reshape(len(local), -1) @ tensors["near"].T
             seen = np.concatenate([np.concatenate([wide, near], -1) / tensors["scale"], place, left], -1)
-            code = self._encoders[net](seen)[:, : sizes["latent"] - PLACE]
+            code = residual(seen, tensors, "encoder", sizes["blocks"])[:, : sizes["latent"] - PLACE]
             return np.concatenate([place, code], -1)
 
         return self._blocks(encode, displacement, (sizes["nodes"], 3), f"{net} encoder")
@@ -218,7 +213,7 @@ class Networks:
 
         def decode(block: np.ndarray) -> np.ndarray:
             placed, cells = self._placed(net, block)
-            modes = self._decoders[net](placed) * tensors["scale"]
+            modes = residual(placed, tensors, "decoder", sizes["blocks"]) * tensors["scale"]
             wide, near = modes[:, : sizes["wide"]], modes[:, sizes["wide"] :]
             local = (wide @ tensors["wide"]).reshape(len(block), -1, 3)
             windows = (near @ tensors["near"]).reshape(len(block), frame.width, frame.width, 3)
