@@ -37,6 +37,7 @@ SETTINGS: dict[str, dict[str, float]] = {
     "mesh 128": {"latent_biotac": 128, "latent_digit": 128},
     "no mirror images": {"mirrored": 0.0},
     "places astray": {"astray": 0.0},
+    "neither": {"mirrored": 0.0, "astray": 0.0},
     "beta 1e-3": {"beta": 1e-3},
     "beta 1e-5": {"beta": 1e-5},
     "published": {"latent_signal": 8, "latent_biotac": 128, "latent_digit": 128, "beta": 0.005},
