@@ -7,8 +7,8 @@ import os
 import torch
 
 from ..errors import TactileError
+from .options import DEVICES
 
-DEVICES = ("auto", "cpu", "cuda")
 # What cuBLAS asks for before it repeats itself to the bit: NVIDIA, cuBLAS Library, "Results reproducibility".
 _REPEATABLE = ("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+DEVICES = ("auto", "cpu", "cuda")  # where networks may be trained; auto: on a GPU when torch sees one
+
 
 @dataclass(frozen=True)
 class Options:

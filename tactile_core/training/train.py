@@ -54,7 +54,7 @@ def train(
     progress : called with the share done (0..1) and a line of text
     bodies : the surfaces of the pairs; None: those of this version's sensors
     frame : sensor, half a window's cells -> the frame that moves over its surface
-    device : of `device.DEVICES`; contacts stay in the host's memory, networks and batches go there
+    device : of `options.DEVICES`; contacts stay in the host's memory, networks and batches go there
     raises: TactileError if the pairs, the folder, the device or a checkpoint in the folder cannot be used
     """
     options, out, where = options or Options(), Path(out_folder), device_of(device)

@@ -6,6 +6,7 @@ import argparse
 
 from ..errors import TactileError
 from ..terminal import bar, tell
+from ..training.options import DEVICES
 from .common import RESUMES, check_seed, progress_argument, seed_argument
 
 BRIEF = "train the networks on pairs"
@@ -35,7 +36,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--without", action="append", default=[], metavar="NAME", help="an indenter to keep apart")
     verb.add_argument("--without-below-x", type=float, metavar="MM", help="keep apart what touches the pad below x")
     what = "auto (default): a GPU when torch sees one; cpu; cuda. The same bytes again on the same device alone"
-    verb.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help=what)
+    verb.add_argument("--device", choices=DEVICES, default="auto", help=what)
     verb.add_argument("--overwrite", action="store_true", help="train anew over older weights in DIR")
     progress_argument(verb)
 
