@@ -133,7 +133,7 @@ class ContactProblem:
         if inside.any():
             landed[inside] += landing(self.indenter, pose, self._rest[self.near[take][inside]] + landed[inside], far)
         candidates = Candidates(
-            self.near[take], landed, np.zeros_like(landed), active, before.core_nodes, np.zeros(len(active), bool)
+            self.near[take], landed, np.zeros_like(landed), active, before.core_nodes, np.zeros(len(active), int)
         )
         return self._rounds(pose, axial_force, before, moved, candidates)
 

@@ -23,6 +23,8 @@ MAX_ITERATIONS = 24  # most contacts take 3 to 7; smaller steps help those that 
 _LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
 _GAP_NOISE = 1e-9  # m: below what single precision of the compliance resolves
 _BEYOND = 1e-9  # relative, by which a sticking force may pass its limit before the node slips
+# ... and may for nodes that have stuck again so often: at edges a node may slip backward as soon as it slips.
+_BEYOND_WAVERING, _WAVERS = 0.01, 2
 _NEARLY_CLOSED = 5e-6  # m, assumed: with larger gaps Newton's step in turning normals leads astray at edges
 _FLAT = np.empty(0, int), np.empty((0, 3, 3))  # no node feels the curvature
 _MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # as without friction: nodes, and curvature x force x compliance
@@ -74,7 +76,7 @@ class Frictional:
         """From a first guess to the contact at its depth, or at a force along the motion, N. Raises UnsolvedError."""
         guess = _Guess(begin.force, begin.core_force, begin.active, begin.slipping, begin.shift)
         state, place, pace, k = begin, begin.displacement, Pace(), self.block.k
-        there, calm, left = self.pose.moved(guess.shift), False, np.zeros(k, bool)
+        there, calm, left, stuck_again = self.pose.moved(guess.shift), False, np.zeros(k, bool), np.zeros(k, int)
         points = self.rest + place
         (gap, normal), off = there.distance(self.indenter, points), self._off(points, there)
         for iteration in range(1, MAX_ITERATIONS + 1):
@@ -86,7 +88,9 @@ class Frictional:
             points = self.rest + displacement
             (gap, turned), off = there.distance(self.indenter, points), self._off(points, there)
             slip = _across(off, normal)
-            active, slips, changed = self._sort(guess, seen, slip, gap, self.core_gap + core_moved)
+            beyond = np.where(stuck_again < _WAVERS, _BEYOND, _BEYOND_WAVERING)
+            active, slips, changed = self._sort(guess, seen, slip, gap, self.core_gap + core_moved, beyond)
+            stuck_again += guess.slips & ~slips & active[:k]
             state = Try(
                 displacement, guess.force, guess.core, guess.shift, guess.active,
                 iterations=iteration, slipping=guess.slips,
@@ -100,6 +104,8 @@ class Frictional:
             self._come_back(guess, back, slip, turned)
             calm = not changed and bool(np.abs(gap[active[:k]]).max(initial=0.0) < _NEARLY_CLOSED)
             trust = pace.after(gap, active[:k])
+            if pace.stalled:
+                break
             if trust == 1:
                 place, normal = displacement, turned
                 continue
@@ -170,7 +176,7 @@ class Frictional:
         core[core_at] += core_change
         return _Guess(force, core, guess.active, guess.slips, guess.shift + step)
 
-    def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap):  # noqa: ANN001, ANN202
+    def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap, beyond):  # noqa: ANN001, ANN202
         """Which points (k + c,) touch and which nodes (k,) slip after a step, and whether that is another answer."""
         k = len(gap)
         pressing = dot(guess.force, seen.normal)
@@ -178,7 +184,7 @@ class Frictional:
         active = np.where(guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -_GAP_NOISE)
         held = active[:k] & guess.active[:k]
         over = lengths(guess.force - pressing[:, None] * seen.normal) > (
-            self.friction * pressing * (1 + _BEYOND) + LEAST_FORCE
+            self.friction * pressing * (1 + beyond) + LEAST_FORCE
         )
         slips = held & np.where(guess.slips, dot(slip, seen.lean) <= SLIP_TOLERANCE, over)
         wrong = (guess.active & ~active).any() or (opening[~guess.active] < -GAP_TOLERANCE).any()

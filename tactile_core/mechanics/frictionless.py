@@ -34,6 +34,7 @@ _CREASE_ITERATION = 6  # from which nodes that flip between two faces are taken 
 _STALE = 0.1  # rad: the compliance along the normals is made anew when one has turned by more
 _FEW = 0.3  # of the nodes: their part of the compliance costs less to make than the whole
 _FREE_ITERATIONS = 4  # in which steps are taken whole, whatever they bring
+_HOPE, _WINDOW, _NEARER = 4, 6, 0.5  # iterations at least, those looked at, what they bring (assumed; random contacts)
 _PROGRESS, _SHRINK, _GROW, _LEAST_TRUST = 0.8, 0.6, 1.3, 0.1
 
 
@@ -43,7 +44,7 @@ class Try:
 
     active : (k + c,) bool; settled : whether it fulfils the tolerances; iterations : so far
     slipping : (k,) bool, nodes whose friction is spent
-    creases : nodes (j,) of the block that flip between two faces, and the normals (j, 3) of the face they left
+    creases : nodes (j,) of the block that flip between two faces, points (j, 3) m of the face they left, normals there
     """
 
     displacement: np.ndarray
@@ -54,7 +55,7 @@ class Try:
     settled: bool = False
     iterations: int = 0
     slipping: np.ndarray | None = None
-    creases: tuple[np.ndarray, np.ndarray] | None = None
+    creases: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         if self.slipping is None:
@@ -74,6 +75,13 @@ class Pace:
 
     def __init__(self) -> None:
         self._trust, self._last, self._calls = 1.0, np.inf, 0
+        self._best: list[float] = []  # m, least that was wrong in the first 1, 2, ... iterations
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the last iterations have hardly come nearer to the contact than those before them."""
+        best = self._best
+        return len(best) >= _HOPE + _WINDOW and best[-1] > _NEARER * best[-1 - _WINDOW]
 
     def after(self, gap: np.ndarray, active: np.ndarray) -> float:
         """The share of the next step to take, for gaps (k,) m that should be closed where ``active`` (k,)."""
@@ -84,6 +92,7 @@ class Pace:
         else:
             self._trust = min(_GROW * self._trust, 1.0)
         self._last = wrong
+        self._best.append(min([wrong, *self._best[-1:]]))
         return self._trust
 
 
@@ -121,6 +130,7 @@ class Frictionless:
             offset = self._offset(gap, normal, place, model, solved)
             solved = self._complement(model, offset, normal, state.active, axial_force)
             state = self._step(state, place, model.matrix, normal, solved, iteration)
+            left = gap
             gap, turned = self.distance(state.displacement, state.shift)
             state.iterations = iteration
             state.settled = self._settled(state, gap, turned, solved.step, axial_force)
@@ -131,7 +141,8 @@ class Frictionless:
                 flips += flipped & ~self.faced
                 if (flips >= 2).any():
                     nodes = np.flatnonzero(flips >= 2)
-                    state.creases = nodes, normal[nodes]
+                    points = (self.rest + place)[nodes] - left[nodes, None] * normal[nodes]
+                    state.creases = nodes, points, normal[nodes]
                     return state
             trust = pace.after(gap, solved.active[: len(gap)])
             place = place + trust * (state.displacement - place)

@@ -162,3 +162,15 @@ def test_random_contacts_settle(sensor, friction):
             gap, _ = contact.pose.distance(drawn.indenter, compliance.surface.rest + contact.displacement)
             assert gap.min() > -1e-6  # m, also at nodes that were never looked at
     assert sum(settled) >= 17
+
+
+@pytest.mark.parametrize(("number", "friction"), [(35, 0.0), (42, 0.78)], ids=["far from a crease", "stick and slip"])
+def test_nodes_that_waver_settle(number, friction):
+    """A node seen too far from the foot of its bump to have two faces; one at an edge that slips back as it slips."""
+    *_, drawn = random_contacts(number + 1)
+    pose = digit_pose(drawn.indenter, drawn.place)
+    depth = drawn.depth * thickness_under("digit", drawn.indenter, pose)
+    problem, contact = ContactProblem(digit_compliance(), drawn.indenter, pose, depth, friction), None
+    for share in np.arange(1, 11) / 10:
+        contact = problem.at_depth(share * depth, contact)
+        assert contact.converged
