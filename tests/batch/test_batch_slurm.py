@@ -1,6 +1,6 @@
-"""SLURM as far as it goes without one: `sbatch` and `scancel` here start and end processes of this machine.
+"""SLURM of one node where there is one; everywhere its stand-ins, that start and end processes of this machine.
 
-What a cluster would do with partitions, limits and node failures is not tried.
+What a cluster would do with several nodes, limits and accounting is not tried.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ import os
 import stat
 import subprocess
 import sys
+import time
 
+import one_node_slurm
 import pytest
 from conftest import ROOT
 
@@ -70,13 +72,75 @@ def calm(recordings, tmp_path):
     return folder, begin
 
 
-def test_the_page_s_array(slurm, calm, content):
+@pytest.fixture
+def real_slurm(slurm, monkeypatch):
+    """The stand-ins' folder, with SLURM's own commands in their place; ours is found beside this Python."""
+    if absent := one_node_slurm.missing():
+        pytest.skip(absent)
+    for name in ("sbatch", "scancel"):
+        (slurm / "bin" / name).unlink()
+    with one_node_slurm.slurm(slurm / "slurm") as environment:
+        for name in ("SLURM_CONF", "PATH"):
+            monkeypatch.setenv(name, environment[name])
+        yield slurm
+
+
+def the_page_s(command, other):
     """The very command of docs/batch.md, but for the folder and 4 parts in place of 100."""
     page = (ROOT / "docs" / "batch.md").read_text(encoding="utf-8")
-    command = next(line for line in page.splitlines() if line.startswith("sbatch "))
+    command = next(line for line in page.splitlines() if line.startswith(command))
+    return command.replace("0-99", "0-3").replace("/100", "/4").replace("/shared/job", str(other))
+
+
+def queue_is_empty():
+    told = subprocess.run(["squeue", "-h"], capture_output=True, text=True, check=True, timeout=60)
+    return not told.stdout.strip()
+
+
+def wait(ready):
+    until = time.monotonic() + 300
+    while not ready():
+        assert time.monotonic() < until
+        time.sleep(0.5)
+
+
+def test_an_array_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
+    """Cancelled once on its way, and submitted again."""
     folder, begin = calm
     other, job = begin("array")
-    command = command.replace("0-99", "0-3").replace("/100", "/4").replace("/shared/job", str(other))
+    monkeypatch.chdir(real_slurm)
+    for shards in (1, 5):
+        subprocess.run(["bash", "-c", the_page_s("sbatch ", other)], check=True, timeout=300, capture_output=True)
+        wait(lambda shards=shards: len(list((other / "shards").rglob("*.h5"))) >= shards or queue_is_empty())
+        if shards == 1:
+            subprocess.run(["scancel", "--user=root"], check=True, timeout=60)
+        wait(queue_is_empty)
+    with runs.opened(other, None):
+        done = runs.run(other, job, local.Local(other, 1), None, lambda done, total: None)
+    told = [path.read_text() for path in real_slurm.glob("slurm-*.out")]
+    assert (done.kept, done.made) == (5, 0), told
+    assert content(folder) == content(other)
+
+
+def test_workers_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
+    pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
+    folder, begin = calm
+    other, job = begin("queue")
+    monkeypatch.chdir(real_slurm)
+    toml = real_slurm / "slurm.toml"
+    toml.write_text(
+        'queue = "slurm"\njobs = 1\n[options]\ncores = 1\nmemory = "2GB"\nwalltime = "00:10:00"\nqueue = "cpu"\n'
+    )
+    with runs.opened(other, None):
+        done = runs.run(other, job, Cluster(other, str(toml)), None, lambda done, total: None)
+    assert done.made == 5 and content(folder) == content(other)
+    wait(queue_is_empty)
+
+
+def test_the_page_s_array(slurm, calm, content):
+    folder, begin = calm
+    other, job = begin("array")
+    command = the_page_s("sbatch ", other)
     subprocess.run(["bash", "-c", command], check=True, timeout=300, capture_output=True)
     with runs.opened(other, None):
         done = runs.run(other, job, local.Local(other, 1), None, lambda done, total: None)
