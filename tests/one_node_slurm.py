@@ -87,7 +87,7 @@ def _idle(environment: dict[str, str]) -> bool:
     return told.stdout.strip() == "idle"
 
 
-def _wait(ready, folder: Path, most: float = 60.0) -> None:  # noqa: ANN001
+def _wait(ready, folder: Path, most: float = 60.0) -> None:
     until = time.monotonic() + most
     while not ready():
         if time.monotonic() > until:

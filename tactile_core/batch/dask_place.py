@@ -22,6 +22,7 @@ from .local import KILLS
 from .tasks import Reply, Task
 
 SCHEMES = ("tcp://", "tls://", "ucx://")
+PATIENCE, AGAIN = 10.0, 60.0  # s without a reply, after which it is told that there is no worker, and told again
 
 
 class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -33,10 +34,14 @@ class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Cluster:
-    """A Dask scheduler's workers. address : of the scheduler, or of a file as `QueueFile`."""
+    """A Dask scheduler's workers. address : of the scheduler, or of a file as `QueueFile`.
 
-    def __init__(self, folder: Path, address: str) -> None:
+    say : told when all tasks wait because no worker has come yet, as in a full queue
+    """
+
+    def __init__(self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None) -> None:
         """Raises TactileError for an address or a file that is neither."""
+        self._say = say
         self._folder = str(folder.resolve())
         self._address = address
         self._queue = None if address.startswith(SCHEMES) else _read(address)
@@ -53,8 +58,19 @@ class Cluster:
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
         """Replies as they come, as long as `count` says that some are awaited."""
         while count():
-            future = self._done.get()
+            future = self._next()
             yield self._tasks.pop(future.key)[0], self._reply(future)
+
+    def _next(self) -> Any:
+        """The next future that is done."""
+        patience = PATIENCE
+        while True:
+            try:
+                return self._done.get(timeout=patience)
+            except queue.Empty:
+                patience = AGAIN
+                if not self._client.scheduler_info()["workers"]:
+                    self._say(f"{self._address}: no worker has come yet; {len(self._tasks)} tasks wait for one")
 
     def _reply(self, future: Any) -> Reply:
         from distributed import KilledWorker

@@ -61,7 +61,7 @@ def place(folder: Path, options: argparse.Namespace) -> Place:
             say(
                 "warning: tcp:// is neither secret nor signed, and Dask's messages run code: private network, or tls://"
             )
-        return Cluster(folder, options.cluster)
+        return Cluster(folder, options.cluster, say)
     from ..batch.local import RESTART, Local
 
     return Local(folder.resolve(), options.workers or 1, options.restart or RESTART)

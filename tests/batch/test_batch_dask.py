@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from tactile_core import convert
+from tactile_core.batch import dask_place
 from tactile_core.batch import run as runs
 from tactile_core.batch.dask_loop import CONFIGURED, loop
 from tactile_core.batch.dask_place import Cluster, QueueFile, _read
@@ -85,6 +86,23 @@ def test_tls_needs_the_certificate(new_job, tmp_path):
             run_on(folder, job, address)
         with dask.config.set({"distributed.comm.tls.ca-file": str(certificate), **tls}):
             assert run_on(folder, job, address).made == 5
+
+
+def test_a_queue_without_workers_is_told(new_job, monkeypatch):
+    monkeypatch.setattr(dask_place, "PATIENCE", 0.5)
+    folder, job = new_job()
+    with workers(protocol="tcp://") as cluster:
+        cluster.sync(cluster.scale_down, list(cluster.workers))
+        said = []
+
+        def joined(text):
+            said.append(text)
+            cluster.scale(1)
+
+        place = Cluster(folder, cluster.scheduler_address, joined)
+        with runs.opened(folder, None):
+            assert runs.run(folder, job, place, None, lambda done, total: None).made == 5
+        assert said == [f"{cluster.scheduler_address}: no worker has come yet; 2 tasks wait for one"]
 
 
 def test_nobody_listening_is_told(new_job):
