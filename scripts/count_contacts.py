@@ -15,7 +15,6 @@ import argparse
 import collections
 import pathlib
 import sys
-import time
 
 import numpy as np
 
@@ -23,29 +22,10 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from tactile_core import atomic  # noqa: E402
-from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.mechanics.placement import pose_at  # noqa: E402
-from tactile_core.mechanics.random_contacts import RandomContact, random_contacts  # noqa: E402
-from tactile_core.mechanics.solve import TIERS, Solution, Step, solve_path  # noqa: E402
-from tactile_core.mechanics.thickness import depth_at  # noqa: E402
+from tactile_core.mechanics.random_contacts import random_contacts  # noqa: E402
+from tactile_core.mechanics.solve import TIERS  # noqa: E402
+from tactile_core.mechanics.validation.many import PENETRATION, SETTLED_TARGET, settle  # noqa: E402
 from tactile_core.rows import failed, row  # noqa: E402
-
-TARGET, PENETRATION = 99.0, 1e-6  # per cent, m: issue MECHANICS
-
-
-def settle(
-    sensor: str, contact: RandomContact, tier: str, friction: float, steps: int = 1
-) -> tuple[Solution | None, float]:
-    """The contact at the end of its path, or None where the tier says that it finds none, and CPU seconds a step."""
-    depth = depth_at(contact.depth, sensor, contact.indenter, pose_at(sensor, contact.indenter, contact.place))
-    depths = [Step(depth=depth * step / steps) for step in range(1, steps + 1)]
-    began = time.process_time()
-    try:
-        path = list(solve_path(sensor, contact.indenter, contact.place, depths, tier, friction))
-    except TactileError:
-        path = []
-    settled = bool(path) and all(found.converged for found in path)
-    return (path[-1] if settled else None), (time.process_time() - began) / steps
 
 
 def main() -> int:
@@ -77,9 +57,8 @@ def main() -> int:
               f"{np.median(took):8.1f} p95 {np.quantile(took, 0.95):8.1f}")  # fmt: skip
         rows.append(row(f"{label}_settled", share, "percent", of=of))
     every = np.concatenate(list(times.values()))
-    rows.append(
-        row(f"{options.sensor}_settled", 100 * settled.total() / len(every), "percent", TARGET, of=of, at_least=True)
-    )
+    share = 100 * settled.total() / len(every)
+    rows.append(row(f"{options.sensor}_settled", share, "percent", SETTLED_TARGET, of=of, at_least=True))
     rows.append(row(f"{options.sensor}_silently_wrong", wrong, "1", 0.0, of=of))
     rows.append(row(f"{options.sensor}_mean_time", float(every.mean()), "ms", of=of + ", with its set-up"))
     for found in rows[-3:]:

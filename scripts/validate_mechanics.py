@@ -27,6 +27,7 @@ from tactile_core.mechanics.validation import (
     incompressible,
     layers,
     manufactured,
+    many,
     oracle,
     patch,
     public_mesh,
@@ -63,6 +64,7 @@ CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
         "Isaac-like settings on the public meshes against our own model (needs the outside data)",
     ),
     "comsol": (lambda quick: comsol.rows(quick, DATA), "COMSOL's presses of a BioTac SP (needs the outside data)"),
+    "many": (many.rows, "Random contacts of nine indenters: how many settle in the fast tier, and how long one takes"),
     "tiers": (tiers.rows, "The fast and the full tier against the reference tier: error beside time"),
 }
 
