@@ -12,6 +12,7 @@ import numpy as np
 from . import flags, results
 from .contact_sheet import Contents, choose_frames, contact_sheet
 from .frames_file import FramesFile
+from .height_map import folds_counted
 from .png_file import write_png
 from .sampling_error import depth_share
 from .stopwatch import Stopwatch
@@ -72,6 +73,7 @@ class FramePass:
         self.tools, self.clock = tools, clock
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._errors: list[np.ndarray] = []
+        self.folded = 0  # height maps of a gel that folds over itself
         self.share = 0.0  # the deepest move of a node so far, over the gel's thickness
         chosen = choose_frames(np.abs(signals.change[frames]).mean(axis=1))
         self.shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
@@ -102,6 +104,8 @@ class FramePass:
         for name, meaning in REMARKABLE.items():
             if self.flagged[name]:
                 found.append(f"{self.flagged[name]} of {len(self.frames)} frames: {meaning} (flag {name})")
+        if self.folded:
+            found.append(f"{self.folded} frames: the translated gel folds over itself; heights there are guesses")
         return tuple(found)
 
     def left(self) -> str:
@@ -133,8 +137,9 @@ class FramePass:
         seen = np.flatnonzero([whole or int(frame) in self.shown for frame in frames])
         if not len(seen):
             return {}
-        with self.clock.stage("height_map"):
+        with self.clock.stage("height_map"), folds_counted() as folds:
             heights = self.tools.height_map(displacement[seen])
+        self.folded += len(folds)
         for frame, height in zip(frames[seen], heights, strict=True):
             shown = self.shown.get(int(frame))
             if "image" in self.keep or shown is not None:

@@ -9,8 +9,11 @@ normal: pixels stand for the places on the plane of height zero where the camera
 
 from __future__ import annotations
 
+import contextlib
+import contextvars
 import functools
 import logging
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -23,6 +26,7 @@ from .errors import TactileError
 from .lattice import Lattice
 
 _log = logging.getLogger(__name__)
+_folded: contextvars.ContextVar[list[int] | None] = contextvars.ContextVar("folded", default=None)
 
 REFINEMENT = 2  # grid for the sideways search, intervals a node interval; measured in tests/test_height_map.py
 MOVE_TOLERANCE = 1e-7  # m, of the sideways search: times a slope of 1, below a tenth of a grey level
@@ -30,6 +34,17 @@ MOVE_ITERATIONS = 12  # 2 or 3 do for presses; where 12 do not, the surface fold
 BEYOND_WINDOW = 1e-3  # m that a picture may reach past the window (17 px/mm: 0.7 mm); the edge is held there
 NEGLIGIBLE = 1e-12  # weight of a node in a pixel, of 1 in all: a hundred-thousandth of float32's rounding
 SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area is about to fold: steps stay finite
+
+
+@contextlib.contextmanager
+def folds_counted() -> Iterator[list[int]]:
+    """For each map made inside that folds over itself, at how many places; it is then not logged."""
+    folded: list[int] = []
+    token = _folded.set(folded)
+    try:
+        yield folded
+    finally:
+        _folded.reset(token)
 
 
 class HeightMapper:
@@ -126,7 +141,12 @@ class HeightMapper:
             at_x, at_z = source_x[active], source_z[active]
             moved = self._look_up(coefficients, at_x, at_z).T
             miss = np.stack([at_x - x[active], at_z - z[active]]) + moved
-        _log.warning("gel surface folds over itself at %d of %d places: height there is a guess", len(active), len(x))
+        folded = _folded.get()
+        if folded is None:
+            found = len(active), len(x)
+            _log.warning("gel surface folds over itself at %d of %d places: height there is a guess", *found)
+        else:
+            folded.append(len(active))
         return source_x, source_z
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:

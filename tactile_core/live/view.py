@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..frame_pass import Tools
+from ..height_map import folds_counted
 from ..recordings.recording import Recording
 from .growing import newest
 from .live_signals import LiveSignals
@@ -49,7 +50,9 @@ class View:
             return None
         self.passed += len(rows) - 1
         translation = self._tools.translate(self._signals.signals(newest(rows)[None]))
-        picture = self._tools.shade(self._tools.height_map(translation.displacement_digit)[0])
+        with folds_counted():  # a line for each such picture would hide the latencies
+            heights = self._tools.height_map(translation.displacement_digit)
+        picture = self._tools.shade(heights[0])
         force = float(np.linalg.norm(translation.force[0]))
         latency, work = time.perf_counter() - came, time.thread_time() - began
         shown = Shown(self.frames - 1, picture, force, latency, work)

@@ -6,6 +6,7 @@ import argparse
 
 from ..errors import TactileError
 from ..terminal import bar, complain, say, tell
+from ..threads import one_thread
 from .common import NOTHING, error_argument, prepare_arguments, prepare_words, progress_argument
 
 BRIEF = "recordings to DIGIT pictures"
@@ -63,6 +64,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Convert; one bad recording does not stop the others."""
+    one_thread()  # before numpy is imported
     from .. import convert, error_budget, results
     from ..recordings import PrepareOptions, sensor_file
 

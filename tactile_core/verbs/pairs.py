@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..terminal import bar, tell
+from ..threads import one_thread
 from . import engine
 from .common import RESUMES, check_seed, progress_argument, seed_argument
 
@@ -35,6 +36,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Make the pairs."""
+    one_thread()  # before numpy is imported
     engine.check_counts(options, "workers", "restart")
     check_seed(options.seed)
     from ..batch import pairs, parts
