@@ -16,10 +16,14 @@ import collections
 import pathlib
 import sys
 
-import numpy as np
-
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+
+from tactile_core.threads import one_thread  # noqa: E402
+
+one_thread()  # before numpy is imported: the times are those of one core
+
+import numpy as np  # noqa: E402
 
 from tactile_core import atomic  # noqa: E402
 from tactile_core.mechanics.random_contacts import random_contacts  # noqa: E402
