@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from ..moving_frame import MovingFrame
+from ..network_sizes import ELECTRODES
 from ..paired_contacts import Pairs, Split
 from .mirror import across, image_of_electrodes
 from .options import Options
@@ -22,9 +23,12 @@ class Batch:
 
     rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) what SVB reads
     biotac, digit : (B, K) what the mesh encoders read           force : (B, 3) N
+    signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places, and a network that
+        is told of one is surer of it than real sensors bear out (docs/train.md)
     """
 
     rows: np.ndarray
+    signed: np.ndarray
     signal: Tensor
     biotac: Tensor
     digit: Tensor
@@ -76,7 +80,8 @@ class Contacts:
         force[turned] = across(force[turned])
         load = torch.from_numpy(force) * touching(rows)
         read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load
-        return Batch(rows, *(each.to(self.device) for each in read))
+        signed = np.where(signal[:, ELECTRODES] > 0, SILENT, rows)
+        return Batch(rows, signed, *(each.to(self.device) for each in read))
 
     def _which(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows (B,) of the pairs, 0 for silent ones, and which (B,) are seen in a mirror."""

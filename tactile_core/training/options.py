@@ -18,7 +18,8 @@ class Options:
     beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: networks.md)
     astray : weight of a translated place's distance from the true one, in cells, against the same loss. Without it
         places leave the dent by ten cells and more: windows that meet it at their edge are a way to a smaller loss from
-        which none leads on (10,000 pairs: 30 um with places astray, 20 without, from mesh to mesh; docs/train.md)
+        which none leads on (10,000 pairs: 30 um with places astray, 20 without, from mesh to mesh; docs/train.md).
+        Rectified samples are left out of it: without its sign a signal fits several places
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (networks.md)
     rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
         rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ

@@ -145,7 +145,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
         model.MVB.loss(biotac, batch.rows, floor)
         + model.MVD.loss(digit, batch.rows, floor)
         + model.MVD.loss(across, batch.rows)
-        + options.astray * (model.MVB.astray(biotac, batch.rows) + model.MVD.astray(digit, batch.rows))
+        + options.astray * (model.MVB.astray(biotac, batch.signed) + model.MVD.astray(digit, batch.signed))
         + options.astray * model.MVD.astray(across, batch.rows)
         + 0.25 * svb_loss(*given)
         + 0.5 * (mvb_loss(*given) + mvd_loss(*given))
@@ -199,7 +199,7 @@ def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, 
 def direct_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Signal -> DIGIT in one network, the bar the chain must reach."""
     found, decoder = model.directly(batch.signal), model.direct_decoder
-    return decoder.loss(found, batch.rows) + options.astray * decoder.astray(found, batch.rows)
+    return decoder.loss(found, batch.rows) + options.astray * decoder.astray(found, batch.signed)
 
 
 STAGES = (
