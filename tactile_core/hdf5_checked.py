@@ -17,6 +17,7 @@ MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk (assumed enough: HDF5 advi
 MAX_RATIO = 1032  # the most that deflate packs (zlib, technical details); lzf at most 88
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}  # that are undone; the numbers are HDF5's
 DEFLATE, STEP = 1, 2**20
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 @contextmanager
@@ -30,12 +31,35 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
     """
     import h5py
 
+    check_superblock(path)
     with h5py.File(path, "r") as file:
         outside = file.id.links.visit(_outside, info=True)
         if outside is not None:
             raise _refused(path, outside, "a link to another file", "data inside this file")
         file.visititems(lambda name, item: _check(path, name, item) if isinstance(item, h5py.Dataset) else None)
         yield file
+
+
+def check_superblock(path: str | os.PathLike) -> None:
+    """Raises TactileError for a file that begins with a driver's information, and OSError.
+
+    The library takes up to 4 GB for it, whatever the file holds (found by fuzzing). Only files in several parts have
+    it. Its address is the fourth of superblocks of version 0 and 1 (HDF5 file format, II.A); later ones have none.
+    """
+    with open(path, "rb") as file:
+        size, start = os.fstat(file.fileno()).st_size, 0
+        while start < size:
+            file.seek(start)
+            block = file.read(64)
+            if block.startswith(SIGNATURE):
+                break
+            start = 2 * start or 512  # where the library looks, too
+    if start >= size or len(block) < 64 or block[8] > 1:
+        return
+    width, addresses = block[13], 24 + 4 * block[8]
+    driver = block[addresses + 3 * width : addresses + 4 * width]
+    if driver.strip(b"\xff"):
+        raise _refused(path, "superblock", "a driver's information: a file in several parts", "one whole file")
 
 
 def declared(data: h5py.Dataset, where: str) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 
 from .. import atomic, sealed
 from ..errors import TactileError
+from ..hdf5_checked import check_superblock
 from ..hdf5_disk import Disk
 from ..recordings import Recording, Signals, prepare, sensor_file
 from ..recordings.parts import read_parts
@@ -177,6 +178,7 @@ class Prepared:
         import h5py
 
         try:
+            check_superblock(self._path)
             with h5py.File(self._path, "r") as file:
                 return what(file)
         except Exception as error:  # the library raises a dozen types on damaged bytes

@@ -126,10 +126,22 @@ def strange_filter(path):
     electrodes(path, shape=(60, 19), dtype="i4", chunks=(60, 19), scaleoffset=0)
 
 
+def driver_information(path):
+    """Of 4 GB, it says; the address of where it says so is the superblock's fourth."""
+    electrodes(path, shape=(60, 19), dtype="f8")
+    with open(path, "r+b") as file:
+        end = file.seek(0, os.SEEK_END)
+        file.write(struct.pack("<B3xI8s", 0, 2**32 - 17, b"NCSAfami") + bytes(64))
+        file.seek(24 + 3 * 8)
+        assert file.read(8) == b"\xff" * 8
+        file.seek(24 + 3 * 8)
+        file.write(struct.pack("<Q", end))
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (huge_shape, "GB in memory"), (huge_chunk, "chunks of 1450 MB"), (chunk_bomb, "unpacks to more than"),
+        (driver_information, "a driver's information"), (huge_shape, "GB in memory"), (huge_chunk, "chunks of 1450 MB"), (chunk_bomb, "unpacks to more than"),
         (external_storage, "other files"), (external_link, "a link to another file"), (virtual_storage, "other files"),
         (strange_filter, "HDF5 filter 6"),
     ],
