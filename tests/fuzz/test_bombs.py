@@ -141,7 +141,8 @@ def driver_information(path):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (driver_information, "a driver's information"), (huge_shape, "GB in memory"), (huge_chunk, "chunks of 1450 MB"), (chunk_bomb, "unpacks to more than"),
+        (driver_information, "a driver's information"),
+        (huge_shape, "GB in memory"), (huge_chunk, "chunks of 1450 MB"), (chunk_bomb, "unpacks to more than"),
         (external_storage, "other files"), (external_link, "a link to another file"), (virtual_storage, "other files"),
         (strange_filter, "HDF5 filter 6"),
     ],
