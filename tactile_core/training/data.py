@@ -23,8 +23,8 @@ class Batch:
 
     rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) what SVB reads
     biotac, digit : (B, K) what the mesh encoders read           force : (B, 3) N
-    signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places, and where a network
-        is told of one, the centre of real recordings' contacts spreads more (docs/train.md)
+    signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places; told of one, the
+        networks place real recordings' contacts less evenly (docs/train.md)
     """
 
     rows: np.ndarray
