@@ -8,7 +8,7 @@ import shutil
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "squeue", "scancel", "sinfo")
@@ -17,8 +17,8 @@ SlurmctldHost={host}(127.0.0.1)
 SlurmctldPort={control}
 SlurmdPort={node}
 AuthInfo=socket={folder}/munge.socket
-SlurmUser={user}
-SlurmdUser={user}
+SlurmUser=root
+SlurmdUser=root
 StateSaveLocation={folder}/state
 SlurmdSpoolDir={folder}/spool
 SlurmctldPidFile={folder}/slurmctld.pid
@@ -50,14 +50,12 @@ def missing() -> str:
 
 @contextlib.contextmanager
 def slurm(folder: Path) -> Iterator[dict[str, str]]:
-    """Start it; gives the environment in which its commands find it. Raises TimeoutError with its logs."""
+    """Start it; gives the environment in which its commands find it. Raises TimeoutError; ``log`` in the folder tells why."""
     for name in ("state", "spool"):
         (folder / name).mkdir(parents=True)
     host = socket.gethostname().split(".")[0]
     control, node = _free_ports(2)
-    text = CONFIGURATION.format(
-        host=host, folder=folder, user="root", control=control, node=node, cores=os.cpu_count() or 1
-    )
+    text = CONFIGURATION.format(host=host, folder=folder, control=control, node=node, cores=os.cpu_count() or 1)
     (folder / "slurm.conf").write_text(text)
     key = folder / "munge.key"
     key.write_bytes(os.urandom(128))
@@ -71,11 +69,12 @@ def slurm(folder: Path) -> Iterator[dict[str, str]]:
         with (folder / "log").open("w") as log:
             for command in commands:
                 running.append(subprocess.Popen(command, env=environment, stdout=log, stderr=log))
-                _wait(lambda: (folder / "munge.socket").exists(), folder)
-            _wait(lambda: _idle(environment), folder)
+                wait((folder / "munge.socket").exists)
+            wait(lambda: _idle(environment))
         yield environment
     finally:
-        subprocess.run(["scancel", "--user=root"], env=environment, capture_output=True, timeout=60)
+        with contextlib.suppress(subprocess.TimeoutExpired):  # where the controller has not started
+            subprocess.run(["scancel", "--user=root"], env=environment, capture_output=True, timeout=60)
         for process in reversed(running):
             process.terminate()
         for process in running:
@@ -87,11 +86,12 @@ def _idle(environment: dict[str, str]) -> bool:
     return told.stdout.strip() == "idle"
 
 
-def _wait(ready, folder: Path, most: float = 60.0) -> None:
+def wait(ready: Callable[[], bool], most: float = 300.0) -> None:
+    """Until something is so; raises TimeoutError after ``most`` s."""
     until = time.monotonic() + most
     while not ready():
         if time.monotonic() > until:
-            raise TimeoutError((folder / "log").read_text())
+            raise TimeoutError(f"not ready after {most:g} s")
         time.sleep(0.2)
 
 

@@ -9,7 +9,6 @@ import os
 import stat
 import subprocess
 import sys
-import time
 
 import one_node_slurm
 import pytest
@@ -97,13 +96,6 @@ def queue_is_empty():
     return not told.stdout.strip()
 
 
-def wait(ready):
-    until = time.monotonic() + 300
-    while not ready():
-        assert time.monotonic() < until
-        time.sleep(0.5)
-
-
 def test_an_array_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
     """Cancelled once on its way, and submitted again."""
     folder, begin = calm
@@ -111,10 +103,10 @@ def test_an_array_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
     monkeypatch.chdir(real_slurm)
     for shards in (1, 5):
         subprocess.run(["bash", "-c", the_page_s("sbatch ", other)], check=True, timeout=300, capture_output=True)
-        wait(lambda shards=shards: len(list((other / "shards").rglob("*.h5"))) >= shards or queue_is_empty())
+        one_node_slurm.wait(lambda shards=shards: len(list((other / "shards").rglob("*.h5"))) >= shards or queue_is_empty())
         if shards == 1:
             subprocess.run(["scancel", "--user=root"], check=True, timeout=60)
-        wait(queue_is_empty)
+        one_node_slurm.wait(queue_is_empty)
     with runs.opened(other, None):
         done = runs.run(other, job, local.Local(other, 1), None, lambda done, total: None)
     told = [path.read_text() for path in real_slurm.glob("slurm-*.out")]
@@ -134,7 +126,7 @@ def test_workers_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
     with runs.opened(other, None):
         done = runs.run(other, job, Cluster(other, str(toml)), None, lambda done, total: None)
     assert done.made == 5 and content(folder) == content(other)
-    wait(queue_is_empty)
+    one_node_slurm.wait(queue_is_empty)
 
 
 def test_the_page_s_array(slurm, calm, content):
