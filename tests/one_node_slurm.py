@@ -50,7 +50,7 @@ def missing() -> str:
 
 @contextlib.contextmanager
 def slurm(folder: Path) -> Iterator[dict[str, str]]:
-    """Start it; gives the environment in which its commands find it. Raises TimeoutError; ``log`` in the folder tells why."""
+    """Start it; gives the environment in which its commands find it. Raises TimeoutError (see ``log`` there)."""
     for name in ("state", "spool"):
         (folder / name).mkdir(parents=True)
     host = socket.gethostname().split(".")[0]

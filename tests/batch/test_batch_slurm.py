@@ -13,6 +13,7 @@ import sys
 import one_node_slurm
 import pytest
 from conftest import ROOT
+from one_node_slurm import wait
 
 from tactile_core import translate
 from tactile_core.batch import inputs, local, recipes
@@ -103,10 +104,10 @@ def test_an_array_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
     monkeypatch.chdir(real_slurm)
     for shards in (1, 5):
         subprocess.run(["bash", "-c", the_page_s("sbatch ", other)], check=True, timeout=300, capture_output=True)
-        one_node_slurm.wait(lambda shards=shards: len(list((other / "shards").rglob("*.h5"))) >= shards or queue_is_empty())
+        wait(lambda shards=shards: len(list((other / "shards").rglob("*.h5"))) >= shards or queue_is_empty())
         if shards == 1:
             subprocess.run(["scancel", "--user=root"], check=True, timeout=60)
-        one_node_slurm.wait(queue_is_empty)
+        wait(queue_is_empty)
     with runs.opened(other, None):
         done = runs.run(other, job, local.Local(other, 1), None, lambda done, total: None)
     told = [path.read_text() for path in real_slurm.glob("slurm-*.out")]
@@ -126,7 +127,7 @@ def test_workers_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
     with runs.opened(other, None):
         done = runs.run(other, job, Cluster(other, str(toml)), None, lambda done, total: None)
     assert done.made == 5 and content(folder) == content(other)
-    one_node_slurm.wait(queue_is_empty)
+    wait(queue_is_empty)
 
 
 def test_the_page_s_array(slurm, calm, content):
