@@ -34,7 +34,7 @@ SETTINGS: dict[str, dict[str, float]] = {
     "signal 4": {"latent_signal": 4},
     "signal 16": {"latent_signal": 16},
     "mesh 16 and 32": {"latent_biotac": 16, "latent_digit": 32},
-    "mesh 128": {"latent_biotac": 128, "latent_digit": 128},
+    "mesh 64 and 96": {"latent_biotac": 64, "latent_digit": 96},
     "no mirror images": {"mirrored": 0.0},
     "places astray": {"astray": 0.0},
     "neither": {"mirrored": 0.0, "astray": 0.0},

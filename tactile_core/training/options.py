@@ -9,12 +9,13 @@ DEVICES = ("auto", "cpu", "cuda")  # where networks may be trained; auto: on a G
 
 @dataclass(frozen=True)
 class Options:
-    """Sizes and lengths of a training. On one core 0.65 of the defaults took 45 minutes for 120,000 contacts.
+    """Sizes and lengths of a training. On one core the defaults took 45 minutes for 120,000 contacts.
 
     latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
     half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
-    epochs : stage -> passes over the training contacts; `effort` multiplies all of them
+    epochs : stage -> passes over the training contacts; `effort` multiplies all of them. Half as many again leave
+        smaller errors on simulated contacts, and follow real recordings worse (docs/train.md)
     beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: networks.md)
     astray : weight of a translated place's distance from the true one, in cells, against the same loss. Without it
         places leave the dent by ten cells and more: windows that meet it at their edge are a way to a smaller loss from
@@ -37,8 +38,8 @@ class Options:
     """
 
     latent_signal: int = 8
-    latent_biotac: int = 64
-    latent_digit: int = 96
+    latent_biotac: int = 128
+    latent_digit: int = 128
     wide_biotac: int = 80
     near_biotac: int = 160
     half_biotac: int = 12
@@ -68,16 +69,16 @@ class Options:
     without_below_x: float | None = None
     left_out: tuple[str, ...] = ()
     effort: float = 1.0
-    svb_epochs: int = 10
-    mvb_epochs: int = 10
-    mvd_epochs: int = 14
-    s2mpn_epochs: int = 4
-    m2mpn_epochs: int = 4
-    chain_epochs: int = 20
-    direct_epochs: int = 20
-    force_epochs: int = 6
-    error_epochs: int = 3
-    back_epochs: int = 8
+    svb_epochs: int = 6
+    mvb_epochs: int = 6
+    mvd_epochs: int = 9
+    s2mpn_epochs: int = 3
+    m2mpn_epochs: int = 3
+    chain_epochs: int = 13
+    direct_epochs: int = 13
+    force_epochs: int = 4
+    error_epochs: int = 2
+    back_epochs: int = 5
     checkpoint_seconds: float = 30.0
 
     def epochs(self, stage: str) -> int:
