@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -39,17 +41,16 @@ class Surface:
         if mirrored:
             self._image, every = image_of_nodes(frame), np.arange(2 * len(data))
             rows = np.concatenate([rows, rows + len(data)])
-        self.place = np.concatenate([frame.place(self._local(every[part])) for part in _parts(len(every))])
+        self.place = _in_parts(lambda part: torch.from_numpy(frame.place(self._local(part))), every).numpy()
         self.cell, self.left = frame.cells(self.place)
         some = rows[:: max(1, len(rows) // BASIS_ROWS)]
         self.wide = principal_basis(self._whole, some, wide, generator)
         self.near = principal_basis(self._tapered, some, near, generator)
-        metres = 1e-3 * torch.cat([self._coefficients(every[part]) for part in _parts(len(every))])
+        metres = _in_parts(self._coefficients, every).mul_(1e-3)
         spread = metres[rows].square().mean(0).sqrt()
         self.scale = spread.clamp(min=max(SMALLEST_SCALE * float(spread.max()), 1e-9))
-        self.modes = metres / self.scale
-        sizes = [self._sizes(every[part]) for part in _parts(len(every))]
-        self.total, self.moving = (torch.cat(each) for each in zip(*sizes, strict=True))
+        self.modes = metres.div_(self.scale)
+        self.total, self.moving = _in_parts(self._sizes, every).T
         self.null = max(float((self.total[rows] / self.moving[rows]).sqrt().mean()), 1e-9)
 
     @property
@@ -84,9 +85,9 @@ class Surface:
     def _coefficients(self, rows: np.ndarray) -> Tensor:
         return torch.cat([self._whole(rows) @ self.wide.T, self._rest_in_window(rows) @ self.near.T], -1)
 
-    def _sizes(self, rows: np.ndarray) -> tuple[Tensor, Tensor]:
+    def _sizes(self, rows: np.ndarray) -> Tensor:
         squares = 1e-6 * self._millimetres(rows).square().sum(-1)
-        return squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()
+        return torch.stack([squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()], -1)
 
     def inputs(self, rows: np.ndarray) -> Tensor:
         """(B, K + K' + 4) what the encoder reads: coefficients, place, what is left of it; zero for silent ones."""
@@ -156,6 +157,17 @@ def _turned(data: np.ndarray, frame: MovingFrame) -> np.ndarray:
     for part in _parts(len(data)):
         local[part] = np.rint(frame.to_local(data[part]))
     return local
+
+
+def _in_parts(values: Callable[[np.ndarray], Tensor], rows: np.ndarray) -> Tensor:
+    """Values of all rows, a part at a time into one place: parts kept apart would leave memory in pieces."""
+    parts = _parts(len(rows))
+    first = values(rows[parts[0]])
+    found = first.new_empty(len(rows), *first.shape[1:])
+    found[parts[0]] = first
+    for part in parts[1:]:
+        found[part] = values(rows[part])
+    return found
 
 
 def _parts(count: int) -> list[slice]:
