@@ -127,12 +127,14 @@ def test_places_are_astray_by_cells_and_silence_has_none(contacts):
     assert float(surface.astray(away, rows)) == pytest.approx((9 * 5 + 0.01) / 10, rel=1e-4)
 
 
-def test_a_batch_knows_which_signals_lost_their_sign(contacts):
+def test_signals_without_their_sign_tell_no_place(contacts):
     rows = np.append(contacts.split.train[:40], SILENT)
     signal = contacts.read(rows, np.random.default_rng(0), rectified=0.5)
     lost = signal[:, 19] > 0
     assert 5 < lost.sum() < 35
-    assert (contacts.batch(rows, signal).signed == ~lost).all()
+    batch = contacts.batch(rows, signal)
+    assert (batch.signed[lost] == SILENT).all() and (batch.signed[~lost] == rows[~lost]).all()
+    assert (batch.rows == rows).all()  # what they decode to is still told
 
 
 def test_statistics_come_from_the_training_presses_alone(contacts):
