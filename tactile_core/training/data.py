@@ -23,7 +23,8 @@ class Batch:
 
     rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) what SVB reads
     biotac, digit : (B, K) what the mesh encoders read           force : (B, 3) N
-    signed : (B,) bool, False where the signal has lost its sign
+    signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places; told of one, the
+        networks place real recordings' contacts less evenly (docs/train.md)
     """
 
     rows: np.ndarray
@@ -79,7 +80,8 @@ class Contacts:
         force[turned] = across(force[turned])
         load = torch.from_numpy(force) * touching(rows)
         read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load
-        return Batch(rows, signal[:, ELECTRODES] == 0, *(each.to(self.device) for each in read))
+        signed = np.where(signal[:, ELECTRODES] > 0, SILENT, rows)
+        return Batch(rows, signed, *(each.to(self.device) for each in read))
 
     def _which(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows (B,) of the pairs, 0 for silent ones, and which (B,) are seen in a mirror."""

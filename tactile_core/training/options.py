@@ -75,7 +75,6 @@ class Options:
     s2mpn_epochs: int = 3
     m2mpn_epochs: int = 3
     chain_epochs: int = 13
-    r2mpn_epochs: int = 3
     direct_epochs: int = 13
     force_epochs: int = 4
     error_epochs: int = 2

@@ -14,7 +14,7 @@ from ..networks import ERROR_UNIT, FORCE_SCALE
 from .data import Batch, Contacts
 from .modules import MeshVae, Residual, compress, initialise, signal_vae
 from .options import Options
-from .surface import SILENT
+from .surface import ROOT_FLOOR
 
 FORCE_WIDTH, FORCE_BLOCKS = 64, 1  # a small head: three numbers out of a latent
 FORCE_FLOOR = 0.1  # N: an error counts against the force plus this, so that light touches do not rule (assumed)
@@ -80,12 +80,11 @@ Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage: the networks it changes and its loss. rectified : share of such signals; None: as the options say."""
+    """One stage: the networks it changes and its loss."""
 
     name: str
     nets: tuple[str, ...]
     loss: Loss
-    rectified: float | None = None
 
 
 def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
@@ -137,37 +136,20 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
     """Everything together: a frozen chain is 23-26 % worse than signal -> DIGIT directly (networks.md).
 
     The autoencoders' own losses stay in at a quarter, so that latents keep their meaning and meshes can be encoded.
-    Rectified signals shape SVB by its own loss alone, and no other network: see `r2mpn_loss`.
     """
-    across, given = model.across(model.MVB.mean(batch.biotac)), (model, contacts, batch, options, generator)
-    total = (
-        model.MVD.loss(across, batch.rows)
+    biotac = model.from_signal(batch.signal)
+    digit, across = model.across(biotac), model.across(model.MVB.mean(batch.biotac))
+    given = (model, contacts, batch, options, generator)
+    floor = torch.where(batch.signal[:, ELECTRODES] > 0, options.rectified_floor, ROOT_FLOOR)
+    return (
+        model.MVB.loss(biotac, batch.rows, floor)
+        + model.MVD.loss(digit, batch.rows, floor)
+        + model.MVD.loss(across, batch.rows)
+        + options.astray * (model.MVB.astray(biotac, batch.signed) + model.MVD.astray(digit, batch.signed))
         + options.astray * model.MVD.astray(across, batch.rows)
         + 0.25 * svb_loss(*given)
         + 0.5 * (mvb_loss(*given) + mvd_loss(*given))
     )
-    if not batch.signed.any():
-        return total
-    rows = batch.rows[batch.signed]
-    biotac = model.from_signal(batch.signal[torch.from_numpy(np.flatnonzero(batch.signed)).to(batch.signal.device)])
-    digit = model.across(biotac)
-    return (
-        total
-        + model.MVB.loss(biotac, rows)
-        + model.MVD.loss(digit, rows)
-        + options.astray * (model.MVB.astray(biotac, rows) + model.MVD.astray(digit, rows))
-    )
-
-
-def r2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Rectified signals to both meshes through R2MPN, all else frozen: simulated ones differ from a real unit's, and
-    where they shape the other networks real recordings are followed worse the longer the training (docs/train.md).
-
-    Such a signal fits several places: told of one, the networks place real contacts less evenly, so none is told.
-    """
-    biotac = model.from_signal(batch.signal)
-    floor = options.rectified_floor
-    return model.MVB.loss(biotac, batch.rows, floor) + model.MVD.loss(model.across(biotac), batch.rows, floor)
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
@@ -217,18 +199,16 @@ def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, 
 def direct_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Signal -> DIGIT in one network, the bar the chain must reach."""
     found, decoder = model.directly(batch.signal), model.direct_decoder
-    told = np.where(batch.signed, batch.rows, SILENT)  # without its sign a signal fits several places
-    return decoder.loss(found, batch.rows) + options.astray * decoder.astray(found, told)
+    return decoder.loss(found, batch.rows) + options.astray * decoder.astray(found, batch.signed)
 
 
 STAGES = (
     Stage("SVB", ("SVB",), svb_loss),
     Stage("MVB", ("MVB",), mvb_loss),
     Stage("MVD", ("MVD",), mvd_loss),
-    Stage("S2MPN", ("S2MPN",), s2mpn_loss, rectified=0.0),
+    Stage("S2MPN", ("S2MPN", "R2MPN"), s2mpn_loss),
     Stage("M2MPN", ("M2MPN",), m2mpn_loss),
-    Stage("chain", ("SVB", "MVB", "MVD", "S2MPN", "M2MPN"), chain_loss),
-    Stage("R2MPN", ("R2MPN",), r2mpn_loss, rectified=1.0),
+    Stage("chain", ("SVB", "MVB", "MVD", "S2MPN", "R2MPN", "M2MPN"), chain_loss),
     Stage("force", ("force",), force_loss),
     Stage("error", ("error",), error_loss),
     Stage("back", ("D2BPN", "B2SPN"), back_loss),

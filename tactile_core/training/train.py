@@ -189,7 +189,7 @@ def epoch_losses(
     rng = np.random.default_rng([seed, index, epoch])
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     rows = contacts.drawn(rng)
-    signal = contacts.read(rows, rng, options.rectified if stage.rectified is None else stage.rectified)
+    signal = contacts.read(rows, rng, options.rectified)
 
     def loss(step: int) -> torch.Tensor:
         part = slice(step * options.batch, (step + 1) * options.batch)
@@ -224,7 +224,7 @@ def validate(stage: Stage, model: Model, contacts: Contacts, seed: int, index: i
     rng = np.random.default_rng([seed, index, VALIDATION_SEED])
     generator = torch.Generator().manual_seed(seed)
     rows = contacts.with_silence(contacts.split.validation)
-    signal, size = contacts.read(rows, rng, stage.rectified or 0.0), 256
+    signal, size = contacts.read(rows, rng), 256
     total = 0.0
     with torch.no_grad():
         for start in range(0, len(rows), size):
