@@ -76,7 +76,7 @@ class Options:
     m2mpn_epochs: int = 3
     chain_epochs: int = 13
     direct_epochs: int = 13
-    force_epochs: int = 4
+    force_epochs: int = 6
     error_epochs: int = 2
     back_epochs: int = 5
     checkpoint_seconds: float = 30.0
