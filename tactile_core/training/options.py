@@ -9,13 +9,13 @@ DEVICES = ("auto", "cpu", "cuda")  # where networks may be trained; auto: on a G
 
 @dataclass(frozen=True)
 class Options:
-    """Sizes and lengths of a training. On one core the defaults took 45 minutes for 120,000 contacts.
+    """Sizes and lengths of a training. On one core the defaults take 15 minutes for 50,000 contacts.
 
     latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
     half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
-    epochs : stage -> passes over the training contacts; `effort` multiplies all of them. Half as many again leave
-        smaller errors on simulated contacts, and follow real recordings worse (docs/train.md)
+    epochs : stage -> passes over the training contacts; `effort` multiplies all of them. More make
+        simulated contacts better, not real recordings (docs/train.md)
     beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: networks.md)
     astray : weight of a translated place's distance from the true one, in cells, against the same loss. Without it
         places leave the dent by ten cells and more: windows that meet it at their edge are a way to a smaller loss from
