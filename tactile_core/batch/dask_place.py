@@ -6,6 +6,7 @@ network, or ``tls://`` with certificates (Dask's own settings ``distributed.comm
 
 from __future__ import annotations
 
+import gc
 import queue
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -97,8 +98,9 @@ class Cluster:
         try:
             return Client(place, security=security, timeout=wait(), set_as_default=False, loop=loop())
         except (OSError, ValueError, TypeError, RuntimeError, MemoryError) as error:  # the last: of other servers
-            found, advice = f"no scheduler answers ({error})", "Start one: dask scheduler"
-            raise TactileError(self._address, found, "a Dask scheduler", advice) from error
+            found = f"no scheduler answers ({error})"
+        gc.collect()  # ends that client here: within the next one's start it would wait for ever, for a lock held there
+        raise TactileError(self._address, found, "a Dask scheduler", "Start one: dask scheduler")
 
     def __exit__(self, *error: object) -> None:
         self._tasks.clear()

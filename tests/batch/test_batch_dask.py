@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import shutil
 import subprocess
 import time
@@ -86,6 +87,18 @@ def test_tls_needs_the_certificate(new_job, tmp_path):
             run_on(folder, job, address)
         with dask.config.set({"distributed.comm.tls.ca-file": str(certificate), **tls}):
             assert run_on(folder, job, address).made == 5
+
+
+def test_a_client_that_found_no_scheduler_is_gone_before_the_next(tmp_path, monkeypatch):
+    monkeypatch.setattr(dask_place, "wait", lambda: 1.0)
+    gc.disable()  # collected later, by chance within the next client's start, it would wait there for ever
+    try:
+        with pytest.raises(TactileError, match="no scheduler answers"), Cluster(tmp_path, "tcp://127.0.0.1:9"):
+            pass
+        left = [each for each in gc.get_objects() if type(each) is distributed.Client]
+    finally:
+        gc.enable()
+    assert not left
 
 
 def test_a_queue_without_workers_is_told(new_job, monkeypatch):
