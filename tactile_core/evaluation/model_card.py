@@ -24,9 +24,7 @@ SWEEP = """\
 Other latent sizes and KL weights, each a training of its own on the same fewer pairs, against the test contacts
 (`scripts/sweep_networks.py`): to be compared with each other, not with the rows above. `published` has the latents and
 the KL weight of the method's authors. Rows of seeds: one direct network from signals to the DIGIT beside the chain,
-each from three seeds, on the trainings' own test presses. These trainings are as the shipped weights': places are not
-told how far they are astray, and there are no mirror images. What both are worth, and other latents trained so:
-[train.md](train.md#what-each-choice-is-worth).
+each from three seeds, on the trainings' own test presses.
 """
 LIMITS = """\
 ## Limits

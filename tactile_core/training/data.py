@@ -23,8 +23,7 @@ class Batch:
 
     rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) what SVB reads
     biotac, digit : (B, K) what the mesh encoders read           force : (B, 3) N
-    signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places; told of one, the
-        networks place real recordings' contacts less evenly (docs/train.md)
+    signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places
     """
 
     rows: np.ndarray
