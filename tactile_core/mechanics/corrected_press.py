@@ -123,7 +123,10 @@ class CorrectedPress:
         rows, columns = surface.shape
         grid = surface.grid(surface.rest + contact.displacement)
         where, closed = f"fast tier, {self.compliance.name}", len(surface.rest) > rows * columns
-        check_follows(where, grid, self.problem.indenter, contact.pose, contact.depth, closed=closed)
+        indenter, pose = self.problem.indenter, contact.pose
+        nodes = self.compliance.touchable[contact.nodes]
+        _, normals = pose.distance(indenter, surface.rest[nodes] + contact.displacement[nodes])
+        check_follows(where, grid, indenter, pose, contact.depth, normals, closed=closed)
 
 
 def _from_touch(contact: Contact, fall: float) -> Contact:

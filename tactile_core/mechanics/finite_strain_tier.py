@@ -69,13 +69,20 @@ class Body:
 
 
 def graded_body(
-    sensor: Sensor, indenter: Indenter, pose: Pose, depth: float, tier: Literal["full", "reference"] = "full"
+    sensor: Sensor,
+    indenter: Indenter,
+    pose: Pose,
+    depth: float,
+    tier: Literal["full", "reference"] = "full",
+    spacing: float = 1.0,
 ) -> Body:
     """A sensor's body, fine where the indenter, ``depth`` m in, overlaps the resting surface.
 
-    The reference tier's cells are half as large as the full tier's.
+    spacing : of the fine part's nodes, over the tier's own. The reference tier's cells are half as large as the full
+    tier's.
     """
-    footprint = dataclasses.replace(_footprint(sensor, indenter, pose, depth), refine=1 if tier == "full" else 2)
+    place = _footprint(sensor, indenter, pose, depth)
+    footprint = dataclasses.replace(place, spacing=spacing * place.spacing, refine=1 if tier == "full" else 2)
     graded = graded_gel(footprint) if sensor == "digit" else graded_skin(footprint)
     mesh = graded.mesh
     if sensor == "digit":

@@ -21,6 +21,7 @@ from .finite_strain import FiniteStrainSolid, State
 from .obstacle import Obstacle, PlacedIndenter
 from .pose_path import between
 from .quadratic_cavity import QuadraticCavity
+from .sunk import BEHIND
 from .touching import Touching
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
@@ -85,6 +86,10 @@ class Tolerance:
 EXACT = Tolerance(1e-9, 1e-8, 1e-13)
 
 
+class NoEquilibriumError(TactileError):
+    """A path has ended: no contact was found beyond it."""
+
+
 class _NotConvergedError(Exception):
     """A load step is too large."""
 
@@ -123,6 +128,7 @@ class FiniteStrainContact:
         self.volume = pre_inflation + (cavity.volume(solid.mesh.nodes) if cavity else 0.0)
         self.core, self.inner = core, np.empty(0, int) if inner is None or core is None else inner
         self.friction, self.tolerance, self.first_share = friction, tolerance, first_share
+        self.most_failures = MOST_FAILURES
         self._factor = DampedFactor(solid, factor or PatternFactor())
         if cavity:
             rows, columns, _ = cavity.hessian(solid.mesh.nodes)
@@ -151,7 +157,7 @@ class FiniteStrainContact:
         except _PathEndsError as end:
             reached = begin.depth + end.part * reach
             found = f"no equilibrium beyond {reached * 1e3:.3f} mm"
-            raise TactileError("finite-strain solver", found, "a smaller depth") from None
+            raise NoEquilibriumError("finite-strain solver", found, "a smaller depth") from None
         return dataclasses.replace(touch, depth=depth)
 
     def move(self, pose: Pose, start: Touch, step: float = 0.1e-3) -> Touch:
@@ -165,7 +171,7 @@ class FiniteStrainContact:
             touch = self._follow(lambda part: between(start.pose, pose, part), start, step / max(way, turned, 1e-12))
         except _PathEndsError as end:
             found = f"no equilibrium beyond {end.part:.0%} of the way"
-            raise TactileError("finite-strain solver", found, "a shorter way, or less force") from None
+            raise NoEquilibriumError("finite-strain solver", found, "a shorter way, or less force") from None
         return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
 
     def _follow(self, along: Callable[[float], Pose], start: Touch, step: float) -> Touch:
@@ -178,7 +184,7 @@ class FiniteStrainContact:
                 done, size = goal, min(step, 2 * size) if touch.iterations <= _EASY else size
             except (_NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError):
                 size, failures = min(size, goal - done) / 2, failures + 1
-                if size < min(step, 1.0) * SMALLEST_STEP or failures > MOST_FAILURES:
+                if size < min(step, 1.0) * SMALLEST_STEP or failures > self.most_failures:
                     raise _PathEndsError(done) from None
             steps += 1
         return dataclasses.replace(touch, steps=steps)
@@ -191,6 +197,8 @@ class FiniteStrainContact:
             PlacedIndenter(self.indenter, pose), self.touchable, at, start.pose, self.friction,
             _GRIP * self._factor.stiffness, self.first_share,
         )  # fmt: skip
+        if (outer.normals @ pose.direction).min(initial=1.0) < BEHIND:
+            raise _NotConvergedError  # it would come to lie before the nodes that it should push
         inner = start.inner.carried(self.core, self.inner, at)
         self._factor.damping, imbalance = 0.0, 1.0
         for iteration in range(1, MAX_ITERATIONS + 1):

@@ -17,10 +17,10 @@ from .expected_error import expected_error
 from .finite_strain import FiniteStrainSolid, State
 from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Body, Sensor, graded_body
 from .force_search import ROUGH, TOLERANCE, touch_at_force, unreachable
-from .newton import FiniteStrainContact, Touch
+from .newton import FiniteStrainContact, NoEquilibriumError, Touch
 from .placement import FRICTION, Placement, on_gel, pose_at
 from .sharpness import sharpest
-from .sunk import check_follows
+from .sunk import SunkError, check_follows, hidden
 from .thickness import DEPTH_LIMIT, thickness_under
 
 Tier = Literal["fast", "full", "reference"]
@@ -30,6 +30,11 @@ _LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less cannot be told from roundin
 _REACHED = 1 / 3  # of the depth that a mesh is made for: contacts less deep are too small for it (assumed)
 _ROOM = 1.5  # times the depth at the largest force, for which a mesh is made: places on a path differ (assumed)
 _MOST_MESHES = 3
+# Of the full tier's spacing, where its own mesh finds no contact: rings deeper than their wire's radius settle then.
+_FINER = 0.5
+# Of load steps without friction, on the tier's own mesh and on the finer one, before another way is shorter: presses
+# that ended well there had none or one.
+_FEW_FAILURES = 3, 1
 _FARTHEST_SLIDE = 10e-3  # m, half of the gel
 
 
@@ -90,7 +95,8 @@ def solve(
     """Press ``indenter`` into ``sensor`` at ``place`` to a depth, m, or a force along the motion, N.
 
     ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round the
-    contact (about a second; with friction up to twenty), ``reference`` the same on cells half as large (minutes).
+    contact (seconds; with friction ten or more; a minute or more for indenters that need a finer mesh), ``reference``
+    the same on cells half as large (minutes).
     Raises TactileError for an impossible request, or for one beyond what the tier finds.
     """
     return next(solve_path(sensor, indenter, place, [Step(depth, force)], tier, friction))
@@ -192,7 +198,10 @@ class _FiniteStrain(_Path):
 
     def __init__(self, *arguments) -> None:  # noqa: ANN002
         super().__init__(*arguments)
-        self._make(self._reach(), self.friction)
+        self.spacing = 1.0  # of the mesh's nodes, over the tier's own
+        self.way: list[Pose] = []  # what was solved, which friction remembers
+        self.made_for = self._reach()
+        self._make(self.made_for, self.friction)
 
     def _reach(self) -> float:
         """The depth, m, that the mesh is to be made for: for forces found without friction, on meshes that were made
@@ -213,13 +222,32 @@ class _FiniteStrain(_Path):
 
     def _make(self, deepest: float, friction: float) -> None:
         """The mesh for contacts of a depth, m, with nothing pressed yet."""
-        self.body = graded_body(self.sensor, self.indenter, self.pose, deepest, self.tier)
+        self.body = graded_body(self.sensor, self.indenter, self.pose, deepest, self.tier, self.spacing)
         self.problem = self.body.contact(self.indenter, self.pose, deepest, friction)
-        self.step = FRICTION_STEP if friction else ONE_STEP
+        self.step = FRICTION_STEP if friction or self.spacing < 1 else ONE_STEP
+        if self.tier == "full" and not friction:
+            self.problem.most_failures = _FEW_FAILURES[self.spacing < 1]
         self.last = self.problem.start()
 
     def to(self, step: Step) -> Solution:
-        """See ``solve_path``."""
+        """See ``solve_path``. Where the full tier's mesh does not hold the indenter, on a finer one from the start."""
+        try:
+            found = self._to(step)
+        except (NoEquilibriumError, SunkError):
+            if self.tier != "full" or self.spacing < 1:
+                raise
+            self._refine()
+            found = self._to(step)
+        self.way.append(self.last.pose)
+        return found
+
+    def _refine(self) -> None:
+        self.spacing = _FINER
+        self._make(self.made_for, self.friction)
+        for pose in self.way if self.friction else ():
+            self.last = self.problem.move(pose, self.last, self.step)
+
+    def _to(self, step: Step) -> Solution:
         pose = self.pose.slid(*step.slide)
         if step.force:
             self.last = self._at_force(pose, step.force)
@@ -236,10 +264,10 @@ class _FiniteStrain(_Path):
         return touch_at_force(move, self.last, pose.direction, force, self.limit, self.where, tolerance)
 
     def _solution(self, touch: Touch) -> Solution:
-        self._check_follows(touch)
+        below = self._hidden(touch)
         gap = touch.outer.gaps(self.body.solid.mesh.nodes + touch.state.displacement)
         table, across = self.errors(touch.depth), self._nodes_across(touch)
-        stated = stated_error.of_finite_strain(table, touch.depth, int((touch.pressing > 0).sum()), across)
+        stated = stated_error.of_finite_strain(table, touch.depth, int((touch.pressing > 0).sum()), across, below)
         slips = touch.outer.slipping[touch.outer.active]
         return Solution(
             self.tier, True, touch.iterations, self.body.displacement(touch), self.body.contact_patch(touch),
@@ -258,8 +286,11 @@ class _FiniteStrain(_Path):
         spacing *= 1 if self.tier == "full" else 2
         return float(2 * np.sqrt(min(radius, 1.0) * max(touch.depth, 0.0)) / spacing)
 
-    def _check_follows(self, touch: Touch) -> None:
+    def _hidden(self, touch: Touch) -> float:
+        """How deep, m, the surface lies in the indenter between nodes; raises SunkError where it does not follow it."""
         mesh = self.body.solid.mesh
         surface = self.body.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"
-        check_follows(where, surface, self.indenter, touch.pose, touch.depth, closed=closed)
+        normals = touch.normals[touch.pressing > 0]
+        check_follows(where, surface, self.indenter, touch.pose, touch.depth, normals, closed=closed)
+        return hidden(where, surface, self.indenter, touch.pose, touch.depth, closed=closed)

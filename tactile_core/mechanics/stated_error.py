@@ -18,6 +18,10 @@ _FEW = 20
 # ring of 2.8 nodes was 8.7 um and 1.6 % off, two balls of 3.9 nodes 5.0 um and 3.0 %, a wedge of 1.5
 # nodes 56 um and 4.5 %; 2 um covers them all.
 _ACROSS, _SHAPE, _FORCE = 8.0, 2e-6, 0.01
+# Where a surface lies more than so deep, m, in the indenter between nodes: of 43 such contacts of eight indenters, with
+# friction and without, forces of 41 were off half the spacing's by less than that over the depth, and shapes of all by
+# less than 0.35 of it, rms. What stands above covered 16 of the forces.
+_HIDDEN, _HIDDEN_SHAPE, _HIDDEN_FORCE = 100e-6, 0.35, 1.0
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
@@ -28,13 +32,19 @@ def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
     return sharper * table[0], min(sharper * table[1], 1.0)
 
 
-def of_finite_strain(table: Errors, depth: float, nodes: int, across: float) -> Errors:
-    """The same in the full and the reference tier; across : nodes across the contact, by the full tier's spacing."""
+def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hidden: float) -> Errors:
+    """The same in the full and the reference tier.
+
+    across : nodes across the contact, by the full tier's spacing; hidden : m, how deep the surface lies in the indenter
+    between nodes
+    """
     if not nodes:
         return _of_nothing(depth)
     coarser = max(_ACROSS / max(across, 1e-3), 1.0) ** 2
     few = 1 / nodes if nodes < _FEW else 0.0
     shape, force = (coarser * least if coarser > 1 else 0.0 for least in (_SHAPE, _FORCE))
+    if hidden > _HIDDEN:
+        shape, force = max(shape, _HIDDEN_SHAPE * hidden), max(force, _HIDDEN_FORCE * hidden / depth)
     return max(table[0], shape), min(max(table[1], force, few), 1.0)
 
 

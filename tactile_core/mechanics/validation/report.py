@@ -27,6 +27,15 @@ The contact's edge falls between nodes: a force at a small depth scatters with t
 does not.
 What each tier is off by on many contacts, by depth, is in `tactile_core/data/mechanics_tiers.json`, made by
 `scripts/measure_tiers.py`; [benchmark](benchmark.md) tells how well its bounds hold.
+
+A contact is refused where the surface has let the indenter through between its nodes: where some carry force on its
+back, as round a ring's wire pressed deeper than its radius, and in the finite-strain tiers also where the surface lies
+deeper in it, halfway between nodes, than two fifths of the depth. The full tier first tries again with half the
+spacing. What is hidden less deep is stated as error. Friction holds nodes at edges; without it they slide off those
+that are sharper than their spacing. Of random contacts of nine indenters to half of the thickness
+(`random_contacts(1000, 20)`, full tier) there settled 948 of 954 on the DIGIT with a friction of 0.78, all of 562
+without and of 40 with friction on the BioTac, but 95 of 123 on the DIGIT without (balls 43 of 43, lying cylinders 13 of
+14, all others 39 of 66). No node of them lay more than 1 um in the indenter.
 """
 
 
