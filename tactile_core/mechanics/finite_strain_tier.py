@@ -17,6 +17,7 @@ from .neo_hookean import NeoHookean
 from .newton import EXACT, FiniteStrainContact, Tolerance, Touch
 from .quadratic_cavity import QuadraticCavity
 from .shared_bulk import SharedBulk
+from .sunk import check_follows, hidden
 
 Sensor = Literal["biotac", "digit"]
 
@@ -56,6 +57,15 @@ class Body:
             factor=self.graded.factor, tolerance=_FULL if self.tier == "full" else EXACT,
             first_share=_FIRST_SHARE[self.sensor],
         )  # fmt: skip
+
+    def hidden(self, touch: Touch, indenter: Indenter) -> float:
+        """How deep, m, the surface lies in the indenter between nodes; raises SunkError where it does not follow it."""
+        mesh = self.solid.mesh
+        surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
+        where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"
+        normals = touch.normals[touch.pressing > 0]
+        check_follows(where, surface, indenter, touch.pose, touch.depth, normals, closed=closed)
+        return hidden(where, surface, indenter, touch.pose, touch.depth, closed=closed)
 
     def displacement(self, touch: Touch) -> np.ndarray:
         """Displacement (n, 3) m of the sensor's surface lattice."""

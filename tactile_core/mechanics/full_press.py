@@ -66,8 +66,12 @@ class FullPress:
         self.last = self.problem.start()
 
     def at_depth(self, depth: float, pose: Pose | None = None) -> FullContact:
-        """The contact at a depth, m, of the press's pose or of a slid one. Raises TactileError where none is found."""
+        """The contact at a depth, m, of the press's pose or of a slid one.
+
+        Raises TactileError where none is found, or the indenter sinks in between the nodes, as ``at_force`` does.
+        """
         self.last = self.problem.move((pose or self.pose).moved(depth), self.last, _STEP)
+        self.body.hidden(self.last, self.indenter)
         return full_contact(self.body, self.last)
 
     def at_force(self, force: float, guess: float, pose: Pose | None = None) -> FullContact:
@@ -86,10 +90,10 @@ class FullPress:
             touch = self.last = self.problem.move(pose.moved(depth), begin, _STEP)
             found = full_contact(self.body, touch)
             miss = abs(found.axial_force / force - 1)
-            if miss <= FORCE_TOLERANCE:
-                return found
-            if before and miss <= _NEAR:
-                return on_line(before, found, force)
+            enough = miss <= FORCE_TOLERANCE
+            if enough or (before and miss <= _NEAR):
+                self.body.hidden(touch, self.indenter)
+                return found if enough else on_line(before, found, force)
             tried.append((depth, found.axial_force))
             before, begin = found, begin if found.axial_force > force else touch
             depth = _next_depth(tried, force)

@@ -20,7 +20,7 @@ from .force_search import ROUGH, TOLERANCE, touch_at_force, unreachable
 from .newton import FiniteStrainContact, NoEquilibriumError, Touch
 from .placement import FRICTION, Placement, on_gel, pose_at
 from .sharpness import sharpest
-from .sunk import SunkError, check_follows, hidden
+from .sunk import SunkError
 from .thickness import DEPTH_LIMIT, thickness_under
 
 Tier = Literal["fast", "full", "reference"]
@@ -264,7 +264,7 @@ class _FiniteStrain(_Path):
         return touch_at_force(move, self.last, pose.direction, force, self.limit, self.where, tolerance)
 
     def _solution(self, touch: Touch) -> Solution:
-        below = self._hidden(touch)
+        below = self.body.hidden(touch, self.indenter)
         gap = touch.outer.gaps(self.body.solid.mesh.nodes + touch.state.displacement)
         table, across = self.errors(touch.depth), self._nodes_across(touch)
         stated = stated_error.of_finite_strain(table, touch.depth, int((touch.pressing > 0).sum()), across, below)
@@ -285,12 +285,3 @@ class _FiniteStrain(_Path):
         radius = sharpest(self.indenter, touch.pose, rest + touch.state.displacement[mesh.surface])
         spacing *= 1 if self.tier == "full" else 2
         return float(2 * np.sqrt(min(radius, 1.0) * max(touch.depth, 0.0)) / spacing)
-
-    def _hidden(self, touch: Touch) -> float:
-        """How deep, m, the surface lies in the indenter between nodes; raises SunkError where it does not follow it."""
-        mesh = self.body.solid.mesh
-        surface = self.body.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
-        where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"
-        normals = touch.normals[touch.pressing > 0]
-        check_follows(where, surface, self.indenter, touch.pose, touch.depth, normals, closed=closed)
-        return hidden(where, surface, self.indenter, touch.pose, touch.depth, closed=closed)
