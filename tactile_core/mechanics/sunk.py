@@ -17,7 +17,7 @@ from .first_touch import in_front
 # What lattices hide under a body that they resolve: in 2,154 random contacts of nine indenters on both sensors, with
 # friction and without, up to 97 um, and where it was more than 50 um a third of the depth at most.
 _HIDDEN, _SHARE = 100e-6, 0.4  # m, and of the depth
-_ADVICE = "Use a blunter one, press less, or a finer tier"
+_ADVICE = "Use a blunter one, friction, a finer tier, or press less"
 _BLUNT = 1.5e-3  # m: a tip this round hides 21 um between nodes half a millimetre apart, and no node slides off it
 _ON_BODY = 1e-6  # m: a ring's foremost point, the middle of its hole, is no part of it
 # Cosine of normals and motion at nodes that carry force. Down to -0.27 where the reference tier agreed (rings 1.6 mm
