@@ -14,10 +14,11 @@ from .finite_strain import FiniteStrainSolid
 from .graded_mesh import Footprint, GradedMesh, graded_gel, graded_skin
 from .hex_mesh import inner_faces
 from .neo_hookean import NeoHookean
-from .newton import EXACT, FiniteStrainContact, Tolerance, Touch
+from .newton import FiniteStrainContact, Touch
 from .quadratic_cavity import QuadraticCavity
 from .shared_bulk import SharedBulk
 from .sunk import check_follows, hidden
+from .tolerance import EXACT, Tolerance
 
 Sensor = Literal["biotac", "digit"]
 

@@ -22,6 +22,7 @@ from .obstacle import Obstacle, PlacedIndenter
 from .pose_path import between
 from .quadratic_cavity import QuadraticCavity
 from .sunk import BEHIND
+from .tolerance import EXACT, Tolerance
 from .touching import Touching
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
@@ -68,22 +69,6 @@ class Touch:
     def force(self) -> np.ndarray:
         """Total force (3,) N of the indenter on the sensor."""
         return self.outer.forces.sum(axis=0)
-
-
-@dataclasses.dataclass(frozen=True)
-class Tolerance:
-    """When an iteration ends.
-
-    gap : m, of every touching node; balance : of the largest nodal force and of the fluid's volume, before the last
-    step; step : m, a last step so small that, Newton's method being quadratic, the balance after it is good
-    """
-
-    gap: float
-    balance: float
-    step: float = 0.0
-
-
-EXACT = Tolerance(1e-9, 1e-8, 1e-13)
 
 
 class NoEquilibriumError(TactileError):

@@ -18,7 +18,7 @@ _FEW = 20
 # ring of 2.8 nodes was 8.7 um and 1.6 % off, two balls of 3.9 nodes 5.0 um and 3.0 %, a wedge of 1.5
 # nodes 56 um and 4.5 %; 2 um covers them all.
 _ACROSS, _SHAPE, _FORCE = 8.0, 2e-6, 0.01
-# Where a surface lies more than so deep, m, in the indenter between nodes: of 43 such contacts of eight indenters, with
+# Where a surface lies more than so deep, m, in the indenter between nodes: of 44 such contacts of six indenters, with
 # friction and without, forces of 41 were off half the spacing's by less than that over the depth, and shapes of all by
 # less than 0.35 of it, rms. What stands above covered 16 of the forces.
 _HIDDEN, _HIDDEN_SHAPE, _HIDDEN_FORCE = 100e-6, 0.35, 1.0

@@ -14,18 +14,15 @@ from ..grid_surface import on_grid
 from ..indenters import Indenter, Pose
 from .first_touch import in_front
 
-# What lattices hide under a body that they resolve: in 2,154 random contacts of nine indenters on both sensors, with
-# friction and without, up to 97 um, and where it was more than 50 um a third of the depth at most.
+# What lattices hide under the tip of a body that they resolve: in 2,154 random contacts of nine indenters on both
+# sensors, with friction and without, up to 97 um, and where it was more than 50 um a third of the depth at most.
 _HIDDEN, _SHARE = 100e-6, 0.4  # m, and of the depth
-_ADVICE = "Use a blunter one, friction, a finer tier, or press less"
 _BLUNT = 1.5e-3  # m: a tip this round hides 21 um between nodes half a millimetre apart, and no node slides off it
 _ON_BODY = 1e-6  # m: a ring's foremost point, the middle of its hole, is no part of it
 # Cosine of normals and motion at nodes that carry force. Down to -0.27 where the reference tier agreed (rings 1.6 mm
 # deep), -0.8 and below where forces were a tenth of its, or pulled (270 random contacts, and paths of rings).
 BEHIND = -0.5
-
-
-_CLOSE = 0.3e-3  # m, from the body to the nodes between which it may have sunk in
+_CLOSE = 0.3e-3  # m, from the body to the nodes between which it may have sunk in (assumed)
 _BETWEEN = np.stack(np.meshgrid([-0.5, 0.0, 0.5], [-0.5, 0.0, 0.5], indexing="ij")).reshape(2, -1)
 
 
@@ -48,7 +45,7 @@ def hidden(where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: 
     below = max(-float(pose.distance(indenter, points)[0].min()), 0.0)
     if below > max(_HIDDEN, _SHARE * depth):
         found = f"the indenter has sunk {below * 1e3:.3f} mm in between the surface's nodes"
-        raise SunkError(where, found, "an indenter that they resolve", _ADVICE)
+        raise _let_through(where, found)
     return below
 
 
@@ -70,11 +67,16 @@ def check_follows(
     """
     if (normals @ pose.direction).min(initial=1.0) < BEHIND:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
-        raise SunkError(where, found, "an indenter that they resolve", _ADVICE)
+        raise _let_through(where, found)
     foremost = pose.support(indenter, pose.direction)[None]
     if np.abs(pose.curvature(indenter, foremost)).max() * _BLUNT < 1:
         return
     below = sunk(grid, indenter, pose, closed=closed)
     if below > max(_HIDDEN, _SHARE * depth):
         found = f"the indenter's tip has sunk {below * 1e3:.3f} mm in between the surface's nodes"
-        raise SunkError(where, found, "an indenter that they resolve", _ADVICE)
+        raise _let_through(where, found)
+
+
+def _let_through(where: str, found: str) -> SunkError:
+    advice = "Use a blunter one, friction, a finer tier, or press less"
+    return SunkError(where, found, "an indenter that they resolve", advice)

@@ -7,7 +7,8 @@ import numpy as np
 from ...indenters import Indenter, pose_on
 from ...sensors import Material
 from ..neo_hookean import NeoHookean
-from ..newton import FiniteStrainContact, Tolerance, Touch
+from ..newton import FiniteStrainContact, Touch
+from ..tolerance import Tolerance
 from .axisymmetric import AxisymmetricSolid, QuadMesh, disc, graded
 
 # Where the indenter has left, or cells are a thousand times as large as the contact, forces are rounding and their
