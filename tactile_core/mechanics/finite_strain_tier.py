@@ -12,7 +12,7 @@ from ..indenters import Indenter, Pose
 from .core import Core, facing_core
 from .finite_strain import FiniteStrainSolid
 from .graded_mesh import Footprint, GradedMesh, graded_gel, graded_skin
-from .hex_mesh import inner_faces
+from .hex_mesh import inner_faces, outer_faces
 from .neo_hookean import NeoHookean
 from .newton import FiniteStrainContact, Touch
 from .quadratic_cavity import QuadraticCavity
@@ -52,11 +52,13 @@ class Body:
         mesh = self.solid.mesh
         distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])
         near = mesh.surface[distance < _REACH]
+        faces = outer_faces(mesh)
         return FiniteStrainContact(
             self.solid, near[~mesh.clamped[near]], indenter, pose, self.cavity, friction=friction,
             core=Core() if len(self.core_nodes) else None, inner=self.core_nodes,
             factor=self.graded.factor, tolerance=_FULL if self.tier == "full" else EXACT,
             first_share=_FIRST_SHARE[self.sensor],
+            faces=None if friction else faces[np.isin(faces, near).all(axis=1)],  # friction holds nodes at edges
         )  # fmt: skip
 
     def hidden(self, touch: Touch, indenter: Indenter) -> float:

@@ -93,6 +93,13 @@ def inner_faces(mesh: HexMesh) -> np.ndarray:
     return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)
 
 
+def outer_faces(mesh: HexMesh) -> np.ndarray:
+    """Quadratic faces (n, 9) of the surface that is touched, node 3 b + a at (xi, eta) = (a, b) - 1."""
+    outer = np.zeros(len(mesh.nodes), bool)
+    outer[mesh.surface] = True
+    return mesh.cells[:, 18:][outer[mesh.cells[:, 18:]].all(axis=1)]
+
+
 @functools.cache
 def gel_mesh() -> HexMesh:
     """The DIGIT's gel on the lattice of its surface; about 20,000 nodes."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..indenters import Indenter, Pose
+from .between_nodes import LET_THROUGH, NO_PUSH, BetweenNodes, Push
 from .damped_factor import DampedFactor, held_back
 from .factor import NotPositiveDefiniteError, PatternFactor
 from .finite_strain import FiniteStrainSolid, State
@@ -26,10 +27,12 @@ from .tolerance import EXACT, Tolerance
 from .touching import Touching
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
-MAX_ITERATIONS = 40
+MAX_ITERATIONS, MAX_GUARDED = 40, 60  # the second where springs between nodes push: they slow the end
 MOST_FAILURES = 8  # of load steps on one path: bounds its time (assumed; the longest path that was found had 8)
 _EASY = 8  # iterations, of a load step after which the next may be longer again (assumed)
 SMALLEST_STEP = 1 / 16  # of a load step, or of the way where that is less; halved below that, the path has ended
+# Of a node's own stiffness, of springs between nodes: stiff ones find their contact only from that of softer ones.
+_SPRING, _STIFF = 10.0, 40.0
 _FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the normal forces
 
 
@@ -37,7 +40,8 @@ _FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the no
 class Touch:
     """A solved contact. depth : m, from the problem's own pose; state : of the solid; outer, inner : what touches.
 
-    pose : of the indenter; fluid : Pa, rise of the fluid's pressure
+    pose : of the indenter; between : (3,) N, its force on the surface between nodes, once that is ``guarded``
+    fluid : Pa, rise of the fluid's pressure
     iterations : Newton iterations of the last load step; steps : load steps, halved ones counted
     """
 
@@ -46,6 +50,8 @@ class Touch:
     state: State
     outer: Touching
     inner: Touching
+    between: np.ndarray
+    guarded: bool = False
     fluid: float = 0.0
     iterations: int = 0
     steps: int = 0
@@ -68,7 +74,12 @@ class Touch:
     @property
     def force(self) -> np.ndarray:
         """Total force (3,) N of the indenter on the sensor."""
-        return self.outer.forces.sum(axis=0)
+        return self.outer.forces.sum(axis=0) + self.between
+
+
+def guarded(touch: Touch) -> Touch:
+    """The same contact, for going on with a surface that keeps the indenter out between its nodes."""
+    return dataclasses.replace(touch, guarded=True)
 
 
 class NoEquilibriumError(TactileError):
@@ -77,6 +88,9 @@ class NoEquilibriumError(TactileError):
 
 class _NotConvergedError(Exception):
     """A load step is too large."""
+
+
+_FAILURES = _NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError  # of a load step
 
 
 class FiniteStrainContact:
@@ -90,6 +104,7 @@ class FiniteStrainContact:
     factor : where it is known already, the solver of the solid's pattern; tolerance : when iterations end
     first_share : a press from rest begins with the nodes that overlap by more than this share of the most: a guess,
         which the active set corrects
+    faces : (f, 9) quadratic faces of the surface that keep the indenter out between their nodes, see ``BetweenNodes``
     """
 
     def __init__(
@@ -107,6 +122,7 @@ class FiniteStrainContact:
         factor: PatternFactor | None = None,
         tolerance: Tolerance = EXACT,
         first_share: float = 0.0,
+        faces: np.ndarray | None = None,
     ) -> None:
         self.solid, self.touchable, self.indenter, self.pose, self.cavity = solid, touchable, indenter, pose, cavity
         self.fixed = (np.repeat(solid.mesh.clamped, 3) if fixed is None else fixed).reshape(-1, 3)
@@ -115,13 +131,14 @@ class FiniteStrainContact:
         self.friction, self.tolerance, self.first_share = friction, tolerance, first_share
         self.most_failures = MOST_FAILURES
         self._factor = DampedFactor(solid, factor or PatternFactor())
+        self._between = None if faces is None else BetweenNodes(faces)
         if cavity:
             rows, columns, _ = cavity.hessian(solid.mesh.nodes)
             self._cavity_places = solid.pattern.find(rows, columns)
 
     def start(self) -> Touch:
         """Nothing is deformed; a pre-inflated skin finds its shape in the first step."""
-        return Touch(0.0, self.pose, self.solid.rest(), Touching.none(), Touching.none())
+        return Touch(0.0, self.pose, self.solid.rest(), Touching.none(), Touching.none(), np.zeros(3))
 
     def press(self, depth: float, start: Touch | None = None, step: float = 0.1e-3) -> Touch:
         """The contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
@@ -167,17 +184,22 @@ class FiniteStrainContact:
             try:
                 touch = self._solve(along(goal), touch)
                 done, size = goal, min(step, 2 * size) if touch.iterations <= _EASY else size
-            except (_NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError):
+            except _FAILURES:
+                steps += 1
+                if self._between and not touch.guarded:
+                    touch = guarded(touch)
+                    continue
                 size, failures = min(size, goal - done) / 2, failures + 1
                 if size < min(step, 1.0) * SMALLEST_STEP or failures > self.most_failures:
                     raise _PathEndsError(done) from None
-            steps += 1
-        return dataclasses.replace(touch, steps=steps)
+            else:
+                steps += 1
+        return dataclasses.replace(self._stiffened(touch), steps=steps)
 
-    def _solve(self, pose: Pose, start: Touch) -> Touch:
-        """One load step, from a solved contact."""
+    def _solve(self, pose: Pose, start: Touch, spring: float = _SPRING) -> Touch:
+        """One load step, from a solved contact; spring : stiffness of those between nodes, over a node's own."""
         state, fluid = start.state.copy(), start.fluid
-        at = self._at(state)
+        at, push = self._at(state), NO_PUSH
         outer = start.outer.carried(
             PlacedIndenter(self.indenter, pose), self.touchable, at, start.pose, self.friction,
             _GRIP * self._factor.stiffness, self.first_share,
@@ -185,9 +207,11 @@ class FiniteStrainContact:
         if (outer.normals @ pose.direction).min(initial=1.0) < BEHIND:
             raise _NotConvergedError  # it would come to lie before the nodes that it should push
         inner = start.inner.carried(self.core, self.inner, at)
-        self._factor.damping, imbalance = 0.0, 1.0
-        for iteration in range(1, MAX_ITERATIONS + 1):
-            step, rise, imbalance, pressure_step, slide = self._newton(state, outer, inner, fluid, imbalance)
+        self._factor.damping, imbalance, sizes = 0.0, 1.0, [0.0, 0.0]
+        for iteration in range(1, (MAX_GUARDED if start.guarded else MAX_ITERATIONS) + 1):
+            if start.guarded and outer.obstacle:
+                push = self._between.push(outer.obstacle, at, spring * self._factor.stiffness)
+            step, rise, imbalance, pressure_step, slide = self._newton(state, outer, inner, fluid, push, imbalance)
             share = self._share(state, step) * (slide if iteration > 1 else 1.0)
             state.displacement += share * step
             state.pressure += share * pressure_step
@@ -197,7 +221,11 @@ class FiniteStrainContact:
             enough = max(self.tolerance.balance, SLIDING_TOLERANCE) if outer.slips else self.tolerance.balance
             small = np.abs(step).max() < self.tolerance.step and not outer.slips and not self._factor.damping
             if all(settled) and share == 1 and (small or max(outer.imbalance, imbalance) < enough):
-                return Touch(start.depth, pose, state, outer, inner, fluid, iteration)
+                found = Touch(start.depth, pose, state, outer, inner, push.total, start.guarded, fluid, iteration)
+                return self._solve(pose, guarded(found)) if self._lets_through(found) and not start.guarded else found
+            sizes.append(float(np.abs(step).max()))
+            if abs(sizes[-1] - sizes[-3]) < _SAME * sizes[-1]:
+                raise _NotConvergedError  # to and fro between two faces of the indenter
             self._factor.relax()
         raise _NotConvergedError
 
@@ -209,11 +237,28 @@ class FiniteStrainContact:
                 return share
         raise FloatingPointError("a cell would be turned inside out")
 
+    def _lets_through(self, touch: Touch) -> bool:
+        """Whether the indenter has come in between nodes."""
+        obstacle, at = touch.outer.obstacle, self._at(touch.state)
+        return bool(self._between and obstacle and self._between.deepest(obstacle, at) > LET_THROUGH)
+
+    def _stiffened(self, touch: Touch) -> Touch:
+        """A contact solved on with stiff springs between nodes; as it is where that fails, or where none are needed.
+
+        What stays hidden is seen afterwards (``sunk``).
+        """
+        if not touch.guarded or not self._lets_through(touch):
+            return touch
+        try:
+            return self._solve(touch.pose, touch, _STIFF)
+        except _FAILURES:
+            return touch
+
     def _at(self, state: State) -> np.ndarray:
         return self.solid.mesh.nodes + state.displacement
 
     def _newton(
-        self, state: State, outer: Touching, inner: Touching, fluid: float, unrest: float
+        self, state: State, outer: Touching, inner: Touching, fluid: float, push: Push, unrest: float
     ) -> tuple[np.ndarray, float, float, np.ndarray, float]:
         """Steps of displacement (n, 3), the fluid's pressure and the cells' (n_cells, 4); the imbalance before them,
         and the share of the step that friction allows."""
@@ -226,6 +271,7 @@ class FiniteStrainContact:
             swell, excess = self.cavity.gradient(at).reshape(-1, 3), self.cavity.volume(at) - self.volume
             residual = residual - fluid * swell
             np.add.at(blocks, self._cavity_places, -fluid * self.cavity.hessian(at)[2])
+        push.add_to(residual, blocks, pattern)
         held, step = self.fixed.copy(), np.zeros_like(residual)
         nodes = np.concatenate([outer.nodes, inner.nodes])
         frames = np.concatenate([touching.begin(at) for touching in (outer, inner)])
@@ -276,6 +322,7 @@ class FiniteStrainContact:
 
 _GRIP = 30.0  # of a node's own stiffness: springs of friction that yield some micrometres at most
 _SHARES = 1.0, 0.5, 0.25, 0.125  # of a step
+_SAME = 1e-6  # relative, of two steps that swing to and fro
 _MOST_ALONG = 0.6  # of the secant's stiffness, for springs that slip while forces are far from balance (assumed)
 _KEPT_VOLUME = 0.3  # least share of its volume that a Gauss point keeps in one step
 
