@@ -49,9 +49,15 @@ class Push:
         """(3,) N."""
         return self.force.sum(axis=0)
 
+    def loads(self, n: int) -> np.ndarray:
+        """(n, 3) N, on a mesh's n nodes."""
+        loads = np.zeros((n, 3))
+        np.add.at(loads, self.nodes, self.weights[:, :, None] * self.force[:, None])
+        return loads
+
     def add_to(self, residual: np.ndarray, blocks: np.ndarray, pattern: BlockPattern) -> None:
         """Load the nodes: residual (n, 3) N, and blocks (n_blocks, 3, 3) N/m on a solid's pattern, in place."""
-        np.subtract.at(residual, self.nodes, self.weights[:, :, None] * self.force[:, None])
+        residual -= self.loads(len(residual))
         pairs = (self.weights[:, :, None] * self.weights[:, None])[..., None, None] * self.stiffness[:, None, None]
         rows, columns = np.repeat(self.nodes, 9, axis=1), np.tile(self.nodes, 9)
         np.add.at(blocks, pattern.find(rows.ravel(), columns.ravel()), pairs.reshape(-1, 3, 3))

@@ -40,7 +40,7 @@ _FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the no
 class Touch:
     """A solved contact. depth : m, from the problem's own pose; state : of the solid; outer, inner : what touches.
 
-    pose : of the indenter; between : (3,) N, its force on the surface between nodes, once that is ``guarded``
+    pose : of the indenter; push : on the surface between nodes, once that is ``guarded``
     fluid : Pa, rise of the fluid's pressure
     iterations : Newton iterations of the last load step; steps : load steps, halved ones counted
     """
@@ -50,7 +50,7 @@ class Touch:
     state: State
     outer: Touching
     inner: Touching
-    between: np.ndarray
+    push: Push
     guarded: bool = False
     fluid: float = 0.0
     iterations: int = 0
@@ -74,7 +74,7 @@ class Touch:
     @property
     def force(self) -> np.ndarray:
         """Total force (3,) N of the indenter on the sensor."""
-        return self.outer.forces.sum(axis=0) + self.between
+        return self.outer.forces.sum(axis=0) + self.push.total
 
 
 def guarded(touch: Touch) -> Touch:
@@ -138,7 +138,7 @@ class FiniteStrainContact:
 
     def start(self) -> Touch:
         """Nothing is deformed; a pre-inflated skin finds its shape in the first step."""
-        return Touch(0.0, self.pose, self.solid.rest(), Touching.none(), Touching.none(), np.zeros(3))
+        return Touch(0.0, self.pose, self.solid.rest(), Touching.none(), Touching.none(), NO_PUSH)
 
     def press(self, depth: float, start: Touch | None = None, step: float = 0.1e-3) -> Touch:
         """The contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
@@ -199,7 +199,7 @@ class FiniteStrainContact:
     def _solve(self, pose: Pose, start: Touch, spring: float = _SPRING) -> Touch:
         """One load step, from a solved contact; spring : stiffness of those between nodes, over a node's own."""
         state, fluid = start.state.copy(), start.fluid
-        at, push = self._at(state), NO_PUSH
+        at = self._at(state)
         outer = start.outer.carried(
             PlacedIndenter(self.indenter, pose), self.touchable, at, start.pose, self.friction,
             _GRIP * self._factor.stiffness, self.first_share,
@@ -209,8 +209,7 @@ class FiniteStrainContact:
         inner = start.inner.carried(self.core, self.inner, at)
         self._factor.damping, imbalance, sizes = 0.0, 1.0, [0.0, 0.0]
         for iteration in range(1, (MAX_GUARDED if start.guarded else MAX_ITERATIONS) + 1):
-            if start.guarded and outer.obstacle:
-                push = self._between.push(outer.obstacle, at, spring * self._factor.stiffness)
+            push = self._push(start.guarded, outer, at, spring)
             step, rise, imbalance, pressure_step, slide = self._newton(state, outer, inner, fluid, push, imbalance)
             share = self._share(state, step) * (slide if iteration > 1 else 1.0)
             state.displacement += share * step
@@ -221,7 +220,8 @@ class FiniteStrainContact:
             enough = max(self.tolerance.balance, SLIDING_TOLERANCE) if outer.slips else self.tolerance.balance
             small = np.abs(step).max() < self.tolerance.step and not outer.slips and not self._factor.damping
             if all(settled) and share == 1 and (small or max(outer.imbalance, imbalance) < enough):
-                found = Touch(start.depth, pose, state, outer, inner, push.total, start.guarded, fluid, iteration)
+                push = self._push(start.guarded, outer, at, spring)
+                found = Touch(start.depth, pose, state, outer, inner, push, start.guarded, fluid, iteration)
                 return self._solve(pose, guarded(found)) if self._lets_through(found) and not start.guarded else found
             sizes.append(float(np.abs(step).max()))
             if abs(sizes[-1] - sizes[-3]) < _SAME * sizes[-1]:
@@ -236,6 +236,12 @@ class FiniteStrainContact:
             if (self.solid.deformation(state.displacement + share * step)[1] > _KEPT_VOLUME * before).all():
                 return share
         raise FloatingPointError("a cell would be turned inside out")
+
+    def _push(self, guarded: bool, outer: Touching, at: np.ndarray, spring: float) -> Push:
+        """Of the indenter on the surface between nodes."""
+        if not (guarded and outer.obstacle):
+            return NO_PUSH
+        return self._between.push(outer.obstacle, at, spring * self._factor.stiffness)
 
     def _lets_through(self, touch: Touch) -> bool:
         """Whether the indenter has come in between nodes."""

@@ -63,6 +63,7 @@ class Solution:
     penetration : m, deepest place of a node in the indenter or the core; slipping : share of the touching nodes
     core_nodes : inner-skin nodes that press on the core; load_steps : how many it took to get here from the last
     volume : the solid and its state, of the full and the reference tier
+    between : (m, 3) N, what the indenter's force on the surface between nodes is on the solid's nodes, if there is any
     """
 
     tier: Tier
@@ -80,6 +81,7 @@ class Solution:
     core_nodes: int
     load_steps: int = 1
     volume: tuple[FiniteStrainSolid, State] | None = None
+    between: np.ndarray | None = None
 
 
 def solve(
@@ -273,7 +275,7 @@ class _FiniteStrain(_Path):
             self.tier, True, touch.iterations, self.body.displacement(touch), self.body.contact_patch(touch),
             touch.force, touch.depth, touch.fluid, *stated, float(-gap.min(initial=0.0)),
             float(slips.mean()) if len(slips) and self.friction else 0.0, len(touch.inner.nodes), touch.steps,
-            (self.body.solid, touch.state),
+            (self.body.solid, touch.state), touch.push.loads(len(touch.state.displacement)) if touch.guarded else None,
         )  # fmt: skip
 
     def _nodes_across(self, touch: Touch) -> float:
