@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import sys
 
 import numpy as np
 
@@ -175,7 +176,7 @@ def _check_table(table: object, names: tuple[str, ...], where: str) -> None:
 
 def _grows(values: object) -> bool:
     numbers = isinstance(values, list) and len(values) > 0 and all(type(v) in (int, float) for v in values)
-    return numbers and bool(np.isfinite(values).all()) and values == sorted(values) and values[0] >= 0
+    return numbers and all(0 <= v <= sys.float_info.max for v in values) and values == sorted(values)
 
 
 def load_translator(folder: str | os.PathLike | None = None) -> Translator:

@@ -47,6 +47,7 @@ def test_shipped_file_is_written_as_this_version_writes_it(tmp_path: Path) -> No
         ("height_px = 320", "height_px = true", "height_px"),
         ("down_x = 1", "down_x = 0", "down_x"),
         ("position_mm = [", "position_mm = [nan, ", "position_mm"),
+        ("position_mm = [", f"position_mm = [{10**400}, ", "position_mm"),
         ("centre = [[", "centre = [[1], [", "gain, centre"),
         ("centre = [[", "centre = [[-", "gain, centre"),
         ("dome_scale = ", "dome_scale = 100", "dome_scale"),

@@ -166,6 +166,8 @@ def test_a_changed_card_is_refused(tmp_path):
             "distance.signed.residual",
         ),
         ({"distance": distance | {"signed": signed | {"residual": [float("nan")] * 5}}}, "distance.signed.residual"),
+        ({"silence": card["silence"] | {"levels": [10**400]}}, "silence.levels"),
+        ({"distance": distance | {"signed": signed | {"residual": [10**400] * 5}}}, "distance.signed.residual"),
         ({"nets": card["nets"] | {"M2MPN": card["nets"]["M2MPN"] | {"sizes": {"blocks": 10**9}}}}, "M2MPN"),
     ]:
         with pytest.raises(TactileError, match=said):
