@@ -16,9 +16,11 @@ from .block_pattern import BlockPattern
 from .elasticity import quadratic
 from .obstacle import Obstacle
 
-LET_THROUGH = 50e-6  # m: at the edge of a contact with a 14 mm ball, quadratic faces hide up to 43 um
+# m: at the edges of nine contacts with balls of 7 and 14 mm quadratic faces hid up to 43 um, and 129 um once.
+LET_THROUGH = 50e-6
 _SLACK = 20e-6  # m, in which they do not push: with 5 um a 14 mm ball 0.1 mm deep was pushed 8 % too hard
-_NEAR = 100e-6  # m: of points this deep at most the normals' turn is accounted for; deeper ones are on their way out
+# m: of points this deep at most the normals' turn is accounted for; deeper ones are on their way out (assumed).
+_NEAR = 100e-6
 
 
 def _weights() -> np.ndarray:

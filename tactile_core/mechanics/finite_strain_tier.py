@@ -14,12 +14,13 @@ from .finite_strain import FiniteStrainSolid
 from .graded_mesh import Footprint, GradedMesh, graded_gel, graded_skin
 from .hex_mesh import inner_faces, outer_faces
 from .neo_hookean import NeoHookean
-from .newton import FiniteStrainContact, Touch
+from .newton import FiniteStrainContact
 from .quadratic_cavity import QuadraticCavity
 from .shared_bulk import SharedBulk
 from .sharpness import sharpest
 from .sunk import check_follows, hidden
 from .tolerance import EXACT, Tolerance
+from .touch import Touch
 
 Sensor = Literal["biotac", "digit"]
 
@@ -34,8 +35,8 @@ _REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth 
 _ACROSS = 11
 _SPACING = 0.3, 1.5  # lattice lines, least and most between nodes there
 _MARGIN = 0.6  # of its size that the fine part reaches beyond the touching nodes
-# m: round a wedge of 0.1 mm the gel found no shape between its nodes, and took a minute to say so; edges of 0.4 mm were
-# held on meshes from 0.1 to 0.5 mm.
+# m: round a wedge of 0.1 mm the gel found no shape between its nodes, and took two minutes to say so; edges of 0.4 mm
+# are held.
 _BENDS = 0.2e-3
 _LEAST_HALF = 1.2  # lattice lines, half of the smallest fine part
 

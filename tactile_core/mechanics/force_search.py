@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import TactileError
-from .newton import Touch
 from .thickness import DEPTH_LIMIT
+from .touch import Touch
 
 TOLERANCE = 1e-4  # relative, of the force
 ROUGH = 0.1  # relative, of the force and the depth that a mesh is made for

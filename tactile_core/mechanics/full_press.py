@@ -12,9 +12,9 @@ from ..errors import TactileError
 from ..indenters import Indenter, Pose
 from .finite_strain_tier import Body, Sensor, graded_body
 from .first_touch import fall
-from .newton import Touch
 from .pose_path import same_line
 from .tolerance import Tolerance
+from .touch import Touch
 from .watched import electrode_feet
 
 Tier = Literal["full", "reference"]

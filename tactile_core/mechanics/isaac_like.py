@@ -19,8 +19,9 @@ from ..indenters import Indenter, Pose
 from ..sensors import Material
 from ..tet_file import TetMesh
 from .corotated_tets import CorotatedTets
-from .newton import FiniteStrainContact, Touch
+from .newton import FiniteStrainContact
 from .pose_path import between
+from .touch import Touch
 
 SKIN = Material(youngs=1.552e6, poisson=0.316)  # fitted by the Isaac Gym authors, on such a mesh (sensors.md)
 MAX_DEPTH = 2.5e-3  # m: the fluid's greatest depth under the pad (sensors.md), for the core's contact is left out

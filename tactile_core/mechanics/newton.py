@@ -24,62 +24,17 @@ from .pose_path import between
 from .quadratic_cavity import QuadraticCavity
 from .sunk import BEHIND
 from .tolerance import EXACT, Tolerance
+from .touch import Touch, guarded
 from .touching import Touching
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
-MAX_ITERATIONS, MAX_GUARDED = 40, 60  # the second where springs between nodes push: they slow the end
+MAX_ITERATIONS, MAX_GUARDED = 40, 60  # the second where springs between nodes push: they slow the end (assumed)
 MOST_FAILURES = 8  # of load steps on one path: bounds its time (assumed; the longest path that was found had 8)
 _EASY = 8  # iterations, of a load step after which the next may be longer again (assumed)
 SMALLEST_STEP = 1 / 16  # of a load step, or of the way where that is less; halved below that, the path has ended
 # Of a node's own stiffness, of springs between nodes: stiff ones find their contact only from that of softer ones.
 _SPRING, _STIFF = 10.0, 40.0
 _FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the normal forces
-
-
-@dataclasses.dataclass
-class Touch:
-    """A solved contact. depth : m, from the problem's own pose; state : of the solid; outer, inner : what touches.
-
-    pose : of the indenter; push : on the surface between nodes, once that is ``guarded``
-    fluid : Pa, rise of the fluid's pressure
-    iterations : Newton iterations of the last load step; steps : load steps, halved ones counted
-    """
-
-    depth: float
-    pose: Pose
-    state: State
-    outer: Touching
-    inner: Touching
-    push: Push
-    guarded: bool = False
-    fluid: float = 0.0
-    iterations: int = 0
-    steps: int = 0
-
-    @property
-    def nodes(self) -> np.ndarray:
-        """(k,) mesh nodes that the indenter touches."""
-        return self.outer.nodes
-
-    @property
-    def pressing(self) -> np.ndarray:
-        """(k,) N, normal forces of the indenter on ``nodes``."""
-        return self.outer.pressing
-
-    @property
-    def normals(self) -> np.ndarray:
-        """(k, 3), of the indenter at ``nodes``."""
-        return self.outer.normals
-
-    @property
-    def force(self) -> np.ndarray:
-        """Total force (3,) N of the indenter on the sensor."""
-        return self.outer.forces.sum(axis=0) + self.push.total
-
-
-def guarded(touch: Touch) -> Touch:
-    """The same contact, for going on with a surface that keeps the indenter out between its nodes."""
-    return dataclasses.replace(touch, guarded=True)
 
 
 class NoEquilibriumError(TactileError):
@@ -209,7 +164,7 @@ class FiniteStrainContact:
         inner = start.inner.carried(self.core, self.inner, at)
         self._factor.damping, imbalance, sizes = 0.0, 1.0, [0.0, 0.0]
         for iteration in range(1, (MAX_GUARDED if start.guarded else MAX_ITERATIONS) + 1):
-            push = self._push(start.guarded, outer, at, spring)
+            push = self._push(start, outer, at, spring)
             step, rise, imbalance, pressure_step, slide = self._newton(state, outer, inner, fluid, push, imbalance)
             share = self._share(state, step) * (slide if iteration > 1 else 1.0)
             state.displacement += share * step
@@ -220,7 +175,7 @@ class FiniteStrainContact:
             enough = max(self.tolerance.balance, SLIDING_TOLERANCE) if outer.slips else self.tolerance.balance
             small = np.abs(step).max() < self.tolerance.step and not outer.slips and not self._factor.damping
             if all(settled) and share == 1 and (small or max(outer.imbalance, imbalance) < enough):
-                push = self._push(start.guarded, outer, at, spring)
+                push = self._push(start, outer, at, spring)
                 found = Touch(start.depth, pose, state, outer, inner, push, start.guarded, fluid, iteration)
                 return self._solve(pose, guarded(found)) if self._lets_through(found) and not start.guarded else found
             sizes.append(float(np.abs(step).max()))
@@ -237,9 +192,9 @@ class FiniteStrainContact:
                 return share
         raise FloatingPointError("a cell would be turned inside out")
 
-    def _push(self, guarded: bool, outer: Touching, at: np.ndarray, spring: float) -> Push:
-        """Of the indenter on the surface between nodes."""
-        if not (guarded and outer.obstacle):
+    def _push(self, start: Touch, outer: Touching, at: np.ndarray, spring: float) -> Push:
+        """Of the indenter on the surface between nodes, where that is guarded."""
+        if not (start.guarded and outer.obstacle):
             return NO_PUSH
         return self._between.push(outer.obstacle, at, spring * self._factor.stiffness)
 
@@ -328,7 +283,7 @@ class FiniteStrainContact:
 
 _GRIP = 30.0  # of a node's own stiffness: springs of friction that yield some micrometres at most
 _SHARES = 1.0, 0.5, 0.25, 0.125  # of a step
-_SAME = 1e-6  # relative, of two steps that swing to and fro
+_SAME = 1e-6  # relative, of two steps that swing to and fro (assumed)
 _MOST_ALONG = 0.6  # of the secant's stiffness, for springs that slip while forces are far from balance (assumed)
 _KEPT_VOLUME = 0.3  # least share of its volume that a Gauss point keeps in one step
 

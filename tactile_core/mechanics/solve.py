@@ -17,11 +17,12 @@ from .expected_error import expected_error
 from .finite_strain import FiniteStrainSolid, State
 from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Body, Sensor, graded_body
 from .force_search import ROUGH, TOLERANCE, touch_at_force, unreachable
-from .newton import FiniteStrainContact, NoEquilibriumError, Touch
+from .newton import FiniteStrainContact, NoEquilibriumError
 from .placement import FRICTION, Placement, on_gel, pose_at
 from .sharpness import sharpest
 from .sunk import SunkError
 from .thickness import DEPTH_LIMIT, thickness_under
+from .touch import Touch
 
 Tier = Literal["fast", "full", "reference"]
 TIERS: tuple[Tier, ...] = ("fast", "full", "reference")

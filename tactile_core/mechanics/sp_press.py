@@ -10,9 +10,10 @@ from .. import biotac_sp
 from ..indenters import Indenter, Pose
 from .finite_strain import FiniteStrainSolid
 from .mooney_rivlin import MooneyRivlin
-from .newton import FiniteStrainContact, Touch
+from .newton import FiniteStrainContact
 from .quadratic_cavity import QuadraticCavity
 from .sp_mesh import half_ellipsoid_mesh
+from .touch import Touch
 
 INTERVALS = (24, 16, 8)  # nodes every 0.6 mm across the pad, 0.9 mm along it
 MIRROR_TOLERANCE = 1e-9  # of a plate's normal across the finger, below which half of the skin is enough

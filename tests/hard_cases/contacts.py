@@ -60,8 +60,8 @@ def broken_full(found: Solution, sensor: str, indenter: Indenter, pose: Pose, fr
     smallest = solid.deformation(state.displacement)[1].min()
     inside_out = () if smallest > 0 else (f"a cell is turned inside out, det F {smallest:.3g}",)
     forces = solid.linearise(state).internal_force(condensed=False).reshape(-1, 3)
-    between = np.zeros(3) if found.between is None else found.between.sum(axis=0)
-    forces -= 0.0 if found.between is None else found.between
+    between = np.zeros_like(forces) if found.between is None else found.between
+    forces -= between
     free = solid.mesh.surface[~solid.mesh.clamped[solid.mesh.surface]]
     largest = max(np.linalg.norm(forces[free], axis=1).max(), 1e-12)
     gap, normal = pose.distance(indenter, solid.mesh.nodes[free] + state.displacement[free])
@@ -71,7 +71,7 @@ def broken_full(found: Solution, sensor: str, indenter: Indenter, pose: Pose, fr
         *_of_numbers(found.displacement, found.force),
         *_of_gaps(gap, bears & (found.depth > 0)),
         *_of_forces(forces[free][bears], normal[bears], friction),
-        *_of_sum(forces[free], found.force - between),
+        *_of_sum(forces[free], found.force - between.sum(axis=0)),
     )
 
 

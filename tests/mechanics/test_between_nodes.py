@@ -1,4 +1,4 @@
-"""Springs between nodes: consistent with their own energy, absent where nodes do, and a cure where nodes slide off."""
+"""Springs between nodes: consistent with their energy, absent where nodes are enough, a cure where they slide off."""
 
 import numpy as np
 import pytest
@@ -58,7 +58,8 @@ def test_force_and_stiffness_are_derivatives_of_the_energy():
         springs.push(ball(), shifted, STIFFNESS).add_to(out, np.zeros((81, 3, 3)), pattern)
         return out.ravel()
 
-    tiny, rows = 1e-9, []  # m: far from where points come in or go
+    # m: no point comes in or goes; what differences of this size leave is 1e-4 of the stiffness, by rounding
+    tiny, rows = 1e-9, []
     for k in range(27):
         step = np.zeros(27)
         step[k] = tiny
@@ -77,8 +78,9 @@ def test_a_smooth_indenter_is_left_to_the_nodes(sensor):
 
 
 def test_a_ring_deeper_than_its_wire_is_held():
-    """3.48 N : the reference tier's in twelve steps without springs; nodes alone went through or found nothing."""
+    """Within what it states of 3.48 N, the reference tier's without springs. Nodes alone let it through."""
     ring, place = Ring(2.5e-3, 1e-3), Placement(-7.847e-3, 3.476e-3, 0.4526, 1.7439)
     found = solve("digit", ring, place, depth=1.62e-3, tier="full", friction=0.0)
     along = float(found.force @ pose_at("digit", ring, place).direction)
-    assert along == pytest.approx(3.48, rel=0.1) and found.penetration < 1e-6
+    assert along == pytest.approx(3.48, rel=found.force_error) and found.penetration < 1e-6
+    assert found.force_error < 0.05

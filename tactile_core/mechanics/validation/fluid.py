@@ -12,8 +12,9 @@ from ...rows import Row, row
 from ...sensors import Material
 from ..finite_strain import FiniteStrainSolid
 from ..hex_mesh import HexMesh
-from ..newton import FiniteStrainContact, Touch
+from ..newton import FiniteStrainContact
 from ..quadratic_cavity import QuadraticCavity
+from ..touch import Touch
 from .block import block
 
 TARGET = 1e-12  # issue MECHANICS

@@ -13,7 +13,8 @@ from ...rows import Row, order, row
 from ...sensors import Material
 from ..bonded_layer import GOLDEN_BALL, GOLDEN_FORCE, GOLDEN_RADIUS, GOLDEN_THICKNESS, quarter_disc
 from ..finite_strain import FiniteStrainSolid
-from ..newton import FiniteStrainContact, Touch
+from ..newton import FiniteStrainContact
+from ..touch import Touch
 from .pressed_disc import disc_mesh, pressed
 
 TARGET = 0.5  # percent, issue MECHANICS

@@ -10,7 +10,8 @@ import numpy as np
 from ...indenters import Sphere
 from ...rows import Row, row
 from ...sensors import Material
-from ..newton import FiniteStrainContact, Touch
+from ..newton import FiniteStrainContact
+from ..touch import Touch
 from .pressed_disc import contact_radius, disc_mesh, pressed
 
 TARGET = 1.0  # percent, issue MECHANICS

@@ -7,8 +7,9 @@ import numpy as np
 from ...indenters import Indenter, pose_on
 from ...sensors import Material
 from ..neo_hookean import NeoHookean
-from ..newton import FiniteStrainContact, Touch
+from ..newton import FiniteStrainContact
 from ..tolerance import Tolerance
+from ..touch import Touch
 from .axisymmetric import AxisymmetricSolid, QuadMesh, disc, graded
 
 # Where the indenter has left, or cells are a thousand times as large as the contact, forces are rounding and their

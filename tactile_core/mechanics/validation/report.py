@@ -37,7 +37,8 @@ the full tier tries again with half the spacing. Of random contacts of nine inde
 (`random_contacts(1000, 20)`, full tier) there settled 948 of 954 on the DIGIT with a friction of 0.78, all of 562
 without and of 40 with friction on the BioTac (these three before there were springs, which friction does not use), and
 121 of 123 on the DIGIT without, where nodes alone settled 95: all but a ring and a bumpy cube, in 11 s on average, 4 in
-the median, beside other programs. No node of them lay more than 1 um in the indenter.
+the median, beside other programs. No node of the first three, or of the 95, lay more than 1 um in the indenter; of the
+121 that was not counted.
 """
 
 

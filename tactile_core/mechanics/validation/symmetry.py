@@ -11,7 +11,8 @@ from ...indenters import Pose, Sphere, pose_on
 from ...rows import Row, row
 from ...sensors import Material
 from ..finite_strain import FiniteStrainSolid
-from ..newton import FiniteStrainContact, Touch
+from ..newton import FiniteStrainContact
+from ..touch import Touch
 from .block import block
 
 TARGET = 1e-8  # of the depth: Newton's method stops at a balance of 1e-8 and is quadratic, so that this is generous
