@@ -15,7 +15,13 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
     axes : contiguous; sums over many places at a time are faster axis by axis
     closed : whether the last column joins the first; places beyond other ends lie on them
     """
-    rows, columns = axes.shape[1:]
+    nodes, weights = stencil(axes.shape[1:], places, closed=closed)
+    return np.einsum("ijp,cijp->pc", weights, axes.reshape(3, -1).take(nodes, axis=1))
+
+
+def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The nodes (4, 4, n), row * columns + column, of a grid whose weighted sum each place (2, n) is, and weights."""
+    rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)
     if closed:
@@ -28,5 +34,4 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
     at_row = np.minimum(np.maximum(cell[0] + _STEPS, 0), rows - 1)
     at_column = cell[1] + _STEPS
     at_column = at_column % columns if closed else np.minimum(np.maximum(at_column, 0), columns - 1)
-    nodes = axes.reshape(3, -1).take(at_row[:, None] * columns + at_column, axis=1)
-    return np.einsum("ijp,cijp->pc", along[:, None] * across, nodes)
+    return at_row[:, None] * columns + at_column, along[:, None] * across

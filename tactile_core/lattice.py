@@ -33,6 +33,11 @@ class Lattice:
         self.faces.flags.writeable = False
 
     @property
+    def closed(self) -> bool:
+        """Whether the last column joins the first: a surface with poles closes round its axis."""
+        return len(self.rest) > self.shape[0] * self.shape[1]
+
+    @property
     def sha256(self) -> str:
         """Name of this surface in files: hash of the rest nodes rounded to 1 nm, so that two builds agree."""
         rounded = np.round(self.rest * 1e9).astype("<i8")

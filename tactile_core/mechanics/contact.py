@@ -23,6 +23,7 @@ from .near_block import NearBlock
 from .near_rows import NearRows
 from .pose_path import between, same_place
 from .solved_contact import Contact
+from .sunk import check_follows
 
 PENETRATION = 1e-6  # m, what MECHANICS allows at any node
 _REACH = 0.8e-3  # m, nodes this far outside the indenter at the end of a solve may come to touch it
@@ -32,7 +33,7 @@ _TAKE_IN = 20e-6  # m: where some nodes go through the indenter, those this clos
 _CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps vary more
 _CLOSED = 0.3e-6  # m: gaps closed to this need no further look
 _MOST_ROUNDS = 12  # of taking in nodes
-_DETOURS = (4, 9, 20)  # steps from the start to the goal, where one does not settle: other steps pass other edges
+DETOURS = (4, 9, 20)  # steps from the start to the goal, where one does not settle: other steps pass other edges
 _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest overlap are first taken to touch
 
 
@@ -55,10 +56,14 @@ class ContactProblem:
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, friction: float = 0.0
     ) -> None:
         self.compliance, self.indenter, self.pose, self.friction = compliance, indenter, pose, friction
-        self._rest = compliance.surface.rest[compliance.touchable]
+        self._rest = self._resting()
         self._block: NearBlock | None = None
         self._rows = NearRows(compliance, np.empty(0, int))
         self._look_near(pose.moved(reach))
+
+    def _resting(self) -> np.ndarray:
+        """Where what may touch rests: the touchable nodes (m, 3) m."""
+        return self.compliance.surface.rest[self.compliance.touchable]
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
         """The contact at a given depth, m, going on from ``start`` where there is one."""
@@ -76,6 +81,13 @@ class ContactProblem:
         self._look_near(pose, start)
         return self._walk(pose, axial_force, start)
 
+    def check_follows(self, contact: Contact) -> None:
+        """Raise SunkError where the indenter has sunk in between the surface's nodes."""
+        surface, deformed = self.compliance.surface, contact.deformed
+        _, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable[contact.nodes]])
+        where, grid = f"fast tier, {self.compliance.name}", surface.grid(deformed)
+        check_follows(where, grid, self.indenter, contact.pose, contact.depth, normals, closed=surface.closed)
+
     def _look_near(self, pose: Pose, start: Contact | None = None) -> None:
         """Follow the nodes that the indenter may reach at a pose, and those that ``start`` touched."""
         wanted = self._within(pose, _REACH)
@@ -84,7 +96,10 @@ class ContactProblem:
             _among(wanted, self.near).all() and _among(touched, self.near).all()
         ):
             near = wanted if start is None else np.union1d(self._within(pose, _REACH + _SPARE), touched)
-            self._rows = NearRows(self.compliance, near)
+            self._rows = self._rows_of(near)
+
+    def _rows_of(self, near: np.ndarray) -> NearRows:
+        return NearRows(self.compliance, near)
 
     def _within(self, pose: Pose, reach: float) -> np.ndarray:
         """Sorted touchable indices (k,) of the resting nodes that lie less than ``reach`` m outside the indenter."""
@@ -97,10 +112,15 @@ class ContactProblem:
         """(n,) sorted touchable indices of the nodes that are followed."""
         return self._rows.near
 
+    @property
+    def nodes_near(self) -> np.ndarray:
+        """The nodes among them."""
+        return self.near
+
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
         """Solve in one step, or where that does not settle by a detour."""
         contact = self._solve(pose, axial_force, start)
-        for steps in _DETOURS:
+        for steps in DETOURS:
             if contact.converged:
                 break
             contact = self._steps(pose, axial_force, start, steps)
@@ -120,7 +140,7 @@ class ContactProblem:
     def _solve(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
         before = start or self._nothing(self.pose)
         moved = self._moved(before)
-        gap, _ = pose.distance(self.indenter, self._rest[self.near] + moved)
+        gap, _ = self._distance(pose, self.near, moved)
         touched = np.zeros(len(gap), bool)
         touched[np.searchsorted(self.near, before.nodes)] = True
         touched &= gap < _REACH
@@ -136,6 +156,10 @@ class ContactProblem:
             self.near[take], landed, np.zeros_like(landed), active, before.core_nodes, np.zeros(len(active), int)
         )
         return self._rounds(pose, axial_force, before, moved, candidates)
+
+    def _distance(self, pose: Pose, nodes: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps (k,) m and normals (k, 3) of the indenter at nodes (k,) displaced by (k, 3) m."""
+        return pose.distance(self.indenter, self._rest[nodes] + moved)
 
     def _moved(self, contact: Contact) -> np.ndarray:
         """Displacement (n, 3) m of the near nodes in a contact."""
@@ -170,7 +194,7 @@ class ContactProblem:
         begin = Try(candidates.displacement, np.zeros_like(rest), np.zeros(block.c), shift, active)
         core_gap = self.compliance.watch_gap[candidates.inner].astype(float)
         if self.friction == 0:
-            solver = Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
+            solver = self._frictionless(block, rest, core_gap, pose, candidates)
         else:
             begin.force, begin.slipping = _borne(before, candidates.nodes)
             spots = self._spots(before, moved, pose, candidates.nodes)
@@ -179,6 +203,11 @@ class ContactProblem:
             return solver.solve(begin, axial_force)
         except UnsolvedError:
             return None
+
+    def _frictionless(
+        self, block: NearBlock, rest: np.ndarray, core_gap: np.ndarray, pose: Pose, candidates: Candidates
+    ) -> Frictionless:
+        return Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
 
     def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
         """Where nodes (k,) stick on the indenter, (k, 3) m in its frame: where they were, or where they meet it."""
@@ -212,20 +241,30 @@ class ContactProblem:
         )  # fmt: skip
 
     def _result(self, pose: Pose, state: Try, candidates: Candidates, iterations: int) -> tuple[Contact, _Around]:
-        nodes, force, slipping = _single(candidates.nodes, state)
+        touching, pressed, slips = _single(candidates.nodes, state)
+        nodes, force, slipping = self._on_nodes(touching, pressed, slips)
         presses = state.core_force > 0
         inner, inner_force = candidates.inner[presses], state.core_force[presses]
-        moved = self._rows.moved(nodes, force, inner, inner_force)
-        gap, normal = pose.distance(self.indenter, self._rest[self.near] + moved)
+        moved = self._place(touching, pressed, self._rows.moved(nodes, force, inner, inner_force))
+        gap, normal = self._distance(pose, self.near, moved)
+        sideways = _sideways(pressed, normal[np.searchsorted(self.near, touching)])
         core = surface_answer.watched_gaps(self.compliance, nodes, force, inner, inner_force)[self.compliance.feet :]
         penetration = max(-float(gap.min(initial=0.0)), -float(core.min(initial=0.0)))
         total = force.sum(axis=0)
         contact = Contact(
             self.compliance, pose, float((pose.apex - self.pose.apex) @ pose.direction), total,
             float(total @ pose.direction), nodes, force, slipping, state.settled and penetration <= PENETRATION,
-            iterations, inner, inner_force, penetration, _sideways(force, normal[np.searchsorted(self.near, nodes)]),
+            iterations, inner, inner_force, penetration, sideways,
         )  # fmt: skip
         return contact, _Around(moved, gap, core)
+
+    def _on_nodes(self, touching: np.ndarray, force: np.ndarray, slipping: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The nodes (k,) that carry what touches, (k, 3) N, and whether they slip (k,)."""
+        return touching, force, slipping
+
+    def _place(self, touching: np.ndarray, force: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """Displacement (n, 3) m of what may touch, from that of the surface there."""
+        return moved
 
 
 def _single(nodes: np.ndarray, state: Try) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -265,22 +304,3 @@ def _sideways(force: np.ndarray, normal: np.ndarray) -> float:
     size = np.linalg.norm(force.sum(axis=0))
     across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
     return float(np.linalg.norm(across) / size) if size else 0.0
-
-
-def surface_displacement(compliance: Compliance, contact: Contact) -> np.ndarray:
-    """Displacement (n, 3) m of the whole surface in a contact."""
-    return contact.displacement.astype(float)
-
-
-def watched_gaps(compliance: Compliance, contact: Contact) -> np.ndarray:
-    """Gaps (w,) m of the watched points in a contact: 19 electrodes, then inner skin over the core."""
-    return surface_answer.watched_gaps(
-        compliance, contact.nodes, contact.nodal_force, contact.core_nodes, contact.core_force
-    )
-
-
-def fluid_pressure(compliance: Compliance, contact: Contact) -> float:
-    """Rise of the fluid's pressure in a contact, Pa."""
-    at_nodes = compliance.pressure.reshape(-1, 3)[contact.nodes]
-    at_core = compliance.inner_pressure[contact.core_nodes]
-    return float((contact.nodal_force * at_nodes).sum() + contact.core_force @ at_core)

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
+from ..errors import TactileError
 from ..indenters import Indenter, Pose
+from .active_set import UnsolvedError
 from .compliance import Compliance
-from .contact import Contact, ContactProblem, fluid_pressure
+from .contact import ContactProblem
 from .correction import Corrected, correct, force_factor
 from .first_touch import fall
+from .force_search import touch_at_force
+from .guarded_contact import GuardedProblem
 from .pose_path import same_line
-from .sunk import check_follows
+from .sharpness import BENDS, sharpest
+from .solved_contact import Contact
+from .sunk import SunkError
 
 FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
 _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
@@ -55,31 +62,63 @@ class CorrectedPress:
     def at_depth(self, depth: float, pose: Pose | None = None) -> FastContact:
         """The contact at a depth, m, of the press's pose or of another one; it may not have converged.
 
-        Raises TactileError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
+        Raises SunkError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
         """
-        pose = pose or self.pose
+        return self._guarded_if_needed(lambda: self._at_depth(depth, pose or self.pose))
+
+    def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
+        """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found."""
+        try:
+            return self._guarded_if_needed(lambda: self._at_force(force, pose or self.pose))
+        except UnsolvedError:
+            return None
+
+    def _guarded_if_needed(self, solve: Callable[[], FastContact | None]) -> FastContact | None:
+        """What ``solve`` finds; where frictionless nodes do not hold the indenter, with points between them, from the
+        start and from then on."""
+        try:
+            found = solve()
+            if found is None or found.linear.converged or not self._may_be_guarded():
+                return found
+        except (SunkError, UnsolvedError):
+            if not self._may_be_guarded():
+                raise
+        self.problem, self.last = GuardedProblem(self.compliance, self.problem.indenter, self.pose, self.limit), None
+        return solve()
+
+    def _may_be_guarded(self) -> bool:
+        """Whether nodes may slide off the indenter, and the surface between them can bend round it."""
+        if self.problem.friction or isinstance(self.problem, GuardedProblem):
+            return False
+        rest = self.compliance.surface.rest[self.compliance.touchable[self.problem.nodes_near]]
+        return sharpest(self.problem.indenter, self.pose, rest) >= BENDS
+
+    def _at_depth(self, depth: float, pose: Pose) -> FastContact:
         contact = self.problem.at_pose(pose.moved(depth), self.last)
         if contact.converged:
             self.last = contact
         return self._with_correction(contact, self._fall_to(pose))
 
-    def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
-        """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found.
+    def _at_force(self, force: float, pose: Pose) -> FastContact | None:
+        """A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
 
-        A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
+        None beyond the limit; raises UnsolvedError where none is found.
         """
-        pose = pose or self.pose
+        if isinstance(self.problem, GuardedProblem):
+            return self._by_depths(force, pose)
         contact, fall = self.last or self._first(pose), self._fall_to(pose)
         if contact is not None and not same_line(contact.pose, pose):
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
         before: tuple[float, float] | None = None  # linear and corrected force, N
         for _ in range(_SEARCH_STEPS):
             if contact is None or not contact.converged:
-                return None
+                raise UnsolvedError(f"no contact at {force:g} N")
             linear, seen = contact.axial_force, _from_touch(contact, fall)
             found = linear, linear * force_factor(self.compliance, seen)
             close = found[1] > 0 and abs(found[1] / force - 1) < FORCE_TOLERANCE
             if seen.depth > self.limit and (close or found[1] < force):
+                if not self.problem.friction:  # what has sunk in bears less than it would
+                    self.problem.check_follows(contact)
                 return None
             if close:
                 self.last = contact
@@ -87,7 +126,31 @@ class CorrectedPress:
             growth = (force / max(found[1], 1e-12)) ** (1 / self._power(before, found))
             before, goal = found, linear * float(np.clip(growth, 1 / _GROWTH, _GROWTH))
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, goal)
-        return None
+        raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
+
+    def _by_depths(self, force: float, pose: Pose) -> FastContact | None:
+        """The same among contacts at depths: where all points feel the turn of their normals those are found quicker.
+
+        Raises SunkError and UnsolvedError.
+        """
+        fall = self._fall_to(pose)
+
+        def move(depth: float, before: FastContact) -> FastContact:
+            contact = self.problem.at_pose(pose.moved(depth + fall), before.linear)
+            if not contact.converged:
+                raise UnsolvedError(f"no contact at {depth * 1e3:g} mm")
+            return self._with_correction(contact, fall)
+
+        start = self.last or self.problem.at_pose(pose.moved(fall))
+        begin = self._with_correction(start, fall)
+        try:
+            found = touch_at_force(move, begin, pose.direction, force, self.limit, "", FORCE_TOLERANCE)
+        except SunkError:
+            raise
+        except TactileError:  # beyond the limit
+            return None
+        self.last = found.linear
+        return found
 
     def _power(self, before: tuple[float, float] | None, found: tuple[float, float]) -> float:
         """By which power the corrected force grows with the linear one, between two contacts; kept for the next."""
@@ -113,20 +176,10 @@ class CorrectedPress:
     def _with_correction(self, contact: Contact, fall: float) -> FastContact:
         made = correct(self.compliance, _from_touch(contact, fall))
         if contact.converged:
-            self._check_follows(contact)
-        pressure = made.factor * fluid_pressure(self.compliance, contact)
+            self.problem.check_follows(contact)
+        pressure = made.factor * contact.fluid_pressure
         force, axial = made.factor * contact.force, made.factor * contact.axial_force
         return FastContact(contact, made, force, axial, pressure, contact.depth - fall)
-
-    def _check_follows(self, contact: Contact) -> None:
-        surface = self.compliance.surface
-        rows, columns = surface.shape
-        grid = surface.grid(surface.rest + contact.displacement)
-        where, closed = f"fast tier, {self.compliance.name}", len(surface.rest) > rows * columns
-        indenter, pose = self.problem.indenter, contact.pose
-        nodes = self.compliance.touchable[contact.nodes]
-        _, normals = pose.distance(indenter, surface.rest[nodes] + contact.displacement[nodes])
-        check_follows(where, grid, indenter, pose, contact.depth, normals, closed=closed)
 
 
 def _from_touch(contact: Contact, fall: float) -> Contact:

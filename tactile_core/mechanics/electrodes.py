@@ -12,8 +12,7 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
-from .compliance import Compliance
-from .contact import Contact, watched_gaps
+from .solved_contact import Contact
 from .watched import electrode_feet
 
 FILM_FLOOR = 20e-6  # m, thinnest film the law knows (networks.md: s = 1 / max(gap, 0.02 mm))
@@ -50,9 +49,9 @@ class Wiring:
                 raise TactileError(f"wiring, {name}", repr(value), expected)
 
 
-def electrode_gaps(compliance: Compliance, contact: Contact) -> np.ndarray:
+def electrode_gaps(contact: Contact) -> np.ndarray:
     """Film thickness (19,) m over each electrode in a contact; negative where the linear model has run out."""
-    return watched_gaps(compliance, contact)[: len(electrode_feet().gap)]
+    return contact.watched_gaps[: len(electrode_feet().gap)]
 
 
 def signal_of_gaps(gaps: np.ndarray) -> np.ndarray:

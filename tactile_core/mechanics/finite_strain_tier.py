@@ -17,7 +17,7 @@ from .neo_hookean import NeoHookean
 from .newton import FiniteStrainContact
 from .quadratic_cavity import QuadraticCavity
 from .shared_bulk import SharedBulk
-from .sharpness import sharpest
+from .sharpness import BENDS, sharpest
 from .sunk import check_follows, hidden
 from .tolerance import EXACT, Tolerance
 from .touch import Touch
@@ -35,9 +35,6 @@ _REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth 
 _ACROSS = 11
 _SPACING = 0.3, 1.5  # lattice lines, least and most between nodes there
 _MARGIN = 0.6  # of its size that the fine part reaches beyond the touching nodes
-# m: round a wedge of 0.1 mm the gel found no shape between its nodes, and took two minutes to say so; edges of 0.4 mm
-# are held.
-_BENDS = 0.2e-3
 _LEAST_HALF = 1.2  # lattice lines, half of the smallest fine part
 
 
@@ -68,7 +65,7 @@ class Body:
     def _faces(self, indenter: Indenter, pose: Pose, near: np.ndarray) -> np.ndarray | None:
         """The faces (f, 9) between nodes ``near`` an indenter, where they can bend round it."""
         mesh = self.solid.mesh
-        if sharpest(indenter, pose, mesh.nodes[near]) < _BENDS:
+        if sharpest(indenter, pose, mesh.nodes[near]) < BENDS:
             return None
         faces = outer_faces(mesh)
         return faces[np.isin(faces, near).all(axis=1)]

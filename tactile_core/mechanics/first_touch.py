@@ -48,8 +48,7 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     that passes the sensor by.
     """
     rows, columns = lattice.shape
-    closed = len(lattice.rest) > rows * columns  # a surface with poles closes round its axis
-    met = in_front(lattice.axes, indenter, pose, closed=closed) if indenter.least_side < _NARROW else None
+    met = in_front(lattice.axes, indenter, pose, closed=lattice.closed) if indenter.least_side < _NARROW else None
     pose, nodes = _on_nodes(lattice, np.empty((0, 3)) if met is None else met[1], indenter, pose)
     before_tip = nodes < len(lattice.rest)
     tip = np.empty((0, 2)) if before_tip.all() else met[0]
@@ -57,7 +56,7 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     places = np.concatenate([np.array(np.divmod(nodes, columns), float), tip.T], axis=1)
     for finer in _FINER if places.size else ():
         tried = (places[:, :, None] + _AROUND[:, None] / finer).reshape(2, -1)
-        points = on_grid(lattice.axes, tried, closed=closed)
+        points = on_grid(lattice.axes, tried, closed=lattice.closed)
         gap, _ = pose.distance(indenter, points)
         best = np.argmin(gap.reshape(-1, _AROUND.shape[1]), axis=1) + np.arange(0, len(gap), _AROUND.shape[1])
         best = best[gap[best] < gap[best].min() + _HIDDEN]

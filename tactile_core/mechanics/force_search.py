@@ -1,14 +1,14 @@
-"""The search for the depth at which a contact of finite strain bears a force."""
+"""The search for the depth at which a contact bears a force."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from ..errors import TactileError
 from .thickness import DEPTH_LIMIT
-from .touch import Touch
 
 TOLERANCE = 1e-4  # relative, of the force
 ROUGH = 0.1  # relative, of the force and the depth that a mesh is made for
@@ -16,15 +16,25 @@ _STEPS = 30
 _LEAST_SHARE = 1e-3  # of the way between two depths, that a search goes
 
 
+class _Pressed(Protocol):
+    """A contact at a ``depth``, m, under a ``force`` (3,) N."""
+
+    depth: float
+    force: np.ndarray
+
+
+_Found = TypeVar("_Found", bound=_Pressed)
+
+
 def touch_at_force(
-    move: Callable[[float, Touch], Touch],
-    last: Touch,
+    move: Callable[[float, _Found], _Found],
+    last: _Found,
     direction: np.ndarray,
     force: float,
     limit: float,
     where: str,
     tolerance: float = TOLERANCE,
-) -> Touch:
+) -> _Found:
     """The contact at a force, N, along ``direction`` (3,), by secants of F^(2/3), nearly straight in the depth, and
     halving.
 

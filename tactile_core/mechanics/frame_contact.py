@@ -45,7 +45,7 @@ class FrameContact:
         """Film (19,) m over the BioTac's electrodes."""
         solved = self._solved
         if isinstance(solved, FastContact):
-            return electrode_gaps(compliance_of(self.sensor), solved.linear)
+            return electrode_gaps(solved.linear)
         return solved.gaps
 
     @functools.cached_property

@@ -22,7 +22,6 @@ GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that MECHANICS allows
 SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up
 FORCE_TOLERANCE = 1e-7  # relative, of the force along the motion where one is asked for
 MAX_ITERATIONS = 60
-_MOST_CURVED = 20  # tangent directions in the Newton step: more cost more than the iterations they save
 _FEELS_CURVATURE = 0.1  # least curvature x force x compliance of such a direction
 _FEELS_AT_ONCE, _LATER = 0.4, 5  # from the second iteration on only for more than this: plain iterations are cheaper
 # Assumed, tried on random contacts: what Newton's step divides by at least, and at most where a mode runs away.
@@ -101,7 +100,10 @@ class Frictionless:
 
     rest : (k, 3) m; core_gap : (c,) m; probe : (k, 3) m, toward the second face of nodes in a crease
     faced : (k,) bool, nodes whose faces are known: they are not looked at for creases
+    most_curved : tangent directions in the Newton step: more cost more than the iterations they save
     """
+
+    most_curved = 20
 
     def __init__(
         self, block: NearBlock, rest: np.ndarray, core_gap: np.ndarray, indenter: Indenter, pose: Pose,
@@ -213,11 +215,11 @@ class Frictionless:
         most = feels * lengths(bend.reshape(-1, 9))
         if most.max(initial=0.0) < threshold:
             return None
-        felt = np.sort(np.argsort(-most, kind="stable")[:_MOST_CURVED])
+        felt = np.sort(np.argsort(-most, kind="stable")[: self.most_curved])
         curvature, axes = np.linalg.eigh(bend[felt])
         weight = (np.maximum(curvature, 0) * solved.pressing[touching[felt], None]).ravel()
         share = (np.maximum(curvature, 0) * feels[felt, None]).ravel()
-        chosen = np.argsort(-share, kind="stable")[:_MOST_CURVED]
+        chosen = np.argsort(-share, kind="stable")[: self.most_curved]
         chosen = chosen[share[chosen] > _FEELS_CURVATURE]
         if not len(chosen):
             return None

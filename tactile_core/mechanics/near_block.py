@@ -7,6 +7,7 @@ import numpy as np
 from .compliance import Compliance
 from .mirrored_halves import axes_of
 from .near_rows import NearRows
+from .points_between import SpringRows
 
 # Relative stiffness added to each node: 1e-6 moves a gap by nanometres and keeps single precision definite, also where
 # one node presses two faces of a concave corner.
@@ -16,22 +17,24 @@ _RIDGE = 1e-6
 class NearBlock:
     """Compliance of k surface nodes (three axes) and c points of the inner skin that may press on the core.
 
-    nodes : (k,) sorted touchable indices, twice where a node touches two faces; inner : (c,) sorted watched points
+    nodes : (k,) sorted touchable indices (with ``SpringRows`` its numbers), twice where one touches two faces
+    inner : (c,) sorted watched points
     rows : the entries of nodes near them, where they are already at hand
     matrix : (3 k + c, 3 k + c) float32, m/N: surface axes first
     """
 
     def __init__(
-        self, compliance: Compliance, nodes: np.ndarray, inner: np.ndarray, rows: NearRows | None = None
+        self, compliance: Compliance, nodes: np.ndarray, inner: np.ndarray, rows: NearRows | SpringRows | None = None
     ) -> None:
         self.nodes, self.inner = nodes, inner
         self.k, self.c = len(nodes), len(inner)
         size = 3 * self.k
-        surface = (rows or NearRows(compliance, np.unique(nodes))).block(nodes)
+        rows = rows or NearRows(compliance, np.unique(nodes))
+        surface = rows.block(nodes)
         self.matrix = surface if not self.c else np.empty((size + self.c, size + self.c), np.float32)
         if self.c:
             self.matrix[:size, :size] = surface
-            self.matrix[:size, size:] = compliance.watch[axes_of(nodes)].take(inner, axis=1)
+            self.matrix[:size, size:] = rows.watched(nodes, inner)
             self.matrix[size:, :size] = self.matrix[:size, size:].T
             self.matrix[size:, size:] = compliance.inner_watch[np.ix_(inner, inner)]
 

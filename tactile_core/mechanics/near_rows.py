@@ -25,6 +25,10 @@ class NearRows:
         """Compliance (3 k, 3 k) float32 m/N among sorted touchable nodes (k,), all of them near ones."""
         return self._rows(nodes).take(axes_of(np.searchsorted(self.near, nodes)), axis=1)
 
+    def watched(self, nodes: np.ndarray, inner: np.ndarray) -> np.ndarray:
+        """Motion (3 k, c) float32 m/N of watched points (c,) under forces on touchable nodes (k,)."""
+        return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
+
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
         """Displacement (n, 3) m of the near nodes under forces (k, 3) N at sorted, single near ones and (c,) N at
         watched points."""

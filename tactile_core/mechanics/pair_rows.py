@@ -12,11 +12,11 @@ from .. import digit_shape, surface
 from ..indenters import Indenter
 from ..scene import PairSpec, Scene
 from .compliance import biotac_compliance, compliance_of, digit_compliance
-from .contact import Contact
 from .corrected_press import CorrectedPress, FastContact
 from .electrodes import electrode_gaps, signal_of_gaps
 from .pair_file import quantise
 from .placement import Placement, on_gel, pose_at
+from .solved_contact import Contact
 from .thickness import depth_at
 
 _SLIDE_FROM, _SLIDE_TO = 2, 10  # steps of a path's force at which a slide may begin (assumed)
@@ -111,7 +111,7 @@ def draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
 def pair_row(biotac: FastContact, digit: FastContact) -> dict[str, np.ndarray]:
     """What one paired contact stores; arrays as in the file, see ``DATASETS``. Electrode gaps are not corrected."""
     skin, gel = biotac_compliance(), digit_compliance()
-    gaps = electrode_gaps(skin, biotac.linear)
+    gaps = electrode_gaps(biotac.linear)
     return {
         "displacement_biotac": quantise(biotac.corrected.displacement),
         "displacement_digit": quantise(digit.corrected.displacement),

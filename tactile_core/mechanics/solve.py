@@ -185,7 +185,7 @@ class _Fast(_Path):
         contact, corrected = found.linear, found.corrected
         patch = np.zeros(len(compliance.surface.rest), bool)
         patch[compliance.touchable[contact.nodes]] = True
-        near = compliance.touchable[self.press.problem.near]
+        near = compliance.touchable[self.press.problem.nodes_near]
         radius = sharpest(self.indenter, contact.pose, compliance.surface.rest[near] + contact.displacement[near])
         stated = stated_error.of_fast(self.errors(contact.depth), found.depth, len(contact.nodes), radius)
         return Solution(

@@ -47,3 +47,22 @@ class Contact:
         return surface_answer.displacement(
             self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
         )
+
+    @property
+    def deformed(self) -> np.ndarray:
+        """(n, 3) m, where the surface's nodes are."""
+        return self.compliance.surface.rest + self.displacement
+
+    @property
+    def watched_gaps(self) -> np.ndarray:
+        """(w,) m, of the watched points: 19 electrodes, then inner skin over the core."""
+        return surface_answer.watched_gaps(
+            self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
+        )
+
+    @property
+    def fluid_pressure(self) -> float:
+        """Pa, by which the fluid's has risen."""
+        at_nodes = self.compliance.pressure.reshape(-1, 3)[self.nodes]
+        at_core = self.compliance.inner_pressure[self.core_nodes]
+        return float((self.nodal_force * at_nodes).sum() + self.core_force @ at_core)

@@ -30,10 +30,12 @@ class SunkError(TactileError):
     """A surface that has let a body through; a finer one may hold it."""
 
 
-def hidden(where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool) -> float:
+def hidden(
+    where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool, share: float = _SHARE
+) -> float:
     """How deep, m, a surface (rows, columns, 3) m lies in a body halfway between nodes, wherever some are near it.
 
-    Raises SunkError for a body pressed ``depth`` m in, where that is too much of it.
+    Raises SunkError for a body pressed ``depth`` m in, where that is too much: also more than a share of the depth.
     """
     columns = grid.shape[1]
     gap, _ = pose.distance(indenter, grid.reshape(-1, 3))
@@ -43,7 +45,7 @@ def hidden(where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: 
     places = (near[:, :, None] + _BETWEEN[:, None]).reshape(2, -1)
     points = on_grid(np.ascontiguousarray(np.moveaxis(grid, 2, 0)), places, closed=closed)
     below = max(-float(pose.distance(indenter, points)[0].min()), 0.0)
-    if below > max(_HIDDEN, _SHARE * depth):
+    if below > max(_HIDDEN, share * depth):
         found = f"the indenter has sunk {below * 1e3:.3f} mm in between the surface's nodes"
         raise _let_through(where, found)
     return below
@@ -59,13 +61,15 @@ def sunk(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> f
 
 
 def check_follows(
-    where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, normals: np.ndarray, *, closed: bool
-) -> None:
+    where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, normals: np.ndarray, *,
+    closed: bool, behind: float = BEHIND,
+) -> None:  # fmt: skip
     """Raise SunkError where a body pressed ``depth`` m in has sunk in between a surface's nodes.
 
     normals : (k, 3) of the body, at the nodes that carry force
+    behind : least cosine of theirs and the motion
     """
-    if (normals @ pose.direction).min(initial=1.0) < BEHIND:
+    if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
         raise _let_through(where, found)
     foremost = pose.support(indenter, pose.direction)[None]

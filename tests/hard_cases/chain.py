@@ -9,7 +9,6 @@ import numpy as np
 
 from tactile_core import metrics
 from tactile_core.flags import Flag
-from tactile_core.mechanics.compliance import biotac_compliance
 from tactile_core.mechanics.electrodes import electrode_gaps, signal_of_gaps
 
 from .case import TRANSLATION, Found, case
@@ -27,7 +26,7 @@ def _translated(name: str, share: float) -> Found:
     digit = press("digit", indenter, place, friction).at_force(biotac.axial_force)
     if digit is None:
         return Found(1.0, "said", 1.0, at_least=True, words="the fast tier says that it finds no contact of this force")
-    change = signal_of_gaps(electrode_gaps(biotac_compliance(), biotac.linear))[None]
+    change = signal_of_gaps(electrode_gaps(biotac.linear))[None]
     signals = dataclasses.replace(
         prepared()[1], change=change, electrodes=3300 + change, quiet=np.zeros(1, bool), flags=np.zeros(1, np.uint16)
     )

@@ -10,7 +10,7 @@ from tactile_core import surface
 from tactile_core.indenters import Cylinder, Sphere, pose_on
 from tactile_core.mechanics.bonded_layer import GOLDEN_FORCE, dimitriadis
 from tactile_core.mechanics.compliance import biotac_compliance, digit_compliance
-from tactile_core.mechanics.contact import ContactProblem, surface_displacement, watched_gaps
+from tactile_core.mechanics.contact import ContactProblem
 from tactile_core.mechanics.placement import Placement, biotac_pose, digit_pose
 from tactile_core.mechanics.random_contacts import random_contacts
 from tactile_core.mechanics.thickness import thickness_under
@@ -68,7 +68,7 @@ def test_no_penetration_no_tension_balance(indenter, place):
     for compliance, pose in sensors_and_poses(indenter, place):
         contact = ContactProblem(compliance, indenter, pose, 0.5e-3).at_depth(0.5e-3)
         assert contact.converged
-        moved = compliance.surface.rest + surface_displacement(compliance, contact)
+        moved = compliance.surface.rest + contact.displacement.astype(float)
         distance, normal = pose.moved(contact.depth).distance(indenter, moved[compliance.touchable])
         assert distance.min() > -1e-6  # m, the penetration MECHANICS allows
         pressing = np.einsum("ki,ki->k", contact.nodal_force, normal[contact.nodes])
@@ -96,7 +96,7 @@ def test_mirrored_place_gives_mirrored_displacement():
         sensors_and_poses(ball, Placement(-9e-3, 3e-3)), sensors_and_poses(ball, Placement(-9e-3, -3e-3)), strict=True
     ):
         a, b = (
-            surface_displacement(compliance, ContactProblem(compliance, ball, pose, 4e-4).at_depth(4e-4))
+            ContactProblem(compliance, ball, pose, 4e-4).at_depth(4e-4).displacement.astype(float)
             for pose in (left, right)
         )
         rest = compliance.surface.rest
@@ -110,10 +110,10 @@ def test_fluid_keeps_its_volume():
     ball = Sphere(3.5e-3)
     skin = biotac_compliance()
     contact = ContactProblem(skin, ball, biotac_pose(ball, PLACES[0]), 8e-4).at_depth(8e-4)
-    change = watched_gaps(skin, contact) - skin.watch_gap
+    change = contact.watched_gaps - skin.watch_gap
     assert change[17] < -0.2e-3  # E18, under the ball
     assert change[19:].max() > 0.02e-3
-    outer = surface_displacement(skin, contact)
+    outer = contact.displacement.astype(float)
     lattice = skin.surface
     areas = surface.node_areas(lattice.rest, lattice.faces)[:, None] * surface.node_normals(lattice.rest, lattice.faces)
     swelling, dented = (outer * areas).sum(), np.abs(outer * areas).sum()
@@ -138,7 +138,7 @@ def test_the_inner_skin_rests_on_the_core():
     light, deep = problem.at_depth(0.2e-3), problem.at_depth(1.2e-3)
     assert len(light.core_nodes) == 0 and len(deep.core_nodes) > 0 and deep.converged
     assert (deep.core_force > 0).all()
-    gaps = watched_gaps(skin, deep)
+    gaps = deep.watched_gaps
     assert gaps[skin.feet :].min() > -1e-6  # m, the penetration MECHANICS allows
     assert np.abs(gaps[deep.core_nodes]).max() < 0.3e-6  # closed to the solver's tolerance
     # with the core the same depth takes more force: it holds the skin against the ball

@@ -39,7 +39,7 @@ def electrode_rows(contacts: int = 240, *, each: bool = True) -> Iterator[Row]:
     inner_skin = _inner_skin()
     touches = _contacts(contacts)
     skin = np.stack([inner_skin(contact) for contact in touches])
-    gaps = np.stack([electrode_gaps(biotac_compliance(), contact) for contact in touches])
+    gaps = np.stack([electrode_gaps(contact) for contact in touches])
     over_e18 = [inner_skin(contact) for contact in _press(INDENTERS[1], OVER_E18, E18_DEPTHS)]
     yield from _grid_rows(biotac_sheet(), [*skin[:: max(len(skin) // 3, 1)], over_e18[-1]])
     for of, sheet in (
