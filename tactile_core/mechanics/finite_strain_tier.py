@@ -18,7 +18,7 @@ from .newton import FiniteStrainContact
 from .quadratic_cavity import QuadraticCavity
 from .shared_bulk import SharedBulk
 from .sharpness import BENDS, sharpest
-from .sunk import check_follows, hidden
+from .sunk import BLUNT, check_follows, hidden
 from .tolerance import EXACT, Tolerance
 from .touch import Touch
 
@@ -63,9 +63,9 @@ class Body:
         )  # fmt: skip
 
     def _faces(self, indenter: Indenter, pose: Pose, near: np.ndarray) -> np.ndarray | None:
-        """The faces (f, 9) between nodes ``near`` an indenter, where they can bend round it."""
+        """The faces (f, 9) between nodes ``near`` an indenter, where those slide off it and faces can bend round it."""
         mesh = self.solid.mesh
-        if sharpest(indenter, pose, mesh.nodes[near]) < BENDS:
+        if not BENDS <= sharpest(indenter, pose, mesh.nodes[near]) < BLUNT:
             return None
         faces = outer_faces(mesh)
         return faces[np.isin(faces, near).all(axis=1)]

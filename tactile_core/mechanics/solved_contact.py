@@ -18,7 +18,8 @@ class Contact:
 
     pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
     force : (3,); axial_force : its part along the motion
-    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3)
+    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3), with what is pushed between nodes as loads on
+        those whose cubic interpolation it is, some of them small and outward
     slipping : (k,) bool, nodes whose friction is spent; without friction all
     converged : whether it may be used; iterations : linearised problems solved for it
     core_nodes : (c,) watched inner points that press on the core; core_force : (c,), on the skin, away from the core

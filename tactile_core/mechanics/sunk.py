@@ -17,7 +17,7 @@ from .first_touch import in_front
 # What lattices hide under the tip of a body that they resolve: in 2,154 random contacts of nine indenters on both
 # sensors, with friction and without, up to 97 um, and where it was more than 50 um a third of the depth at most.
 _HIDDEN, _SHARE = 100e-6, 0.4  # m, and of the depth
-_BLUNT = 1.5e-3  # m: a tip this round hides 21 um between nodes half a millimetre apart, and no node slides off it
+BLUNT = 1.5e-3  # m: a tip this round hides 21 um between nodes half a millimetre apart, and no node slides off it
 _ON_BODY = 1e-6  # m: a ring's foremost point, the middle of its hole, is no part of it
 # Cosine of normals and motion at nodes that carry force. Down to -0.27 where the reference tier agreed (rings 1.6 mm
 # deep), -0.8 and below where forces were a tenth of its, or pulled (270 random contacts, and paths of rings).
@@ -73,7 +73,7 @@ def check_follows(
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
         raise _let_through(where, found)
     foremost = pose.support(indenter, pose.direction)[None]
-    if np.abs(pose.curvature(indenter, foremost)).max() * _BLUNT < 1:
+    if np.abs(pose.curvature(indenter, foremost)).max() * BLUNT < 1:
         return
     below = sunk(grid, indenter, pose, closed=closed)
     if below > max(_HIDDEN, _SHARE * depth):
