@@ -69,8 +69,8 @@ def learn_all(arguments: argparse.Namespace) -> list[dict]:
         print(f"{sensor}: {solved} of {wanted} contacts solved in the full tier, {len(samples)} in both", flush=True)
         learned, found = learn_correction.learn(sensor, samples)
         rows += found
-        for name, values in vars(learned).items():
-            arrays[f"{sensor}_{name}"] = np.asarray(values)
+        for kind, parts in vars(learned).items():
+            arrays |= {f"{sensor}_{kind}_{name}": values for name, values in vars(parts).items()}
     path = ROOT / "tactile_core" / "data" / correction.FILE
     with atomic.new_file(path) as partial, open(partial, "wb") as file:
         np.savez_compressed(file, **arrays)

@@ -39,7 +39,9 @@ from tactile_core.scene import load_scene
 ROOT = Path(__file__).resolve().parent.parent
 TRAINING, REPORT = ROOT / "scenes" / "training", ROOT / "docs" / "mechanics.md"
 SEED = 20261122  # of the random contacts: the correction has learned from those of seed 0
-FULL, REFERENCE = 9, 3  # random contacts a sensor: one of each indenter, and the first three of these
+# Random contacts: one of each indenter, five on the BioTac, whose full tier finds deep edges sooner; and
+# the first of these.
+FULL, REFERENCE = {"digit": 9, "biotac": 45}, 3
 QUICK = 3
 REPEATS = {"fast": 3, "full": 1, "reference": 1}  # of a solve, the fastest counts: the first may read and compile
 FAST_EDGES, FULL_EDGES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.6), (0.2, 0.6)  # of the bins of depth over thickness
@@ -82,15 +84,16 @@ def table(work: Path, quick: bool) -> tuple[dict, dict[Sensor, list]]:
 
 def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], list[dict]]:
     """Every tier of one sensor, and the contacts that the reference tier settled."""
-    contacts = drawn(QUICK if quick else FULL, SEED)
+    full = FULL[sensor]
+    contacts = drawn(QUICK if quick else full, SEED)
     kept = {tier: [keep(work, sensor, tier, i, contact) for i, contact in enumerate(contacts[:count])]
-            for tier, count in (("fast", FULL), ("full", FULL), ("reference", 0 if quick else REFERENCE))}  # fmt: skip
+            for tier, count in (("fast", full), ("full", full), ("reference", 0 if quick else REFERENCE))}  # fmt: skip
     pairs, (scene, _) = read_pairs(TRAINING / "test_contacts.h5"), load_scene(TRAINING)
     if quick:
         pairs = pairs.some(np.flatnonzero(pairs.press < 2 * QUICK))
     fast = [*fast_misses(sensor, pairs, scene), *misses(kept["fast"], kept["full"])]
-    full = by_depth([*misses(kept["full"], kept["reference"]), *validated(sensor)], FULL_EDGES)
-    bins = {"fast": by_depth(fast, FAST_EDGES), "full": full, "reference": [share_of(each) for each in full]}
+    finer = by_depth([*misses(kept["full"], kept["reference"]), *validated(sensor)], FULL_EDGES)
+    bins = {"fast": by_depth(fast, FAST_EDGES), "full": finer, "reference": [share_of(each) for each in finer]}
     found = {tier: {"ms": middle(kept[tier]), "bins": bins[tier]} for tier in bins}
     for tier in ("fast", "full"):
         all_depths = by_depth(misses(kept[tier], kept["reference"]), (DEPTH_LIMIT,))

@@ -33,7 +33,7 @@ _TAKE_IN = 20e-6  # m: where some nodes go through the indenter, those this clos
 _CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps vary more
 _CLOSED = 0.3e-6  # m: gaps closed to this need no further look
 _MOST_ROUNDS = 12  # of taking in nodes
-DETOURS = (4, 9, 20)  # steps from the start to the goal, where one does not settle: other steps pass other edges
+_DETOURS = (4, 9, 20)  # steps from the start to the goal, where one does not settle: other steps pass other edges
 _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest overlap are first taken to touch
 
 
@@ -120,7 +120,7 @@ class ContactProblem:
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
         """Solve in one step, or where that does not settle by a detour."""
         contact = self._solve(pose, axial_force, start)
-        for steps in DETOURS:
+        for steps in _DETOURS:
             if contact.converged:
                 break
             contact = self._steps(pose, axial_force, start, steps)

@@ -14,7 +14,7 @@ import numpy as np
 from ..indenters import Indenter, Pose
 from .candidates import Candidates
 from .compliance import Compliance
-from .contact import DETOURS, ContactProblem
+from .contact import ContactProblem
 from .frictionless import Frictionless, Try
 from .near_block import NearBlock
 from .points_between import SpringRows, points_between
@@ -32,6 +32,7 @@ _BEHIND = -0.8
 _MOST = 1500  # nodes and points that may touch: more take gigabytes and minutes (rings need 500)
 _MARGIN = 1e-3  # m: no point is farther from the nodes that it depends on
 _STEP = 0.3e-3  # m of the motion, at most: in longer steps nodes land on the far side of a wire
+_DETOUR = 9  # steps, where that does not settle
 
 
 class _Sprung(Frictionless):
@@ -105,7 +106,7 @@ class GuardedProblem(ContactProblem):
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
         travel = float(np.linalg.norm(pose.apex - (start or self).pose.apex))
-        for steps in (max(math.ceil(travel / _STEP), 1), *DETOURS):
+        for steps in (max(math.ceil(travel / _STEP), 1), _DETOUR):
             contact = self._steps(pose, axial_force, start, steps)
             if contact.converged:
                 break

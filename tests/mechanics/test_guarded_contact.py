@@ -28,9 +28,7 @@ def test_points_lie_on_the_smooth_surface_halfway_between_nodes(sensor):
     np.testing.assert_allclose(points.weights.sum(axis=1), 1, atol=1e-15)
     heaviest = np.sort(points.weights, axis=1)[:, ::-1]
     along, amid = heaviest[:, 1] > 0.5, heaviest[:, 3] > 0.3  # of two nodes, and of four
-    assert (
-        along ^ amid
-    ).all() and 0.3 < amid.mean() < 0.37
+    assert (along ^ amid).all() and 0.3 < amid.mean() < 0.37
     nodes = compliance.touchable[points.nodes[amid]]
     first = np.array(np.divmod(nodes[:, 5], surface.shape[1]), float)  # the lower of the middle two, either way
     expected = on_grid(surface.axes, first + 0.5, closed=surface.closed)
