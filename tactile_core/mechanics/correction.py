@@ -11,6 +11,7 @@ import dataclasses
 import functools
 import pathlib
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,18 +62,27 @@ class Learned:
 
     def log_factor(self, features: np.ndarray) -> float:
         """Logarithm of the force's factor."""
-        every = self._near(features, ALL, self.widths[0]) @ self.force_weights[0]
-        few = self._near(features, ESSENTIAL, self.widths[1]) @ self.force_weights[1]
+        every = self._near(features, ALL, self._all, self.widths[0]) @ self.force_weights[0]
+        few = self._near(features, ESSENTIAL, self._few, self.widths[1]) @ self.force_weights[1]
         return self._trusted(features, 1) * float(every + few) / 2
 
     def field(self, features: np.ndarray) -> np.ndarray:
         """The correction on the grid (g, 3), per metre of depth."""
-        near = self._near(features, ALL, self.widths[2])
+        near = self._near(features, ALL, self._all, self.widths[2])
         return self._trusted(features, 2) * np.tensordot(near @ self.field_weights, self.fields, 1)
 
-    def _near(self, features: np.ndarray, parts: slice | np.ndarray, width: float) -> np.ndarray:
+    def _near(self, features: np.ndarray, parts: slice | np.ndarray, supports: _Supports, width: float) -> np.ndarray:
         scaled = ((features - self.shift) / self.scale)[None, parts]
-        return kernel(scaled, self.supports[:, parts], width)[0] * alike(rubs(features), self.support_rubs)
+        return kernel(scaled, *supports, width)[0] * alike(rubs(features), self.support_rubs)
+
+    @functools.cached_property
+    def _all(self) -> _Supports:
+        return _Supports(self.supports, squares(self.supports))
+
+    @functools.cached_property
+    def _few(self) -> _Supports:
+        few = np.ascontiguousarray(self.supports[:, ESSENTIAL])
+        return _Supports(few, squares(few))
 
     def _trusted(self, features: np.ndarray, column: int) -> float:
         return float(np.interp(features[0], self.trust[:, 0], self.trust[:, column]))
@@ -99,11 +109,23 @@ class Correction:
         return of_still if share == 0 else (1 - share) * of_still + share * of(self.rubbing, features)
 
 
-def kernel(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
+class _Supports(NamedTuple):
+    """Scaled features (n, j) and their ``squares``."""
+
+    features: np.ndarray
+    squares: np.ndarray
+
+
+def squares(features: np.ndarray) -> np.ndarray:
+    """Sums (n,) of the squares of scaled features (n, f)."""
+    return (features**2).sum(axis=1)
+
+
+def kernel(a: np.ndarray, b: np.ndarray, b_squares: np.ndarray, width: float) -> np.ndarray:
     """Inverse multiquadric and linear kernel (n, m) of scaled features (n, f) and (m, f): smooth, and tame far out."""
     products = a @ b.T
-    squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * products
-    return 1 / np.sqrt(1 + np.maximum(squares, 0) / width**2) + 0.1 * (products / a.shape[1] + 1)
+    apart = squares(a)[:, None] + b_squares - 2 * products
+    return 1 / np.sqrt(1 + np.maximum(apart, 0) / width**2) + 0.1 * (products / a.shape[1] + 1)
 
 
 def rubs(features: np.ndarray) -> np.ndarray:

@@ -30,6 +30,7 @@ from .correction import (
     frame,
     kernel,
     rubs,
+    squares,
 )
 from .finite_strain_tier import ONE_STEP, Sensor, graded_body
 from .guarded_contact import GuardedProblem
@@ -232,7 +233,7 @@ class _Choice(NamedTuple):
 
     def near(self, a: np.ndarray, b: np.ndarray, a_rubs: np.ndarray, b_rubs: np.ndarray) -> np.ndarray:
         """Kernel (n, m) between scaled features (n, j) and (m, j) of samples that ``rubs`` so."""
-        return kernel(a, b, self.width) * alike(a_rubs[:, None], b_rubs)
+        return kernel(a, b, squares(b), self.width) * alike(a_rubs[:, None], b_rubs)
 
     def weights(self, scaled: np.ndarray, rubbing: np.ndarray, goals: np.ndarray) -> np.ndarray:
         """Of supports (n, f), for goals (n, k)."""
