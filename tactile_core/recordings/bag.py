@@ -78,6 +78,8 @@ def open_bag(path: str) -> Iterator[Bag]:
         reader = openers[what](Path(path))
         reader.open()
     try:
+        if not all(isinstance(name, str) for one in reader.connections for name in (one.topic, one.msgtype)):
+            raise TactileError(path, "a topic without a name or a message type", "both, as text", "The bag is damaged")
         topics: dict[str, list[Any]] = {}
         for connection in sorted(reader.connections, key=lambda one: one.topic):
             topics.setdefault(connection.msgtype, []).append(connection)

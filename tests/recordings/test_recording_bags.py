@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import bz2
-from contextlib import suppress
+import contextlib
+import sqlite3
 
 import numpy as np
 import pytest
@@ -102,6 +103,20 @@ def test_a_bag_packed_file_by_file_is_refused(make, tmp_path):
         recordings.read(tmp_path / "touch")
 
 
+@pytest.mark.parametrize(("column", "value"), [("type", None), ("name", None), ("name", b"/biotac"), ("type", 3.5)])
+def test_a_topic_whose_name_or_type_is_no_text_is_refused(column, value, make, tmp_path):
+    """Found by fuzzing: single bytes of a database make a column NULL, a number or bytes."""
+    write_bag(tmp_path / "touch", make(frames=3), "sqlite3", "hand")
+    (path,) = (tmp_path / "touch").glob("*.db3")
+    with contextlib.closing(sqlite3.connect(path)) as database, database:
+        database.execute("CREATE TABLE loose AS SELECT * FROM topics")  # without the columns' constraints
+        database.execute("DROP TABLE topics")
+        database.execute("ALTER TABLE loose RENAME TO topics")
+        database.execute(f"UPDATE topics SET {column} = ?", [value])
+    with pytest.raises(TactileError, match=r"touch.*db3"):
+        recordings.read(path)
+
+
 @pytest.mark.parametrize("container", ["ros1", "mcap", "sqlite3"])
 def test_damaged_bags_end_in_one_error(container, make, tmp_path):
     write_bag(tmp_path / "touch", make(frames=20), container, "hand")
@@ -114,5 +129,5 @@ def test_damaged_bags_end_in_one_error(container, make, tmp_path):
         for place in random.integers(16, len(data), 6):
             broken[place] = random.integers(256)
         (tmp_path / "broken").write_bytes(broken[: random.integers(20, len(broken))])
-        with suppress(TactileError):  # anything else fails the test
+        with contextlib.suppress(TactileError):  # anything else fails the test
             assert len(recordings.read(tmp_path / "broken")) <= 20
