@@ -39,8 +39,7 @@ from tactile_core.scene import load_scene
 ROOT = Path(__file__).resolve().parent.parent
 TRAINING, REPORT = ROOT / "scenes" / "training", ROOT / "docs" / "mechanics.md"
 SEED = 20261122  # of the random contacts: the correction has learned from those of seed 0
-# Random contacts: one of each indenter, five on the BioTac, whose full tier finds deep edges sooner; and
-# the first of these.
+# Random contacts: one of each indenter, five on the BioTac, whose full tier finds deep edges sooner; the first three.
 FULL, REFERENCE = {"digit": 9, "biotac": 45}, 3
 QUICK = 3
 REPEATS = {"fast": 3, "full": 1, "reference": 1}  # of a solve, the fastest counts: the first may read and compile

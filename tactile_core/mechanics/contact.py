@@ -22,7 +22,7 @@ from .landing import landing, meeting
 from .near_block import NearBlock
 from .near_rows import NearRows
 from .pose_path import between, same_place
-from .solved_contact import Contact
+from .solved_contact import Contact, sideways_share
 from .sunk import check_follows
 
 PENETRATION = 1e-6  # m, what MECHANICS allows at any node
@@ -247,7 +247,7 @@ class ContactProblem:
         inner, inner_force = candidates.inner[presses], state.core_force[presses]
         moved = self._place(touching, pressed, self._rows.moved(nodes, force, inner, inner_force))
         gap, normal = self._distance(pose, self.near, moved)
-        sideways = _sideways(pressed, normal[np.searchsorted(self.near, touching)])
+        sideways = sideways_share(pressed, normal[np.searchsorted(self.near, touching)])
         core = surface_answer.watched_gaps(self.compliance, nodes, force, inner, inner_force)[self.compliance.feet :]
         penetration = max(-float(gap.min(initial=0.0)), -float(core.min(initial=0.0)))
         total = force.sum(axis=0)
@@ -298,9 +298,3 @@ def _among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
     if not len(others):
         return np.zeros(len(nodes), bool)
     return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes
-
-
-def _sideways(force: np.ndarray, normal: np.ndarray) -> float:
-    size = np.linalg.norm(force.sum(axis=0))
-    across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
-    return float(np.linalg.norm(across) / size) if size else 0.0

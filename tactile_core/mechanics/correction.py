@@ -238,15 +238,11 @@ def learned() -> dict[str, Correction]:
     with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         return {
             sensor: Correction(*(
-                Learned(**{name: _plain(arrays[f"{sensor}_{kind}_{name}"]) for name in names})
+                Learned(**{name: arrays[f"{sensor}_{kind}_{name}"].astype(np.float64) for name in names})
                 for kind in ("still", "rubbing")
             ))
             for sensor in ("biotac", "digit")
         }  # fmt: skip
-
-
-def _plain(values: np.ndarray) -> np.ndarray:
-    return values.astype(np.float64)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,7 +8,6 @@ import itertools
 import logging
 import time
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,21 +16,8 @@ from ..rows import Row, row
 from . import correction
 from .compliance import compliance_of
 from .contact import ContactProblem
-from .correction import (
-    ALL,
-    ESSENTIAL,
-    LINES,
-    MIRRORED,
-    Correction,
-    Frame,
-    Learned,
-    alike,
-    features,
-    frame,
-    kernel,
-    rubs,
-    squares,
-)
+from .correction import Correction, Frame, features, frame
+from .correction_fit import MOST, WHOLE, Known, choices, fit
 from .finite_strain_tier import ONE_STEP, Sensor, graded_body
 from .guarded_contact import GuardedProblem
 from .placement import pose_at
@@ -44,14 +30,7 @@ log = logging.getLogger(__name__)
 SHARES = 0.4, 0.7, 1.0  # of a press's depth, at which it is sampled
 # m of a load step with friction: on a 7 mm ball 0.06 mm steps differ from it by 4 um rms and 1.6 % of force.
 _RUBBING_STEP = 0.5e-3
-FIELDS = 32  # learned fields a sensor
-_WIDTHS = 2.0, 4.0, 8.0, 16.0  # of the kernel, in standard deviations of a feature
-# Over the kernel's mean diagonal. With a hundredth of it, contacts unlike those learned from were farther off: a ring
-# without tilt by 25 % of force.
-_RIDGES = 1e-1, 1.0
-_MOST = 0.6  # of the logarithm of a force's factor: beyond lie contacts too small for the fast tier's lattice
 _FOLDS = 5
-_WHOLE = np.array([[0.0, 1.0, 1.0]])  # all of what is predicted is trusted
 _BINS = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 2.0  # depth over thickness, of what is trusted and told
 _SIGNIFICANT = 10e-6  # m, nodes that move less do not count (issue 3, point 8)
 
@@ -151,150 +130,52 @@ def _triangulation(sensor: str):  # noqa: ANN202
     return scipy.spatial.Delaunay(correction.plane(sensor))
 
 
-def mirrored(field: np.ndarray) -> np.ndarray:
-    """A field on the grid (..., g, 3) under z -> -z."""
-    grid = field.reshape(*field.shape[:-2], LINES, LINES, 3)[..., :, ::-1, :]
-    return (grid * [1.0, 1.0, -1.0]).reshape(field.shape)
-
-
 def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Correction, list[Row]]:
     """The correction of one sensor, and rows of its errors on presses kept apart (five folds by press)."""
     samples = list(samples)
-    known = _Known(
+    known = Known(
         np.array([s.features for s in samples]), np.log([s.ratio for s in samples]),
         np.array([residual_on_grid(sensor, s.frame, s.full - s.fast) / s.depth for s in samples]),
         np.array([s.press for s in samples]) % _FOLDS, np.array([s.friction > 0 for s in samples]),
     )  # fmt: skip
-    errors, parts = np.empty((len(samples), 6)), []
-    for kind in (False, True):
-        if not (known.rubbing == kind).any():
-            parts.append(parts[-1])
-            continue
+    errors, parts = np.empty((len(samples), 6)), {}
+    for kind in map(bool, np.unique(known.rubbing)):
         log_factor, fields = _guessed_apart(known, kind)
         for f in range(_FOLDS):  # what is trusted on a fold is found on the others
             trust = _trust(known, (known.fold != f) & (known.rubbing == kind), log_factor, fields)
             for i in np.flatnonzero((known.fold == f) & (known.rubbing == kind)):
                 of_force, of_field = (np.interp(known.x[i, 0], trust[:, 0], trust[:, k]) for k in (1, 2))
                 errors[i] = _errors(sensor, samples[i], np.exp(of_force * log_factor[i]), of_field * fields[i])
-        choices = _choices(known, kind)
-        log.info(
-            "%s, %s friction: %s and %s for forces, %s for fields", sensor, "with" if kind else "without", *choices
-        )
+        chosen = choices(known, kind)
+        log.info("%s, %s friction: %s and %s for forces, %s for fields", sensor, "with" if kind else "without", *chosen)
         trust = _trust(known, known.rubbing == kind, log_factor, fields)
-        parts.append(dataclasses.replace(_fit(known, *choices), trust=trust))
+        parts[kind] = dataclasses.replace(fit(known, *chosen), trust=trust)
     frictions = np.array([s.friction for s in samples])
     each = ((friction, frictions == friction) for friction in np.unique(frictions))
     depth = known.x[:, 0]
     rows = [found for friction, part in each for found in _rows(sensor, friction, depth[part], errors[part])]
-    return Correction(*parts), rows
+    return Correction(*(parts.get(kind, parts.get(not kind)) for kind in (False, True))), rows  # one stands for both
 
 
-class _Known(NamedTuple):
-    """Of n samples: features x (n, f), logarithms of the forces' ratios (n,), fields (n, g, 3), folds (n,) and whether
-    they rub (n,)."""
-
-    x: np.ndarray
-    log_ratio: np.ndarray
-    fields: np.ndarray
-    fold: np.ndarray
-    rubbing: np.ndarray
-
-    def some(self, which: np.ndarray) -> _Known:
-        """Those of them."""
-        return _Known(*(values[which] for values in self))
-
-
-def _guessed_apart(known: _Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
+def _guessed_apart(known: Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
     """Logarithms (n,) and fields (n, g, 3) of the samples of one kind, each learned from the other folds."""
     log_factor, fields = np.zeros(len(known.x)), np.zeros_like(known.fields)
     for f in range(_FOLDS):
         rest = known.some(known.fold != f)
-        part = _fit(rest, *_choices(rest, kind))
+        part = fit(rest, *choices(rest, kind))
         for i in np.flatnonzero((known.fold == f) & (known.rubbing == kind)):
             log_factor[i], fields[i] = part.log_factor(known.x[i]), part.field(known.x[i])
     return log_factor, fields
 
 
-def _trust(known: _Known, which: np.ndarray, log_guess: np.ndarray, guess: np.ndarray) -> np.ndarray:
+def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.ndarray) -> np.ndarray:
     """See ``Learned``: the share of what was predicted for presses kept apart that leaves the least squares."""
-    rows, depth, log_ratio = [], known.x[which, 0], np.clip(known.log_ratio[which], -_MOST, _MOST)
+    rows, depth, log_ratio = [], known.x[which, 0], np.clip(known.log_ratio[which], -MOST, MOST)
     for _, _, here in _bins(depth):
         pairs = (log_guess[which][here], log_ratio[here]), (guess[which][here], known.fields[which][here])
         shares = [float(np.clip((g * t).sum() / max((g * g).sum(), 1e-30), 0, 1)) for g, t in pairs]
         rows.append([float(depth[here].mean()), *shares])
-    return np.array(rows) if rows else _WHOLE
-
-
-class _Choice(NamedTuple):
-    """Of a kernel regression: width in standard deviations of a feature, ridge over the kernel's mean diagonal."""
-
-    width: float
-    ridge: float
-
-    def near(self, a: np.ndarray, b: np.ndarray, a_rubs: np.ndarray, b_rubs: np.ndarray) -> np.ndarray:
-        """Kernel (n, m) between scaled features (n, j) and (m, j) of samples that ``rubs`` so."""
-        return kernel(a, b, squares(b), self.width) * alike(a_rubs[:, None], b_rubs)
-
-    def weights(self, scaled: np.ndarray, rubbing: np.ndarray, goals: np.ndarray) -> np.ndarray:
-        """Of supports (n, f), for goals (n, k)."""
-        near = self.near(scaled, scaled, rubbing, rubbing)
-        return np.linalg.solve(near + self.ridge * np.eye(len(near)) * np.trace(near) / len(near), goals)
-
-
-def _fit(known: _Known, for_force: _Choice, by_few: _Choice, for_fields: _Choice) -> Learned:
-    """Kernel ridge regression on samples and their mirror images."""
-    x = np.concatenate([known.x, known.x * MIRRORED])
-    fields = np.concatenate([known.fields, mirrored(known.fields)])
-    log_ratio = np.clip(np.tile(known.log_ratio, 2), -_MOST, _MOST)
-    shift, scale = x.mean(axis=0) * (MIRRORED > 0), x.std(axis=0) + 1e-9
-    scaled, rubbing = (x - shift) / scale, rubs(x)
-    flat = fields.reshape(len(fields), -1)
-    _, _, basis = np.linalg.svd(flat, full_matrices=False) if len(flat) < flat.shape[1] else _by_covariance(flat)
-    basis = basis[:FIELDS]
-    few = scaled[:, ESSENTIAL]
-    return Learned(
-        shift, scale, scaled.astype(np.float32), rubbing.astype(np.float32),
-        np.array([for_force.width, by_few.width, for_fields.width]),
-        np.array([for_force.weights(scaled, rubbing, log_ratio), by_few.weights(few, rubbing, log_ratio)]),
-        for_fields.weights(scaled, rubbing, flat @ basis.T).astype(np.float32),
-        basis.reshape(len(basis), LINES * LINES, 3).astype(np.float16), _WHOLE,
-    )  # fmt: skip
-
-
-def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
-    values, vectors = np.linalg.eigh(flat.T @ flat)
-    return None, None, vectors[:, np.argsort(values)[::-1]].T
-
-
-def _choices(known: _Known, kind: bool) -> tuple[_Choice, _Choice, _Choice]:
-    """What leaves the least error on presses of one kind kept apart, for forces by all features and by the essential
-    ones, whose mean counts, and for fields."""
-    coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
-    forces = np.clip(known.log_ratio, -_MOST, _MOST)[:, None]
-    choices = [_Choice(width, ridge) for width in _WIDTHS for ridge in _RIDGES]
-    both = [_left(known, kind, ALL, np.column_stack([forces, coarse]), choice) for choice in choices]
-    few = [_left(known, kind, ESSENTIAL, forces, choice) for choice in choices]
-    pairs = itertools.product(range(len(choices)), repeat=2)
-    one, other = min(pairs, key=lambda pair: _size((both[pair[0]][:, :1] + few[pair[1]]) / 2))
-    fields = min(range(len(choices)), key=lambda i: _size(both[i][:, 1:]))
-    return choices[one], choices[other], choices[fields]
-
-
-def _left(known: _Known, kind: bool, parts: slice | np.ndarray, goals: np.ndarray, choice: _Choice) -> np.ndarray:
-    """Errors (m, k) of goals (n, k) of the samples of one kind in each fold, learned from the rest."""
-    error, rubbing = np.zeros_like(goals), rubs(known.x)
-    for f in np.unique(known.fold):
-        rest, held = known.fold != f, (known.fold == f) & (known.rubbing == kind)
-        scaled = ((known.x - known.x[rest].mean(axis=0)) / (known.x[rest].std(axis=0) + 1e-9))[:, parts]
-        near = choice.near(scaled[held], scaled[rest], rubbing[held], rubbing[rest])
-        error[held] = near @ choice.weights(scaled[rest], rubbing[rest], goals[rest]) - goals[held]
-    return error[known.rubbing == kind]
-
-
-def _size(error: np.ndarray) -> float:
-    """Of errors (m, k): the median and the mean of their root mean squares."""
-    size = np.sqrt((error**2).mean(axis=1))
-    return float(np.median(size) + size.mean())
+    return np.array(rows) if rows else WHOLE
 
 
 def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> list[float]:

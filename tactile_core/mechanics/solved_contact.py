@@ -67,3 +67,10 @@ class Contact:
         at_nodes = self.compliance.pressure.reshape(-1, 3)[self.nodes]
         at_core = self.compliance.inner_pressure[self.core_nodes]
         return float((self.nodal_force * at_nodes).sum() + self.core_force @ at_core)
+
+
+def sideways_share(force: np.ndarray, normal: np.ndarray) -> float:
+    """Forces (k, 3) N across the normals (k, 3) there, over the whole force."""
+    size = np.linalg.norm(force.sum(axis=0))
+    across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
+    return float(np.linalg.norm(across) / size) if size else 0.0
