@@ -53,7 +53,7 @@ def _read(file: Path) -> Calibration:
         content = tomllib.loads(read_toml_text(file))
     except OSError as error:
         raise TactileError(file, f"cannot be read ({error.strerror})", "a file of `tactile calibrate`") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise TactileError(file, str(error), "a file of `tactile calibrate`", ADVICE) from error
     try:
         return _Reader(content).calibration(file.parent)

@@ -83,7 +83,7 @@ def is_result(folder: Path) -> bool:
     """Whether a folder holds a result of ours, so that --overwrite may replace it."""
     try:
         note = json.loads((folder / NOTE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return False
     return isinstance(note, dict) and note.get("format") == FORMAT
 

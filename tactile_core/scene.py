@@ -76,7 +76,7 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
         raise TactileError(file, f"cannot be read ({error})", "a scene.toml or a folder that holds one") from error
     try:
         scene = msgspec.toml.decode(text, type=Scene)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise TactileError(file, str(error), "the fields of scenes/press_sphere/scene.toml") from error
     check(file, scene)
     found = [with_files_of(file.parent, spec) for spec in scene.indenters]

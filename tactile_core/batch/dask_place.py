@@ -113,7 +113,7 @@ def _read(address: str) -> QueueFile:
     except OSError as error:
         expected = "tcp://HOST:PORT, tls://HOST:PORT or a TOML file"
         raise TactileError("--cluster", f"{address!r} ({error.strerror})", expected) from error
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise TactileError(address, str(error), "queue, jobs and [options], as in docs/batch.md") from error
 
 

@@ -57,7 +57,7 @@ def _aside(folder: Path) -> dict[str, str]:
     for file in sorted((folder / jobs.ASIDE).glob("*.json")):
         try:
             found[file.stem] = str(json.loads(file.read_text(encoding="utf-8"))["why"])
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             found[file.stem] = "its reason cannot be read"
     return found
 

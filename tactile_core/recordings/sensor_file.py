@@ -55,7 +55,7 @@ def read(path: str | os.PathLike) -> Sensor:
         sensor = msgspec.toml.decode(read_toml_text(file), type=Sensor)
     except OSError as error:
         raise TactileError(file, f"cannot be read ({error.strerror})", "a file of `tactile adapt`") from error
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise TactileError(file, str(error), "a file of `tactile adapt`", ADVICE) from error
     if sensor.format != FORMAT:
         raise TactileError(f"{file}, format", repr(sensor.format), repr(FORMAT), ADVICE)

@@ -19,12 +19,12 @@ import numpy as np
 import pytest
 
 from tactile_core import deformations, paired_contacts, recordings, scene, tet_file, weights
-from tactile_core.batch import inputs
+from tactile_core.batch import dask_place, inputs
 from tactile_core.calibration_file import SHIPPED, load_calibration
 from tactile_core.errors import TactileError
 from tactile_core.indenters import mesh_file
 from tactile_core.optics.inputs import read_frames
-from tactile_core.recordings import parts
+from tactile_core.recordings import parts, sensor_file
 from tactile_core.small_text import MOST
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows limits no process's memory")
@@ -305,12 +305,20 @@ def test_scenes_name_no_files_outside_of_their_folder(way, tmp_path):
     refused(scene.load_scene, folder, "a file in the scene's folder")
 
 
-def test_scenes_and_calibrations_that_are_long(tmp_path):
-    for load in (scene.load_scene, load_calibration):
-        for content in (b"a = " + b"[" * 10**7, b"#" * (2 * MOST), b"a" + b".a" * 10**6 + b" = 1"):
-            path = tmp_path / "a.toml"
-            path.write_bytes(content)
-            refused(load, path, str(path))
+LONG_TOML = {
+    "brackets": b"a = " + b"[" * 10**7,
+    "comment": b"#" * (2 * MOST),
+    "key": b"a" + b".a" * 10**6 + b" = 1",
+    "number": b"a = " + b"9" * 5000,  # Python reads whole numbers of up to 4,300 digits
+}
+
+
+@pytest.mark.parametrize("content", LONG_TOML.values(), ids=LONG_TOML)
+def test_long_toml_files(content, tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_bytes(content)
+    for load in (scene.load_scene, load_calibration, sensor_file.read, lambda path: dask_place._read(str(path))):
+        refused(load, path, str(path))
 
 
 def test_a_calibrations_photograph_is_bounded(tmp_path):
