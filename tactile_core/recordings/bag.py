@@ -206,10 +206,13 @@ def _choose(bag: Bag, block: np.ndarray) -> tuple[int, list[str]]:
     if not block.shape[1]:
         raise TactileError(bag.path, "a hand without fingers", "at least one BioTac")
     live = np.flatnonzero(block[..., -ELECTRODES:].any(axis=(0, 2)))
-    finger = int(live[0]) if len(live) else 0
+    if not len(live):
+        return 0, [f"all electrodes of all {block.shape[1]} fingers are 0: finger 0 is read"]
+    if len(live) == 1:
+        return int(live[0]), []
     others = ", ".join(str(number) for number in live[1:])
-    told = f"finger {finger} is read; others with signals: {others} (ask for one as {Path(bag.path).name}#{live[-1]})"
-    return finger, [told] if others else []
+    told = f"finger {live[0]} is read; others with signals: {others} (ask for one as {Path(bag.path).name}#{live[-1]})"
+    return int(live[0]), [told]
 
 
 def _recording(bag: Bag, layout: ModuleType, rows: np.ndarray, warnings: list[str]) -> Recording:

@@ -69,6 +69,15 @@ def test_the_finger_with_signals_is_found_and_another_can_be_asked_for(make, tmp
         recordings.read(f"{tmp_path / 'hand.bag'}#4")
 
 
+def test_a_hand_without_signals_is_read_and_told(make, tmp_path):
+    press = make(frames=60)
+    press.electrodes[:] = 0
+    write_bag(tmp_path / "touch", press, "mcap", "hand", finger=1)
+    recording = recordings.read(tmp_path / "touch")
+    assert recording.warnings[0] == "all electrodes of all 2 fingers are 0: finger 0 is read"
+    np.testing.assert_array_equal(recording.electrodes, 0)
+
+
 def test_another_version_of_a_message_is_refused_and_none_of_its_text_is_run(make, tmp_path, monkeypatch):
     evil = {**bag_biotac_all.VERSIONS[0], "sr_robot_msgs/msg/Biotac": "int16 pac0\nint16[] electrodes\n"}
     write_bag(tmp_path / "good.bag", make(frames=3), "ros1", "all")
