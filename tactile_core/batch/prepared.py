@@ -11,8 +11,9 @@ import dataclasses
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
+import msgspec
 import numpy as np
 
 from .. import atomic, sealed
@@ -32,6 +33,20 @@ if TYPE_CHECKING:
 CHUNK = 1024  # rows a chunk: 160 kB of changes
 COLUMNS = {"time": np.float64, "change": np.float64, "electrodes": np.float32, "quiet": bool, "flags": np.uint16}
 MAX_WARNINGS = 100  # kept of one recording, the rest are counted
+
+
+class About(TypedDict):
+    """What is told of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all."""
+
+    recording: str
+    layout: str
+    simulated: bool
+    start_time: float
+    kind: str
+    warnings: list[str]
+    prepared: list[dict[str, Any]]
+    sha256: str
+    frames: int
 
 
 def make(folder: Path, job: Job, index: int) -> tuple[int, bool]:
@@ -146,7 +161,10 @@ class _Writer:
 
 
 class Prepared:
-    """An open look into a prepared file; every call opens it anew, so that nothing stays open in a worker."""
+    """An open look into a prepared file; every call opens it anew, so that nothing stays open in a worker.
+
+    Each raises TactileError for a damaged file.
+    """
 
     def __init__(self, file: Path) -> None:
         self._path = file
@@ -154,9 +172,9 @@ class Prepared:
     def __len__(self) -> int:
         return self._read(lambda file: len(file["time"]))
 
-    def about(self) -> dict[str, Any]:
-        """What is told of the recording: warnings, kind, start_time, simulated, sha256, frames..."""
-        return json.loads(self._read(lambda file: file["about"][()].tobytes()))
+    def about(self) -> About:
+        """What is told of the recording."""
+        return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
     def rows(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
         """Times (T,) s and signals of the frames from `start` up to `stop`; `rest` is that of the first of them."""

@@ -16,7 +16,7 @@ from conftest import ROOT
 
 from tactile_core import convert, results, sealed
 from tactile_core.batch import job as jobs
-from tactile_core.batch import manifest
+from tactile_core.batch import manifest, prepared
 from tactile_core.batch import run as runs
 from tactile_core.errors import TactileError
 
@@ -65,6 +65,19 @@ def test_what_is_whole_is_kept_and_what_is_damaged_made_anew(new_job, do, conten
     done = do(folder, job)
     assert (done.made, done.kept) == (4, 1)
     assert content(folder) == before
+
+
+@pytest.mark.parametrize("about", [b"", b"[" * 100_000, b"[]", b"{}"])
+def test_what_is_told_of_a_recording_is_checked(new_job, do, about):
+    folder, job = new_job()
+    do(folder, job)
+    file = jobs.prepared_file(folder, job.inputs[0].name)
+    with h5py.File(file, "r+") as data:
+        del data["about"]
+        data["about"] = np.frombuffer(about, np.uint8)
+    for read in (lambda: prepared.Prepared(file).rows(0, 1), lambda: manifest.status(folder, job)):
+        with pytest.raises(TactileError, match="a prepared recording"):
+            read()
 
 
 def test_a_shard_that_kills_its_worker_is_set_aside_and_the_rest_goes_on(new_job, do, monkeypatch):

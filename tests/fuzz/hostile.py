@@ -158,7 +158,7 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         "job": ((folder / "job" / jobs.FILE).read_bytes(), read_job),
         "deformations": (hdf5(narang), lambda path: list(deformations.read(path))),
         "pairs": (hdf5({"press": np.zeros(4, np.int32), "force": np.zeros((4, 3))}), paired_contacts.read_pairs),
-        "prepared": (hdf5({"time": np.arange(8.0), "about": np.frombuffer(b"{}", np.uint8)}), read_prepared),
+        "prepared": (good_prepared(), read_prepared),
         "seal": (sealed.MAGIC + b"0" * 64 + b"\n" + bytes(500), sealed.digest_of),
     }
 
@@ -216,9 +216,18 @@ def read_job(path: Path) -> None:
     jobs.read(path.parent)
 
 
+def good_prepared() -> bytes:
+    about = {"recording": "a", "layout": "csv", "simulated": False, "start_time": 0.0, "kind": "raw", "warnings": [],
+             "prepared": [], "sha256": "0" * 64, "frames": 8}  # fmt: skip
+    sizes = {"time": (), "quiet": (), "flags": ()}
+    arrays = {name: np.zeros((8, *sizes.get(name, (19,))), kind) for name, kind in prepared.COLUMNS.items()}
+    parts = {"part": np.zeros(1, np.int64), "rest": np.zeros((1, 19))}
+    return hdf5(arrays | parts | {"about": np.frombuffer(json.dumps(about).encode(), np.uint8)})
+
+
 def read_prepared(path: Path) -> None:
     found = prepared.Prepared(path)
-    len(found), found.about()
+    len(found), found.rows(0, 4)
 
 
 def loaders(folder: Path) -> dict[str, tuple[bytes, Loader]]:
