@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import glob
 import hashlib
 import os
@@ -18,6 +19,8 @@ from ..recordings.bag import MARK, split
 from ..small_text import read_small
 
 SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3")  # what is taken from a folder
+MOST_STARS, MOST_PARTS = 2, 100  # of a glob: '**', whose work multiplies; parts, each a call deeper in Python's glob
+MOST_QUOTED = 200  # characters of a glob in an error: a line of a list may have millions
 SLIDE = "_bio.csv"  # of the slide set, whose other files (_cw.csv, _cp.csv) are no recordings
 
 
@@ -36,12 +39,13 @@ class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 def find(words: Sequence[str], out: Path) -> list[Path]:
     """The recordings that `words` name, in their order, each once; what lies in the folder `out` is left out.
 
-    Raises TactileError for a word that names nothing.
+    Raises TactileError for a word that names nothing, and for a glob that would go through a folder again and again.
     """
     own = out.resolve()
+    within = functools.cache(lambda folder: list(_of_folder(folder)))  # a list may name a folder on each line
     found: dict[Path, None] = {}
     for word in words:
-        paths = [path for path in _named(word) if not path.is_relative_to(own)]
+        paths = [path for path in _named(word, within) if not path.is_relative_to(own)]
         if not paths:
             advice = "Check the path; quote a glob, so that the shell leaves it alone"
             raise TactileError(word, "names no recording", f"files ({', '.join(SUFFIXES)}), folders or globs", advice)
@@ -49,17 +53,28 @@ def find(words: Sequence[str], out: Path) -> list[Path]:
     return list(found)
 
 
-def _named(word: str) -> Iterator[Path]:
+def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
+    """The recordings of a word. within : those in a folder."""
     if word.startswith("@"):
         for line in _lines(Path(word[1:])):
-            yield from _named(os.path.join(os.path.dirname(word[1:]), line))
+            yield from _named(os.path.join(os.path.dirname(word[1:]), line), within)
     elif os.path.isdir(word):
-        yield from _of_folder(Path(word).resolve())
+        yield from within(Path(word).resolve())
     elif os.path.exists(word) or not glob.has_magic(word):
         yield Path(word).resolve()
     else:
-        for path in sorted(glob.glob(word, recursive=True)):
-            yield from _named(path)
+        for path in _globbed(word):
+            yield from _named(path, within)
+
+
+def _globbed(word: str) -> list[str]:
+    """What a glob names, by name; one that may look into the same folders again and again is refused."""
+    parts = word.replace(os.sep, "/").split("/")
+    wild = next(place for place, part in enumerate(parts) if glob.has_magic(part))
+    if ".." in parts[wild:] or parts.count("**") > MOST_STARS or len(parts) > MOST_PARTS:
+        expected = f"no '..' after a wildcard, at most {MOST_STARS} '**' and {MOST_PARTS} parts"
+        raise TactileError(word[:MOST_QUOTED], "a glob that goes through folders again and again", expected)
+    return sorted(glob.glob(word, recursive=True))
 
 
 def _lines(file: Path) -> list[str]:

@@ -57,6 +57,20 @@ def test_inputs_are_files_folders_globs_and_lists(recordings, tmp_path):
             inputs.find([word], out)
 
 
+def test_a_list_that_names_a_folder_often_goes_through_it_once(recordings, tmp_path, monkeypatch):
+    (tmp_path / "list.txt").write_text(f"{recordings[0].parent}\n" * 100 + f"{tmp_path}/*\n")
+    walk, walked = os.walk, []
+    monkeypatch.setattr(os, "walk", lambda folder: walked.append(folder) or walk(folder))
+    assert inputs.find([f"@{tmp_path / 'list.txt'}"], tmp_path / "out") == [*recordings, tmp_path / "list.txt"]
+    assert walked == [recordings[0].parent]
+
+
+@pytest.mark.parametrize("word", ["*/../*/../*.csv", "**/**/**", "[a/" + "./" * 1000 + "b"])
+def test_globs_that_may_take_for_ever_are_refused(word, tmp_path):
+    with pytest.raises(TactileError, match="again and again"):
+        inputs.find([word], tmp_path / "out")
+
+
 def test_a_folder_that_may_not_be_read_is_no_bag(recordings, tmp_path, monkeypatch):
     def refused(path, *words, **more):
         if "closed" in str(path):
