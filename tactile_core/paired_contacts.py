@@ -8,6 +8,7 @@ import json
 import os
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from .errors import TactileError
@@ -74,7 +75,7 @@ class Pairs:
     @property
     def indenter_names(self) -> list[str]:
         """By number, as in ``indenter``."""
-        return [str(name) for name in json.loads(self.attributes["indenters"])]
+        return json.loads(self.attributes["indenters"])
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,7 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
         found = "cannot be read as HDF5, it is damaged or cut off" if os.path.exists(path) else "no such file"
         raise TactileError(path, found, "a whole HDF5 file of pairs", ADVICE) from error
     _check_values(arrays, path)
+    _check_names(attributes["indenters"], arrays["indenter"], path)
     digest = _content_hash(arrays, scales, attributes)
     return Pairs(
         scale_biotac=scales["displacement_biotac"],
@@ -155,6 +157,18 @@ def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> Non
         if array.dtype.kind == "f" and name != "contact_center" and not np.isfinite(array).all():
             bad = int(np.flatnonzero(~np.isfinite(array.reshape(count, -1)).all(-1))[0])
             raise TactileError(f"{os.fspath(path)}, {name}, contact {bad}", "NaN or infinite", "finite numbers", ADVICE)
+
+
+def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> None:
+    """The attribute `names` is a JSON list of texts, and has one for each number of `indenter`."""
+    place = f"{os.fspath(path)}, attribute indenters"
+    try:
+        found = msgspec.json.decode(names, type=list[str])
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise TactileError(place, str(error), "a JSON list of names", ADVICE) from error
+    if indenter.size and not 0 <= indenter.min() <= indenter.max() < len(found):
+        told = f"{len(found)} names for numbers {indenter.min()} to {indenter.max()}"
+        raise TactileError(place, told, "a name for each number of the dataset indenter, from 0", ADVICE)
 
 
 def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attributes: dict[str, str]) -> str:

@@ -25,6 +25,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
+from small_pairs import write_pairs  # noqa: E402
+
 from tactile_core import (  # noqa: E402
     calibration_file,
     deformations,
@@ -157,7 +159,7 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         "safetensors": (safetensors, lambda path: weights.from_safetensors(weights.read_bytes(path), path)),
         "job": ((folder / "job" / jobs.FILE).read_bytes(), read_job),
         "deformations": (hdf5(narang), lambda path: list(deformations.read(path))),
-        "pairs": (hdf5({"press": np.zeros(4, np.int32), "force": np.zeros((4, 3))}), paired_contacts.read_pairs),
+        "pairs": (write_pairs(folder / "pairs.h5", presses=2, steps=2).read_bytes(), paired_contacts.read_pairs),
         "prepared": (good_prepared(), read_prepared),
         "seal": (sealed.MAGIC + b"0" * 64 + b"\n" + bytes(500), sealed.digest_of),
     }

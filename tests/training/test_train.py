@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import itertools
 import json
 from dataclasses import replace
@@ -145,10 +146,18 @@ def test_a_foreign_or_damaged_checkpoint_is_refused(pairs, tmp_path):
     with pytest.raises(TactileError, match="options"):
         train(pairs, tmp_path, 3, replace(QUICK, beta=0.1), **SURFACES)
     whole = path.read_bytes()
-    for data in (whole[:1000], b"", b"no archive"):
+    told = [b"[" * 100_000, b"[]", b'{"identity": 1, "stage": 0, "epoch": 0, "log": []}']
+    for data in (whole[:1000], b"", b"no archive", *map(archive, told)):
         path.write_bytes(data)
         with pytest.raises(TactileError, match="cannot be read"):
             read(path, {})
+
+
+def archive(text: bytes) -> bytes:
+    """A checkpoint that tells this."""
+    file = io.BytesIO()
+    np.savez(file, state=np.frombuffer(text, np.uint8))
+    return file.getvalue()
 
 
 def test_an_existing_result_is_kept(quick, pairs):
