@@ -107,7 +107,19 @@ def good_recordings(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         path = folder / container
         path = path if path.is_file() else next(file for file in path.iterdir() if file.suffix != ".yaml")
         found[container] = (path.read_bytes(), prepare)
+    mark = folder / "sqlite3" / "metadata.yaml"
+    found["metadata"] = (mark.read_bytes(), read_bag_with(mark))
     return found
+
+
+def read_bag_with(mark: Path) -> Loader:
+    """Reads the ROS 2 bag of a folder with other metadata."""
+
+    def read(path: Path) -> None:
+        shutil.copy(path, mark)
+        prepare(mark.parent)
+
+    return read
 
 
 def prepare(path: Path) -> None:

@@ -18,7 +18,7 @@ sys.modules["hostile"] = hostile
 found.loader.exec_module(hostile)
 
 NAMES = [
-    *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3"),
+    *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3", "metadata"),
     *("scene", "calibration", "sensor", "list", "queue", "tet", "obj", "stl", "ply", "off", "heights"),
     *("safetensors", "weights_card", "job", "deformations", "pairs", "prepared", "seal"),
 ]
@@ -59,4 +59,4 @@ def test_the_good_file_is_read(name, table, tmp_path):
 
 
 def test_every_loader_is_here(table):
-    assert set(table) | {"ros1", "mcap", "sqlite3"} == set(NAMES)
+    assert set(table) | {"ros1", "mcap", "sqlite3", "metadata"} == set(NAMES)

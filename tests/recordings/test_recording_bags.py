@@ -110,6 +110,9 @@ def test_a_bag_packed_file_by_file_is_refused(make, tmp_path):
     assert "FILE" in mark.read_text()
     with pytest.raises(TactileError, match="packed file by file"):
         recordings.read(tmp_path / "touch")
+    mark.write_text(mark.read_text().replace("FILE", "''") + "#" * bag.MAX_METADATA)
+    with pytest.raises(TactileError, match="huge metadata"):
+        recordings.read(tmp_path / "touch")
 
 
 @pytest.mark.parametrize(("column", "value"), [("type", None), ("name", None), ("name", b"/biotac"), ("type", 3.5)])
