@@ -11,6 +11,9 @@ from .calibration import BACKGROUND_DEGREE, BACKGROUND_UNIT, LARGEST_LEVEL, Cali
 from .camera import Camera
 from .errors import TactileError
 
+FORMATS = ("PNG", "JPEG", "BMP", "TIFF")  # of photographs; for others the library may start programs (EPS: Ghostscript)
+MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 million
+
 
 def background_picture(calibration: Calibration) -> np.ndarray:
     """Background (H, W, 3) float32, grey levels; whole numbers of 8 bits.
@@ -51,10 +54,13 @@ def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np
     from PIL import Image
 
     try:
-        with Image.open(path) as image:
+        with Image.open(path, formats=FORMATS) as image:
+            if image.width * image.height > MOST_PIXELS:
+                raise ValueError(f"{image.width} x {image.height} pixels, over {MOST_PIXELS // 10**6} million")
             picture = np.asarray(image.convert("RGB"))
-    except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise TactileError(path, f"cannot be read as a picture ({error})", "an image file") from error
+    except Exception as error:  # the library raises a dozen types on damaged bytes
+        expected = f"an image file ({', '.join(FORMATS)})"
+        raise TactileError(path, f"cannot be read as a picture ({error})", expected) from error
     if camera is not None and picture.shape[:2] != camera.shape:
         found = f"{picture.shape[1]} x {picture.shape[0]} pixels"
         raise TactileError(path, found, f"{camera.width} x {camera.height}, as the calibration's camera")

@@ -21,6 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
@@ -28,6 +29,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from small_pairs import write_pairs  # noqa: E402
 
 from tactile_core import (  # noqa: E402
+    background,
     calibration_file,
     deformations,
     networks,
@@ -153,9 +155,12 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
     sensor_file.write(folder / "sensor.toml", sensor_file.Sensor(sensor_file.FORMAT, "made up", [1.0] * 19, [0.0] * 19))
     scenes, unit = ROOT / "scenes" / "press_sphere" / "scene.toml", calibration_file.SHIPPED
     queue = b'queue = "slurm"\njobs = 10\n[options]\ncores = 1\nmemory = "4GB"\nwalltime = "01:00:00"\n'
+    photograph = io.BytesIO()
+    Image.fromarray(np.random.default_rng(0).integers(0, 256, (12, 16, 3), np.uint8)).save(photograph, "PNG")
     heights = io.BytesIO()
     np.savez_compressed(heights, height_map=np.zeros((2, 8, 6), np.float32))
     return {
+        "photograph": (photograph.getvalue(), background.read_photograph),
         "scene": (scenes.read_bytes(), scene.load_scene),
         "calibration": (unit.read_bytes(), calibration_file.load_calibration),
         "list": (b"# two\na.csv\n\n./b.csv\n", read_list),

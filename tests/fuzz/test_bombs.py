@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from tactile_core import deformations, paired_contacts, recordings, scene, tet_file, weights
+from tactile_core.background import background_picture, read_photograph
 from tactile_core.batch import dask_place, inputs
 from tactile_core.calibration_file import SHIPPED, load_calibration
 from tactile_core.errors import TactileError
@@ -322,19 +323,36 @@ def test_long_toml_files(content, tmp_path):
 
 
 def test_a_calibrations_photograph_is_bounded(tmp_path):
+    declared = bytearray(plain_png(1, 1))
+    declared[12:33] = header = b"IHDR" + struct.pack(">II", 60_000, 60_000) + bytes(declared[24:29])
+    declared[29:33] = struct.pack(">I", zlib.crc32(header))
+    for content in (bytes(declared), plain_png(9_000, 9_000)):
+        (tmp_path / "bomb.png").write_bytes(content)
+        for name in ("../bomb.png", "bomb.png"):
+            text = SHIPPED.read_text().replace('photograph = ""', f'photograph = "{name}"')
+            (tmp_path / "a.toml").write_text(text)
+            refused(lambda path: background_picture(load_calibration(path)), tmp_path / "a.toml", "bomb.png")
+
+
+def plain_png(width: int, height: int) -> bytes:
+    """A black one, small whatever its size."""
     from PIL import Image
 
-    from tactile_core.background import background_picture
-
     content = io.BytesIO()
-    Image.new("1", (1, 1)).save(content, "PNG")
-    header = b"IHDR" + struct.pack(">II", 60_000, 60_000) + content.getvalue()[24:29]
-    png = content.getvalue()[:12] + header + struct.pack(">I", zlib.crc32(header)) + content.getvalue()[33:]
-    (tmp_path / "bomb.png").write_bytes(png)
-    for name in ("../bomb.png", "bomb.png"):
-        text = SHIPPED.read_text().replace('photograph = ""', f'photograph = "{name}"')
-        (tmp_path / "a.toml").write_text(text)
-        refused(lambda path: background_picture(load_calibration(path)), tmp_path / "a.toml", "bomb.png")
+    Image.new("1", (width, height)).save(content, "PNG")
+    return content.getvalue()
+
+
+def test_a_photograph_starts_no_program(tmp_path, monkeypatch):
+    """Pillow opens EPS by Ghostscript, whatever the file is called."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    (tmp_path / "gs").write_text(f"#!/bin/sh\n: > {tmp_path}/started\n")
+    (tmp_path / "gs").chmod(0o755)
+    (tmp_path / "a.png").write_bytes(
+        b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\nshowpage\n%%EOF\n"
+    )
+    refused(read_photograph, tmp_path / "a.png", "a.png")
+    assert not (tmp_path / "started").exists()
 
 
 def test_lists_of_inputs(tmp_path):

@@ -19,7 +19,7 @@ found.loader.exec_module(hostile)
 
 NAMES = [
     *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3", "metadata"),
-    *("scene", "calibration", "sensor", "list", "queue", "tet", "obj", "stl", "ply", "off", "heights"),
+    *("scene", "calibration", "photograph", "sensor", "list", "queue", "tet", "obj", "stl", "ply", "off", "heights"),
     *("safetensors", "weights_card", "job", "deformations", "pairs", "prepared", "seal"),
 ]
 FEW = settings(
