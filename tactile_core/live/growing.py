@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import TactileError
+from ..recordings.assemble import MAX_BAD_SHARE, BadRows
 from ..recordings.readers import layout_of
 from ..recordings.recording import Recording
 from ..recordings.table import Header, read_lines
 
 MOST = 2**24  # bytes taken at a time, so that a file that is long already costs bounded memory
 MAX_LINE = 2**20
+FEW = 20  # rows, 0.2 s, of which any number may be bad at once: a program that stumbles, or a cable that is touched
 
 
 class Growing:
@@ -24,14 +26,16 @@ class Growing:
         self._path = Path(path)
         self._place, self._rest, self._lines = 0, b"", 0
         self._header: Header | None = None
+        self.rows, self.bad = 0, 0  # that came; of them passed over
         if not self._path.is_file():
             raise TactileError(path, "there is no such file", "a CSV recording that is being written")
+        self._file = _identity(self._path.stat())
 
     def poll(self) -> Recording | None:
-        """The rows that came since the last call; None where none did.
+        """The rows that came since the last call; None where none did, or bad ones alone, which are passed over.
 
-        Raises TactileError for a file that became shorter, for one that is no recording, and for a row that tells of
-        another sensor. A bad cell is NaN.
+        Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row that
+        tells of another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN.
         """
         data = self._new_bytes()
         whole, end, self._rest = (self._rest + data).rpartition(b"\n")
@@ -45,13 +49,22 @@ class Growing:
         self._lines += whole.count(b"\n") + 1
         if table is None:
             return None
-        return layout_of(str(self._path), "csv", table.header).read(table)
+        self.rows += len(table.lines)
+        try:
+            return layout_of(str(self._path), "csv", table.header).read(table)
+        except BadRows:
+            self.bad += len(table.lines)
+            if self.bad > max(FEW, MAX_BAD_SHARE * self.rows):
+                raise
+            return None
 
     def _new_bytes(self) -> bytes:
         try:
-            size = self._path.stat().st_size
-            if size < self._place:
-                raise TactileError(self._path, "became shorter", "a file that grows", "Watch the new file")
+            found = self._path.stat()
+            size = found.st_size
+            if size < self._place or _identity(found) != self._file:
+                told = "became shorter" if size < self._place else "was replaced by another file"
+                raise TactileError(self._path, told, "a file that grows", "Watch the new file")
             if size == self._place:
                 return b""
             with open(self._path, "rb") as file:
@@ -61,6 +74,11 @@ class Growing:
             raise TactileError(self._path, error.strerror or str(error), "a readable file") from error
         self._place += len(data)
         return data
+
+
+def _identity(found: os.stat_result) -> tuple[int, int]:
+    """What a file keeps while it grows."""
+    return found.st_dev, found.st_ino
 
 
 def newest(recording: Recording) -> np.ndarray:

@@ -35,6 +35,10 @@ class Problem:
     essential: bool = True
 
 
+class BadRows(TactileError):
+    """More rows are bad than a recording may have."""
+
+
 def check_electrodes(path: str, count: int, source: str) -> None:
     """Raise for any other sensor than the 19-electrode BioTac. source says where the count was seen."""
     if count == ELECTRODES:
@@ -157,7 +161,7 @@ def _check_share(path: str, bad: np.ndarray, problems: Sequence[Problem], row_wo
     frames, count = len(bad), int(bad.sum())
     if count > max(1, MAX_BAD_SHARE * frames) or count == frames:
         first = next(p for p in problems if p.essential)
-        raise TactileError(
+        raise BadRows(
             f"{path}, {row_word} {first.row}, {first.field}",
             f"{first.found}; {count} of {frames} rows are bad",
             f"at most {MAX_BAD_SHARE:.0%} of the rows",

@@ -32,6 +32,7 @@ examples:
   tactile watch --rosbag-play touch.bag --speed 2"""
 LEAVES = NOTHING
 POLL = 0.002  # s between two looks at the file
+LONGEST_WAIT = 10.0  # s without a frame that are played; a longer gap is skipped
 TOLD = 1.0  # s between two lines of figures
 
 
@@ -101,10 +102,13 @@ def _followed(options: argparse.Namespace) -> Iterator[tuple[Recording | None, f
     """New rows of a growing file and when they came; None now and then while there are none."""
     from ..live import Growing
 
-    growing, last = Growing(options.recording), time.perf_counter()
+    growing, last, bad = Growing(options.recording), time.perf_counter(), 0
     while options.idle is None or time.perf_counter() - last < options.idle:
         came = time.perf_counter()
         rows = growing.poll()
+        if growing.bad > bad:
+            bad = growing.bad
+            say(f"{bad} of {growing.rows} rows were bad and are passed over")
         if rows is None:
             time.sleep(POLL)
         else:
@@ -120,6 +124,10 @@ def _played(path: str, speed: float) -> Iterator[tuple[Recording | None, float]]
     for part in read_parts(path):
         recording, done = part.recording, part.repeated
         while done < len(recording):
+            ahead = recording.time[done] / speed - (time.perf_counter() - began) if speed else 0.0
+            if ahead > LONGEST_WAIT:
+                say(f"nothing for {ahead:.0f} s before frame {done}: skipped")
+                began -= ahead
             due = done + 1 if speed == 0 else _due(recording, speed * (time.perf_counter() - began))
             if due <= done:
                 time.sleep(POLL)

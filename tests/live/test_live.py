@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import time
 from types import SimpleNamespace
 
@@ -43,6 +44,48 @@ def test_a_file_that_becomes_shorter_and_one_that_is_no_recording_are_told(slide
         live.Growing(tmp_path / "other.csv").poll()
     with pytest.raises(TactileError, match="no such file"):
         live.Growing(tmp_path / "none.csv")
+
+
+def test_a_bad_row_is_passed_over_and_many_are_not(slide_csv):
+    path = slide_csv(frames=30)
+    growing = live.Growing(path)
+    assert len(growing.poll()) == 30
+    good = path.read_bytes().splitlines(keepends=True)[-1]
+    bad = good.replace(good.split(b",")[-1], b"nan\n")
+    for row in (bad, good[:40] + b"\n"):
+        with open(path, "ab") as file:
+            file.write(row)
+        assert growing.poll() is None
+        with open(path, "ab") as file:
+            file.write(good)
+        assert len(growing.poll()) == 1
+    assert (growing.rows, growing.bad) == (34, 2)
+    with pytest.raises(TactileError, match="rows are bad"):
+        for _ in range(20):
+            with open(path, "ab") as file:
+                file.write(bad)
+            growing.poll()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows replaces no open file")
+def test_another_file_of_the_same_name_is_told(slide_csv, tmp_path):
+    path, other = slide_csv(frames=5), slide_csv("other", frames=90)
+    growing = live.Growing(path)
+    growing.poll()
+    os.replace(other, path)
+    with pytest.raises(TactileError, match="replaced by another file"):
+        growing.poll()
+
+
+def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    electrodes = recordings.read(slide_csv(frames=40)).electrodes
+    np.savez(tmp_path / "gap.npz", electrodes=electrodes, time=np.r_[0.0, 1e6 + np.arange(39) / 100])
+    began = time.perf_counter()
+    assert cli.main(["watch", str(tmp_path / "gap.npz"), "--play", "--out", str(tmp_path / "now.png")]) == 0
+    told = capsys.readouterr()
+    assert "before frame 1: skipped" in told.err and told.out.startswith("40 frames: ")
+    assert time.perf_counter() - began < 60  # a million seconds otherwise
 
 
 def test_live_signals_are_those_of_the_whole_recording(slide_csv):
