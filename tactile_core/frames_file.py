@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,6 +52,12 @@ PACKED = {
     "image": {"compression": "gzip", "compression_opts": 4},
 }
 LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk of its own
+
+
+def shard_arrays(keep: Iterable[str]) -> set[str]:
+    """Names of a shard's datasets that keeps these words."""
+    kept = [PICTURES if word == "image" else KEPT[word] for word in keep]
+    return {name for about in (ALWAYS, *kept) for name in about}
 
 
 class FramesFile:

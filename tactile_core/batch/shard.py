@@ -15,6 +15,7 @@ import numpy as np
 from .. import atomic, sealed
 from ..frame_pass import CHUNK, Tools, translated
 from ..frames_file import FramesFile
+from ..hdf5_checked import check_superblock
 from . import job as jobs
 from .prepared import Prepared
 
@@ -35,16 +36,16 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
     """
     name = job.inputs[index].name
     file = jobs.shard_file(folder, name, number)
-    if sealed.digest_of(file) is not None:
-        return False
     prepared = Prepared(jobs.prepared_file(folder, name))
     about, frames = prepared.about(), len(prepared)
+    if sealed.digest_of(file) is not None and is_of(file, job, index, number, frames):
+        return False
     start = number * job.recipe.shard_frames
     stop = min(start + job.recipe.shard_frames, frames)
     time, signals = prepared.rows(start, stop)
     attributes = {
-        "recording": about["recording"].encode(errors="replace").decode(), "recording_sha256": about["sha256"],
-        "simulated": about["simulated"], "recipe": job.id, "shard": number, "shards": count(frames, job),
+        "recording": about["recording"].encode(errors="replace").decode(),
+        "simulated": about["simulated"], **_identity(job, index, number, frames),
     }  # fmt: skip
     with atomic.new_file(file, shared=True) as partial:
         keep = tuple(job.recipe.keep)
@@ -56,6 +57,25 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
             out.annotate("electrodes", rest=signals.rest, kind=signals.kind)
         sealed.seal(partial)
     return True
+
+
+def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
+    """Whether a whole shard is shard `number` of recording `index`, of so many frames, and no other under its name."""
+    import h5py
+
+    try:
+        check_superblock(file)
+        with h5py.File(file, "r") as found:
+            return all(found.attrs[name] == value for name, value in _identity(job, index, number, frames).items())
+    except Exception:  # the library raises a dozen types on what is no shard
+        return False
+
+
+def _identity(job: Job, index: int, number: int, frames: int) -> dict[str, str | int]:
+    """The attributes that tell a shard from others."""
+    return {
+        "recording_sha256": job.inputs[index].sha256, "recipe": job.id, "shard": number, "shards": count(frames, job)
+    }  # fmt: skip
 
 
 def _arrays(

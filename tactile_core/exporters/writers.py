@@ -38,7 +38,8 @@ def export(
     try:
         with atomic.new_folder(out) as partial:
             layouts()[layout].write(source, partial, progress)
-            atomic.write_json(partial / NOTE, {"layout": layout, "job": source.id, "versions": results.versions()})
+            note = {"layout": layout, "job": source.id, "left_out": source.aside, "versions": results.versions()}
+            atomic.write_json(partial / NOTE, note)
     except OSError as error:
         found = f"cannot be written ({error.strerror or error})"
         raise TactileError(out, found, "a writable folder", "Make room, or name another --out folder") from error

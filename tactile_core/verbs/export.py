@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..terminal import bar, tell
+from ..terminal import bar, say, tell
 from .common import NOTHING, progress_argument
 
 BRIEF = "a finished batch job as NPZ, PNG, OpenEXR or LeRobot data set"
@@ -35,6 +35,8 @@ def run(options: argparse.Namespace) -> int:
     from .. import exporters
 
     with bar("export", "frame", options.progress) as shown:
-        exporters.export(options.job, options.to, options.out, shown)
+        source = exporters.export(options.job, options.to, options.out, shown)
+    for name, why in source.aside.items():
+        say(f"warning: {name} was set aside and is left out: {why}")
     tell(options.out)
     return 0

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 import sys
 from pathlib import Path
 
 import fake_tools
+import h5py
 import numpy as np
 import pytest
 from PIL import Image
 
-from tactile_core import exporters
+from tactile_core import cli, exporters, sealed
 from tactile_core.batch import inputs, local, recipes
 from tactile_core.batch import job as jobs
 from tactile_core.batch import run as runs
@@ -141,3 +143,93 @@ def test_what_cannot_be_exported_is_told(job, tmp_path):
     finally:
         file.write_bytes(whole)
     assert not (tmp_path / "out").exists()
+
+
+def without_force(file):
+    del file["force"]
+
+
+def with_another_array(file):
+    file["odd"] = np.zeros(len(file["frame"]))
+
+
+def with_a_scalar(file):
+    del file["force"]
+    file["force"] = 1.0
+
+
+def with_other_rows(file):
+    del file["force"]
+    file["force"] = np.zeros((3, 3), np.float32)
+
+
+def with_another_type(file):
+    force = file["force"][:]
+    del file["force"]
+    file["force"] = force.astype(np.float64)
+
+
+def with_a_secret(file):
+    secret = Path(file.filename).parent / "secret.bin"
+    secret.write_bytes(bytes(1000))
+    del file["force"]
+    file.create_dataset("force", (len(file["frame"]), 3), "f4", external=[(str(secret), 0, 1000)])
+
+
+def with_a_link(file):
+    del file["force"]
+    file["force"] = h5py.ExternalLink("other.h5", "force")
+
+
+def as_another_shard(file):
+    file.attrs["shard"] = 1
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (without_force, "arrays .*; expected .*force"),
+        (with_another_array, "arrays .*odd"),
+        (with_a_scalar, r"force: shape \(\)"),
+        (with_other_rows, r"force: shape \(3, 3\)"),
+        (with_another_type, "force: .*float64.*float32"),
+        (with_a_secret, "values lie in other files"),
+        (with_a_link, "a link to another file"),
+        (as_another_shard, "another shard under this name"),
+    ],
+)
+def test_shards_of_strangers_are_read_with_care(change, told, job, tmp_path):
+    """A seal is a hash that anyone can make."""
+    shutil.copytree(job, tmp_path / "job")
+    path = jobs.shard_file(tmp_path / "job", "00001_b", 0)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    sealed.seal(path)
+    with pytest.raises(TactileError, match=told):
+        exporters.export(tmp_path / "job", "npz", tmp_path / "out", silent)
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_was_set_aside_is_told(job, tmp_path, capsys):
+    shutil.copytree(job, tmp_path / "job")
+    jobs.prepared_file(tmp_path / "job", "00001_b").unlink()
+    (tmp_path / "job" / jobs.ASIDE / "00001_b.json").write_text('{"task": "00001_b", "why": "b.npz: damaged"}')
+    words = ["export", str(tmp_path / "job"), "--to", "npz", "--out", str(tmp_path / "out")]
+    assert cli.main(words) == 0
+    assert "warning: 00001_b was set aside and is left out: b.npz: damaged" in capsys.readouterr().err
+    assert json.loads((tmp_path / "out" / "note.json").read_text())["left_out"] == {"00001_b": "b.npz: damaged"}
+    assert cli.main(words) == 2
+    assert "--overwrite" not in capsys.readouterr().err  # which this verb does not have
+
+
+@pytest.mark.parametrize(("stretch", "told"), [(3.0, "as the first"), (1e6, "1 or more")])
+def test_lerobot_takes_one_rate(stretch, told, job, tmp_path):
+    pytest.importorskip("pyarrow", reason="pyarrow is absent: pip install tactile-core[batch]")
+    shutil.copytree(job, tmp_path / "job")
+    for name, number in (("00001_b", 0), ("00001_b", 1), *([("00000_a", 0), ("00000_a", 1)] if stretch > 99 else [])):
+        path = jobs.shard_file(tmp_path / "job", name, number)
+        with h5py.File(path, "r+") as file:
+            file["time"][:] *= stretch
+        sealed.seal(path)
+    with pytest.raises(TactileError, match=told):
+        exporters.export(tmp_path / "job", "lerobot", tmp_path / "out", silent)

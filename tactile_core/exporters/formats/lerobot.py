@@ -31,6 +31,7 @@ DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
 CHUNK = 1000  # files a folder
 FILE_MB = 100  # a data file is closed at the end of the episode that takes it beyond
+SAME_RATE = 0.1  # that recordings may differ by: clocks and lost frames do, 100 Hz and 50 Hz do not (assumed)
 TASK = "touch, BioTac to DIGIT"
 NUMBERS = ("electrodes", "force", "contact_center", "confidence", "latent_digit")
 PICTURE = "observation.images.digit"
@@ -64,6 +65,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
             done += len(rows["index"])
             progress(done, source.frames)
         rate = rate or _rate(one)
+        _check_rate(one, rate)
         episodes.append({
             "episode_index": index, "tasks": [TASK], "length": one.frames,
             "dataset_from_index": start, "dataset_to_index": done,
@@ -116,6 +118,15 @@ def _rate(one: Recorded) -> float:
     steps = np.diff(next(one.blocks())["time"])
     steps = steps[steps > 0]
     return float(1 / np.median(steps)) if len(steps) else NOMINAL_RATE
+
+
+def _check_rate(one: Recorded, first: float) -> None:
+    """Raises TactileError for a recording of another rate than the first one's, and for less than a frame a second."""
+    rate = _rate(one)
+    if round(first) < 1 or abs(rate / first - 1) > SAME_RATE:
+        expected = f"{first:g} frames/s, as the first: the layout has one rate" if round(first) else "1 or more"
+        advice = "Export it on its own, from a job of recordings of one rate"
+        raise TactileError(one.name, f"{rate:g} frames/s", expected, advice)
 
 
 class _Place:
