@@ -51,20 +51,21 @@ def write_json(path: str | os.PathLike, content: Any, *, shared: bool = False) -
 
 
 @contextlib.contextmanager
-def new_folder(path: str | os.PathLike, *, overwrite: bool = False) -> Iterator[Path]:
+def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Iterator[Path]:
     """Yield an empty folder beside `path`; leaving the block moves it to `path` as one piece.
 
     An error or Ctrl-C inside the block removes it and leaves what stood at `path` untouched. What a killed process
     left behind is cleared by the next one (or by `sweep`): a lock on `.<name>.tactile-lock`, which the system drops
     when its holder dies, tells a dead writer from a living one. Raises TactileError when the folder exists and
-    `overwrite` is not given, and when another process is writing it.
+    `overwrite` is not true (None: the user has no such option), and when another process is writing it.
     """
     path = Path(path)
     partial, old = _beside(path, "partial"), _beside(path, "old")
     with _locked(path):
         _recover(path)
         if path.exists() and not overwrite:
-            raise TactileError(path, "already exists", "a new folder", "Name another one, or add --overwrite")
+            advice = "Name another one" + ("" if overwrite is None else ", or add --overwrite")
+            raise TactileError(path, "already exists", "a new folder", advice)
         try:
             partial.mkdir()
             yield partial
@@ -88,7 +89,8 @@ def sweep(folder: str | os.PathLike) -> None:
 def sweep_files(folder: str | os.PathLike) -> None:
     """Clear the temporary files of killed writers; only for who knows that none is living."""
     for leftover in Path(folder).glob(".*.tactile-partial"):
-        leftover.unlink(missing_ok=True)
+        if not leftover.is_dir():
+            leftover.unlink(missing_ok=True)
 
 
 def _beside(path: Path, role: str) -> Path:

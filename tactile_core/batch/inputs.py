@@ -21,7 +21,7 @@ from ..small_text import read_small
 SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3")  # what is taken from a folder
 MOST_STARS, MOST_PARTS = 2, 100  # of a glob: '**', whose work multiplies; parts, each a call deeper in Python's glob
 MOST_QUOTED = 200  # characters of a glob in an error: a line of a list may have millions
-SLIDE = "_bio.csv"  # of the slide set, whose other files (_cw.csv, _cp.csv) are no recordings
+SLIDE, BESIDE = "_bio.csv", ("_cw.csv", "_cp.csv")  # of the slide set; its wrenches and poses are no recordings
 
 
 class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -44,27 +44,35 @@ def find(words: Sequence[str], out: Path) -> list[Path]:
     own = out.resolve()
     within = functools.cache(lambda folder: list(_of_folder(folder)))  # a list may name a folder on each line
     found: dict[Path, None] = {}
-    for word in words:
+    for word, place in _words(words):
         paths = [path for path in _named(word, within) if not path.is_relative_to(own)]
         if not paths:
-            advice = "Check the path; quote a glob, so that the shell leaves it alone"
-            raise TactileError(word, "names no recording", f"files ({', '.join(SUFFIXES)}), folders or globs", advice)
+            expected, advice = f"files ({', '.join(SUFFIXES)}), folders or globs", "Check the path"
+            advice += "; quote a glob, so that the shell leaves it alone" if not place else ""
+            raise TactileError(f"{place}{word[:MOST_QUOTED]}", "names no recording", expected, advice)
         found |= dict.fromkeys(paths)
     return list(found)
 
 
+def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Each path or glob, those of lists among them, and where it stands: "list.txt, line 3, " or nothing."""
+    for word in words:
+        if word.startswith("@"):
+            for number, line in _lines(Path(word[1:])):
+                yield os.path.join(os.path.dirname(word[1:]), line), f"{word[1:]}, line {number}, "
+        else:
+            yield word, ""
+
+
 def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
-    """The recordings of a word. within : those in a folder."""
-    if word.startswith("@"):
-        for line in _lines(Path(word[1:])):
-            yield from _named(os.path.join(os.path.dirname(word[1:]), line), within)
-    elif os.path.isdir(word):
-        yield from within(Path(word).resolve())
-    elif os.path.exists(word) or not glob.has_magic(word):
-        yield Path(word).resolve()
-    else:
-        for path in _globbed(word):
-            yield from _named(path, within)
+    """The recordings of a path or glob. within : those in a folder."""
+    there = os.path.lexists(word) or not glob.has_magic(word)
+    for path in [word] if there else _globbed(word):
+        real = Path(os.path.realpath(path))
+        if real.is_dir():
+            yield from within(real)
+        else:
+            yield real
 
 
 def _globbed(word: str) -> list[str]:
@@ -77,28 +85,42 @@ def _globbed(word: str) -> list[str]:
     return sorted(glob.glob(word, recursive=True))
 
 
-def _lines(file: Path) -> list[str]:
-    """Paths of a list file, one a line; blank lines and those that begin with # are passed over."""
+def _lines(file: Path) -> list[tuple[int, str]]:
+    """Paths of a list file, one a line, and their lines; blank lines and those that begin with # are passed over."""
     try:
-        lines = [line.strip() for line in read_small(file).splitlines()]
-        if any("\0" in line for line in lines):
+        text = read_small(file)
+        if "\0" in text:
             raise ValueError("it holds a zero byte")
     except (OSError, ValueError) as error:
         raise TactileError(file, f"cannot be read ({error})", "a text file with one path a line") from error
-    return [line for line in lines if line and not line.startswith(("#", "@"))]
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
+    for number, line in lines:
+        if line.startswith("@"):
+            advice = f"Give both lists to the command, or write ./{line[:MOST_QUOTED]} for a file"
+            raise TactileError(f"{file}, line {number}", line[:MOST_QUOTED], "a path: lists name no lists", advice)
+    return [(number, line) for number, line in lines if line and not line.startswith("#")]
 
 
 def _of_folder(folder: Path) -> Iterator[Path]:
-    """Recordings in a folder and below it, by name; links to folders are not followed."""
+    """Recordings in a folder and below it, by name; links to folders are not followed.
+
+    Raises TactileError for a folder that cannot be looked into.
+    """
+
+    def refused(error: OSError) -> None:
+        """What `os.walk` would pass over."""
+        found, expected = f"cannot be looked into ({error.strerror})", "a readable folder"
+        raise TactileError(error.filename, found, expected, "Make it readable, or name the others one by one")
+
     if _is_bag(folder):
         yield folder
         return
-    for place, folders, names in os.walk(folder):
+    for place, folders, names in os.walk(folder, onerror=refused):
         bags = [name for name in folders if _is_bag(Path(place, name))]
         folders[:] = sorted(name for name in folders if name not in bags and not name.startswith("."))
-        slides = [name for name in names if name.endswith(SLIDE)]
-        plain = [name for name in names if name.lower().endswith(SUFFIXES) and not name.startswith(".")]
-        for name in sorted([*bags, *(slides or plain)]):
+        beside = BESIDE if any(name.endswith(SLIDE) for name in names) else ()
+        files = [name for name in names if name.lower().endswith(SUFFIXES) and not name.startswith(".")]
+        for name in sorted([*bags, *(name for name in files if not name.endswith(beside))]):
             yield Path(place) / name
 
 
@@ -128,6 +150,8 @@ def unit_hash(calibration: Path) -> str:
 def content_hash(path: Path) -> tuple[str, int]:
     """Hash and bytes of a file, or of all files of a bag's folder with their names. Raises TactileError."""
     path = Path(split(str(path))[0])
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise TactileError(path, "no regular file", "a recording", "Copy what it gives into a file")
     try:
         files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
         return results.sha256(path), sum(file.stat().st_size for file in files)

@@ -13,12 +13,15 @@ import msgspec
 
 from .. import __version__, atomic, results
 from ..errors import TactileError
+from ..recordings import sensor_file
+from ..small_text import read_small
 from .inputs import Input
 from .recipes import Recipe, Simulate, Translate
 
 FORMAT = "tactile-job-1"
 FILE, PREPARED, SHARDS, ASIDE, MANIFEST = "job.json", "prepared", "shards", "aside", "manifest.json"
 ADVICE = "Use an empty --out folder"
+MOST = 2**30  # bytes of a job file; one of 10,000 inputs has 3 MB
 
 
 class Job(msgspec.Struct, forbid_unknown_fields=True, frozen=True, dict=True):
@@ -61,6 +64,13 @@ def write(folder: Path, job: Job) -> None:
         raise TactileError(folder, found, "a writable folder", "Name another --out folder") from error
 
 
+def check_empty(folder: Path, advice: str) -> None:
+    """Raises TactileError for a folder, without a job, that holds something of others; hidden files do not count."""
+    others = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+    if others:
+        raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", advice)
+
+
 def exists(folder: Path) -> bool:
     """Whether the folder holds a job."""
     return (folder / FILE).exists()
@@ -70,7 +80,7 @@ def read(folder: Path) -> Job:
     """The job of a folder. Raises TactileError for none, for one that is damaged or of another version."""
     file = folder / FILE
     try:
-        job = msgspec.convert(json.loads(file.read_text(encoding="utf-8")), Job)
+        job = msgspec.convert(json.loads(read_small(file, MOST)), Job)
     except OSError as error:
         advice = "Name recordings to start a job"
         raise TactileError(file, f"cannot be read ({error.strerror or error})", "a job folder", advice) from error
@@ -82,14 +92,27 @@ def read(folder: Path) -> Job:
         found = f"made by version {job.recipe.version}"
         raise TactileError(file, found, f"version {__version__}, which is running", ADVICE)
     for index, one in enumerate(job.inputs):
-        if not one.name.startswith(f"{index:05d}_") or os.path.basename(one.name) != one.name:
+        odd = os.path.basename(one.name) != one.name or "\0" in one.name + one.path
+        if odd or not one.name.startswith(f"{index:05d}_") or not _encodes(one.name + one.path):
             raise TactileError(f"{file}, inputs", f"the name {one.name!r:.80}", f"{index:05d}_<file name>", ADVICE)
     if isinstance(job.recipe, Translate):
         results.parse_keep(",".join(job.recipe.keep))
+        job.recipe.prepare.options().check()
+        if job.recipe.sensor is not None:
+            sensor_file.check(job.recipe.sensor, f"{file}, recipe, sensor")
     if isinstance(job.recipe, Simulate) and len(job.recipe.values) != len(job.inputs):
         found = f"{len(job.recipe.values)} sets of values"
         raise TactileError(f"{file}, recipe", found, f"{len(job.inputs)}, one for each input", ADVICE)
     return job
+
+
+def _encodes(name: str) -> bool:
+    """Whether it can be a path of this machine's."""
+    try:
+        os.fsencode(name)
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def prepared_file(folder: Path, name: str) -> Path:

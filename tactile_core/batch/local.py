@@ -34,7 +34,8 @@ class Local:
         self, folder: Path, workers: int, restart: int = RESTART, command: Sequence[str] | None = None
     ) -> None:
         self._folder, self._workers, self._restart, self._command = folder, workers, restart, command or WORKER_COMMAND
-        self._environment = {**os.environ, **ONE, "PYTHONPATH": _search_path()}
+        # SAFEPATH: else `-m` takes modules from the folder that the command is given in, with a stranger's recordings.
+        self._environment = {**os.environ, **ONE, "PYTHONPATH": _search_path(), "PYTHONSAFEPATH": "1"}
         self._todo: queue.SimpleQueue[Task | None] = queue.SimpleQueue()
         self._done: queue.SimpleQueue[tuple[Task, Reply] | BaseException] = queue.SimpleQueue()
         self._running: set[subprocess.Popen] = set()

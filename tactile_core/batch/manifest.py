@@ -8,7 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from .. import atomic, sealed
+from ..errors import TactileError
+from ..small_text import read_small
 from . import job as jobs
 from . import kinds
 from .job import Job
@@ -56,21 +60,50 @@ def _aside(folder: Path) -> dict[str, str]:
     found = {}
     for file in sorted((folder / jobs.ASIDE).glob("*.json")):
         try:
-            found[file.stem] = str(json.loads(file.read_text(encoding="utf-8"))["why"])
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            found[file.stem] = str(json.loads(read_small(file))["why"])
+        except (OSError, ValueError, KeyError, TypeError, RecursionError, TactileError):
             found[file.stem] = "its reason cannot be read"
     return found
 
 
 def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
-    """Files of a job that are not as they were written; each is read once. progress : (files done, in all)"""
-    files = sorted([*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")])
+    """Files of a job that are not as they were written; each is read once. progress : (files done, in all)
+
+    Where the job was done once, by its manifest: shards that are gone, and whole ones of another place or job, too.
+    """
+    told = _told(folder)
+    there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]
+    files = sorted({*there, *told})
     bad = []
     for index, file in enumerate(files):
-        if sealed.digest_of(file) is None:
+        digest = sealed.digest_of(file)
+        if digest is None or told.get(file, digest) != digest:
             bad.append(file)
         progress(index + 1, len(files))
     return bad
+
+
+def _told(folder: Path) -> dict[Path, str]:
+    """Shards of a manifest and their hashes; none where there is no manifest, or one that cannot be read."""
+    try:
+        found = msgspec.json.decode(read_small(folder / jobs.MANIFEST, jobs.MOST), type=_Manifest)
+    except (OSError, ValueError, RecursionError, TactileError):
+        return {}
+    shards = [shard for recording in found.recordings for shard in recording.shards]
+    return {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
+
+
+class _Shard(msgspec.Struct):
+    file: str
+    sha256: str
+
+
+class _Recording(msgspec.Struct):
+    shards: list[_Shard]
+
+
+class _Manifest(msgspec.Struct):
+    recordings: list[_Recording]
 
 
 def write(folder: Path, job: Job) -> None:

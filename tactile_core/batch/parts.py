@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import TactileError
 from . import job as jobs
+from . import lock
 from . import run as runs
 from .job import Job
 
@@ -28,13 +29,14 @@ def begun(out: Path, job: Job) -> Iterator[Path]:
     folder = folder_of(out)
     with runs.opened(folder, None):
         if not jobs.exists(folder):
+            jobs.check_empty(folder, "Move it away, or choose another name for the result")
             jobs.write(folder, job)
         elif jobs.read(folder).id != job.id:
             found = "holds parts of another scene, seed, count, option or version"
             raise TactileError(folder, found, "none or the same", "Remove the folder to start anew")
         yield folder
     if (folder / DONE).exists():
-        shutil.rmtree(folder)
+        _remove(folder)
 
 
 def write(out: str | os.PathLike, job: Job) -> Path:
@@ -49,6 +51,18 @@ DONE = ".done"
 def finished(folder: Path) -> None:
     """Let the folder be removed at the end of `begun`."""
     (folder / DONE).touch()
+
+
+def _remove(folder: Path) -> None:
+    """Remove what is ours, the job last, and the folder where nothing of others is left in it."""
+    for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    for file in (jobs.MANIFEST, jobs.FILE, lock.FILE, DONE):
+        (folder / file).unlink(missing_ok=True)
+    for file in folder.glob(f"{lock.FILE}-*"):
+        file.unlink()
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def check(done: runs.Done) -> None:

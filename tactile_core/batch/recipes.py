@@ -83,7 +83,7 @@ class Render(msgspec.Struct, tag="render", tag_field="verb", forbid_unknown_fiel
     exr: bool
     noise: bool
     calibration: str = ""
-    shard_frames: int = PICTURE_FRAMES
+    shard_frames: Annotated[int, Meta(ge=1, le=MAX_SHARD_FRAMES)] = PICTURE_FRAMES
     version: str = __version__
 
 

@@ -64,8 +64,8 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
 
 def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
-    """Clear what killed workers left; not in an array, whose other parts may be writing."""
-    if part is None:
+    """Clear what killed workers left; not in an array, whose other parts may be writing, nor where no job is."""
+    if part is None and jobs.exists(folder):
         for place in (".", jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
             atomic.sweep_files(folder / place)
 
@@ -76,6 +76,15 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
     progress : called with (tasks done, tasks known so far)
     Raises TactileError when the disk cannot be written.
     """
+    try:
+        return _run(folder, job, place, part, progress)
+    except OSError as error:
+        where, found = error.filename2 or error.filename or folder, f"cannot be written ({error.strerror or error})"
+        raise TactileError(where, found, "a job folder of ours that can be written") from error
+
+
+def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:
+    """As `run`; raises OSError."""
     work = _Work(folder, job, part)
     for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
         (folder / name).mkdir(exist_ok=True)

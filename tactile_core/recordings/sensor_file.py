@@ -57,15 +57,20 @@ def read(path: str | os.PathLike) -> Sensor:
         raise TactileError(file, f"cannot be read ({error.strerror})", "a file of `tactile adapt`") from error
     except (ValueError, RecursionError) as error:
         raise TactileError(file, str(error), "a file of `tactile adapt`", ADVICE) from error
+    check(sensor, file)
+    return sensor
+
+
+def check(sensor: Sensor, where: str | os.PathLike) -> None:
+    """Raises TactileError naming the field that is out of range."""
     if sensor.format != FORMAT:
-        raise TactileError(f"{file}, format", repr(sensor.format), repr(FORMAT), ADVICE)
+        raise TactileError(f"{where}, format", repr(sensor.format), repr(FORMAT), ADVICE)
     limits = {"gain": (LEAST, MOST), "offset_counts": (-LARGEST_OFFSET, LARGEST_OFFSET)}
     for field, (least, most) in limits.items():
         for electrode, value in enumerate(getattr(sensor, field), start=1):
             if not least <= value <= most:  # false for nan
-                where = f"{file}, {field}, E{electrode}"
-                raise TactileError(where, f"{value:g}", f"{least:g} to {most:g}", ADVICE)
-    return sensor
+                place = f"{where}, {field}, E{electrode}"
+                raise TactileError(place, f"{value:g}", f"{least:g} to {most:g}", ADVICE)
 
 
 def write(path: str | os.PathLike, sensor: Sensor) -> None:

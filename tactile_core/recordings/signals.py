@@ -41,6 +41,15 @@ class PrepareOptions:
     counts_per_unit: float | None = None
     smooth: int | None = None
 
+    def check(self) -> None:
+        """Raises TactileError for what no recording can meet; whether `tare` fits, a recording must say."""
+        if self.kind is not None and self.kind not in KINDS:
+            raise TactileError("option kind", repr(self.kind), ", ".join(KINDS))
+        if self.counts_per_unit is not None and not 0 < self.counts_per_unit < 1e9:
+            raise TactileError("option counts_per_unit", f"{self.counts_per_unit:g}", "counts a unit, above 0")
+        if self.smooth is not None and not (1 <= self.smooth <= LONGEST and self.smooth % 2):
+            raise TactileError("option smooth", f"{self.smooth} frames", f"an odd number from 1 to {LONGEST}")
+
 
 @dataclass(frozen=True, eq=False)
 class Signals:
@@ -72,6 +81,7 @@ class Signals:
 def prepare(recording: Recording, options: PrepareOptions | None = None) -> Signals:
     """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet."""
     options = options or PrepareOptions()
+    options.check()
     flags, warnings = recording.flags.copy(), list(recording.warnings)
     readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = _kind(recording, readings, options)
@@ -107,16 +117,12 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
 def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -> tuple[str, str]:
     if options.kind is None:
         return detect(readings)
-    if options.kind not in KINDS:
-        raise TactileError("option kind", repr(options.kind), ", ".join(KINDS))
     return options.kind, f"told by the user (the samples look {detect(readings)[0]})"
 
 
 def _smoothed_over(options: PrepareOptions, kind: str) -> int:
     if options.smooth is None:
         return RECTIFIED if kind == "rectified" else SIGNED
-    if not 1 <= options.smooth <= LONGEST or options.smooth % 2 == 0:
-        raise TactileError("option smooth", f"{options.smooth} frames", f"an odd number from 1 to {LONGEST}")
     return options.smooth
 
 
@@ -124,11 +130,8 @@ def _counts_per_unit(
     recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions, warnings: list[str]
 ) -> float:
     """Factor to counts: 1, the user's, or for scaled recordings one that gives the usual size of a press (assumed)."""
-    factor = options.counts_per_unit
-    if factor is not None:
-        if not 0 < factor < 1e9:
-            raise TactileError("option counts_per_unit", f"{factor:g}", "counts a unit, above 0")
-        return float(factor)
+    if options.counts_per_unit is not None:
+        return float(options.counts_per_unit)
     if kind != "scaled":
         return 1.0
     largest = np.abs(readings - np.median(readings, axis=0)).max(axis=1)

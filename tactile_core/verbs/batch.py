@@ -59,7 +59,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     doing = verb.add_mutually_exclusive_group()
     doing.add_argument("--plan", action="store_true", help="write job.json and stop")
     doing.add_argument("--status", action="store_true", help="say how far the job is; reads files, changes nothing")
-    doing.add_argument("--verify", action="store_true", help="read every shard; exit status 2 if one is damaged")
+    doing.add_argument("--verify", action="store_true", help="read every shard; status 2 if one is damaged or gone")
     progress_argument(verb)
 
 
@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
         if options.inputs:
             raise TactileError("--status and --verify", "given with INPUTS", "--out DIR alone")
         job = jobs.read(folder)
-        return _status(folder, job) if options.status else _verify(folder, options.progress)
+        return _status(folder, job) if options.status else _verify(folder, job, options.progress)
     engine.check_counts(options, "workers", "restart", "shard_frames")
     if part is not None and not jobs.exists(folder):
         raise TactileError(folder, "no job yet", "a job that all parts share", "Make it once with --plan")
@@ -108,9 +108,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
         found = inputs.hashed(paths, shown)
     job = jobs.make(found, _recipe(options), options.weights, options.calibration)
     if there is None:
-        others = [path.name for path in folder.iterdir() if not path.name.startswith(".")]
-        if others:
-            raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", "Name another --out")
+        jobs.check_empty(folder, "Name another --out")
         jobs.write(folder, job)
         return job
     if job.id != there.id:
@@ -123,15 +121,18 @@ def _recipe(options: argparse.Namespace) -> Translate:
     """The recipe that the options say."""
     from .. import results, translate
     from ..batch.inputs import unit_hash
-    from ..batch.recipes import SHARD_FRAMES, Prepare, Translate
+    from ..batch.recipes import MAX_SHARD_FRAMES, SHARD_FRAMES, Prepare, Translate
     from ..optics.variant import variant_for
     from ..recordings import sensor_file
 
     keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
     prepare = Prepare(**prepare_words(options))
+    prepare.options().check()
     sensor = None if options.sensor is None else sensor_file.read(options.sensor)
     sha256 = translate.load_translator(options.weights).sha256
     frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
+    if frames > MAX_SHARD_FRAMES:
+        raise TactileError("--shard-frames", str(frames), f"1 to {MAX_SHARD_FRAMES}")
     unit = "" if options.calibration is None else unit_hash(Path(options.calibration))
     preset = options.preset or "fast"
     if options.preset is not None and "image" not in keep:
@@ -152,13 +153,17 @@ def _status(folder: Path, job: Job) -> int:
     return 0
 
 
-def _verify(folder: Path, progress: bool) -> int:
+def _verify(folder: Path, job: Job, progress: bool) -> int:
     from ..batch import manifest
 
     with bar("verify", "file", progress) as shown:
         bad = manifest.damaged(folder, shown)
     for file in bad:
-        complain(f"{file}: damaged; the same command makes it anew")
-    if not bad:
-        say(f"{folder}: every file is as it was written")
-    return 2 if bad else 0
+        found = "damaged, or another's" if file.exists() else "missing"
+        complain(f"{file}: {found}; the same command makes it anew")
+    if bad:
+        return 2
+    found = manifest.status(folder, job)
+    rest = "" if found.complete else f"; not complete: {found.there} of {found.shards} shards of the prepared inputs"
+    say(f"{folder}: every file is as it was written{rest}")
+    return 0

@@ -192,3 +192,10 @@ def test_input_is_not_changed(press):
     recordings.prepare(recording)
     np.testing.assert_array_equal(recording.electrodes, before)
     np.testing.assert_array_equal(recording.flags, flags)
+
+
+@pytest.mark.parametrize("step", [5e-324, 1e-310, 1e-9])
+def test_stamps_that_hardly_differ_have_a_rate(step, press):
+    recording = assemble("a.npz", "NPZ", electrodes=press.electrodes, stamps=np.arange(len(press.time)) * step)
+    assert recording.rate == pytest.approx(1e6)
+    assert len(recordings.prepare(recording).change) == len(recording)

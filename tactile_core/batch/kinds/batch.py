@@ -35,9 +35,10 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
 def seen(folder: Path, job: Job, index: int) -> Seen | None:
     """Shards, frames and warnings of a prepared recording."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
-    if not file.exists():
+    try:
+        about = prepared.Prepared(file).about()
+    except TactileError:  # none yet, or a damaged one, which the next run makes anew
         return None
-    about = prepared.Prepared(file).about()
     return Seen(shard.count(about["frames"], job), about["frames"], tuple(about["warnings"]))
 
 

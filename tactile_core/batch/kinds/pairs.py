@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -84,7 +85,9 @@ def _counts(folder: Path, job: Job, index: int) -> dict[int, int]:
     """Contacts of each block that is there."""
     name, found = job.inputs[index].name, {}
     for file in (folder / jobs.SHARDS).glob(f"{name}-*.h5"):
-        found[int(file.stem.rpartition("-")[2])] = _count(file)
+        number = file.stem.rpartition("-")[2]
+        if re.fullmatch(r"[0-9]{6,9}", number):  # not what a cloud's folder calls a conflicted copy
+            found[int(number)] = _count(file)
     return found
 
 
