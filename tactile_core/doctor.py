@@ -77,7 +77,7 @@ def try_library(library: Library) -> tuple[str, str]:
             return "", f"missing, {install}"
     except (ImportError, ValueError, AttributeError):
         return "", f"missing, {install}"
-    command = [sys.executable, "-c", _TRY, library.module, library.package]
+    command = [sys.executable, "-P", "-c", _TRY, library.module, library.package]
     try:
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TRY_SECONDS)
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -57,3 +57,11 @@ def test_a_path_to_nothing_is_trouble(monkeypatch):
 def test_an_old_llvm_is_not_trusted(told, words):
     assert words in variant._too_old(told)
     assert bool(variant._too_old(told)) == bool(words)
+
+
+def test_nothing_is_imported_from_the_current_folder(tmp_path, monkeypatch):
+    """A stranger's folder may hold an h5py.py; the probe of Mitsuba's LLVM is started in the same way."""
+    (tmp_path / "h5py.py").write_text("open('ran', 'w')\n")
+    monkeypatch.chdir(tmp_path)
+    version, trouble = doctor.try_library(next(one for one in doctor.LIBRARIES if one.module == "h5py"))
+    assert version and not trouble and not (tmp_path / "ran").exists()

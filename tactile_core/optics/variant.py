@@ -71,9 +71,8 @@ def variant_for(preset: str, wanted: str | None = None) -> str:
 def llvm_trouble(library: str) -> str:
     """What keeps LLVM from working, in words; "" where it works. library : DRJIT_LIBLLVM_PATH, "" where unset"""
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", _PROBE], capture_output=True, text=True, errors="replace", timeout=PROBE_SECONDS
-        )
+        command = [sys.executable, "-P", "-c", _PROBE]  # -P: nothing is imported from the current folder
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=PROBE_SECONDS)
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"LLVM could not be tried ({type(error).__name__})"
     where = f"{library} (DRJIT_LIBLLVM_PATH)" if library else "LLVM"
