@@ -14,14 +14,14 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from . import keep_words, network_sizes
+from . import keep_words, network_sizes, results
 from .error_budget import Budget
 from .errors import TactileError
 
 COSTS = Path(__file__).parent / "data" / "costs.json"
 TIERS = Path(__file__).parent / "data" / "mechanics_tiers.json"
 OF_SCENE = ("electrodes", "displacement_biotac", "displacement_digit", "translation", "image")
-OF_RECORDING = ("latent", "displacement", "height", "image")
+OF_RECORDING = results.KEEPABLE
 NAMES = {"biotac": "BioTac", "digit": "DIGIT"}
 # Once, where matrices are not cached: time as docs/simulate.md has it, memory as ``compliance.build`` asks for, and the
 # size of the files.
@@ -30,7 +30,11 @@ BUILD_S, BUILD_MB, MATRICES_MB = 60.0, 2000.0, {"biotac": 283.0, "digit": 151.0}
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """One thing that is built. verb : which builds it; told : how much of it; seconds; memory, disk : MB it adds."""
+    """One thing that is built.
+
+    verb : which builds it; told : how much of it; seconds; memory, disk : MB it adds
+    building : MB taken meanwhile, and given back
+    """
 
     what: str
     verb: str
@@ -38,6 +42,7 @@ class Part:
     seconds: float = 0.0
     memory: float = 0.0
     disk: float = 0.0
+    building: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,9 +60,9 @@ class Plan:
 
     @property
     def memory(self) -> float:
-        """MB of the hungriest verb, as they run one after another."""
-        verbs = {part.verb for part in self.parts}
-        return max(sum(part.memory for part in self.parts if part.verb == verb) for verb in verbs)
+        """MB of the hungriest verb, as they run one after another; matrices are built one after another, too."""
+        verbs = {part.verb: [one for one in self.parts if one.verb == part.verb] for part in self.parts}
+        return max(sum(p.memory for p in parts) + max(p.building for p in parts) for parts in verbs.values())
 
     @property
     def disk(self) -> float:
@@ -74,7 +79,7 @@ class Plan:
         """All of it, to read."""
         found = [self.of, f"{'verb':9}{'what':22}{'s':>9}{'MB':>7}{'disk MB':>9}  of"]
         for part in self.parts:
-            numbers = f"{part.seconds:9.2f}{part.memory:7.0f}{part.disk:9.1f}"
+            numbers = f"{part.seconds:9.2f}{part.memory or part.building:7.0f}{part.disk:9.1f}"
             found.append(f"{part.verb:9}{part.what:22}{numbers}  {part.told}")
         found.append(f"in all about {self.seconds:.3g} s, {self.memory:.0f} MB of memory, {self.disk:.3g} MB on disk")
         return [*found, f"not built: {', '.join(self.left_out) or 'nothing'}"]
@@ -87,14 +92,17 @@ def costs() -> dict[str, Any]:
 
 
 def plan(path: str | os.PathLike, keep: str | None, budget: Budget, preset: str | None) -> Plan:
-    """Of a scene (a folder or a .toml) or a recording. keep : its outputs as text, None for all that there are.
+    """Of a scene (a folder or a .toml) or a recording.
+
+    keep : its outputs as text; None for all that a scene can have, and for what `tactile convert` keeps by itself
 
     Raises TactileError for what cannot be read, another word, or a bound that nothing meets.
     """
     path = Path(path)
     if path.is_dir() or path.suffix == ".toml":
         return of_scene(path, keep_words.parse(keep, OF_SCENE), budget, preset)
-    return of_recording(path, keep_words.parse(keep, OF_RECORDING), budget, preset)
+    usual = ",".join(results.DEFAULT_KEEP)
+    return of_recording(path, keep_words.parse(usual if keep is None else keep, OF_RECORDING), budget, preset)
 
 
 def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:
@@ -165,7 +173,8 @@ def _matrices(sensor: str) -> list[Part]:
     if found.bytes:
         return [Part(f"{NAMES[sensor]} matrices", "simulate", f"{found.bytes / 1e6:.0f} MB, cached; {nodes}")]
     told = f"to be built once in {found.folder}; {nodes}"
-    return [Part(f"{NAMES[sensor]} matrices", "simulate", told, BUILD_S, BUILD_MB, MATRICES_MB[sensor])]
+    what = f"{NAMES[sensor]} matrices"
+    return [Part(what, "simulate", told, BUILD_S, disk=MATRICES_MB[sensor], building=BUILD_MB)]
 
 
 def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
@@ -211,16 +220,26 @@ def _preset(budget: Budget, preset: str) -> str:
 
 
 def _preset_ms(name: str) -> float:
-    """ms a picture by LLVM, or as it was measured at all."""
+    """ms a picture, by the variant that runs here where it was measured."""
     from .optics.presets import measured
 
     ms = measured()["presets"][name]["ms"]
-    return ms.get("numpy", ms.get("llvm_ad_rgb", max(ms.values())))
+    return ms.get(_variant(name) or "numpy", max(ms.values()))
+
+
+def _variant(preset: str) -> str:
+    """Of Mitsuba, that runs here; "" where none is needed, or none is there."""
+    from .optics.variant import variant_for
+
+    try:
+        return variant_for(preset)
+    except ModuleNotFoundError:
+        return ""
 
 
 def _lit(name: str) -> str:
     from .optics.presets import measured
 
     found = measured()["presets"][name]
-    needs = "numpy alone" if name == "fast" else "Mitsuba, by LLVM where there is one"
+    needs = "numpy alone" if name == "fast" else f"Mitsuba, {_variant(name) or 'which is missing here'}"
     return f"3 LEDs, preset {name}: {found['says']}; {found['error']:.2g} levels; {needs}; PNG by Huffman coding"

@@ -72,6 +72,7 @@ def test_outputs_add_up(monkeypatch, tmp_path):
     alone, both = found.seconds, of(keep="displacement_digit,displacement_biotac").seconds
     assert both - alone == pytest.approx(0.03 * number + plan.BUILD_S)
     assert of(keep="displacement_biotac").memory == plan.BUILD_MB + 150 and found.memory == plan.BUILD_MB + 100
+    assert of(keep="displacement_digit,displacement_biotac").memory == plan.BUILD_MB + 150  # one after the other
 
 
 def test_an_exact_bound_costs_the_full_tier():
@@ -102,14 +103,17 @@ def test_pictures_cost_what_their_preset_was_measured_to(monkeypatch):
     fast, reference = (of(keep="image", preset=name).seconds for name in ("fast", "reference"))
     ms = {name: plan._preset_ms(name) for name in ("fast", "reference")}
     assert reference - fast == pytest.approx(201 * (ms["reference"] - ms["fast"]) / 1e3)
+    monkeypatch.setattr(plan, "_variant", lambda preset: "scalar_rgb")
+    assert plan._preset_ms("standard") == presets.measured()["presets"]["standard"]["ms"]["scalar_rgb"]
     exact = presets.measured()["presets"]["fast"]["error"]
     assert any("preset fast" in part.told for part in of(keep="image", budget=Budget(levels=exact)).parts)
 
 
 def test_a_recording_is_planned_as_it_is_converted(slide_csv):
-    latent, everything = of(slide_csv(), "latent"), of(slide_csv())
+    latent, everything = of(slide_csv(), "latent"), of(slide_csv(), "latent,displacement,height,image")
     assert built(latent) == ["networks"] and "contact mechanics" in latent.left_out
     assert built(everything) == ["networks", "height maps", "pictures"]
+    assert built(of(slide_csv())) == ["networks", "pictures"]  # as `convert` keeps them
     assert latent.seconds == pytest.approx(1.0 + 0.01 * 150) and "150 frames" in latent.parts[0].told
 
 

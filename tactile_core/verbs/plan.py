@@ -29,7 +29,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         "--keep",
         metavar="WORDS",
         help="outputs; of a scene out of electrodes,displacement_biotac,displacement_digit,translation,image;"
-        " of a recording latent,displacement,height,image (default: all)",
+        " of a recording latent,displacement,height,image (default: all of a scene, those of `convert`)",
     )
     verb.add_argument("--preset", metavar="NAME", help="of the pictures (default: as `render` and `convert` have it)")
     error_argument(verb, "um of surfaces, levels of pictures, or both: 50um,0.6levels")
