@@ -19,10 +19,8 @@ TRY_SECONDS = 60.0  # torch takes five on a slow disk
 _TRY = """
 import importlib, importlib.metadata, sys
 module = importlib.import_module(sys.argv[1])
-version = getattr(module, "__version__", "")
-try: version = version or importlib.metadata.version(sys.argv[2])
-except importlib.metadata.PackageNotFoundError: pass
-print(version)
+try: print(importlib.metadata.version(sys.argv[2]))  # inside Blender some have none
+except importlib.metadata.PackageNotFoundError: print(getattr(module, "__version__", ""))
 """
 
 

@@ -72,7 +72,9 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
     file = file / "scene.toml" if file.is_dir() else file
     try:
         text = read_toml_text(file)
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise TactileError(file, "no text", "a scene.toml or a folder that holds one") from error
+    except OSError as error:
         raise TactileError(file, f"cannot be read ({error})", "a scene.toml or a folder that holds one") from error
     try:
         scene = msgspec.toml.decode(text, type=Scene)

@@ -82,8 +82,8 @@ def read(folder: Path) -> Job:
     try:
         job = msgspec.convert(json.loads(read_small(file, MOST)), Job)
     except OSError as error:
-        advice = "Name recordings to start a job"
-        raise TactileError(file, f"cannot be read ({error.strerror or error})", "a job folder", advice) from error
+        found, advice = f"cannot be read ({error.strerror or error})", "Begin one: tactile batch RECORDINGS --out DIR"
+        raise TactileError(file, found, "the folder of a job", advice) from error
     except (ValueError, RecursionError) as error:  # of JSON and of msgspec
         raise TactileError(file, f"damaged ({error})", f"a job file ({FORMAT})", ADVICE) from error
     if job.format != FORMAT:

@@ -15,12 +15,14 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..frames_file import FORMAT as CONVERTED
+from ..hdf5_checked import SIGNATURE
 from ..recordings.simulated import FORMAT as SIMULATED
 from ..recordings.store import open_hdf5, open_npz
 
 if TYPE_CHECKING:
     from ..recordings.store import Store
 
+CONVERT = "Of a recording: `tactile convert` it first, and render its frames.h5"
 EXPECTED = "frames.h5, a simulated recording (.h5), a height map (.npz, .exr), or a scene's folder"
 HEIGHT_ARRAY = "height_map"
 
@@ -73,7 +75,15 @@ def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier:
         from .exr import read_height
 
         return Frames("height map", np.zeros(1, int), heights=read_height(path)[None])
+    if not _is_hdf5(path):
+        raise TactileError(path, "no HDF5 file", EXPECTED, CONVERT)
     return _of_hdf5(path)
+
+
+def _is_hdf5(path: Path) -> bool:
+    """Whether a file begins as HDF5 does; our own have no room before that."""
+    with open(path, "rb") as file:
+        return file.read(len(SIGNATURE)) == SIGNATURE
 
 
 def _of_hdf5(path: Path) -> Frames:
@@ -84,7 +94,7 @@ def _of_hdf5(path: Path) -> Frames:
         elif kind == SIMULATED:
             name, numbers = "truth/displacement_digit", None
         else:
-            raise TactileError(path, f"format {kind!r}", EXPECTED)
+            raise TactileError(path, f"format {kind!r}" if kind else "no frames of ours", EXPECTED, CONVERT)
         _check_displacement(store, name)
         scale = float(store.attributes_of(name).get("scale", 1.0))
         displacement = store.array(name, (None, len(sensors.digit_surface().rest), 3), np.float32)
@@ -107,6 +117,8 @@ def _check_displacement(store: Store, name: str) -> None:
 def _of_npz(path: Path) -> Frames:
     with open_npz(os.fspath(path)) as store:
         names = list(store.shapes)
+        if "electrodes" in names:
+            raise TactileError(path, "a recording's electrodes", EXPECTED, CONVERT)
         if HEIGHT_ARRAY not in names and len(names) != 1:
             expected = f"one called {HEIGHT_ARRAY}, or one in all"
             raise TactileError(path, f"arrays {', '.join(names) or 'none'}", expected)

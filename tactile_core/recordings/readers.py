@@ -73,7 +73,9 @@ def container_of(path: str) -> str:
     """csv, hdf5, npz or bag. Raises TactileError for what is no file."""
     path, finger = split(path)
     if os.path.isdir(path) and kind(Path(path)) is None:
-        raise TactileError(path, "a folder", "one recording file", "Name the recording inside the folder")
+        scene = os.path.isfile(os.path.join(path, "scene.toml"))
+        advice = "Simulate it first: tactile simulate" if scene else "Name the recording inside the folder"
+        raise TactileError(path, "a scene" if scene else "a folder", "one recording file", advice)
     if not os.path.exists(path):
         raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ or bag)", "Check the path")
     if not os.path.isfile(path) and not os.path.isdir(path):

@@ -58,16 +58,20 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     from .. import live
     from ..convert import load_tools
+    from ..recordings.readers import container_of
 
     _check(options)
+    path = options.rosbag_play or options.recording
+    container = container_of(path)
+    if container != "csv" and not (options.play or options.rosbag_play):
+        raise TactileError(path, f"a finished recording ({container})", "a CSV file that grows", "Play it: add --play")
     if not 1 <= options.rate <= 1e4:
         raise TactileError("--rate", f"{options.rate:g}", "1 to 10,000 Hz")
-    path = options.rosbag_play or options.recording
     playing = options.play or options.rosbag_play
     source = _played(path, 1.0 if options.speed is None else options.speed) if playing else _followed(options)
     view = live.View(load_tools(options.weights), options.rate)
     draw = _window(path) if options.out is None else _file(options.out)
-    told = time.perf_counter()
+    told, failed = time.perf_counter(), False
     try:
         for rows, came in source:
             shown = None if rows is None else view.show(rows, came)
@@ -76,9 +80,13 @@ def run(options: argparse.Namespace) -> int:
             if time.perf_counter() - told >= TOLD:
                 told = time.perf_counter()
                 say(view.told() + (f"; force {shown.force:.2f} N" if shown else ""))
+    except TactileError:
+        failed = not view.frames
+        raise
     finally:
-        say(f"rest from {view.rest_found}" if view.rest_found else "rest was not found")
-        tell(f"{view.frames} frames: {view.told()}")
+        if not failed:
+            say(f"rest from {view.rest_found}" if view.rest_found else "rest was not found")
+            tell(f"{view.frames} frames: {view.told()}")
     return 0
 
 
