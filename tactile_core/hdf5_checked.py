@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 import os
 import zlib
 from collections.abc import Iterator
@@ -9,6 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from .errors import TactileError
+from .hdf5_heaps import check_heaps
 
 if TYPE_CHECKING:
     import h5py
@@ -16,7 +19,9 @@ if TYPE_CHECKING:
 MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk (assumed enough: HDF5 advises 1 MB, and keeps one in memory)
 MAX_RATIO = 1032  # the most that deflate packs (zlib, technical details); lzf at most 88
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}  # that are undone; the numbers are HDF5's
-DEFLATE, STEP = 1, 2**20
+DEFLATE, CHECKSUM, STEP = 1, 3, 2**20
+WIDTHS = {2, 4, 8, 16, 32}  # bytes of an address and of a size; the library opens no file with others
+MAX_PLAIN_CHUNK = 2**24  # bytes of a chunk in a file of our own; they have 0.2 MB
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -31,7 +36,7 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
     """
     import h5py
 
-    check_superblock(path)
+    check_before_opening(path)
     with h5py.File(path, "r") as file:
         outside = file.id.links.visit(_outside, info=True)
         if outside is not None:
@@ -40,12 +45,18 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
         yield file
 
 
-def check_superblock(path: str | os.PathLike) -> None:
-    """Raises TactileError for a file that begins with a driver's information, and OSError.
+def check_before_opening(path: str | os.PathLike) -> None:
+    """Raises TactileError for a file that the library would take all memory for (both found by fuzzing), and OSError.
 
-    The library takes up to 4 GB for it, whatever the file holds (found by fuzzing). Only files in several parts have
-    it. Its address is the fourth of superblocks of version 0 and 1 (HDF5 file format, II.A); later ones have none.
+    One begins with a driver's information, for which it takes up to 4 GB whatever the file holds; only files in several
+    parts have it. Another has a list without end, see ``hdf5_heaps``.
     """
+    found = os.stat(path)
+    _check_bytes(os.fspath(path), found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=256)  # a prepared recording is opened for each shard
+def _check_bytes(path: str, *_identity: int) -> None:
     with open(path, "rb") as file:
         size, start = os.fstat(file.fileno()).st_size, 0
         while start < size:
@@ -54,12 +65,16 @@ def check_superblock(path: str | os.PathLike) -> None:
             if block.startswith(SIGNATURE):
                 break
             start = 2 * start or 512  # where the library looks, too
-    if start >= size or len(block) < 64 or block[8] > 1:
+    if start >= size or len(block) < 64:
         return
-    width, addresses = block[13], 24 + 4 * block[8]
-    driver = block[addresses + 3 * width : addresses + 4 * width]
-    if driver.strip(b"\xff"):
-        raise _refused(path, "superblock", "a driver's information: a file in several parts", "one whole file")
+    if block[8] <= 1:  # the fourth address is the driver's (HDF5 file format, II.A); later superblocks have none
+        width, length, addresses = block[13], block[14], 24 + 4 * block[8]
+        if block[addresses + 3 * width : addresses + 4 * width].strip(b"\xff"):
+            raise _refused(path, "superblock", "a driver's information: a file in several parts", "one whole file")
+    else:
+        width, length = block[9], block[10]
+    if {width, length} <= WIDTHS:
+        check_heaps(path, start, width, length)
 
 
 def declared(data: h5py.Dataset, where: str) -> None:
@@ -68,6 +83,20 @@ def declared(data: h5py.Dataset, where: str) -> None:
     if data.size * data.dtype.itemsize > MAX_RATIO * stored + STEP:
         found = f"shape {data.shape} in {stored} stored bytes"
         raise TactileError(where, found, "a dataset whose values are in the file", "Write the file again")
+
+
+def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
+    """Raises TactileError for a dataset of more than numbers in this file, perhaps with checksums: none of it unpacks.
+
+    For files of our own, of which a few rows are read again and again: `open_checked` looks at each chunk.
+    """
+    layout, name = data.id.get_create_plist(), data.name
+    if layout.get_external_count() or data.is_virtual or data.dtype.kind not in "fiub":
+        raise _refused(path, name, "no plain numbers", "numbers in this file")
+    if any(layout.get_filter(index)[0] != CHECKSUM for index in range(layout.get_nfilters())):
+        raise _refused(path, name, "packed values", "plain ones")
+    if data.chunks is not None and math.prod(data.chunks) * data.dtype.itemsize > MAX_PLAIN_CHUNK:
+        raise _refused(path, name, f"chunks of shape {data.chunks}", f"at most {MAX_PLAIN_CHUNK // 2**20} MB")
 
 
 def _outside(name: bytes, link: h5py.h5l.LinkInfo) -> bytes | None:

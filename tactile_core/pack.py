@@ -11,6 +11,7 @@ import numpy as np
 
 from . import atomic, sealed
 from .errors import TactileError
+from .hdf5_checked import open_checked
 
 
 def write(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
@@ -37,8 +38,10 @@ def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, n
             found[name] = item[rows] if item.shape else item[()]
 
     try:
-        with h5py.File(file, "r") as opened:
+        with open_checked(file) as opened:
             opened.visititems(note)
+    except TactileError:
+        raise
     except Exception as error:  # the library raises a dozen types on damaged bytes
         raise TactileError(file, f"damaged ({error})", "a shard", "Run the job again: it is made anew") from error
     return found

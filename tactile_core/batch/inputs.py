@@ -68,11 +68,11 @@ def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
     """The recordings of a path or glob. within : those in a folder."""
     there = os.path.lexists(word) or not glob.has_magic(word)
     for path in [word] if there else _globbed(word):
-        real = Path(os.path.realpath(path))
-        if real.is_dir():
-            yield from within(real)
+        real = os.path.realpath(path)
+        if os.path.isdir(real):
+            yield from within(Path(real))
         else:
-            yield real
+            yield Path(real)
 
 
 def _globbed(word: str) -> list[str]:
@@ -150,7 +150,7 @@ def unit_hash(calibration: Path) -> str:
 def content_hash(path: Path) -> tuple[str, int]:
     """Hash and bytes of a file, or of all files of a bag's folder with their names. Raises TactileError."""
     path = Path(split(str(path))[0])
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
         raise TactileError(path, "no regular file", "a recording", "Copy what it gives into a file")
     try:
         files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]

@@ -18,10 +18,11 @@ import numpy as np
 
 from .. import atomic, sealed
 from ..errors import TactileError
-from ..hdf5_checked import check_superblock
+from ..hdf5_checked import check_before_opening, check_plain, declared
 from ..hdf5_disk import Disk
 from ..recordings import Recording, Signals, prepare, sensor_file
 from ..recordings.parts import read_parts
+from ..recordings.recording import ELECTRODES
 from . import job as jobs
 from .inputs import content_hash
 
@@ -196,9 +197,30 @@ class Prepared:
         import h5py
 
         try:
-            check_superblock(self._path)
+            check_before_opening(self._path)
             with h5py.File(self._path, "r") as file:
+                _check(self._path, file)
                 return what(file)
+        except TactileError:
+            raise
         except Exception as error:  # the library raises a dozen types on damaged bytes
             found, advice = f"damaged ({error})", "Run the job again: it is made anew"
             raise TactileError(self._path, found, "a prepared recording", advice) from error
+
+
+def _check(path: Path, file: h5py.File) -> None:
+    """Raises ValueError or TactileError for other arrays than ours, whose rows would take more memory."""
+    import h5py
+
+    count = len(file["time"])
+    wide = {"change", "electrodes"}
+    shapes = {name: (count, ELECTRODES) if name in wide else (count,) for name in COLUMNS}
+    for name in (*COLUMNS, "part", "rest", "about"):
+        if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+            raise ValueError(f"{name} is a link")
+        data = file[name]
+        check_plain(path, data)
+        if name in shapes and data.shape != shapes[name]:
+            raise ValueError(f"{name} of shape {data.shape}, not {shapes[name]}")
+        if name not in shapes:
+            declared(data, f"{path}, {name}")

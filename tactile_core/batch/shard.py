@@ -15,7 +15,7 @@ import numpy as np
 from .. import atomic, sealed
 from ..frame_pass import CHUNK, Tools, translated
 from ..frames_file import FramesFile
-from ..hdf5_checked import check_superblock
+from ..hdf5_checked import check_before_opening
 from . import job as jobs
 from .prepared import Prepared
 
@@ -64,7 +64,7 @@ def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
     import h5py
 
     try:
-        check_superblock(file)
+        check_before_opening(file)
         with h5py.File(file, "r") as found:
             return all(found.attrs[name] == value for name, value in _identity(job, index, number, frames).items())
     except Exception:  # the library raises a dozen types on what is no shard

@@ -5,6 +5,7 @@ What a bag says of its messages' layout is compared, never compiled: the library
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -42,7 +43,7 @@ class Bag:
 def split(path: str) -> tuple[str, int | None]:
     """``hand.bag#2`` -> the path and the finger; a path that exists is taken as it is."""
     found = FINGER.match(path)
-    if found is None or Path(path).exists():
+    if found is None or os.path.exists(path):
         return path, None
     return found[1], int(found[2])
 

@@ -126,6 +126,13 @@ def test_lists_name_what_is_there(recordings, tmp_path):
             inputs.find([f"@{listed}"], tmp_path / "out")
 
 
+@pytest.mark.parametrize("name", ["a" * 300, "a" * 300 + "#1"])
+def test_names_that_no_disk_takes_are_told(name, tmp_path):
+    (tmp_path / "list.txt").write_text(name)
+    with pytest.raises(TactileError, match=r"cannot be read \(File name too long\)"):
+        inputs.hashed(inputs.find([f"@{tmp_path / 'list.txt'}"], tmp_path / "out"), none)
+
+
 def test_a_folder_that_cannot_be_looked_into_is_told(recordings, tmp_path, monkeypatch):
     scandir = os.scandir
 

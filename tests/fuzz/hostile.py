@@ -130,13 +130,13 @@ def prepare(path: Path) -> None:
         recordings.prepare(part.recording)
 
 
-def hdf5(arrays: dict[str, np.ndarray]) -> bytes:
+def hdf5(arrays: dict[str, np.ndarray], packing: str | None = "gzip") -> bytes:
     import h5py
 
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         for name, values in arrays.items():
-            file.create_dataset(name, data=values, compression="gzip" if values.ndim else None)
+            file.create_dataset(name, data=values, compression=packing if values.ndim else None)
     return memory.getvalue()
 
 
@@ -241,7 +241,7 @@ def good_prepared() -> bytes:
     sizes = {"time": (), "quiet": (), "flags": ()}
     arrays = {name: np.zeros((8, *sizes.get(name, (19,))), kind) for name, kind in prepared.COLUMNS.items()}
     parts = {"part": np.zeros(1, np.int64), "rest": np.zeros((1, 19))}
-    return hdf5(arrays | parts | {"about": np.frombuffer(json.dumps(about).encode(), np.uint8)})
+    return hdf5(arrays | parts | {"about": np.frombuffer(json.dumps(about).encode(), np.uint8)}, packing=None)
 
 
 def read_prepared(path: Path) -> None:

@@ -18,9 +18,9 @@ import h5py
 import numpy as np
 import pytest
 
-from tactile_core import deformations, paired_contacts, recordings, scene, tet_file, weights
+from tactile_core import deformations, hdf5_heaps, pack, paired_contacts, recordings, scene, tet_file, weights
 from tactile_core.background import background_picture, read_photograph
-from tactile_core.batch import dask_place, inputs
+from tactile_core.batch import dask_place, inputs, prepared
 from tactile_core.calibration_file import SHIPPED, load_calibration
 from tactile_core.errors import TactileError
 from tactile_core.indenters import mesh_file
@@ -139,16 +139,34 @@ def driver_information(path):
         file.write(struct.pack("<Q", end))
 
 
+def endless_list(path):
+    """A group's heap whose first free place names itself as the next."""
+    electrodes(path, data=np.zeros((60, 19)))
+    with open(path, "r+b") as file:
+        content = file.read()
+        heap = content.index(b"HEAP")
+        _, first, address = struct.unpack_from("<3Q", content, heap + 8)
+        assert struct.unpack_from("<Q", content, address + first)[0] == hdf5_heaps.END
+        file.seek(address + first)
+        file.write(struct.pack("<Q", first))
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
+        (endless_list, "a list of free places without end"),
         (driver_information, "a driver's information"),
         (huge_shape, "GB in memory"), (huge_chunk, "chunks of 1450 MB"), (chunk_bomb, "unpacks to more than"),
         (external_storage, "other files"), (external_link, "a link to another file"), (virtual_storage, "other files"),
         (strange_filter, "HDF5 filter 6"),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("load", [prepare, lambda path: list(deformations.read(path)), paired_contacts.read_pairs])
+@pytest.mark.parametrize(
+    "load",
+    [
+        prepare, lambda path: list(deformations.read(path)), paired_contacts.read_pairs, pack.read,
+    ],
+)  # fmt: skip
 def test_hdf5(make, words, load, tmp_path):
     make(tmp_path / "a.h5")
     if make is huge_shape and load is not prepare:
@@ -156,6 +174,40 @@ def test_hdf5(make, words, load, tmp_path):
     elif make is huge_shape:
         words = "0 stored bytes"
     refused(load, tmp_path / "a.h5", words)
+
+
+SPOILED = {
+    "change": [
+        ({"shape": (8, 19), "compression": "gzip"}, "packed values"),
+        ({"shape": (8, 19), "external": [("/etc/passwd", 0, 1216)]}, "no plain numbers"),
+        ({"shape": (8, 19), "chunks": (10**6, 19), "maxshape": (None, 19)}, "chunks of shape"),
+        ({"shape": (8, 10**6)}, "change of shape"),
+    ],
+    "about": [({"shape": (10**12,), "chunks": (1000,)}, "stored bytes")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"), [(name, *one) for name, several in SPOILED.items() for one in several]
+)
+def test_prepared_recordings_are_plain(name, options, words, tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for column, kind in prepared.COLUMNS.items():
+            file[column] = np.zeros((8, 19) if column in ("change", "electrodes") else 8, kind)
+        file["part"], file["rest"], file["about"] = np.zeros(1, int), np.zeros((1, 19)), np.zeros(2, np.uint8)
+        del file[name]
+        file.create_dataset(name, dtype=np.uint8 if name == "about" else float, **options)
+    refused(rows_of, tmp_path / "a.h5", words)
+
+
+@pytest.mark.parametrize(("make", "words"), [(endless_list, "without end"), (driver_information, "a driver's")])
+def test_prepared_recordings_are_looked_at_first(make, words, tmp_path):
+    make(tmp_path / "a.h5")
+    refused(rows_of, tmp_path / "a.h5", words)
+
+
+def rows_of(path):
+    prepared.Prepared(path).rows(0, 4)
 
 
 def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
