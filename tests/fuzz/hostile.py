@@ -8,6 +8,7 @@ TactileError; the spoiled file is left beside it.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import io
 import json
 import random
@@ -46,6 +47,7 @@ from tactile_core.batch import job as jobs  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.indenters import mesh_file  # noqa: E402
 from tactile_core.live import Growing  # noqa: E402
+from tactile_core.optics import exr  # noqa: E402
 from tactile_core.optics import inputs as pictures  # noqa: E402
 from tactile_core.recordings import parts, sensor_file  # noqa: E402
 
@@ -157,9 +159,13 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
     queue = b'queue = "slurm"\njobs = 10\n[options]\ncores = 1\nmemory = "4GB"\nwalltime = "01:00:00"\n'
     photograph = io.BytesIO()
     Image.fromarray(np.random.default_rng(0).integers(0, 256, (12, 16, 3), np.uint8)).save(photograph, "PNG")
+    found: dict[str, tuple[bytes, Loader]] = {}
+    if importlib.util.find_spec("OpenEXR"):  # the extra [render] may be absent
+        exr.write_exr(folder / "height.exr", {"height": np.zeros((8, 6), np.float32)}, {"made": "up"})
+        found["exr"] = ((folder / "height.exr").read_bytes(), exr.read_height)
     heights = io.BytesIO()
     np.savez_compressed(heights, height_map=np.zeros((2, 8, 6), np.float32))
-    return {
+    return found | {
         "photograph": (photograph.getvalue(), background.read_photograph),
         "scene": (scenes.read_bytes(), scene.load_scene),
         "calibration": (unit.read_bytes(), calibration_file.load_calibration),

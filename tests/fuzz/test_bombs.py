@@ -407,6 +407,20 @@ def test_a_photograph_starts_no_program(tmp_path, monkeypatch):
     assert not (tmp_path / "started").exists()
 
 
+@pytest.mark.parametrize(("width", "told"), [(10**7, "610 MB of pixels"), (2 * 10**8, "12207 MB"), (100, "damaged")])
+def test_a_wide_exr_picture(width, told, tmp_path):
+    pytest.importorskip("OpenEXR", reason="OpenEXR is absent: pip install tactile-core[render]")
+    from tactile_core.optics.exr import read_height, write_exr
+
+    write_exr(tmp_path / "a.exr", {"height": np.zeros((16, 8), np.float32)}, {})
+    content = bytearray((tmp_path / "a.exr").read_bytes())
+    window = content.index(b"dataWindow\0box2i\0") + 21
+    assert struct.unpack_from("<4i", content, window) == (0, 0, 7, 15)
+    struct.pack_into("<4i", content, window, 0, 0, width, 15)
+    (tmp_path / "a.exr").write_bytes(content)
+    refused(read_height, tmp_path / "a.exr", told)
+
+
 def test_lists_of_inputs(tmp_path):
     (tmp_path / "list.txt").write_bytes(b"\xff\xfe" * 1000)
     refused(lambda path: inputs.find([f"@{path}"], tmp_path / "out"), tmp_path / "list.txt", "list.txt")

@@ -19,7 +19,8 @@ found.loader.exec_module(hostile)
 
 NAMES = [
     *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3", "metadata"),
-    *("scene", "calibration", "photograph", "sensor", "list", "queue", "tet", "obj", "stl", "ply", "off", "heights"),
+    *("scene", "calibration", "photograph", "sensor", "list", "queue", "heights", "exr"),
+    *("tet", "obj", "stl", "ply", "off"),
     *("safetensors", "weights_card", "job", "deformations", "pairs", "prepared", "seal"),
 ]
 FEW = settings(
@@ -41,7 +42,7 @@ def table(tmp_path_factory):
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_spoiled_file_is_refused_in_words(name, seed, table, tmp_path):
     if name not in table:
-        pytest.skip("rosbags is absent: pip install tactile-core[ros]")
+        pytest.skip("rosbags or OpenEXR is absent: pip install tactile-core[ros,render]")
     data, load = table[name]
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     hostile.survives(tmp_path / "spoiled", hostile.spoil(data, random.Random(seed)), load)
@@ -51,7 +52,7 @@ def test_a_spoiled_file_is_refused_in_words(name, seed, table, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_good_file_is_read(name, table, tmp_path):
     if name not in table:
-        pytest.skip("rosbags is absent: pip install tactile-core[ros]")
+        pytest.skip("rosbags or OpenEXR is absent: pip install tactile-core[ros,render]")
     data, load = table[name]
     path = tmp_path / "good"
     path.write_bytes(data)
@@ -59,4 +60,4 @@ def test_the_good_file_is_read(name, table, tmp_path):
 
 
 def test_every_loader_is_here(table):
-    assert set(table) | {"ros1", "mcap", "sqlite3", "metadata"} == set(NAMES)
+    assert set(table) | {"ros1", "mcap", "sqlite3", "metadata", "exr"} == set(NAMES)
