@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import glob
 import hashlib
+import logging
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +19,7 @@ from ..errors import TactileError
 from ..recordings.bag import MARK, split
 from ..small_text import read_small
 
+log = logging.getLogger(__name__)
 SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3")  # what is taken from a folder
 MOST_STARS, MOST_PARTS = 2, 100  # of a glob: '**', whose work multiplies; parts, each a call deeper in Python's glob
 MOST_QUOTED = 200  # characters of a glob in an error: a line of a list may have millions
@@ -104,13 +106,12 @@ def _lines(file: Path) -> list[tuple[int, str]]:
 def _of_folder(folder: Path) -> Iterator[Path]:
     """Recordings in a folder and below it, by name; links to folders are not followed.
 
-    Raises TactileError for a folder that cannot be looked into.
+    One that cannot be looked into, such as a disk's lost+found, is passed over with a warning.
     """
 
     def refused(error: OSError) -> None:
-        """What `os.walk` would pass over."""
-        found, expected = f"cannot be looked into ({error.strerror})", "a readable folder"
-        raise TactileError(error.filename, found, expected, "Make it readable, or name the others one by one")
+        """What `os.walk` passes over without a word."""
+        log.warning("%s: cannot be looked into (%s), passed over", error.filename, error.strerror)
 
     if _is_bag(folder):
         yield folder
