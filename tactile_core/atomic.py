@@ -27,6 +27,8 @@ def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]
     partial = _beside(path, "partial")
     if shared:
         partial = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tactile-partial")
+    if os.path.lexists(partial):  # a killed writer's, or what a stranger put there: a link would be written through
+        partial.unlink()
     try:
         yield partial
         _sync(partial)
@@ -59,7 +61,7 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Ite
     when its holder dies, tells a dead writer from a living one. Raises TactileError when the folder exists and
     `overwrite` is not true (None: the user has no such option), and when another process is writing it.
     """
-    path = Path(path)
+    path = Path(os.path.abspath(path))
     partial, old = _beside(path, "partial"), _beside(path, "old")
     with _locked(path):
         _recover(path)
@@ -81,7 +83,10 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Ite
 def sweep(folder: str | os.PathLike) -> None:
     """Clear what killed writers of folders left in `folder`; living ones, and files of others, are let alone."""
     for lock in Path(folder).glob(".*.tactile-lock"):
-        path = lock.with_name(lock.name.removeprefix(".").removesuffix(".tactile-lock"))
+        name = lock.name.removeprefix(".").removesuffix(".tactile-lock")
+        if name in ("", ".", "..") or lock.is_symlink() or not lock.is_file():
+            continue
+        path = lock.with_name(name)
         with contextlib.suppress(TactileError), _locked(path):
             _recover(path)
 
@@ -94,17 +99,19 @@ def sweep_files(folder: str | os.PathLike) -> None:
 
 
 def _beside(path: Path, role: str) -> Path:
-    """A hidden name in the same folder, that no other program uses."""
+    """A hidden name in the same folder, that no other program uses. Raises TactileError for a path without a name."""
+    if not path.name:
+        raise TactileError(path, "no name", "a new file or folder")
     return path.with_name(f".{path.name}.tactile-{role}")
 
 
 def _recover(path: Path) -> None:
     """Undo an exchange that was cut between its two moves, then clear what is left of it."""
     partial, old = _beside(path, "partial"), _beside(path, "old")
-    if old.exists() and not path.exists():
+    if old.is_dir() and not old.is_symlink() and not path.exists():
         os.replace(old, path)
     for leftover in (partial, old):
-        if leftover.is_symlink():
+        if leftover.is_symlink() or leftover.is_file():
             leftover.unlink()
         elif leftover.exists():
             shutil.rmtree(leftover)
@@ -115,7 +122,10 @@ def _locked(path: Path) -> Iterator[None]:
     """Hold the lock of one folder's writer; raises TactileError when another process holds it."""
     lock = _beside(path, "lock")
     while True:
-        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise TactileError(lock, f"cannot be opened ({error.strerror})", "no file of others there") from error
         try:
             _lock(descriptor)
         except OSError:
@@ -184,7 +194,7 @@ def claim(path: str | os.PathLike) -> None:
     if not os.fspath(path):
         raise TactileError("--out", "an empty name", "a file to write")
     path = Path(path)
-    if path.exists():
+    if os.path.lexists(path):
         raise TactileError(path, "exists already", "a new file", "Remove it or choose another name")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

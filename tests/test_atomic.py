@@ -121,3 +121,37 @@ def test_sweep_lets_files_of_others_alone(tmp_path):
     (tmp_path / ".editor.partial").mkdir()
     atomic.sweep(tmp_path)
     assert names(tmp_path) == [".editor.lock", ".editor.partial"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links and pipes of POSIX")
+def test_what_a_stranger_put_in_a_temporary_place_is_not_written_through(tmp_path):
+    (tmp_path / "victim").write_text("mine")
+    (tmp_path / ".a.txt.tactile-partial").symlink_to(tmp_path / "victim")
+    os.mkfifo(tmp_path / ".b.txt.tactile-partial")
+    for name in ("a.txt", "b.txt"):
+        atomic.write_bytes(tmp_path / name, b"new")
+        assert (tmp_path / name).read_bytes() == b"new" and not (tmp_path / name).is_symlink()
+    assert (tmp_path / "victim").read_text() == "mine"
+    (tmp_path / "c.txt").symlink_to(tmp_path / "none")
+    with pytest.raises(TactileError, match="exists already"):
+        atomic.claim(tmp_path / "c.txt")
+
+
+def test_odd_names_beside_a_folder_are_let_alone_or_told(tmp_path, monkeypatch):
+    (tmp_path / "..tactile-lock").touch()
+    (tmp_path / ".other.tactile-lock").mkdir()
+    (tmp_path / ".old.tactile-old").write_text("mine")
+    atomic.sweep(tmp_path)
+    assert (tmp_path / ".other.tactile-lock").is_dir() and not (tmp_path / "old").exists()
+    (tmp_path / ".x.tactile-lock").mkdir()
+    with pytest.raises(TactileError, match="cannot be opened"), atomic.new_folder(tmp_path / "x"):
+        pass
+    (tmp_path / ".y.tactile-partial").write_text("left")
+    with atomic.new_folder(tmp_path / "y"):
+        pass
+    with pytest.raises(TactileError, match="cannot be written"):
+        atomic.claim(tmp_path / ("a" * 300))
+    monkeypatch.chdir(tmp_path / "y")
+    with atomic.new_folder(".", overwrite=True) as folder:
+        (folder / "new").touch()
+    assert [path.name for path in (tmp_path / "y").iterdir()] == ["new"]
