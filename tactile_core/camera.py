@@ -17,6 +17,8 @@ from .errors import TactileError
 # Plane of height zero, shared frame: the lowest point of the public gel mesh at rest (sensors.md). Heights grow
 # with y, toward the camera, so that an indentation raises them.
 HEIGHT_ZERO_Y = -8.301e-3
+MOST_PIXELS = 10_000_000  # 2 GB of arrays; the camera has 76,800 (assumed enough)
+FINEST = 1000.0  # pixels a millimetre; the camera has 15 to 20 (assumed enough)
 LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a camera that is higher
 
 
@@ -49,10 +51,13 @@ class Camera:
             size = getattr(self, name)
             if not (isinstance(size, int) and size >= 2):
                 raise TactileError(f"camera, {name}", repr(size), "a whole number of pixels, 2 or more")
+        if self.width * self.height > MOST_PIXELS:
+            found = f"{self.width} x {self.height} pixels"
+            raise TactileError("camera, size", found, f"at most {MOST_PIXELS // 10**6} million pixels")
         for name in ("px_per_mm_x", "px_per_mm_y"):
             scale = getattr(self, name)
-            if not (math.isfinite(scale) and scale > 0):
-                raise TactileError(f"camera, {name}", repr(scale), "a number of pixels a millimetre above 0")
+            if not 0 < scale <= FINEST:  # false for nan
+                raise TactileError(f"camera, {name}", repr(scale), f"pixels a millimetre, above 0, at most {FINEST:g}")
         for name in ("right_z", "down_x"):
             if getattr(self, name) not in (-1, 1):
                 raise TactileError(f"camera, {name}", repr(getattr(self, name)), "+1 or -1")

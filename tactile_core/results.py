@@ -20,6 +20,7 @@ from .errors import TactileError
 
 FORMAT = "tactile-result-1"
 FRAMES, IMAGES, SHEET, NOTE, TIMINGS = "frames.h5", "images", "contact_sheet.png", "note.json", "timings.json"
+OURS = {FRAMES, IMAGES, SHEET, NOTE, TIMINGS, "exr", "rest.exr"}  # the last two of `tactile render --exr`
 IMAGE_NAME = "{:05d}.png"
 
 KEEPABLE = ("latent", "displacement", "height", "image")
@@ -58,12 +59,21 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
     return folders
 
 
-def check_free(folder: Path, overwrite: bool) -> None:
-    """Raises TactileError where a result may not stand: one is there (unless `overwrite`), or something else is."""
+def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
+    """Raises TactileError where a result may not stand: one is there (unless `overwrite`), or something else is.
+
+    maker : what its note says of who made it; another verb's result is something else, and so is one among whose files
+        there are others
+    """
     if not os.path.lexists(folder):
         return
-    if not is_result(folder):
-        raise TactileError(folder, "exists and is no result", "a free place", "Name another --out folder")
+    if not is_result(folder, maker):
+        raise TactileError(folder, "exists and is no result of this verb", "a free place", "Name another --out folder")
+    names = sorted(path.name for path in folder.iterdir())
+    others = [name for name in names if name not in OURS and not name.startswith(".")]  # as .DS_Store
+    if others:
+        found, advice = f"holds {others[0]:.80}, which is not of the result", "Name another --out, or move it away"
+        raise TactileError(folder, found, "a result alone", advice)
     if not overwrite:
         raise TactileError(folder, "already holds a result", "a free place", "Add --overwrite, or another --out")
 
@@ -79,13 +89,13 @@ def check_writable(out: Path) -> None:
         raise TactileError(out, found, "a writable folder", advice) from error
 
 
-def is_result(folder: Path) -> bool:
-    """Whether a folder holds a result of ours, so that --overwrite may replace it."""
+def is_result(folder: Path, maker: str = "") -> bool:
+    """Whether a folder holds a result of ours, made by `maker`, so that --overwrite may replace it."""
     try:
         note = json.loads((folder / NOTE).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return False
-    return isinstance(note, dict) and note.get("format") == FORMAT
+    return isinstance(note, dict) and note.get("format") == FORMAT and note.get("made_by", "") == maker
 
 
 def sha256(path: str | os.PathLike) -> str:

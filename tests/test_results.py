@@ -85,3 +85,12 @@ def test_frames_file_is_the_same_bytes_again(tmp_path):
     write_frames(tmp_path / "a")
     write_frames(tmp_path / "b")
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_results_of_another_verb_and_files_of_others_are_not_replaced(tmp_path):
+    make_result(tmp_path / "touch")
+    with pytest.raises(TactileError, match="is no result of this verb"):
+        results.check_free(tmp_path / "touch", True, "tactile render")
+    (tmp_path / "touch" / "mine.txt").write_text("mine")
+    with pytest.raises(TactileError, match=r"holds mine\.txt"):
+        results.check_free(tmp_path / "touch", True)

@@ -44,6 +44,8 @@ Progress = Callable[[int, int], None]
 def _silent(text: str) -> None:
     """For callers that do not ask what was picked."""
 
+MAKER = "tactile render"  # in the note
+
 
 @dataclasses.dataclass(frozen=True)
 class Options:
@@ -119,7 +121,7 @@ def render(
 
 def claimed(out: Path, options: Options) -> str:
     """The preset, when `out` may be written; raises TactileError where not, and what `choose_preset` raises."""
-    results.check_free(out, options.overwrite)
+    results.check_free(out, options.overwrite, MAKER)
     results.check_writable(out.parent)
     atomic.sweep(out.parent)
     return choose_preset(options)
@@ -245,7 +247,7 @@ def note_of(
     about = PRESETS[preset] if preset != FAST else None
     return {
         "format": results.FORMAT,
-        "made_by": "tactile render",
+        "made_by": MAKER,
         "input": {"file": file.name, "sha256": results.sha256(file), "kind": kind},
         "frames": {"selected": frames_text(options.frames), "rendered": count},
         "calibration": {"file": calibration.name, "sha256": results.sha256(calibration), "unit": unit},

@@ -297,3 +297,20 @@ def test_a_recording_is_as_exact_as_its_heights(render, tiers):
 def test_a_bound_on_a_scene_s_gel_is_not_met_in_parts(render):
     status, _, err = render(SCENES / "press", "--preset", "fast", "--error", "9um", "--workers", "2")
     assert status == 2 and "Simulate the scene first" in err
+
+
+def test_the_result_of_convert_that_is_rendered_is_not_replaced(render, tmp_path):
+    """A result's note tells which verb made it."""
+    (tmp_path / "out").mkdir()
+    with FramesFile(tmp_path / "out" / "frames.h5", 1, ("displacement",), {}) as file:
+        still = np.zeros((1, len(digit_surface().rest), 3), np.float32)
+        file.write(0, {"frame": np.array([0]), "displacement_digit": still})
+    (tmp_path / "out" / "note.json").write_text('{"format": "tactile-result-1"}')
+    status, _, err = render(tmp_path / "out" / "frames.h5", "--overwrite")
+    assert status == 2 and "no result of this verb" in err and (tmp_path / "out" / "frames.h5").exists()
+
+
+@pytest.mark.parametrize("size", ["24000x32000", "3000x4000"])
+def test_a_size_without_bound_is_refused(size, render):
+    status, _, err = render(RECORDING, "--frames", "0:1", "--size", size)
+    assert status == 2 and "at most 10 million pixels" in err
