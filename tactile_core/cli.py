@@ -33,6 +33,10 @@ EXTRAS = {
     "mitsuba": "render", "drjit": "render", "OpenEXR": "render", "rosbags": "ros", "lz4": "ros",
     "distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch",
 }  # fmt: skip
+# Options that name something; that of --keep may be empty.
+PATHS = (
+    *("frames", "press", "weights", "cluster", "calibration", "sensor", "start", "background", "json", "sheet", "test"),
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,9 +75,12 @@ def _stopped(stop: KeyboardInterrupt, left: str) -> int:
 
 
 def _check_out(options: argparse.Namespace) -> None:
-    """An empty name, as a script's unset variable gives it, would be the current folder."""
+    """An empty name, as a script's unset variable gives it, would be the current folder, or as if it were not given."""
     if getattr(options, "out", None) == "":
         raise TactileError("--out", "an empty name", "a file or folder to write", "Name one")
+    for name in PATHS:
+        if getattr(options, name, None) == "":
+            raise TactileError(f"--{name}", "an empty value", "a value", "Leave the option out, or name one")
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -36,11 +36,20 @@ def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.n
             numbers = np.arange(len(values))
         else:
             raise TactileError(path, f"format {kind!r}", f"{CONVERTED!r} or {SIMULATED!r}", "Name a file of `tactile`")
+    check_numbers(path, numbers)
     row = np.flatnonzero(numbers == frame)
     if len(row) != 1 or len(numbers) != len(values):
         held = f"{numbers.min():g} to {numbers.max():g}" if len(numbers) else "none"
         raise TactileError(f"{path}, frame {frame}", "not in the file", f"a frame it holds ({held})")
     return values[row[0]].astype(np.float64) * scale
+
+
+def check_numbers(path: str | os.PathLike, numbers: np.ndarray) -> None:
+    """Raises TactileError for frame numbers (T,) that are no whole numbers from 0 on, each greater than the last."""
+    whole = np.isfinite(numbers).all() and (numbers == np.floor(numbers)).all() and (numbers >= 0).all()
+    if not (whole and (np.diff(numbers) > 0).all() and (numbers < 2**31).all()):
+        found = f"frame numbers {np.array2string(numbers, threshold=6, edgeitems=3)}"
+        raise TactileError(f"{os.fspath(path)}, frame", found, "whole ones from 0 on, each greater than the last")
 
 
 def _array(store: Store, name: str, sensor: str) -> np.ndarray:

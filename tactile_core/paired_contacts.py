@@ -8,7 +8,6 @@ import json
 import os
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 
 from .errors import TactileError
@@ -163,8 +162,10 @@ def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> N
     """The attribute `names` is a JSON list of texts, and has one for each number of `indenter`."""
     place = f"{os.fspath(path)}, attribute indenters"
     try:
-        found = msgspec.json.decode(names, type=list[str])
-    except (msgspec.DecodeError, RecursionError) as error:
+        found = json.loads(names)
+        if not isinstance(found, list) or not all(isinstance(name, str) for name in found):
+            raise ValueError(f"a {type(found).__name__}")
+    except (ValueError, RecursionError) as error:
         raise TactileError(place, str(error), "a JSON list of names", ADVICE) from error
     if indenter.size and not 0 <= indenter.min() <= indenter.max() < len(found):
         told = f"{len(found)} names for numbers {indenter.min()} to {indenter.max()}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib.util
 import json
 import os
 from collections.abc import Collection
@@ -228,13 +229,12 @@ def _preset_ms(name: str) -> float:
 
 
 def _variant(preset: str) -> str:
-    """Of Mitsuba, that runs here; "" where none is needed, or none is there."""
-    from .optics.variant import variant_for
+    """Of Mitsuba, that runs here; "" where none is needed, or none is there. Mitsuba itself is not loaded."""
+    from .optics.variant import LLVM, SCALAR, llvm_trouble
 
-    try:
-        return variant_for(preset)
-    except ModuleNotFoundError:
+    if preset == "fast" or importlib.util.find_spec("mitsuba") is None:
         return ""
+    return SCALAR if llvm_trouble(os.environ.get("DRJIT_LIBLLVM_PATH", "")) else LLVM
 
 
 def _lit(name: str) -> str:

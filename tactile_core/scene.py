@@ -15,6 +15,7 @@ from .scene_indenters import IndenterSpec, NotNegative, Positive, with_files_of
 from .small_text import read_toml_text
 
 FORMAT = "tactile-scene-1"
+LARGEST = 1e6  # of any number: none that means something comes near, squares of far larger ones are infinite (assumed)
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -92,6 +93,8 @@ def check(file: str | os.PathLike, scene: Scene) -> None:
     numbers = list(_numbers(msgspec.to_builtins(scene)))
     if not np.isfinite(numbers).all():
         raise TactileError(file, "a number is nan or infinite", "finite numbers")
+    if np.max(np.abs(numbers), initial=0.0) > LARGEST:
+        raise TactileError(file, f"the number {max(numbers, key=abs):g}", f"millimetres, newtons... up to {LARGEST:g}")
     names = [spec.name for spec in scene.indenters]
     if len(set(names)) < len(names):
         raise TactileError(f"{file}, indenters", f"names {names}", "different names")

@@ -149,3 +149,16 @@ def test_an_older_file_is_kept(mesh, tmp_path):
     status, _, err = mesh("digit", "--out", "a.ply")
     assert status == 2 and "exists already" in err
     assert (tmp_path / "a.ply").read_text() == "mine"
+
+
+@pytest.mark.parametrize("tilt", ["180", "-46", "nan", "inf"])
+def test_a_tilt_that_presses_from_elsewhere_is_refused(tilt, mesh):
+    words = ("--press", "sphere", "--diameter", "7", "--depth-mm", "0.3", "--out", "m.ply")
+    status, _, err = mesh("digit", *words, f"--tilt-deg={tilt}")
+    assert status == 2 and "--tilt-deg" in err and "-45 to 45" in err
+
+
+@pytest.mark.parametrize("option", ["--frames", "--press"])
+def test_an_empty_value_is_not_taken_for_none(option, mesh):
+    status, _, err = mesh("digit", option, "", "--out", "m.ply")
+    assert status == 2 and f"{option}: an empty value" in err

@@ -7,6 +7,7 @@ import pytest
 from tactile_core import frames_file, sensors
 from tactile_core.errors import TactileError
 from tactile_core.frame_surface import frame_displacement
+from tactile_core.optics.inputs import read_frames
 from tactile_core.recordings import Truth, write_simulated
 
 NODES = {"biotac": len(sensors.biotac_surface().rest), "digit": len(sensors.digit_surface().rest)}
@@ -68,3 +69,13 @@ def test_a_deformation_that_was_not_kept_or_is_of_another_surface_is_refused(con
         frame_displacement(converted, "digit", 4)
     with pytest.raises(TactileError, match="another version of the surface"):
         frame_displacement(converted, "biotac", 4)
+
+
+@pytest.mark.parametrize("numbers", [[4, 4, 4], [-1, 0, 1], [0.5, 1.5, 2.5], [0, np.nan, 2], [3, 2, 1], [0, 1, 2**40]])
+def test_odd_frame_numbers_are_refused(numbers, converted):
+    with h5py.File(converted, "r+") as file:
+        del file["frame"]
+        file["frame"] = np.array(numbers)
+    for read in (lambda: frame_displacement(converted, "digit", 4), lambda: read_frames(converted)):
+        with pytest.raises(TactileError, match="frame: frame numbers"):
+            read()

@@ -72,7 +72,7 @@ def poison(file):
         (replace("displacement_biotac", lambda file: file["displacement_digit"][:], scale=0.0), "scale 0.0"),
         (replace("force", np.zeros((15, 3), np.int32)), "force: dtype int32"),
         (poison, "signal, contact 4: NaN"),
-        (lambda file: file.attrs.update(indenters="sphere"), "attribute indenters: JSON is malformed"),
+        (lambda file: file.attrs.update(indenters="sphere"), "attribute indenters: Expecting value"),
         (lambda file: file.attrs.update(indenters="[" * 10_000), "a JSON list of names"),
         (lambda file: file.attrs.update(indenters='{"sphere": 0}'), "a JSON list of names"),
         (lambda file: file.attrs.update(indenters="[]"), "0 names for numbers 0 to 0"),

@@ -1,6 +1,7 @@
 """Scenes that ship load; anything else is refused with file and field."""
 
 import pathlib
+import re
 
 import pytest
 
@@ -68,3 +69,12 @@ def test_recording_times_must_grow(tmp_path):
     text = (SCENES / "press_roll_slide" / "scene.toml").read_text(encoding="utf-8")
     with pytest.raises(TactileError, match="growing times"):
         load_scene(write(tmp_path, text.replace("time_s = 0.5,", "time_s = 9.5,")))
+
+
+def test_numbers_beyond_all_measure_are_refused(tmp_path):
+    text = (SCENES / "press" / "scene.toml").read_text(encoding="utf-8")
+    changed = re.sub(r"force_n = [0-9.]+", "force_n = 1e300", text, count=1)
+    assert changed != text
+    (tmp_path / "scene.toml").write_text(changed)
+    with pytest.raises(TactileError, match="the number 1e\\+300"):
+        load_scene(tmp_path)

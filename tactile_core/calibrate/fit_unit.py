@@ -36,6 +36,13 @@ class Calibrated:
     warnings: tuple[str, ...]
 
 
+def check_diameter(ball_diameter: float) -> None:
+    """Raises TactileError for a ball, m, that does not fit on the gel."""
+    if not MM_LIMITS[0] <= 1e3 * ball_diameter <= MM_LIMITS[1]:
+        expected = f"{MM_LIMITS[0]:g} to {MM_LIMITS[1]:g}"
+        raise TactileError("ball diameter, mm", f"{1e3 * ball_diameter:g}", expected)
+
+
 def calibrate(
     photographs: Photographs,
     ball_diameter: float,
@@ -48,9 +55,7 @@ def calibrate(
 
     Raises TactileError for a ball that does not fit on the gel, and where no photograph shows such a ball.
     """
-    if not MM_LIMITS[0] <= 1e3 * ball_diameter <= MM_LIMITS[1]:
-        expected = f"{MM_LIMITS[0]:g} to {MM_LIMITS[1]:g}"
-        raise TactileError("ball diameter, mm", f"{1e3 * ball_diameter:g}", expected)
+    check_diameter(ball_diameter)
     whole = fitted_size(start, photographs)
     factor = working_factor(whole.camera.width, whole.camera.height)
     working = whole.at_size(whole.camera.width // factor, whole.camera.height // factor)

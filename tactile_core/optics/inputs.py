@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
+from ..frame_surface import check_numbers
 from ..frames_file import FORMAT as CONVERTED
 from ..hdf5_checked import SIGNATURE
 from ..recordings.simulated import FORMAT as SIMULATED
@@ -90,7 +91,9 @@ def _of_hdf5(path: Path) -> Frames:
     with open_hdf5(os.fspath(path)) as store:
         kind = store.attributes.get("format")
         if kind == CONVERTED:
-            name, numbers = "displacement_digit", store.array("frame", (None,)).astype(int)
+            name, numbers = "displacement_digit", store.array("frame", (None,))
+            check_numbers(path, numbers)
+            numbers = numbers.astype(int)
         elif kind == SIMULATED:
             name, numbers = "truth/displacement_digit", None
         else:

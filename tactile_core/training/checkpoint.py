@@ -6,9 +6,8 @@ import io
 import json
 import os
 from dataclasses import dataclass, field
-from typing import TypedDict
+from typing import Any
 
-import msgspec
 import numpy as np
 import torch
 from torch import nn
@@ -16,16 +15,8 @@ from torch import nn
 from ..errors import TactileError
 from ..weights import write_bytes
 
+TEXT = {"identity": dict, "stage": int, "epoch": int, "log": list}  # of the JSON text: a State but for its arrays
 ADVICE = "Remove the file to start again, or train into another folder"
-
-
-class Text(TypedDict):
-    """The JSON text: a State but for its arrays."""
-
-    identity: dict
-    stage: int
-    epoch: int
-    log: list[list]
 
 
 @dataclass
@@ -67,14 +58,20 @@ def read(path: str | os.PathLike, identity: dict) -> State:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-        text = msgspec.convert(json.loads(arrays.pop("state").tobytes()), Text)
-        state = State(**text, arrays=arrays)
+        text = json.loads(arrays.pop("state").tobytes())
+        state = State(*(_of_kind(text[name], kind) for name, kind in TEXT.items()), arrays)
     except Exception as error:  # of zip files, arrays, JSON and what it tells: a dozen types on damaged bytes
         raise TactileError(path, f"cannot be read ({error})", "a checkpoint", ADVICE) from error
     for name, expected in identity.items():
         if state.identity.get(name) != expected:
             raise TactileError(path, f"{name} {state.identity.get(name)}", f"{name} {expected}", ADVICE)
     return state
+
+
+def _of_kind(value: Any, kind: type) -> Any:
+    if not isinstance(value, kind):
+        raise ValueError(f"a {type(value).__name__} for a {kind.__name__}")
+    return value
 
 
 def restore(state: State, model: nn.Module, path: str | os.PathLike) -> None:

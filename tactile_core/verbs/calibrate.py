@@ -58,6 +58,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _check_options(options: argparse.Namespace) -> None:
     from .. import atomic
+    from ..calibrate.fit_unit import check_diameter
 
     if options.test:
         for name in ("out", "start", "unit"):
@@ -66,6 +67,10 @@ def _check_options(options: argparse.Namespace) -> None:
         for path in (options.json, options.sheet):
             if path is not None:
                 atomic.claim(path)
+        if options.json is not None and options.json == options.sheet:
+            raise TactileError("--json and --sheet", options.json, "two files")
+        if options.ball_diameter is not None:
+            check_diameter(1e-3 * options.ball_diameter)
         return
     for name in ("json", "sheet"):
         if getattr(options, name) is not None:
@@ -73,6 +78,9 @@ def _check_options(options: argparse.Namespace) -> None:
     if options.out is None or options.ball_diameter is None:
         missing = "--out" if options.out is None else "--ball-diameter"
         raise TactileError(missing, "missing", "a file to write and the ball's diameter in mm", "Or try one: --test")
+    check_diameter(1e-3 * options.ball_diameter)
+    if _sheet_beside(options.out) == Path(options.out):
+        raise TactileError("--out", options.out, "a file to write that ends in .toml: the sheet is the .png beside it")
     atomic.claim(options.out)
     atomic.claim(_sheet_beside(options.out))
 

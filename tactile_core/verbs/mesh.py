@@ -31,6 +31,7 @@ examples:
   tactile mesh digit --frames results/touch/frames.h5 --frame 120 --out frame_120.ply
   tactile mesh digit --press sphere --diameter 7 --depth-mm 0.6 --tier full --out contact.vtu
   tactile mesh biotac --press scenes/press_sphere --indenter sphere_14mm --force-n 0.5 --out contact.ply"""
+MOST_TILT = 45.0  # degrees off the normal, as in scenes
 LEAVES = NOTHING
 TIERS = ("fast", "full", "reference")
 _EDGE_MM = 0.5  # of a cylinder's rim, as in scenes
@@ -98,6 +99,8 @@ def _check(options: argparse.Namespace) -> None:
     ]
     if given and not options.press:
         raise TactileError("--" + given[0].replace("_", "-"), "given without --press", "--press WHAT")
+    if not abs(options.tilt_deg) <= MOST_TILT:  # nan, too
+        raise TactileError("--tilt-deg", f"{options.tilt_deg:g}", f"-{MOST_TILT:g} to {MOST_TILT:g}, as in scenes")
     if options.press and (options.depth_mm is None) == (options.force_n is None):
         raise TactileError(
             "--press", "both or none of --depth-mm and --force-n", "one of them", "Say how far or how hard"

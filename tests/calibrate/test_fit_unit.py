@@ -164,6 +164,10 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
         (["--ball-diameter", "6", "--out", "unit.toml", "--json", "rows.json"], "--json"),
         (["--test", "none.toml", "--out", "unit.toml"], "--out"),
         (["--test", "none.toml"], "none.toml"),
+        (["--ball-diameter", "6", "--out", "unit.png"], "ends in .toml"),
+        (["--ball-diameter", "17", "--out", "unit.toml"], "ball diameter, mm: 17"),
+        (["--test", "none.toml", "--ball-diameter", "nan"], "ball diameter, mm: nan"),
+        (["--test", "none.toml", "--json", "same", "--sheet", "same"], "--json and --sheet"),
     ],
 )
 def test_verb_refuses(words: list, where: str, folder: Path, capsys: pytest.CaptureFixture) -> None:
