@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import os
 import sys
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from .small_text import read_toml_text
 
 FORMAT = "tactile-calibration-1"
 SHIPPED = Path(__file__).parent / "data" / "calibrations" / "default.toml"
+LARGEST = 1e6  # of a unit's numbers: none that means something comes near (assumed); a fit's errors may be larger
 ADVICE = "Make it again with `tactile calibrate`"
 
 _TABLES = {
@@ -55,10 +57,22 @@ def _read(file: Path) -> Calibration:
         raise TactileError(file, f"cannot be read ({error.strerror})", "a file of `tactile calibrate`") from error
     except (ValueError, RecursionError) as error:
         raise TactileError(file, str(error), "a file of `tactile calibrate`", ADVICE) from error
+    largest = max(map(abs, _finite({name: content[name] for name in content if name != "fit"})), default=0.0)
+    if largest > LARGEST:
+        raise TactileError(file, f"the number {largest:g}", f"millimetres, levels... up to {LARGEST:g}", ADVICE)
     try:
         return _Reader(content).calibration(file.parent)
     except TactileError as error:
         raise TactileError(f"{file}, {error.where}", error.found, error.expected, ADVICE) from error
+
+
+def _finite(value: Any) -> Iterator[float]:
+    """All finite numbers in tables and lists."""
+    if isinstance(value, dict | list):
+        for each in value.values() if isinstance(value, dict) else value:
+            yield from _finite(each)
+    elif isinstance(value, float) and math.isfinite(value):
+        yield value
 
 
 class _Reader:

@@ -51,6 +51,8 @@ def test_shipped_file_is_written_as_this_version_writes_it(tmp_path: Path) -> No
         ("centre = [[", "centre = [[1], [", "gain, centre"),
         ("centre = [[", "centre = [[-", "gain, centre"),
         ("dome_scale = ", "dome_scale = 100", "dome_scale"),
+        ("position_mm = [", "position_mm = [1e300, ", r"the number 1e\+300"),
+        ("px_per_mm_x = ", "px_per_mm_x = 1000", "px_per_mm_x"),
         ("[camera]", "[camera", "table declaration"),
     ],
 )
