@@ -15,7 +15,7 @@ from .scene_indenters import IndenterSpec, NotNegative, Positive, with_files_of
 from .small_text import read_toml_text
 
 FORMAT = "tactile-scene-1"
-LARGEST = 1e6  # of any number: none that means something comes near, squares of far larger ones are infinite (assumed)
+LARGEST = 1e9  # of any number: none that means something comes near, squares of far larger ones are infinite (assumed)
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
