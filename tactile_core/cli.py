@@ -35,8 +35,8 @@ EXTRAS = {
 }  # fmt: skip
 # Options that name something; that of --keep may be empty.
 PATHS = (
-    *("frames", "press", "weights", "cluster", "calibration", "sensor", "start", "background", "json", "sheet", "test"),
-)
+    "frames", "press", "weights", "cluster", "calibration", "sensor", "start", "background", "json", "sheet", "test",
+)  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

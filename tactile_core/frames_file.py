@@ -54,10 +54,10 @@ PACKED = {
 LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk of its own
 
 
-def shard_arrays(keep: Iterable[str]) -> set[str]:
-    """Names of a shard's datasets that keeps these words."""
-    kept = [PICTURES if word == "image" else KEPT[word] for word in keep]
-    return {name for about in (ALWAYS, *kept) for name in about}
+def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:
+    """Datasets of a file that keeps these words, with unit and meaning; a shard has the pictures, too."""
+    kept = [PICTURES if shard and word == "image" else KEPT[word] for word in keep]
+    return {name: told for about in (ALWAYS, *kept) for name, told in about.items()}
 
 
 class FramesFile:
@@ -76,9 +76,7 @@ class FramesFile:
         """
         import h5py
 
-        self._about = dict(ALWAYS)
-        for word in keep:
-            self._about |= PICTURES if room and word == "image" else KEPT[word]
+        self._about = arrays_of(keep, shard=bool(room))
         self._count, self._framed = count, bool(room)
         self._disk = Disk(path)
         self._file = h5py.File(self._disk, "w", userblock_size=room)

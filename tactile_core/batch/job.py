@@ -21,7 +21,7 @@ from .recipes import Recipe, Simulate, Translate
 FORMAT = "tactile-job-1"
 FILE, PREPARED, SHARDS, ASIDE, MANIFEST = "job.json", "prepared", "shards", "aside", "manifest.json"
 ADVICE = "Use an empty --out folder"
-MOST = 2**30  # bytes of a job file; one of 10,000 inputs has 3 MB
+MOST = 2**30  # bytes of a job file; one of 10,000 inputs has 2.5 MB
 
 
 class Job(msgspec.Struct, forbid_unknown_fields=True, frozen=True, dict=True):

@@ -15,7 +15,7 @@ from ..batch import manifest, shard
 from ..batch.prepared import Prepared
 from ..batch.recipes import Translate
 from ..errors import TactileError
-from ..frames_file import shard_arrays
+from ..frames_file import arrays_of
 from ..hdf5_checked import declared, open_checked
 from ..recordings.store import damage_told
 
@@ -101,7 +101,7 @@ def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
     if not shard.is_of(path, job, index, number, frames):
         raise TactileError(path, "another shard under this name", f"shard {number} of {job.inputs[index].name}", ADVICE)
     rows = min(job.recipe.shard_frames, frames - number * job.recipe.shard_frames)
-    expected = shard_arrays(job.recipe.keep)
+    expected = set(arrays_of(job.recipe.keep, shard=True))
     with damage_told(str(path), "shard"), open_checked(path) as file:
         if set(file) != expected:
             raise TactileError(path, f"arrays {', '.join(sorted(file))}", ", ".join(sorted(expected)), ADVICE)

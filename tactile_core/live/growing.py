@@ -32,7 +32,7 @@ class Growing:
         self._file = _identity(self._path.stat())
 
     def poll(self) -> Recording | None:
-        """The rows that came since the last call; None where none did, or bad ones alone, which are passed over.
+        """The rows that came since the last call; None where none did, or too many are bad: all are passed over.
 
         Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row that
         tells of another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN.
