@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from . import (
-    add_menu,
-    command_line,
+from .operators import (
     import_recording,
-    panels,
-    preferences,
     preview,
-    properties,
     render_engine,
-    render_settings,
     render_setup,
     scene_files,
     simulate,
     translate_recording,
 )
+from .process import command_line
+from .ui import add_menu, panels, preferences, properties, render_settings
 
 # In the order of registration: properties before what uses them.
 PARTS = (

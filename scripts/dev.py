@@ -3,7 +3,7 @@
     python3 scripts/dev.py demo                     convert the recording that ships; results in out/demo/
     python3 scripts/dev.py test                     check the style, then run the tests
     python3 scripts/dev.py test --train             the same with torch, so that the training tests run too
-    python3 scripts/dev.py test tests/test_cli.py -x    what is not known here goes to pytest
+    python3 scripts/dev.py test tests/cli/test_cli.py -x    what is not known here goes to pytest
     python3 scripts/dev.py test-blender             the extension's tests in the bpy wheel (--bpy 5.0.1 for another)
     python3 scripts/dev.py test-blender --binary /usr/bin/blender    and in a real Blender, from the zip that users get
 

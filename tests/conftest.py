@@ -53,3 +53,22 @@ def slide_csv(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture
+def any_variant() -> str:
+    """The faster of Mitsuba's variants that works here."""
+    from gel_pictures import NO_MITSUBA
+
+    from tactile_core.pictures.mitsuba.variant import choose_variant
+
+    pytest.importorskip("mitsuba", reason=NO_MITSUBA)
+    return choose_variant().name
+
+
+@pytest.fixture
+def press():
+    """A gel that is pressed; Blender's tests, which have no package of this name, never ask for it."""
+    from gel_pictures import Press
+
+    return Press()

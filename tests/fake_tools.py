@@ -1,7 +1,8 @@
 """A conversion without networks: one dent whose depth follows the electrodes; pictures in two grey levels.
 
-Run as a script it is the command ``tactile`` with these tools, slowed down by FAKE_DELAY seconds a chunk of frames,
-so that tests can interrupt it: ``python tests/fake_tools.py convert touch.csv --out results``.
+Run as a script it is the command ``tactile`` with these tools: ``python tests/fake_tools.py convert touch.csv --out
+results``. FAKE_HOLD names a chunk of frames, counted from 0 in each process, at which it stops for good, so that tests
+can interrupt it there.
 """
 
 from __future__ import annotations
@@ -13,18 +14,20 @@ import time
 import numpy as np
 
 from tactile_core import sensors
-from tactile_core.flags import Flag
-from tactile_core.frame_pass import Tools
+from tactile_core.jobs.frame_pass import Tools
 from tactile_core.recordings import Signals
-from tactile_core.translate import Translation
+from tactile_core.recordings.flags import Flag
+from tactile_core.translation.translate import Translation
 
 SHAPE = (320, 240)
+PARENT = os.getppid()  # when this process began; another once that one has died
+chunks = 0  # translated by this process
 
 
 def translate(signals: Signals) -> Translation:
     """Depth of a dent in the middle: 1 um a count of the mean change; frames beyond 100 counts are out of range."""
     depth = np.abs(signals.change).mean(axis=1).astype(np.float32)
-    time.sleep(float(os.environ.get("FAKE_DELAY", "0")))
+    hold()
     codes = [np.repeat(depth[:, None], size, axis=1) for size in (8, 32, 64)]
     skin, gel = _dent(sensors.biotac_surface().rest, depth), _dent(sensors.digit_surface().rest, depth)
     force = np.outer(depth, [0, 0.01, 0]).astype(np.float32)
@@ -32,6 +35,14 @@ def translate(signals: Signals) -> Translation:
     flags = np.where(depth > 100, Flag.OUT_OF_RANGE, 0).astype(np.uint16)
     errors = [share * depth * np.float32(1e-6) for share in (0.1, 0.1, 0.2, 0.2)]
     return Translation(*codes, skin, gel, force, center, np.exp(-depth / 100), *errors, flags)
+
+
+def hold() -> None:
+    """Stop for good at the chunk that FAKE_HOLD names, but no longer than the process that started this one lives."""
+    global chunks
+    chunks += 1
+    while os.environ.get("FAKE_HOLD") == str(chunks - 1) and os.getppid() == PARENT:
+        time.sleep(0.01)
 
 
 def _dent(rest: np.ndarray, depth: np.ndarray) -> np.ndarray:
@@ -58,7 +69,8 @@ def tools() -> Tools:
 
 
 if __name__ == "__main__":
-    from tactile_core import cli, convert
+    from tactile_core.cli.main import main
+    from tactile_core.jobs import convert
 
     convert.load_tools = lambda weights=None: tools()
-    sys.exit(cli.main())
+    sys.exit(main())

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.height_map import rest_height_map
-from tactile_core.optics.variant import choose_variant
+from tactile_core.pictures.height_map import rest_height_map
+from tactile_core.pictures.mitsuba.variant import choose_variant
 
 NO_MITSUBA = 'Mitsuba is missing: pip install "tactile-core[render]"'
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tactile_core import networks
-from tactile_core.paired_contacts import read_pairs
+from tactile_core.simulation.pairs_file import read_pairs
+from tactile_core.translation import networks
 
 PAIRS = Path(__file__).resolve().parent.parent / "scenes" / "training" / "test_contacts.h5"
 HELD, PAUSE = 6, 4  # frames a contact is held, and without contact before it

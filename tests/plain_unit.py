@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from tactile_core.calibration import BACKGROUND_TERMS, Background, Calibration, Fit, Gain
-from tactile_core.camera import Camera, Led
+from tactile_core.sensors.calibration import BACKGROUND_TERMS, Background, Calibration, Fit, Gain
+from tactile_core.sensors.camera import Camera, Led
 
 LEDS = (
     Led("red", (10.8e-3, -10.9e-3, 7.0e-3), 1.0e-3),

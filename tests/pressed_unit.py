@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from tactile_core.calibrate.ball_print import print_on
-from tactile_core.calibration import Calibration
-from tactile_core.height_map import rest_height_map
-from tactile_core.shading import Shader
+from tactile_core.pictures.calibrate.ball_print import print_on
+from tactile_core.pictures.height_map import rest_height_map
+from tactile_core.pictures.shading import Shader
+from tactile_core.sensors.calibration import Calibration
 
 BALL = 3e-3  # m, radius
 PLACES = ((0.0, 0.0, 0.9), (-3.0, -4.0, 1.0), (3.2, -3.5, 0.8), (-3.1, 4.2, 1.1), (2.8, 3.9, 1.0))  # mm

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_core.lattice import Lattice, grid_faces
-from tactile_core.mechanics.compliance import Compliance, build
-from tactile_core.mechanics.hex_mesh import HexMesh, hex_cells
+from tactile_core.geometry.lattice import Lattice, grid_faces
+from tactile_core.mechanics.fast.compliance import Compliance, build
+from tactile_core.mechanics.solids.hex_mesh import HexMesh, hex_cells
 from tactile_core.sensors import Material
 
 

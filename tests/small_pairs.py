@@ -8,9 +8,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from tactile_core.evaluation.translation import Bodies
-from tactile_core.lattice import Lattice, grid_faces
-from tactile_core.moving_frame import MovingFrame
+from tactile_core.geometry.lattice import Lattice, grid_faces
+from tactile_core.training.step_errors import Bodies
+from tactile_core.translation.contact_frame import ContactFrame
 
 SHAPES = {"biotac": (9, 7), "digit": (11, 8)}
 
@@ -37,7 +37,7 @@ def write_pairs(
     digit: np.ndarray | None = None,
     seed: int = 0,
 ) -> Path:
-    """Write a pairs file: each press is a path of growing depth; signals follow the gap law s = k / gap."""
+    """Write a pairs file: each press is a path of growing depth; signals follow the gap law s = -k / gap."""
     biotac = grid(*SHAPES["biotac"]) if biotac is None else biotac
     digit = grid(*SHAPES["digit"]) if digit is None else digit
     rng = np.random.default_rng(seed)
@@ -53,7 +53,7 @@ def write_pairs(
     places = np.stack([rng.uniform(-14e-3, 4e-3, 19), np.zeros(19), rng.uniform(-6e-3, 6e-3, 19)], -1)
     rest_gap = rng.uniform(0.6e-3, 1.7e-3, 19)
     gap = np.maximum(rest_gap - dents(places, center, depth, np.sqrt(radius * 2e-3))[..., 1], 0.02e-3)
-    signal = 0.1 * (1 / gap - 1 / rest_gap)
+    signal = -0.1 * (1 / gap - 1 / rest_gap)
     stiffness = 8e3 * np.sqrt(radius / 3.5e-3)
     force = np.stack([0.05 * depth * stiffness, depth * stiffness, np.zeros_like(depth)], -1)
     scale = 1e-7
@@ -77,16 +77,17 @@ def write_pairs(
                 "version": "0",
                 "indenters": json.dumps(["sphere"]),
                 "format": "tactile-pairs-1",
+                "polarity": "falls",
             }
         )
     return path
 
 
-def frame(sensor: str, half: int) -> MovingFrame:
+def frame(sensor: str, half: int) -> ContactFrame:
     """The frame that moves over one of the small surfaces; the BioTac's nodes are turned, as on the sensor."""
     rows, columns = SHAPES[sensor]
     turn = np.linspace(-1, 1, rows * columns) if sensor == "biotac" else np.zeros(rows * columns)
-    return MovingFrame(rows, columns, half, turn.astype(np.float32))
+    return ContactFrame(rows, columns, half, turn.astype(np.float32))
 
 
 def bodies() -> Bodies:

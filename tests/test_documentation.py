@@ -22,7 +22,7 @@ from labelled_recording import labelled_arrays, write_labelled
 from plain_unit import plain_unit
 from pressed_unit import write_photographs
 
-from tactile_core.scene import load_scene
+from tactile_core.simulation.scene import load_scene
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "scenes" / "README.md"]
@@ -45,16 +45,16 @@ LESS = [
 ]
 # What is run by another test -> its file, and the words it is run by.
 ELSEWHERE = {
-    "tactile simulate scenes/press_roll_slide --grid": ("tests/batch/test_batch_kinds.py", "--grid"),
-    "tactile watch --rosbag-play": ("tests/live/test_live.py", "--rosbag-play"),
-    "tactile render frames.h5": ("tests/batch/test_batch_kinds.py", "--workers"),
+    "tactile simulate scenes/press_roll_slide --grid": ("tests/jobs/engine/test_batch_kinds.py", "--grid"),
+    "tactile watch --rosbag-play": ("tests/jobs/live/test_live.py", "--rosbag-play"),
+    "tactile render frames.h5": ("tests/jobs/engine/test_batch_kinds.py", "--workers"),
     "python3 scripts/dev.py demo": (".ci/run", "dev.py demo"),
     "python3 scripts/dev.py test-blender": (".ci/run", "dev.py test-blender"),
     "python3 scripts/dev.py test": (".ci/run", "dev.py test"),
     "python -m pip install": ("scripts/dev.py", '"install"'),
     "python3 scripts/build_extension.py": ("tests/blender/test_extension_zip.py", "build_extension"),
     "blender ": ("tests/blender/test_command_line.py", "tactile"),
-    "sbatch ": ("tests/batch/test_batch_slurm.py", "sbatch"),
+    "sbatch ": ("tests/jobs/engine/test_batch_slurm.py", "sbatch"),
 }
 # What no test runs, and why.
 NOT_RUN = {"python3 scripts/fetch_blender.py": "needs root, and 1.7 GB of Debian's packages"}

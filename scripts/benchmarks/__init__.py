@@ -1,1 +1,1 @@
-"""The stages of `scripts/benchmark.py`: each method is measured in a process of its own."""
+"""What measures, and what makes the data that ships; no part of the package. Scripts here are run by their path."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import TactileError
 from ..sensors import sensor_surface
 from . import mesh_files
-from .hex_mesh import HexMesh, gel_mesh, skin_mesh
+from .solids.hex_mesh import HexMesh, gel_mesh, skin_mesh
 from .solve import Sensor, Solution
 
 SUFFIXES = (".ply", ".stl", ".vtu")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import TactileError
-from ..grid_surface import on_grid
-from ..indenters import Indenter, Pose
-from ..lattice import Lattice
+from ..geometry.catmull_rom import on_grid
+from ..geometry.indenters import Indenter, Pose
+from ..geometry.lattice import Lattice
 from .pose_path import same_line
 
 _ADVANCES = 60  # of a body by its smallest distance: more than any shape needs

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import atomic
 from ..errors import TactileError
-from ..surface import node_normals
-from . import stress
-from .finite_strain import FiniteStrainSolid, State
-from .hex_mesh import HexMesh
+from ..files import atomic
+from ..sensors.unrolling import node_normals
+from .solids import stress
+from .solids.finite_strain import FiniteStrainSolid, State
+from .solids.hex_mesh import HexMesh
 
 Data = Mapping[str, np.ndarray]
 TRIANGLE, TETRAHEDRON, TRIQUADRATIC_HEXAHEDRON = 5, 10, 29  # cell types of VTK

@@ -6,8 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from .. import digit_shape, sensors, surface
-from ..indenters import Indenter, Pose, pose_on
+from .. import sensors
+from ..geometry.indenters import Indenter, Pose, pose_on
+from ..sensors import digit, unrolling
 from .first_touch import first_touch
 
 FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (sensors.md), taken for both sensors
@@ -25,14 +26,14 @@ class Placement:
 
 def biotac_pose(indenter: Indenter, place: Placement) -> Pose:
     """First touch on the BioTac, at the place of its pad that rolls onto (x, z) of the DIGIT's plane."""
-    point, outward = surface.roll_up(np.array([place.x, place.z]))
+    point, outward = unrolling.roll_up(np.array([place.x, place.z]))
     pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
     return first_touch(sensors.biotac_surface(), indenter, pose)
 
 
 def digit_pose(indenter: Indenter, place: Placement) -> Pose:
     """First touch on the DIGIT's gel at (x, z), leaning as much off the dome's normal as off the BioTac's."""
-    point, outward = digit_shape.dome_point(place.x, place.z)
+    point, outward = digit.dome_point(place.x, place.z)
     pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
     return first_touch(sensors.digit_surface(), indenter, pose)
 
@@ -44,4 +45,4 @@ def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
 
 def on_gel(x: float, z: float, margin: float = 0.0) -> bool:
     """Whether a place of the DIGIT's plane lies on the gel, at least ``margin`` m inside its outline."""
-    return bool(digit_shape.outline_distance(np.array(x), np.array(z)) > margin)
+    return bool(digit.outline_distance(np.array(x), np.array(z)) > margin)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..indenters import Pose
+from ..geometry.indenters import Pose
 
 _ROUNDING = 1e-12  # m
 

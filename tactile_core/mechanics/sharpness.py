@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..indenters import Indenter, Pose
+from ..geometry.indenters import Indenter, Pose
 
 # m, of the sharpest edges that the correction was learned on (``random_contacts``, scenes/training). With sharper ones
 # errors are taken to grow as the radius falls (assumed; 0.1 mm, a quarter, made 1.8 to 2.7 times the stated error).

@@ -9,20 +9,20 @@ from typing import Literal
 import numpy as np
 
 from ..errors import TactileError
-from ..indenters import Indenter, Pose
-from . import stated_error
-from .compliance import compliance_of
-from .corrected_press import CorrectedPress
-from .expected_error import expected_error
-from .finite_strain import FiniteStrainSolid, State
-from .finite_strain_tier import FRICTION_STEP, ONE_STEP, Body, Sensor, graded_body
+from ..geometry.indenters import Indenter, Pose
+from . import error_estimate
+from .error_estimate import expected_error
+from .fast.compliance import compliance_of
+from .fast.press import CorrectedPress
+from .finite_strain.body import FRICTION_STEP, ONE_STEP, Body, Sensor, graded_body
+from .finite_strain.contact_state import ContactState
+from .finite_strain.newton import FiniteStrainContact, NoEquilibriumError
 from .force_search import ROUGH, TOLERANCE, touch_at_force, unreachable
-from .newton import FiniteStrainContact, NoEquilibriumError
+from .penetration import PenetrationError
 from .placement import FRICTION, Placement, on_gel, pose_at
 from .sharpness import sharpest
-from .sunk import SunkError
+from .solids.finite_strain import FiniteStrainSolid, State
 from .thickness import DEPTH_LIMIT, thickness_under
-from .touch import Touch
 
 Tier = Literal["fast", "full", "reference"]
 TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
@@ -187,7 +187,7 @@ class _Fast(_Path):
         patch[compliance.touchable[contact.nodes]] = True
         near = compliance.touchable[self.press.problem.nodes_near]
         radius = sharpest(self.indenter, contact.pose, compliance.surface.rest[near] + contact.displacement[near])
-        stated = stated_error.of_fast(self.errors(contact.depth), found.depth, len(contact.nodes), radius)
+        stated = error_estimate.of_fast(self.errors(contact.depth), found.depth, len(contact.nodes), radius)
         return Solution(
             "fast", contact.converged, contact.iterations, corrected.displacement, patch, found.force, contact.depth,
             found.pressure, *stated, contact.penetration,
@@ -236,7 +236,7 @@ class _FiniteStrain(_Path):
         """See ``solve_path``. Where the full tier's mesh does not hold the indenter, on a finer one from the start."""
         try:
             found = self._to(step)
-        except (NoEquilibriumError, SunkError):
+        except (NoEquilibriumError, PenetrationError):
             if self.tier != "full" or self.spacing < 1:
                 raise
             self._refine()
@@ -258,19 +258,19 @@ class _FiniteStrain(_Path):
             self.last = self.problem.move(pose.moved(step.depth or 0.0), self.last, self.step)
         return self._solution(self.last)
 
-    def _at_force(self, pose: Pose, force: float, tolerance: float = TOLERANCE) -> Touch:
+    def _at_force(self, pose: Pose, force: float, tolerance: float = TOLERANCE) -> ContactState:
         """The contact at a force, N, along the motion; tolerance : relative, of the force."""
 
-        def move(depth: float, before: Touch) -> Touch:
+        def move(depth: float, before: ContactState) -> ContactState:
             return self.problem.move(pose.moved(depth), before, self.step)
 
         return touch_at_force(move, self.last, pose.direction, force, self.limit, self.where, tolerance)
 
-    def _solution(self, touch: Touch) -> Solution:
+    def _solution(self, touch: ContactState) -> Solution:
         below = self.body.hidden(touch, self.indenter)
         gap = touch.outer.gaps(self.body.solid.mesh.nodes + touch.state.displacement)
         table, across = self.errors(touch.depth), self._nodes_across(touch)
-        stated = stated_error.of_finite_strain(table, touch.depth, int((touch.pressing > 0).sum()), across, below)
+        stated = error_estimate.of_finite_strain(table, touch.depth, int((touch.pressing > 0).sum()), across, below)
         slips = touch.outer.slipping[touch.outer.active]
         return Solution(
             self.tier, True, touch.iterations, self.body.displacement(touch), self.body.contact_patch(touch),
@@ -279,7 +279,7 @@ class _FiniteStrain(_Path):
             (self.body.solid, touch.state), touch.push.loads(len(touch.state.displacement)) if touch.guarded else None,
         )  # fmt: skip
 
-    def _nodes_across(self, touch: Touch) -> float:
+    def _nodes_across(self, touch: ContactState) -> float:
         """How many nodes of the full tier's mesh lie across the contact where the indenter is sharpest."""
         mesh = self.body.solid.mesh
         rest = mesh.nodes[mesh.surface]

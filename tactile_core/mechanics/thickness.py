@@ -6,8 +6,9 @@ import functools
 
 import numpy as np
 
-from .. import biotac_shape, digit_shape, sensors
-from ..indenters import Indenter, Pose
+from .. import sensors
+from ..geometry.indenters import Indenter, Pose
+from ..sensors import biotac, digit
 
 DEPTH_LIMIT = 0.6  # of the thickness: as deep as MECHANICS is asked to go
 _DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
@@ -23,8 +24,8 @@ def thickness(sensor: str, point: np.ndarray) -> float:
     where the normal passes the core by. Raises ValueError for another sensor.
     """
     if sensor == "digit":
-        on_dome, outward = digit_shape.dome_point(float(point[0]), float(point[2]))
-        return float((digit_shape.BACK_Y - on_dome[1]) / -outward[1])
+        on_dome, outward = digit.dome_point(float(point[0]), float(point[2]))
+        return float((digit.BACK_Y - on_dome[1]) / -outward[1])
     if sensor != "biotac":
         raise ValueError(f"the thickness of a {sensor!r} is not known")
     node = int(np.argmin(((sensors.biotac_surface().rest - point) ** 2).sum(axis=1)))
@@ -35,8 +36,8 @@ def _to_core(point: np.ndarray, outward: np.ndarray) -> float:
     """Distance, m, from a point (3,) m of the BioTac's skin along its inward normal to the core, or to the axis."""
     distance = np.arange(0, _FARTHEST, _STEP)
     x, y, z = (point - distance[:, None] * outward).T
-    radius = np.hypot(y - biotac_shape.AXIS_Y, z)
-    over = radius - biotac_shape.core_radius(x, np.arctan2(z, biotac_shape.AXIS_Y - y))
+    radius = np.hypot(y - biotac.AXIS_Y, z)
+    over = radius - biotac.core_radius(x, np.arctan2(z, biotac.AXIS_Y - y))
     inside = np.flatnonzero(over <= 0)
     if not len(inside):
         return float(distance[np.argmin(radius)])
@@ -67,7 +68,7 @@ def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float
 @functools.cache
 def _outward() -> np.ndarray:
     """Outward normals (n, 3) of the resting skin."""
-    from .. import surface
+    from ..sensors import unrolling as surface
 
     lattice = sensors.biotac_surface()
     return surface.node_normals(lattice.rest, lattice.faces)

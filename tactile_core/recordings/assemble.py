@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..flags import Flag
+from .flags import Flag
 from .recording import ELECTRODES, NOMINAL_RATE, Recording, Truth
 
 MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)

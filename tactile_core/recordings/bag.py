@@ -5,7 +5,6 @@ What a bag says of its messages' layout is compared, never compiled: the library
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -17,16 +16,17 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
+from .array_store import damage_told
 from .assemble import MAX_FRAMES, assemble, check_electrodes
+from .fingers import named, split
 from .recording import ELECTRODES, Recording
-from .store import damage_told
 
+LOOKED_AT = 100  # frames by which the fingers of a hand are told
 STARTS = {b"#ROSBAG V": "ros1", b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite"}
 MARK = "metadata.yaml"  # of a folder that is a ROS 2 bag
 MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk; recorders make them of 1 to 16 MB (assumed enough)
 MAX_METADATA = 2**20  # bytes of YAML, of which four times as many take 30 s (assumed enough)
 PACKED = re.compile(rb"compression_mode:\s*[\"']?(file|message)", re.IGNORECASE)
-FINGER = re.compile(r"(.+)#([0-4])$")
 
 
 @dataclass(frozen=True)
@@ -38,14 +38,6 @@ class Bag:
     finger: int | None
     topics: dict[str, list[Any]]
     reader: Any
-
-
-def split(path: str) -> tuple[str, int | None]:
-    """``hand.bag#2`` -> the path and the finger; a path that exists is taken as it is."""
-    found = FINGER.match(path)
-    if found is None or os.path.exists(path):
-        return path, None
-    return found[1], int(found[2])
 
 
 def kind(path: Path) -> str | None:
@@ -126,10 +118,21 @@ def read_bag(
         if finger >= block.shape[1]:
             raise TactileError(bag.path, f"{block.shape[1]} fingers, no number {finger}", "path#finger, from 0")
         rows = np.concatenate([rows[len(rows) - repeated :], block[:, finger]])
-        yield _recording(bag, layout, rows, warnings), repeated
+        yield named(_recording(bag, layout, rows, warnings), bag.finger), repeated
         repeated = min(context, len(rows))
     if finger is None:
         raise TactileError(bag.path, f"no {layout.MESSAGE} message", "at least one frame")
+
+
+def fingers_of(bag: Bag, layout: ModuleType) -> tuple[int, ...]:
+    """Numbers of the fingers of a hand whose electrodes are not all zeros, by its first frames."""
+    block = next(_blocks(bag, layout, LOOKED_AT), np.empty((0, 0, ELECTRODES)))
+    return tuple(int(number) for number in _live(block))
+
+
+def _live(block: np.ndarray) -> np.ndarray:
+    """Fingers with signals in frames (n, fingers, 1 + WIDTH), electrodes last."""
+    return np.flatnonzero(block[..., -ELECTRODES:].any(axis=(0, 2)))
 
 
 def _blocks(bag: Bag, layout: ModuleType, frames: int) -> Iterator[np.ndarray]:
@@ -206,7 +209,7 @@ def _choose(bag: Bag, block: np.ndarray) -> tuple[int, list[str]]:
     """The finger to read, and what to say of the others. block : (n, fingers, 1 + WIDTH), electrodes last."""
     if not block.shape[1]:
         raise TactileError(bag.path, "a hand without fingers", "at least one BioTac")
-    live = np.flatnonzero(block[..., -ELECTRODES:].any(axis=(0, 2)))
+    live = _live(block)
     if not len(live):
         return 0, [f"all electrodes of all {block.shape[1]} fingers are 0: finger 0 is read"]
     if len(live) == 1:

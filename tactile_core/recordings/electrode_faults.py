@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..flags import Flag
+from .flags import Flag
 from .recording import Recording
 
 FULL_SCALE = 4095.0  # counts of the 12-bit converter
 DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
+# counts that the others' median moves by meanwhile; units with less noise stand still in steady grips, as long as
+# nothing moves: by 4 and less in 36 such grips (PHAC, trials 01 to 03)
+STEADY = 6.0
 NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 counts of noise (assumed: half of it)
 
 
@@ -50,19 +53,25 @@ def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.
 def _still(readings: np.ndarray) -> np.ndarray:
     """(T, 19) bool: samples of runs of equal readings of ``DEAD_FRAMES`` or more.
 
-    An electrode that is quiet elsewhere too has no noise to miss: there only a run over the whole recording counts.
+    Runs while nothing moves are no fault, but over the whole recording. An electrode that is quiet elsewhere too has no
+    noise to miss: there only a run over the whole recording counts.
     """
     still = np.zeros(readings.shape, bool)
     changes = np.diff(readings, axis=0) != 0
     for j, change in enumerate(changes.T):
         bounds = np.r_[0, np.flatnonzero(change) + 1, len(readings)]
         for first, last in zip(bounds, bounds[1:], strict=False):
-            if last - first >= DEAD_FRAMES:
+            if last - first >= DEAD_FRAMES and (last - first == len(readings) or _moves(readings[first:last])):
                 still[first:last, j] = True
         moving = ~still[1:, j]
         if moving.any() and change[moving].mean() < NOISY:
             still[:, j] = False
     return still
+
+
+def _moves(readings: np.ndarray) -> bool:
+    """Whether half of the electrodes of readings (T, 19) move by more than `STEADY`."""
+    return bool(np.median(np.ptp(readings, axis=0)) > STEADY)
 
 
 def _electrodes(mask: np.ndarray) -> str:

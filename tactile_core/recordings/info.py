@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from ..flags import Flag, names
+from .flags import Flag, names
 from .readers import read
 from .recording import ELECTRODES, Recording
 from .signals import PrepareOptions, Signals, prepare
@@ -41,6 +41,7 @@ def _rows(recording: Recording, signals: Signals) -> list[tuple[str, str]]:
         ("duration", f"{recording.duration:.2f} s{_start(recording)}"),
         ("time", _time(recording)),
         ("kind", f"{signals.kind}: {report['kind_evidence']}"),
+        ("polarity", f"{report['polarity']}: {report['polarity_evidence']}"),
         ("tare", f"{report['quiet_evidence']}{_parts(recording, signals)}"),
         ("drift", _drift(signals)),
         (

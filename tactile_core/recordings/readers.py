@@ -7,17 +7,20 @@ import os
 import pkgutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
 
 from ..errors import TactileError
 from . import formats
-from .bag import kind, open_bag, read_bag, split
-from .cut_cell import shown
+from .array_store import Store, open_hdf5, open_npz
+from .bag import fingers_of, kind, open_bag, read_bag
+from .fingers import named, split
+from .matlab import START, START_OF_HDF5, open_matlab
 from .recording import Recording
-from .store import Store, open_hdf5, open_npz
 from .table import read_header, read_table
+from .truncated_cell import shown
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
@@ -47,8 +50,47 @@ def read(path: str | os.PathLike[str]) -> Recording:
         if container == "bag":
             with open_bag(path) as bag:
                 return next(read_bag(bag, layout_of(path, container, bag.topics)))[0]
+        if container == "mat":
+            file, finger = split(path)
+            with open_matlab(file) as store:
+                return _read_finger(layout_of(file, container, store.shapes), store, finger)
         layout = layout_of(path, container, read_header(path))
         return layout.read(read_table(path))
+
+
+def _read_finger(layout: ModuleType, store: Store, finger: int | None) -> Recording:
+    """One finger of a hand: the one asked for, or the first; a warning names the others."""
+    known = layout.fingers(store.shapes)
+    chosen = known[0] if finger is None else finger
+    if chosen not in known:
+        told = ", ".join(map(str, known))
+        raise TactileError(store.path, f"finger {chosen}", f"one that it holds: {told}", "Name it as path#finger")
+    found = layout.read(store, chosen)
+    if finger is not None or len(known) == 1:
+        return named(found, finger)
+    others = ", ".join(map(str, known[1:]))
+    told = f"finger {chosen} is read; others: {others} (ask for one as {os.path.basename(store.path)}#{known[-1]})"
+    return replace(found, warnings=(told, *found.warnings))
+
+
+def each_finger(path: str | os.PathLike[str]) -> list[str]:
+    """Paths of the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for all others.
+
+    Raises TactileError as `read` does for what is no recording at all.
+    """
+    path = os.fspath(path)
+    if split(path)[1] is not None:
+        return [path]
+    with reading(path):
+        container, known = container_of(path), ()
+        if container == "mat":
+            with open_matlab(path) as store:
+                known = layout_of(path, container, store.shapes).fingers(store.shapes)
+        elif container == "bag":
+            with open_bag(path) as bag:
+                known = fingers_of(bag, layout_of(path, container, bag.topics))
+    alone = len(known) < 2 and (container != "mat" or known == (0,))
+    return [path] if alone else [f"{path}#{finger}" for finger in known]
 
 
 def names(store: Store) -> set[str]:
@@ -70,22 +112,24 @@ def reading(path: str) -> Iterator[None]:
 
 
 def container_of(path: str) -> str:
-    """csv, hdf5, npz or bag. Raises TactileError for what is no file."""
+    """csv, hdf5, npz, mat or bag. Raises TactileError for what is no file."""
     path, finger = split(path)
     if os.path.isdir(path) and kind(Path(path)) is None:
         scene = os.path.isfile(os.path.join(path, "scene.toml"))
         advice = "Simulate it first: tactile simulate" if scene else "Name the recording inside the folder"
         raise TactileError(path, "a scene" if scene else "a folder", "one recording file", advice)
     if not os.path.exists(path):
-        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ or bag)", "Check the path")
+        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT or bag)", "Check the path")
     if not os.path.isfile(path) and not os.path.isdir(path):
-        raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ or bag)")
+        raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT or bag)")
     if kind(Path(path)) is not None:
         return "bag"
-    if finger is not None:
-        raise TactileError(path, f"finger {finger} of a file that is no bag", "one recording", "Leave out the #")
     with open(path, "rb") as file:
         start = file.read(8)
+    if start.startswith((START, START_OF_HDF5)):
+        return "mat"
+    if finger is not None:
+        raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
     if start == b"\x89HDF\r\n\x1a\n":
         return "hdf5"
     return "npz" if start.startswith(ZIP_STARTS) else "csv"

@@ -38,7 +38,7 @@ class Recording:
     start_time : unix time of the first frame, s; 0.0 if unknown
     electrodes : (T, 19) float, counts (or the file's own unit), E1..E19; NaN where the file is unreadable
     rows : (T,) int, line of each frame in a text file (the header is line 1); index of the frame in others
-    flags : (T,) uint16, bits of :class:`tactile_core.flags.Flag`
+    flags : (T,) uint16, bits of :class:`tactile_core.recordings.flags.Flag`
     pdc, tac, tdc : (T,) float or None, counts
     pac : (T, P) float or None, counts; P = 22 at 2,200 Hz, or what the file holds
     position, force : (T, 3) float or None, in the file's own frame and unit

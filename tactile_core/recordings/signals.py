@@ -9,17 +9,39 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..flags import Flag
 from .electrode_faults import dead, saturated
-from .kinds import KINDS, detect
-from .quiet import Quiet, baseline, calmest, find_quiet, level, window_frames
+from .flags import Flag
+from .polarity import AUTO, FALLS, POLARITIES, Polarity, polarity_of
 from .recording import Recording
 from .repair import fill, find_glitches, is_time_series
+from .rest_level import TARED_PDC, Quiet, baseline, calmest, find_quiet, level, pressure_rest, window_frames
+from .signal_kind import KINDS, detect
 from .smoothing import LONGEST, RECTIFIED, SIGNED, smooth
 
 # Counts that the 95th percentile of a scaled recording's largest changes is stretched to (networks.md).
 SCALED_PEAK = 150.0
+FRAMEWISE = ("change", "electrodes", "quiet", "flags", "pdc")  # arrays of `Signals` with a row for each frame
+UNIT_DRIFT = 60.0  # counts that a unit's rest may drift between recordings (the slide set's: 40 to 51 in two days)
+SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (data README)
 SHOWN = 8  # bad places spelled out one by one in the warnings
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A unit's rest, found in other recordings of it. counts, spread : of E1..E19; pdc : counts, or None"""
+
+    counts: tuple[float, ...]
+    spread: tuple[float, ...]
+    pdc: float | None = None
+
+    def agrees(self, level: np.ndarray, pdc: float) -> bool:
+        """Whether a calm level (19,) counts is a rest of this unit: under its PDC at rest, counts.
+
+        Where one of them has no PDC, or one of another zero: near its own counts.
+        """
+        if self.pdc is not None and abs(pdc - self.pdc) < TARED_PDC:
+            return abs(pdc - self.pdc) < SAME_PRESSURE
+        return bool((np.abs(level - np.array(self.counts)) <= np.maximum(UNIT_DRIFT, self.spread)).all())
 
 
 @dataclass(frozen=True)
@@ -32,6 +54,8 @@ class PrepareOptions:
     repair : remove glitches (unreadable samples are always interpolated)
     counts_per_unit : factor from a scaled recording's unit to counts
     smooth : frames, odd, that the changes are averaged over round each; None: 3 of a rectified recording, else 1
+    polarity : "falls" or "rises": what counts do where a film thins; "auto": as the file says, or the recording shows
+    rest : the unit's own, for raw recordings that hold no calm part near it
     """
 
     kind: str | None = None
@@ -40,6 +64,8 @@ class PrepareOptions:
     repair: bool = True
     counts_per_unit: float | None = None
     smooth: int | None = None
+    polarity: str = AUTO
+    rest: Rest | None = None
 
     def check(self) -> None:
         """Raises TactileError for what no recording can meet; whether `tare` fits, a recording must say."""
@@ -49,20 +75,24 @@ class PrepareOptions:
             raise TactileError("option counts_per_unit", f"{self.counts_per_unit:g}", "counts a unit, above 0")
         if self.smooth is not None and not (1 <= self.smooth <= LONGEST and self.smooth % 2):
             raise TactileError("option smooth", f"{self.smooth} frames", f"an odd number from 1 to {LONGEST}")
+        if self.polarity not in (AUTO, *POLARITIES):
+            raise TactileError("option polarity", repr(self.polarity), ", ".join((AUTO, *POLARITIES)))
 
 
 @dataclass(frozen=True, eq=False)
 class Signals:
     """Signals ready for the networks.
 
-    change : (T, 19) float, counts, plain reading minus rest, drift removed, smoothed as told. Rectified: |change| minus
-        its quiet level
+    change : (T, 19) float, counts, plain reading minus rest, drift removed, smoothed as told; with the sign of a raw
+        reading, which falls where a film thins, whatever the file's own polarity is. Rectified: |change| minus its
+        quiet level
     rest : (19,) float, counts, what the electrodes read without contact at the first frame
     drift : (19,) float, counts/s, mean slope of the rest level over the recording
     electrodes : (T, 19) float, counts: the readings after repair, before the tare
     kind : "raw", "tared", "scaled" or "rectified"
     quiet : (T,) bool, frames without contact that rest was taken from
     flags : (T,) uint16, the recording's and those found here
+    pdc : (T,) float, counts, the fluid's pressure over its level at rest; NaN where the recording has none
     warnings : the recording's and those found here
     report : what was found and done, fit for JSON
     """
@@ -74,6 +104,7 @@ class Signals:
     kind: str
     quiet: np.ndarray
     flags: np.ndarray
+    pdc: np.ndarray
     warnings: tuple[str, ...]
     report: dict[str, Any]
 
@@ -94,21 +125,31 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
         flags |= np.uint16(Flag.RECTIFIED)
         warnings.append("the recording holds absolute changes (rectified): their sign is lost, and much of the place")
     quiet = _quiet(recording, readings, kind, options)
-    rest = _rest(recording, readings, kind, quiet, options, warnings)
-    if not quiet.parts:
-        flags |= np.uint16(Flag.NO_QUIET_PART)
+    unit_rest = _unit_rest(recording, readings, kind, quiet, options, warnings)
+    if unit_rest is None:
+        rest = _rest(recording, readings, kind, quiet, options, warnings)
+        if not quiet.parts:
+            flags |= np.uint16(Flag.NO_QUIET_PART)
+    else:
+        rest = np.broadcast_to(np.array(unit_rest.counts), readings.shape).copy()
+        quiet = Quiet(np.zeros(len(readings), bool), (), "the unit's own rest: no calm part near it")
     flags |= saturated(recording, readings, kind, warnings) | dead(recording, readings, warnings)
     slope = (rest[-1] - rest[0]) / recording.duration if recording.duration > 0 else np.zeros(rest.shape[1])
     frames = _smoothed_over(options, kind)
+    change = smooth(readings - rest, frames)
+    polarity = _polarity(recording, readings, change, kind, quiet, options, rest_known=unit_rest is not None)
+    flags |= np.uint16(_doubts(polarity, warnings))
     report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope) | {"smoothed_frames": frames}
+    report |= {"polarity": polarity.name, "polarity_evidence": polarity.evidence}
     return Signals(
-        change=smooth(readings - rest, frames),
+        change=polarity.sign * change,
         rest=rest[0].copy(),
         drift=slope,
         electrodes=readings,
         kind=kind,
         quiet=quiet.mask,
         flags=flags,
+        pdc=_pressure_change(recording, kind, quiet, unit_rest),
         warnings=tuple(warnings),
         report=report,
     )
@@ -118,6 +159,68 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
     if options.kind is None:
         return detect(readings)
     return options.kind, f"told by the user (the samples look {detect(readings)[0]})"
+
+
+def _unit_rest(
+    recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
+) -> Rest | None:
+    """The unit's rest where it is known and nothing calm lies near it: a steady grip is calm, too."""
+    if options.rest is None or kind != "raw" or options.tare is not None:
+        return None
+    told = "no quiet part"
+    if quiet.parts:
+        still = level(readings[quiet.mask])
+        pdc = np.nan if recording.pdc is None else float(np.median(recording.pdc[quiet.mask]))
+        if options.rest.agrees(still, pdc):
+            return None
+        off = np.abs(still - np.array(options.rest.counts))
+        told = f"what is calm lies up to {off.max():.0f} counts from it (E{off.argmax() + 1})"
+    warnings.append(f"rest is the unit's own: {told}")
+    return options.rest
+
+
+def _pressure_change(recording: Recording, kind: str, quiet: Quiet, unit_rest: Rest | None) -> np.ndarray:
+    """PDC (T,) counts over its level at rest; NaN where there is none."""
+    if recording.pdc is None:
+        return np.full(len(recording), np.nan)
+    if unit_rest is not None and unit_rest.pdc is not None and not _is_tared(recording.pdc, unit_rest.pdc):
+        return recording.pdc - unit_rest.pdc
+    return recording.pdc - pressure_rest(recording.pdc, kind, quiet)
+
+
+def _is_tared(pdc: np.ndarray, rest: float) -> bool:
+    """Whether a recording's PDC is of another zero than the unit's: far below its rest, as pressure never is."""
+    finite = pdc[np.isfinite(pdc)]
+    return bool(len(finite)) and rest - float(np.median(finite)) > TARED_PDC
+
+
+def _polarity(
+    recording: Recording, readings: np.ndarray, change: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions,
+    *, rest_known: bool,
+) -> Polarity:  # fmt: skip
+    """What counts do where a film thins: as the user says, else the file, else as the recording shows."""
+    if kind == "rectified":
+        return Polarity(FALLS, "the sign is lost", True)
+    shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known)
+    for told, who in ((options.polarity, "as told"), (recording.about.get("polarity", ""), "as the file says")):
+        if told in POLARITIES:
+            doubt = shown.sure and shown.name != told
+            return Polarity(told, f"{who}; {shown.evidence}" if shown.sure else who, not doubt)
+    return shown
+
+
+def _doubts(polarity: Polarity, warnings: list[str]) -> int:
+    """Flag of every frame, told in the warnings; 0 where nothing is in doubt."""
+    if polarity.sure:
+        return 0
+    if not polarity.evidence.startswith("assumed"):
+        warnings.append(f"polarity {polarity.name!r} contradicts the recording ({polarity.evidence})")
+        return Flag.POLARITY_DOUBTED
+    warnings.append(
+        f"polarity {polarity.evidence}. Counts are taken to fall where the film thins, as raw ones do; say"
+        " --polarity rises if they hold rest minus reading"
+    )
+    return Flag.POLARITY_ASSUMED
 
 
 def _smoothed_over(options: PrepareOptions, kind: str) -> int:

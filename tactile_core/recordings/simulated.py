@@ -1,7 +1,8 @@
 """The project's own simulated recording: one HDF5 file that says that it is simulated and carries its truth.
 
 Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sensor``, ``scene`` (TOML text), ``seed``,
-``made_by``, ``note``, ``start_time`` (unix s, 0 if unknown). Datasets, T first: ``time`` (T,) float64 s; ``electrodes``
+``made_by``, ``note``, ``polarity`` ("falls"; files without it are older, their counts rise), ``start_time`` (unix s,
+0 if unknown). Datasets, T first: ``time`` (T,) float64 s; ``electrodes``
 (T, 19), ``pdc``, ``tac``, ``tdc`` (T,) int16 raw 12-bit counts; ``truth/displacement_biotac`` (T, N, 3) and
 ``truth/displacement_digit`` (T, M, 3) int16 with attribute ``scale`` (m a unit); ``truth/force`` (T, 3) float32 N;
 ``truth/contact_center`` (T, 2) float32 m. The same arrays give the same bytes. `tactile simulate --keep` leaves out the
@@ -17,11 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import atomic
 from ..errors import TactileError
+from ..files import atomic
+from .array_store import Store, open_hdf5
 from .assemble import assemble
+from .polarity import FALLS, RISES
 from .recording import ELECTRODES, Recording, Truth
-from .store import Store, open_hdf5
 
 if TYPE_CHECKING:
     import h5py
@@ -75,6 +77,7 @@ def write_simulated(
         "seed": int(seed),
         "made_by": made_by,
         "note": note,
+        "polarity": FALLS,
         "start_time": float(start_time),
     }
     plain = {"time": np.asarray(time, np.float64)} | counts
@@ -114,6 +117,7 @@ def read_simulated(store: Store, layout: str) -> Recording:
     electrodes = store.array("electrodes", (None, ELECTRODES))
     frames = len(electrodes)
     about = {key: store.attributes.get(key, "") for key in ("sensor", "scene", "seed", "made_by", "note")}
+    about["polarity"] = str(store.attributes.get("polarity", RISES))
     time, truth = _times(store, frames), _truth(store, frames)
     columns = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
     return assemble(

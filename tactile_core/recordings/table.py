@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import TactileError
 from .assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
-from .cut_cell import doubt_last_cell, shown
+from .truncated_cell import doubt_last_cell, shown
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
 MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)
@@ -186,12 +186,15 @@ def _text(path: str, data: bytes) -> list[str]:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise TactileError(path, "UTF-16 text", "UTF-8 text", "Save the file as UTF-8 (in a spreadsheet: CSV UTF-8)")
     if b"\0" in data:
-        raise TactileError(f"{path}, byte {data.index(0)}", "binary data", "a CSV, HDF5 or NPZ recording")
+        raise TactileError(f"{path}, byte {data.index(0)}", "binary data", "a CSV, HDF5, NPZ or MATLAB 5 recording")
     try:
         text = data.decode("utf-8-sig").replace('"', "")
     except UnicodeDecodeError as error:
         raise TactileError(
-            f"{path}, byte {error.start}", "not UTF-8 text", "a CSV, HDF5 or NPZ recording", "Save a text file as UTF-8"
+            f"{path}, byte {error.start}",
+            "not UTF-8 text",
+            "a CSV, HDF5, NPZ or MATLAB 5 recording",
+            "Save a text file as UTF-8",
         ) from None
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 

@@ -13,7 +13,7 @@ import torch
 from torch import nn
 
 from ..errors import TactileError
-from ..weights import write_bytes
+from ..translation.weights import write_bytes
 
 TEXT = {"identity": dict, "stage": int, "epoch": int, "log": list}  # of the JSON text: a State but for its arrays
 ADVICE = "Remove the file to start again, or train into another folder"

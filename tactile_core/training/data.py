@@ -8,13 +8,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..moving_frame import MovingFrame
-from ..network_sizes import ELECTRODES
-from ..paired_contacts import Pairs, Split
-from .mirror import across, image_of_electrodes
+from ..simulation.pairs_file import Pairs, Split
+from ..translation.contact_frame import ContactFrame
+from ..translation.network_sizes import ELECTRODES
+from .mirror_augmentation import across, image_of_electrodes
+from .noise_model import measured
 from .options import Options
-from .readings import measured
-from .surface import SILENT, Surface, touching
+from .surface_codec import SILENT, SurfaceCodec, touching
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ class Contacts:
     """
 
     def __init__(
-        self, pairs: Pairs, split: Split, options: Options, frames: dict[str, MovingFrame], generator: torch.Generator,
+        self, pairs: Pairs, split: Split, options: Options, frames: dict[str, ContactFrame], generator: torch.Generator,
         device: torch.device | None = None,
     ) -> None:  # fmt: skip
         self.pairs, self.split, self.options = pairs, split, options
         self.device = device or torch.device("cpu")
         self.biotac, self.digit = (
-            Surface(
+            SurfaceCodec(
                 getattr(pairs, f"displacement_{name}"), getattr(pairs, f"scale_{name}"), split.train, frames[name],
                 getattr(options, f"wide_{name}"), getattr(options, f"near_{name}"), generator,
                 mirrored=options.mirrored > 0,
@@ -66,7 +66,7 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0) -> np.ndarray:
-        """(B, 20) the signals of the contacts as a sensor would give them: see `readings.measured`."""
+        """(B, 20) the signals of the contacts as a sensor would give them: see `noise_model.measured`."""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes()]

@@ -8,17 +8,19 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .. import __version__, typical_signals
-from ..evaluation.translation import Bodies
-from ..network_sizes import ELECTRODES, ERROR_FEATURES, NETS, PLACE, SURFACES
-from ..networks import Networks, load
-from ..weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
+from .. import __version__
+from ..recordings.polarity import FALLS
+from ..translation import reference_signals
+from ..translation.network_sizes import ELECTRODES, ERROR_FEATURES, NETS, PLACE, SURFACES
+from ..translation.networks import Networks, load
+from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
 from .device import label
 from .modules import compress
 from .report import QUANTILES, Measure, distance_quantiles, error_rows, fit_error_bounds, silence_quantiles
 from .stages import FORCE_BLOCKS, FORCE_WIDTH, Model
-from .surface import Surface
+from .step_errors import Bodies
+from .surface_codec import SurfaceCodec
 
 DRAWS = 4  # noisy readings of each training contact for the distance's statistics
 COLLAPSED = 1e-3  # share of the largest variance: latents that vary less are unused, their noise is no distance
@@ -42,13 +44,14 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
     tensors = {net: net_tensors(net, model, contacts) for net in NETS}
     tensors["SVB"] |= signal_statistics(model, contacts, seed)
     sizes = net_sizes(contacts)
-    typical = typical_signals.make(contacts.pairs.signal[contacts.split.train], seed)
+    typical = reference_signals.make(contacts.pairs.signal[contacts.split.train], seed)
     measure = Measure(assemble(tensors, sizes), contacts, bodies, seed)
     silence = silence_quantiles(measure)
     card = {
         "format": CARD_FORMAT,
         "nets": write_nets(folder, tensors, sizes),
-        "signals": typical_signals.write(folder, typical),
+        "signals": reference_signals.write(folder, typical),
+        "polarity": FALLS,
         "units": UNITS,
         "seed": seed,
         "options": contacts.options.settings(),
@@ -98,7 +101,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
     }
 
 
-def surface_sizes(surface: Surface) -> dict[str, int]:
+def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
     """Sizes of a surface's lattice, window and bases."""
     frame, wide, near = surface.frame, len(surface.wide), len(surface.near)
     lattice = {"rows": frame.rows, "columns": frame.columns, "half": frame.half, "nodes": surface.nodes}

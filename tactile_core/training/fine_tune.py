@@ -18,14 +18,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from .. import metrics, networks, sensors, typical_signals
-from ..moving_frame import PLACE_UNIT, MovingFrame
-from ..network_sizes import NETS, PLACE
-from ..networks import FORCE_SCALE, Networks
-from ..rows import Row, row
-from ..weights import CARD_NAME, card_bytes, read_bytes, sha256, to_safetensors, write_bytes
+from .. import accuracy, sensors
+from ..accuracy import Row, row
+from ..translation import networks, reference_signals
+from ..translation.contact_frame import PLACE_UNIT, ContactFrame
+from ..translation.network_sizes import NETS, PLACE
+from ..translation.networks import FORCE_SCALE, Networks
+from ..translation.weights import CARD_NAME, card_bytes, read_bytes, sha256, to_safetensors, write_bytes
 from .export import versions
-from .labelled import Labelled, read_labelled
+from .labelled_recording import LabelledRecording, read_labelled
 from .modules import Residual
 from .stages import FORCE_FLOOR
 from .train import deterministic, prepare_folder
@@ -54,7 +55,7 @@ def fine_tune(
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
     data = read_labelled(path, before.frames["MVB"], seed)
-    typical = typical_signals.read(source).typical.astype(np.float32)
+    typical = reference_signals.read(source).typical.astype(np.float32)
     prepare_folder(Path(out_folder), overwrite)
     net = "R2MPN" if data.rectified else "S2MPN"
     with deterministic():
@@ -82,7 +83,7 @@ def _file_sha256(path: str | os.PathLike) -> str:
 
 
 def _train(
-    nets: Networks, net: str, data: Labelled, typical: np.ndarray, seed: int, progress: Progress
+    nets: Networks, net: str, data: LabelledRecording, typical: np.ndarray, seed: int, progress: Progress
 ) -> dict[str, np.ndarray]:
     """The network's tensors, rounded as they are written, at the epoch that was best on the validation presses."""
     module, head = _module(nets, net), _module(nets, "force").requires_grad_(False)
@@ -135,14 +136,14 @@ def _force(head: Residual, latent: Tensor) -> Tensor:
     return (FORCE_SCALE * torch.sinh(head(latent).clamp(-8.0, 8.0))).square().sum(-1).add(1e-12).sqrt()
 
 
-def _rows(nets: Networks, data: Labelled, when: str) -> list[Row]:
+def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
     """Median miss of place and force on the presses kept for it; null: always the training's median."""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVB"]
     latent = nets.s2m(nets.encode_signal(data.change[test], data.rectified), data.rectified)
     true, middle = on_skin(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
-    miss, null = (metrics.lengths(on_skin(frame, each) - true) for each in (latent[:, :PLACE], middle))
-    load, usual = metrics.lengths(nets.force(latent)), np.median(data.force[train])
+    miss, null = (accuracy.lengths(on_skin(frame, each) - true) for each in (latent[:, :PLACE], middle))
+    load, usual = accuracy.lengths(nets.force(latent)), np.median(data.force[train])
     share, nothing = (100 * np.abs(each - data.force[test]) / data.force[test] for each in (load, usual))
     of = f"kept presses, {when}"
     return [
@@ -151,7 +152,7 @@ def _rows(nets: Networks, data: Labelled, when: str) -> list[Row]:
     ]
 
 
-def on_skin(frame: MovingFrame, place: np.ndarray) -> np.ndarray:
+def on_skin(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
     """(F, 3) m on the resting skin of places (F, 2) on its lattice, between nodes by bilinear interpolation."""
     rest = sensors.biotac_surface().rest[: frame.rows * frame.columns].reshape(frame.rows, frame.columns, 3)
     size = np.array([frame.rows, frame.columns])
@@ -164,7 +165,7 @@ def on_skin(frame: MovingFrame, place: np.ndarray) -> np.ndarray:
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
     """The weights folder: all files of the source but the tuned one, and the card with a note of it, last."""
-    for name in [*(f"{net}.safetensors" for net in NETS if net != tuned), typical_signals.FILE]:
+    for name in [*(f"{net}.safetensors" for net in NETS if net != tuned), reference_signals.FILE]:
         write_bytes(folder / name, read_bytes(source / name))
     data = to_safetensors(state)
     write_bytes(folder / f"{tuned}.safetensors", data)

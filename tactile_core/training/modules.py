@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..layers import NORM_EPSILON
-from ..network_sizes import ELECTRODES, PLACE, SIGNAL_HIDDEN
-from ..networks import COUNT_SCALE
-from .surface import ROOT_FLOOR, Surface
+from ..translation.layers import NORM_EPSILON
+from ..translation.network_sizes import ELECTRODES, PLACE, SIGNAL_HIDDEN
+from ..translation.networks import COUNT_SCALE
+from .surface_codec import ROOT_FLOOR, SurfaceCodec
 
 
 class Plain(nn.ModuleList):
@@ -95,7 +95,7 @@ class MeshVae(Vae):
     surface : what ties places to cells, coefficients to fields
     """
 
-    def __init__(self, surface: Surface, latent: int, width: int, blocks: int) -> None:
+    def __init__(self, surface: SurfaceCodec, latent: int, width: int, blocks: int) -> None:
         modes = surface.modes.shape[1]
         encoder = Residual(modes + 2 * PLACE, 2 * (latent - PLACE), width, blocks)
         super().__init__(encoder, Residual(latent + PLACE, modes, width, blocks))

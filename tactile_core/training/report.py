@@ -9,10 +9,18 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .. import error_bounds, metrics
-from ..error_bounds import KINDS
-from ..evaluation.summary import figure_row, figure_rows
-from ..evaluation.translation import (
+from .. import accuracy
+from ..accuracy import Row
+from ..translation import error_bounds
+from ..translation.error_bounds import KINDS
+from ..translation.network_sizes import SURFACES
+from ..translation.networks import DISTANCES, Networks
+from ..translation.translate import silent_level
+from ..translation.weights import write_bytes
+from .data import Contacts
+from .error_summary import figure_row, figure_rows
+from .stages import Model
+from .step_errors import (
     Bodies,
     Columns,
     error_columns,
@@ -22,14 +30,7 @@ from ..evaluation.translation import (
     translation_figures,
     true_displacement,
 )
-from ..network_sizes import SURFACES
-from ..networks import DISTANCES, Networks
-from ..rows import Row
-from ..translate import silent_level
-from ..weights import write_bytes
-from .data import Contacts
-from .stages import Model
-from .surface import SILENT
+from .surface_codec import SILENT
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 0.999)
 # The shapes that networks.md's prototype was trained on, in its words three spheres and a flat cylinder.
@@ -82,7 +83,7 @@ def signal_rows(measure: Measure) -> list[Row]:
     """SVB: rms over electrodes of the reconstruction against the signal as read, averaged over contacts."""
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
-    value, null = (metrics.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
+    value, null = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
     return [figure_row("SVB_rms_counts", value, null, None, "test presses")]
 
 
@@ -91,9 +92,9 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
     nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
     biotac = nets.s2m(nets.encode_signal(change))
     return {
-        "biotac_m": metrics.lengths(nets.decode_biotac(biotac)).max(-1),
-        "digit_m": metrics.lengths(nets.decode_digit(nets.m2m(biotac))).max(-1),
-        "force_N": metrics.lengths(nets.force(biotac)),
+        "biotac_m": accuracy.lengths(nets.decode_biotac(biotac)).max(-1),
+        "digit_m": accuracy.lengths(nets.decode_digit(nets.m2m(biotac))).max(-1),
+        "force_N": accuracy.lengths(nets.force(biotac)),
     }
 
 
@@ -102,7 +103,7 @@ def silence_rows(measure: Measure) -> list[Row]:
     values = silence(measure)
     largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
     named = [*largest, ("silence_force_N", values["force_N"])]
-    return [figure_row(name, metrics.mean(value), 0.0, None, "noise alone") for name, value in named]
+    return [figure_row(name, accuracy.mean(value), 0.0, None, "noise alone") for name, value in named]
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:

@@ -9,12 +9,12 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..network_sizes import ELECTRODES, ERROR_FEATURES, PLACE, SURFACES
-from ..networks import ERROR_UNIT, FORCE_SCALE
+from ..translation.network_sizes import ELECTRODES, ERROR_FEATURES, PLACE, SURFACES
+from ..translation.networks import ERROR_UNIT, FORCE_SCALE
 from .data import Batch, Contacts
 from .modules import MeshVae, Residual, compress, initialise, signal_vae
 from .options import Options
-from .surface import ROOT_FLOOR
+from .surface_codec import ROOT_FLOOR
 
 FORCE_WIDTH, FORCE_BLOCKS = 64, 1  # a small head: three numbers out of a latent
 FORCE_FLOOR = 0.1  # N: an error counts against the force plus this, so that light touches do not rule (assumed)

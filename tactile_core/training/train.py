@@ -18,10 +18,9 @@ import numpy as np
 import torch
 
 from ..errors import TactileError
-from ..evaluation.translation import Bodies, our_bodies
-from ..moving_frame import MovingFrame, frame_of
-from ..paired_contacts import Pairs, Split, read_pairs, split_presses
 from ..sensors import sensor_surface
+from ..simulation.pairs_file import Pairs, Split, read_pairs, split_presses
+from ..translation.contact_frame import ContactFrame, frame_of
 from . import checkpoint
 from .data import Contacts
 from .device import device_of
@@ -29,6 +28,7 @@ from .export import export, versions
 from .options import Options
 from .report import draw_losses, write_log
 from .stages import STAGES, Model, Stage
+from .step_errors import Bodies, our_bodies
 
 log = logging.getLogger(__name__)
 Progress = Callable[[float, str], None]
@@ -43,7 +43,7 @@ def train(
     options: Options | None = None,
     progress: Progress | None = None,
     bodies: Bodies | None = None,
-    frame: Callable[[str, int], MovingFrame] = frame_of,
+    frame: Callable[[str, int], ContactFrame] = frame_of,
     overwrite: bool = False,
     device: str = "cpu",
 ) -> dict:

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from tactile_core.lattice import Lattice
+from tactile_core.geometry.lattice import Lattice
 
 ORDER = 6  # K, terms of Chebyshev's series
 FILTERS = 3, 16, 16, 16, 32

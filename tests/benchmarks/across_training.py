@@ -18,18 +18,18 @@ from pathlib import Path
 import numpy as np
 import torch
 from across_networks import Across, MeshVae, SignalVae
+from benchmarks.translation.noise import as_read
+from benchmarks.translation.test_set import SEED
 from torch import Tensor, nn
 
-from tactile_core import metrics, sensors
-from tactile_core.evaluation.readings import as_read
-from tactile_core.evaluation.summary import figure_rows
-from tactile_core.evaluation.test_set import SEED
-from tactile_core.evaluation.translation import mesh_columns, true_displacement
-from tactile_core.networks import COUNT_SCALE
-from tactile_core.paired_contacts import Pairs, read_pairs, split_presses
-from tactile_core.rows import Row, row
+from tactile_core import accuracy, sensors
+from tactile_core.accuracy import Row, row
+from tactile_core.simulation.pairs_file import Pairs, read_pairs, split_presses
+from tactile_core.training.error_summary import figure_rows
+from tactile_core.training.noise_model import measured
 from tactile_core.training.options import Options
-from tactile_core.training.readings import measured
+from tactile_core.training.step_errors import mesh_columns, true_displacement
+from tactile_core.translation.networks import COUNT_SCALE
 
 SENSORS = "biotac", "digit"
 KL = 0.005  # weight, of the divergence a number of the latent: the mildest reading of what is published
@@ -151,7 +151,7 @@ def train_maps(model: Across, pairs: Pairs, rows: np.ndarray, scales: list[float
 
 
 def error_rows(model: Across, pairs: Pairs, scales: list[float]) -> list[Row]:
-    """Errors of every step on contacts, averaged as ours are: see `evaluation.summary`."""
+    """Errors of every step on contacts, averaged as ours are: see `training.error_summary`."""
     change = torch.from_numpy(np.arcsinh(as_read(pairs.signal, SEED) / np.float32(COUNT_SCALE)))
     parts = []
     for start in range(0, len(pairs.press), 64):
@@ -165,7 +165,7 @@ def error_rows(model: Across, pairs: Pairs, scales: list[float]) -> list[Row]:
 def error_columns(
     model: Across, pairs: Pairs, rows: np.ndarray, change: Tensor, skin_scale: float, gel_scale: float
 ) -> dict[str, np.ndarray]:
-    """As `evaluation.translation.translation_figures` has them."""
+    """As `step_errors.translation_figures` has them."""
     skin, gel = (true_displacement(pairs, sensor, rows) for sensor in SENSORS)
     with torch.no_grad():
         mesh = model.MVB.posterior(torch.from_numpy(skin / np.float32(skin_scale)))[0]
@@ -176,9 +176,9 @@ def error_columns(
             "MVD": model.MVD.decode(own), "M2MPN": model.MVD.decode(model.M2MPN(mesh)),
             "chain": model.MVD.decode(model.M2MPN(signal)),
         }  # fmt: skip
-    found = mesh_columns("null_biotac", 0 * skin, skin, metrics.lengths) | mesh_columns("null_digit", 0 * gel, gel)
+    found = mesh_columns("null_biotac", 0 * skin, skin, accuracy.lengths) | mesh_columns("null_digit", 0 * gel, gel)
     for name, moved in on_skin.items():
-        found |= mesh_columns(name, skin_scale * moved.numpy(), skin, metrics.lengths)
+        found |= mesh_columns(name, skin_scale * moved.numpy(), skin, accuracy.lengths)
     for name, moved in on_gel.items():
         found |= mesh_columns(name, gel_scale * moved.numpy(), gel)
     return found

@@ -11,13 +11,13 @@ import dataclasses
 
 import numpy as np
 
-from tactile_core.calibrate.ball_print import print_on
-from tactile_core.calibrate.bench import Bench, working_factor
-from tactile_core.calibrate.measures import figures
-from tactile_core.calibrate.photographs import Photographs
-from tactile_core.calibrate.press_fit import Sight, fit_ball
-from tactile_core.calibration import Calibration
-from tactile_core.view import slopes
+from tactile_core.pictures.calibrate.ball_pictures import BallPictures, working_factor
+from tactile_core.pictures.calibrate.ball_print import print_on
+from tactile_core.pictures.calibrate.photo_metrics import figures
+from tactile_core.pictures.calibrate.photographs import Photographs
+from tactile_core.pictures.calibrate.press_fit import Sight, fit_ball
+from tactile_core.pictures.perspective import slopes
+from tactile_core.sensors.calibration import Calibration
 
 SIZES, DIRECTIONS = 40, 72  # bins; Taxim's own 125 x 125 leave most bins of nine presses empty
 STEEPEST = np.radians(70.0)
@@ -33,9 +33,9 @@ class Table:
 
 
 class TableBench:
-    """Stands in for ``Bench`` where balls are fitted: the same geometry, the table's picture."""
+    """Stands in for ``BallPictures`` where balls are fitted: the same geometry, the table's picture."""
 
-    def __init__(self, bench: Bench, table: Table) -> None:
+    def __init__(self, bench: BallPictures, table: Table) -> None:
         self.right, self.down, self.camera = bench.right, bench.down, bench.camera
         self._bench, self._table = bench, table
         self._terms = _terms(bench)
@@ -67,7 +67,7 @@ def fit_table(calibration: Calibration, photographs: Photographs, radius: float)
 def try_table(table: Table, calibration: Calibration, photographs: Photographs, radius: float) -> list[dict]:
     """The figures of ``tactile calibrate --test`` but for the radius, one a press."""
     working = TableBench(_working(calibration), table)
-    whole = TableBench(Bench(calibration), table)
+    whole = TableBench(BallPictures(calibration), table)
     found = []
     for press in photographs.presses:
         ball, _ = fit_ball(working, Sight(press), radius)
@@ -76,19 +76,19 @@ def try_table(table: Table, calibration: Calibration, photographs: Photographs, 
     return found
 
 
-def _working(calibration: Calibration) -> Bench:
+def _working(calibration: Calibration) -> BallPictures:
     camera = calibration.camera
     factor = working_factor(camera.width, camera.height)
-    return Bench(calibration.at_size(camera.width // factor, camera.height // factor))
+    return BallPictures(calibration.at_size(camera.width // factor, camera.height // factor))
 
 
-def _terms(bench: Bench) -> np.ndarray:
+def _terms(bench: BallPictures) -> np.ndarray:
     """1, x, y, x^2, xy, y^2 (H, W, 6) of image coordinates in units of about half the picture."""
     x, y = bench.right / 8e-3, bench.down / 8e-3
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
 
 
-def _bins(bench: Bench, ball: tuple[float, float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+def _bins(bench: BallPictures, ball: tuple[float, float, float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Bins (H, W) of the size and direction of the slope that the press adds."""
     rise = print_on(bench.rest, bench.right, bench.down, ball) - bench.rest
     along_right, along_down = slopes(rise, bench.camera)

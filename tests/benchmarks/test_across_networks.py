@@ -10,7 +10,7 @@ from across_networks import ORDER, Across, Chebyshev, Fixed, MeshVae, halved, ra
 from across_training import run_epoch, shuffled, vae_loss  # noqa: E402
 from small_pairs import dents, grid  # noqa: E402
 
-from tactile_core.lattice import Lattice, grid_faces  # noqa: E402
+from tactile_core.geometry.lattice import Lattice, grid_faces  # noqa: E402
 
 SHAPE = 11, 9
 

@@ -1,6 +1,5 @@
 """The benchmark runs, says what it measured, and writes what can be read; never how fast."""
 
-import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -16,10 +15,9 @@ SCRIPTS = Path(__file__).parents[2] / "scripts"
 @pytest.fixture(scope="module")
 def script():
     path = list(sys.path)
-    spec = importlib.util.spec_from_file_location("benchmark_script", SCRIPTS / "benchmark.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    yield module
+    from benchmarks.table import speed_error
+
+    yield speed_error
     sys.path[:] = path
 
 
@@ -36,7 +34,7 @@ def test_a_stage_runs_and_its_rows_can_be_read(script, tmp_path, capsys):
 
 
 def test_the_front_holds_what_nothing_beats_in_both(script):
-    from benchmarks.report import pareto, steps
+    from benchmarks.table.report import pareto, steps
 
     front = pareto([(3, 1.0), (1, 4.0), (2, 5.0), (2.5, 2.0), (9, 1.0)])
     assert front == [(1, 4.0), (2.5, 2.0), (3, 1.0)]
@@ -44,7 +42,7 @@ def test_the_front_holds_what_nothing_beats_in_both(script):
 
 
 def test_a_promise_counts_what_stayed_below(script):
-    from benchmarks.promise import Promise
+    from benchmarks.table.promise import Promise
 
     promise = Promise("x", "um", np.array([2.0, 2, 2, 2]), np.array([1.0, 1, 1, 3]), list("aabb"), "four")
     assert promise.covered() == 0.75 and promise.row()["ok"] is None
@@ -54,8 +52,8 @@ def test_a_promise_counts_what_stayed_below(script):
 
 
 def test_readme_gets_the_table(script, tmp_path):
-    from benchmarks.method import Method
-    from benchmarks.readme import HEADER, write_readme
+    from benchmarks.table.method import Method
+    from benchmarks.table.readme import HEADER, write_readme
 
     file = tmp_path / "README.md"
     file.write_text(f"before\n\n{HEADER}\n| old | a | 1 | 2 | 3 | 4 |\n\nafter\n")
@@ -75,8 +73,8 @@ def test_readme_gets_the_table(script, tmp_path):
 
 
 def test_the_report_that_ships_can_be_read_and_draws(script):
-    from benchmarks.method import Method
-    from benchmarks.report import plot
+    from benchmarks.table.method import Method
+    from benchmarks.table.report import plot
 
     told = json.loads((SCRIPTS.parent / "docs" / "benchmark.json").read_text())
     names = [row["name"] for row in told["rows"]]

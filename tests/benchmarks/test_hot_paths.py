@@ -5,14 +5,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tactile_core import networks
-from tactile_core.height_map import digit_mapper
-from tactile_core.indenters import Sphere
-from tactile_core.mechanics.compliance import compliance_of
-from tactile_core.mechanics.corrected_press import CorrectedPress
+from tactile_core.geometry.indenters import Sphere
+from tactile_core.mechanics.fast.compliance import compliance_of
+from tactile_core.mechanics.fast.press import CorrectedPress
 from tactile_core.mechanics.placement import FRICTION, Placement, pose_at
-from tactile_core.optics.presets import FAST
-from tactile_core.optics.renderer import Renderer
+from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.presets import FAST
+from tactile_core.pictures.renderer import Renderer
+from tactile_core.translation import networks
 
 BALL, PLACE = Sphere(3.5e-3), Placement(-8e-3, 1e-3)
 QUICK = {"warmup_rounds": 1, "rounds": 3, "iterations": 1}  # a comparison, not a measurement: scripts/benchmark.py

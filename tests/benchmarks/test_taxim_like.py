@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from taxim_like import TableBench, fit_table, try_table
 
-from tactile_core.calibrate.bench import Bench
-from tactile_core.calibrate.photographs import Photographs, chosen, read_photographs
-from tactile_core.calibrate.trial import mean_figures, try_unit
-from tactile_core.calibration_file import load_calibration
-from tactile_core.rows import HEADER, line, row
+from tactile_core.accuracy import HEADER, line, row
+from tactile_core.pictures.calibrate.ball_pictures import BallPictures
+from tactile_core.pictures.calibrate.evaluate import evaluate_unit, mean_figures
+from tactile_core.pictures.calibrate.photographs import Photographs, chosen, read_photographs
+from tactile_core.sensors.calibration_file import load_calibration
 
 BALL = 3e-3  # m, radius
 KEPT_APART = ["0003.png", "0018.png", "0033.png", "0036.png", "0039.png"]
@@ -29,7 +29,7 @@ def test_shipped_calibration_beats_a_table_fitted_on_the_same_presses(photograph
     test = chosen(photographs, KEPT_APART)
     table = fit_table(unit, chosen(photographs, list(unit.fit.photographs)), BALL)
     rows_of_table = try_table(table, unit, test, BALL)
-    ours, null = mean_figures(try_unit(unit, test, BALL, search_radius=False))
+    ours, null = mean_figures(evaluate_unit(unit, test, BALL, search_radius=False))
     theirs = {name: float(np.mean([found[name] for found in rows_of_table])) for name in rows_of_table[0]}
     units = {"roi_l1": "levels", "roi_psnr": "dB", "roi_ssim": "", "frame_l1": "levels", "lobe_iou": ""}
     print("\n" + HEADER)
@@ -43,5 +43,5 @@ def test_shipped_calibration_beats_a_table_fitted_on_the_same_presses(photograph
 def test_time_of_a_picture(photographs: Photographs, benchmark: Callable) -> None:
     unit = load_calibration()
     table = fit_table(unit, chosen(photographs, list(unit.fit.photographs)[:2]), BALL)
-    picture = benchmark(TableBench(Bench(unit), table).change, (0.0, 0.0, 1e-3, BALL))
+    picture = benchmark(TableBench(BallPictures(unit), table).change, (0.0, 0.0, 1e-3, BALL))
     assert np.isfinite(picture).all()

@@ -7,7 +7,7 @@ pytest.importorskip("torch", reason="needs torch")
 
 from torch_chain import TorchChain
 
-from tactile_core import networks
+from tactile_core.translation import networks
 
 TOLERANCE = 1e-5  # as tests/training/test_trained_parity.py has it
 

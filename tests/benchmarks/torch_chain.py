@@ -6,10 +6,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from tactile_core.moving_frame import PLACE_UNIT
-from tactile_core.network_sizes import PLACE
-from tactile_core.networks import Networks
 from tactile_core.training import modules
+from tactile_core.translation.contact_frame import PLACE_UNIT
+from tactile_core.translation.network_sizes import PLACE
+from tactile_core.translation.networks import Networks
 
 
 class TorchChain:

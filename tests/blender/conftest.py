@@ -62,7 +62,7 @@ def scene(extension: ModuleType):
 
 @pytest.fixture
 def part(extension: ModuleType):
-    """``part("addon.axes")``: a module of the extension as Blender imported it."""
+    """``part("addon.objects.axes")``: a module of the extension as Blender imported it."""
     return lambda name: importlib.import_module(f"{PACKAGE}.{name}")
 
 

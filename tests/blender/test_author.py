@@ -49,7 +49,7 @@ def test_an_indenter_looks_as_large_as_it_is(sensors, nodes_of, part, shape):
     thing = bpy.context.object
     import msgspec
 
-    spec = msgspec.json.decode(thing.tactile.spec, type=part("tactile_core.scene_indenters").IndenterSpec)
+    spec = msgspec.json.decode(thing.tactile.spec, type=part("tactile_core.simulation.indenter_specs").IndenterSpec)
     low, high = spec.build().bounds()
     nodes = nodes_of(thing)
     # A hundredth of a body of some mm: the hull's corners lie on the body, its edges a little inside.
@@ -59,7 +59,7 @@ def test_an_indenter_looks_as_large_as_it_is(sensors, nodes_of, part, shape):
 
 @pytest.mark.parametrize("folder", SCENES, ids=lambda path: path.name)
 def test_shipped_scenes_come_back_exactly(scene, part, tmp_path, folder):
-    load = part("tactile_core.scene").load_scene
+    load = part("tactile_core.simulation.scene").load_scene
     wanted = load(folder)[0]
     bpy.ops.tactile.import_scene(filepath=str(folder / "scene.toml"))
     if wanted.recording is None:
@@ -83,10 +83,10 @@ def test_a_motion_of_the_user_s_own_is_exported(sensors, part, tmp_path):
     ball.tactile.press_by = "FORCE"
     _key(ball, 1, x=-8, y=0, force=0.0)
     _key(ball, 51, x=-10, y=2, force=0.4)
-    for curve in part("addon.curves").fcurves_of(ball):
+    for curve in part("addon.objects.curves").fcurves_of(ball):
         for point in curve.keyframe_points:
             point.interpolation = "LINEAR"
-    recording = part("tactile_core.scene").load_scene(_export(tmp_path))[0].recording
+    recording = part("tactile_core.simulation.scene").load_scene(_export(tmp_path))[0].recording
     assert [(p.time_s, p.x_mm, p.z_mm, p.force_n) for p in recording.points] == [
         (0.0, -8.0, 0.0, 0.0), (1.0, -10.0, 2.0, 0.4),
     ]  # fmt: skip
@@ -99,7 +99,7 @@ def test_curved_motion_is_sampled(sensors, part, tmp_path):
     ball.tactile.press_by = "FORCE"
     _key(ball, 1, x=-8, force=0.0)
     _key(ball, 11, x=-10, force=0.4)
-    points = part("tactile_core.scene").load_scene(_export(tmp_path))[0].recording.points
+    points = part("tactile_core.simulation.scene").load_scene(_export(tmp_path))[0].recording.points
     assert len(points) == 11 and points[5].x_mm == pytest.approx(-9, abs=0.01)
     assert points[2].x_mm > -8.4  # Bezier keys start slowly; a straight line would be there already
 
@@ -116,9 +116,9 @@ def test_simulating_bakes_what_the_command_line_computes(scene, nodes_of, part, 
     assert bpy.ops.tactile.simulate(seed=3) == {"FINISHED"}
     command = [sys.executable, "-P", "-m", "tactile_core", "simulate", str(folder), "--seed", "3"]
     wanted = tmp_path / "wanted.h5"
-    environment = part("addon.jobs")._environment()
+    environment = part("addon.process.jobs")._environment()
     subprocess.run([*command, "--out", str(wanted)], env=environment, check=True, timeout=300)
-    truth = part("addon.recording_reader").read(wanted).truth
+    truth = part("addon.process.recording_reader").read(wanted).truth
     for frame in (0, 5, 10):
         scene.frame_set(frame)
         for role, surface, moved in (
@@ -126,7 +126,7 @@ def test_simulating_bakes_what_the_command_line_computes(scene, nodes_of, part, 
             ("DIGIT", part("tactile_core.sensors").digit_surface(), truth.displacement_digit),
         ):
             sensor = next(thing for thing in scene.objects if thing.tactile.role == role)
-            nodes = part("addon.axes").to_blender(surface.rest + moved[frame], 1000)
+            nodes = part("addon.objects.axes").to_blender(surface.rest + moved[frame], 1000)
             np.testing.assert_allclose(nodes_of(sensor), nodes, atol=1e-3)
     gel = scene.objects["DIGIT gel"]
     assert gel["force"][2] == pytest.approx(-truth.force[10, 1], rel=1e-4)
@@ -147,7 +147,7 @@ def test_pressing_by_height_finds_the_force(sensors, part):
     assert ball.tactile.force == 0
     sensors.frame_set(3)
     place = part("tactile_core.mechanics.placement").Placement(-8e-3, 0.0)
-    ball_shape = part("tactile_core.indenters").Sphere(3.5e-3)
+    ball_shape = part("tactile_core.geometry.indenters").Sphere(3.5e-3)
     wanted = part("tactile_core.mechanics.solve").solve("digit", ball_shape, place, depth=0.5e-3, friction=0.0)
     # 10 %: the top of the gel is known to 10 um, and force goes with depth to the power of 1.5.
     assert ball.tactile.force == pytest.approx(np.linalg.norm(wanted.force), rel=0.1)
@@ -173,7 +173,7 @@ def test_any_mesh_can_press_as_it_is_modifiers_and_scale_included(sensors, part,
     thing.tactile.press_by = "FORCE"
     sensors.frame_start, sensors.frame_end = 1, 2
     path = _export(tmp_path)
-    spec = part("tactile_core.scene").load_scene(path)[0].indenters[0]
+    spec = part("tactile_core.simulation.scene").load_scene(path)[0].indenters[0]
     corners = np.frombuffer(
         Path(spec.file).read_bytes()[84:], np.dtype([("n", "<f4", 3), ("c", "<f4", (3, 3)), ("s", "<u2")])
     )
@@ -257,7 +257,7 @@ def test_an_unwritable_folder_is_reported(scene, tmp_path):
 
 
 def test_a_worker_that_dies_is_reported(part, tmp_path):
-    jobs, error = part("addon.jobs"), part("tactile_core.errors").TactileError
+    jobs, error = part("addon.process.jobs"), part("tactile_core.errors").TactileError
     job = jobs.Job("no such job", tmp_path)
     with pytest.raises(error, match="KeyError"):
         while not job.poll(0.1):
@@ -265,7 +265,7 @@ def test_a_worker_that_dies_is_reported(part, tmp_path):
 
 
 def test_a_cancelled_worker_is_gone(part, tmp_path):
-    jobs = part("addon.jobs")
+    jobs = part("addon.process.jobs")
     (tmp_path / "scene.toml").write_text((ROOT / "scenes" / "press" / "scene.toml").read_text())
     job = jobs.Job("simulate", tmp_path, seed=0)
     job.cancel()
@@ -274,19 +274,19 @@ def test_a_cancelled_worker_is_gone(part, tmp_path):
 
 def test_a_digit_alone_is_simulated_without_a_biotac(scene, part, nodes_of):
     bpy.ops.tactile.add_sensor(sensor="DIGIT")
-    assert part("addon.simulate")._outputs(scene) == ["displacement_digit"]
+    assert part("addon.operators.simulate")._outputs(scene) == ["displacement_digit"]
     _press(scene)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     scene.frame_set(3)
     gel = scene.objects["DIGIT gel"]
-    rest = part("addon.axes").to_blender(part("tactile_core.sensors").digit_surface().rest, 1000)
+    rest = part("addon.objects.axes").to_blender(part("tactile_core.sensors").digit_surface().rest, 1000)
     # 0.1 N of a 7 mm ball dents the gel by 0.1 mm; the force points into it.
     assert 0.02 < np.abs(nodes_of(gel) - rest).max() < 0.5 and gel["force"][2] == pytest.approx(-0.1, rel=0.05)
 
 
 def test_a_biotac_alone_is_simulated_without_a_digit(scene, part):
     bpy.ops.tactile.add_sensor(sensor="BIOTAC")
-    assert part("addon.simulate")._outputs(scene) == ["electrodes", "displacement_biotac"]
+    assert part("addon.operators.simulate")._outputs(scene) == ["electrodes", "displacement_biotac"]
     _press(scene)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     scene.frame_set(3)

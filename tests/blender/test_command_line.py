@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.fixture
 def run(part, scene):
     """Calls the command as Blender does; the exit status."""
-    return lambda *arguments: part("addon.command_line").main([str(argument) for argument in arguments])
+    return lambda *arguments: part("addon.process.command_line").main([str(argument) for argument in arguments])
 
 
 def test_convert_writes_a_blend_and_pictures(run, slide_csv, tmp_path):

@@ -39,8 +39,8 @@ def test_the_listing_is_what_git_tracks(builder, packed):
         "__init__.py",
         "blender_manifest.toml",
         "LICENSE",
-        "addon/panels.py",
-        "tactile_core/weights/MVB.safetensors",
+        "addon/ui/panels.py",
+        "tactile_core/data/weights/MVB.safetensors",
     ):
         assert needed in names
     assert not [

@@ -13,13 +13,13 @@ TOLERANCE = 1e-3  # mm: ten times what float32 rounds coordinates of 30 mm to, t
 
 
 def _translated(part, frames="40:140"):
-    return part("addon.recording_data").load(str(RECORDING), "auto", frames, lambda share: None)
+    return part("addon.operators.recording_data").load(str(RECORDING), "auto", frames, lambda share: None)
 
 
 def _wanted(part, frame):
     moved = _translated(part).translation.displacement_biotac[frame - 40]
     rest = part("tactile_core.sensors").biotac_surface().rest
-    return part("addon.axes").to_blender(rest + moved, 1000)
+    return part("addon.objects.axes").to_blender(rest + moved, 1000)
 
 
 @pytest.mark.parametrize("motion", ["SHAPE_KEYS", "COMPACT"])
@@ -62,8 +62,8 @@ def test_the_scene_s_own_unit_is_kept_when_asked(imported, scene, nodes_of):
 def test_electrodes_sit_under_the_skin_and_show_their_signal(imported, part, scene):
     imported()
     change = _translated(part).signals.change
-    colours = part("addon.electrode_markers").colours_of(change)
-    places = part("addon.axes").to_blender(part("tactile_core.sensors").electrodes(), 1000)
+    colours = part("addon.objects.electrode_markers").colours_of(change)
+    places = part("addon.objects.axes").to_blender(part("tactile_core.sensors").electrodes(), 1000)
     for frame in (50, 80):
         scene.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -144,7 +144,7 @@ def test_undo_takes_it_back(imported, scene):
 
 
 def test_a_recording_read_in_another_process_is_the_same(part):
-    reader, read = part("addon.recording_reader"), part("tactile_core.recordings").read
+    reader, read = part("addon.process.recording_reader"), part("tactile_core.recordings").read
     if not reader._hdf5_works():
         pytest.skip("HDF5 does not work in this Blender's own process")
     found, wanted = reader._read_elsewhere(str(RECORDING)), read(RECORDING)
@@ -159,4 +159,4 @@ def test_what_another_process_cannot_read_is_told_as_here(part, tmp_path):
     bad = tmp_path / "bad.h5"
     bad.write_bytes(b"\x89HDF\r\n\x1a\nrubbish")
     with pytest.raises(part("tactile_core.errors").TactileError, match="damaged"):
-        part("addon.recording_reader")._read_elsewhere(str(bad))
+        part("addon.process.recording_reader")._read_elsewhere(str(bad))

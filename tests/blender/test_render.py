@@ -33,9 +33,10 @@ def _pixels(path):
 
 
 def _wanted(part, frame=80):
-    found = part("addon.recording_data")._KEPT
+    found = part("addon.operators.recording_data")._KEPT
     displacement = next(iter(found.values())).translation.displacement_digit[frame - 70]
-    return part("tactile_core.shading").Shader()(part("tactile_core.height_map").height_map(displacement))
+    heights = part("tactile_core.pictures.height_map").height_map(displacement)
+    return part("tactile_core.pictures.shading").Shader()(heights)
 
 
 def test_a_frame_holds_the_library_s_own_pixels(ready, part, tmp_path):
@@ -73,7 +74,7 @@ def test_exr_holds_the_same_in_float(ready, part, tmp_path):
     ready.render.filepath = str(tmp_path / "frame.exr")
     bpy.ops.render.render(write_still=True)
     linear = _pixels(tmp_path / "frame.exr")
-    picture = part("addon.render_engine").to_linear(_wanted(part))[::-1, :, :3]
+    picture = part("addon.operators.render_engine").to_linear(_wanted(part))[::-1, :, :3]
     assert np.abs(linear - picture).max() < 0.01  # a grey level is at most 0.009 of linear light
 
 
@@ -114,13 +115,13 @@ def test_the_camera_looks_at_what_the_picture_shows(ready, part):
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector
 
-    unit = part("tactile_core.calibration_file").load_calibration().camera
+    unit = part("tactile_core.sensors.calibration_file").load_calibration().camera
     gel = bpy.context.scene.objects["DIGIT gel"]
     bpy.context.view_layer.update()
-    height_zero = part("tactile_core.camera").HEIGHT_ZERO_Y
+    height_zero = part("tactile_core.sensors.camera").HEIGHT_ZERO_Y
     for row, column in ((0, 0), (319, 239), (100, 60)):
         x, z = unit.to_gel(row, column)
-        place = part("addon.axes").to_blender(np.array([x, height_zero, z]), 1000)
+        place = part("addon.objects.axes").to_blender(np.array([x, height_zero, z]), 1000)
         seen = world_to_camera_view(bpy.context.scene, ready.camera, gel.matrix_world @ Vector(place.tolist()))
         assert seen.x * 240 - 0.5 == pytest.approx(column, abs=0.05)
         assert (1 - seen.y) * 320 - 0.5 == pytest.approx(row, abs=0.05)
@@ -129,7 +130,7 @@ def test_the_camera_looks_at_what_the_picture_shows(ready, part):
 def test_output_panels_are_shown_for_the_engine_and_given_back(extension):
     import bl_ui.properties_output as output
 
-    part = sys.modules["bl_ext.user_default.tactile.addon.render_engine"]
+    part = sys.modules["bl_ext.user_default.tactile.addon.operators.render_engine"]
     assert part.ID in output.RENDER_PT_format.COMPAT_ENGINES
     assert part.ID in output.RENDER_PT_output.COMPAT_ENGINES
 
@@ -146,10 +147,10 @@ def test_a_saved_file_renders_headless(ready, tmp_path):
     assert sorted(path.name for path in (tmp_path / "images").iterdir()) == ["0079.png", "0080.png"]
 
 
-TRACED = importlib.util.find_spec("mitsuba") is not None and (ROOT / "tactile_core" / "optics").exists()
+TRACED = importlib.util.find_spec("mitsuba") is not None
 
 
-@pytest.mark.skipif(not TRACED, reason="mitsuba or the optics room is missing")
+@pytest.mark.skipif(not TRACED, reason="mitsuba is missing")
 def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, part, tmp_path):
     ready.frame_set(80)
     ready.tactile_render.preset = "standard"
@@ -162,9 +163,9 @@ def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, part, tmp_path):
 @pytest.fixture
 def traced(part, tmp_path):
     """A worker as Mitsuba's presets use it, with the one that needs no Mitsuba; heights (H, W) m of a rest gel."""
-    unit = part("tactile_core.calibration_file").load_calibration()
-    tracer = part("addon.tracer").Tracer(unit, "fast")
-    yield tracer, part("tactile_core.height_map").rest_height_map(unit.camera)
+    unit = part("tactile_core.sensors.calibration_file").load_calibration()
+    tracer = part("addon.process.tracer").Tracer(unit, "fast")
+    yield tracer, part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
     tracer.close()
 
 
@@ -172,13 +173,13 @@ def test_a_worker_draws_what_the_library_draws(traced, part):
     tracer, heights = traced
     raised = heights.copy()
     raised[150:170, 100:120] += 2e-4
-    renderer = part("tactile_core.optics.renderer").Renderer(preset="fast")
+    renderer = part("tactile_core.pictures.renderer").Renderer(preset="fast")
     for height in (heights, raised):
         np.testing.assert_array_equal(tracer.draw(height, lambda: False), renderer(height))
 
 
 def test_esc_stops_a_worker(traced, part):
-    with pytest.raises(part("addon.tracer").Stopped):
+    with pytest.raises(part("addon.process.tracer").Stopped):
         traced[0].draw(traced[1], lambda: True)
 
 
@@ -193,16 +194,16 @@ def test_live_picture_and_render_are_of_the_same_unit(ready, part):
     ready.frame_set(80)
     gel = ready.objects["DIGIT gel"]
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    displacement = part("addon.digit_objects").displacement_of(gel, depsgraph)
-    before = part("addon.pictures").fast_picture(ready, displacement)[0].astype(float)
+    displacement = part("addon.objects.digit_objects").displacement_of(gel, depsgraph)
+    before = part("addon.operators.pictures").fast_picture(ready, displacement)[0].astype(float)
     ready.tactile_render.lights = (0.2, 1, 1)
-    after = part("addon.pictures").fast_picture(ready, displacement)[0].astype(float)
+    after = part("addon.operators.pictures").fast_picture(ready, displacement)[0].astype(float)
     assert np.abs(after - before)[..., 0].max() > 20
 
 
 def test_a_bound_on_pictures_picks_the_preset(ready, part):
-    settings, scene = part("addon.render_settings"), bpy.context.scene
-    table = part("tactile_core.optics.presets").measured()["presets"]
+    settings, scene = part("addon.ui.render_settings"), bpy.context.scene
+    table = part("tactile_core.pictures.presets").measured()["presets"]
     scene.tactile_render.preset = "standard"
     assert settings.preset_of(scene) == "standard"
     for preset in ("fast", "reference"):

@@ -23,20 +23,20 @@ def gel(imported):
 
 
 def _translation(part):
-    return part("addon.recording_data").load(str(RECORDING), "auto", "40:140", lambda share: None).translation
+    return part("addon.operators.recording_data").load(str(RECORDING), "auto", "40:140", lambda share: None).translation
 
 
 def test_the_gel_moves_as_translated(gel, nodes_of, part):
     rest = part("tactile_core.sensors").digit_surface().rest
     for frame in (40, 80, 139):
         bpy.context.scene.frame_set(frame)
-        wanted = part("addon.axes").to_blender(rest + _translation(part).displacement_digit[frame - 40], 1000)
+        wanted = part("addon.objects.axes").to_blender(rest + _translation(part).displacement_digit[frame - 40], 1000)
         np.testing.assert_allclose(nodes_of(gel), wanted, atol=TOLERANCE)
 
 
 def test_the_displacement_can_be_read_back(gel, part):
     bpy.context.scene.frame_set(80)
-    found = part("addon.digit_objects").displacement_of(gel, bpy.context.evaluated_depsgraph_get())
+    found = part("addon.objects.digit_objects").displacement_of(gel, bpy.context.evaluated_depsgraph_get())
     np.testing.assert_allclose(found, _translation(part).displacement_digit[40], atol=1e-3 * TOLERANCE)
 
 
@@ -49,7 +49,7 @@ def test_the_gel_says_how_far_it_may_be_off(gel, part):
 
 def test_the_contact_patch_is_an_attribute_of_every_frame(gel, part):
     surface = part("tactile_core.sensors").digit_surface()
-    patch = part("tactile_core.patch_of_dent").contact_patch(_translation(part).displacement_digit, surface)
+    patch = part("tactile_core.translation.contact_patch").contact_patch(_translation(part).displacement_digit, surface)
     assert patch[40].any() and not patch[40].all()
     for frame in (40, 80, 100, 139):
         bpy.context.scene.frame_set(frame)
@@ -61,14 +61,14 @@ def test_the_contact_patch_is_an_attribute_of_every_frame(gel, part):
 
 def test_the_picture_and_height_map_are_those_of_the_library(gel, part):
     bpy.context.scene.frame_set(80)
-    part("addon.pictures").update(gel, bpy.context.evaluated_depsgraph_get())
-    heights = part("tactile_core.height_map").height_map(_translation(part).displacement_digit[40])
+    part("addon.operators.pictures").update(gel, bpy.context.evaluated_depsgraph_get())
+    heights = part("tactile_core.pictures.height_map").height_map(_translation(part).displacement_digit[40])
     shown = bpy.data.images["DIGIT height map"]
     values = np.empty(320 * 240 * 4, np.float32)
     shown.pixels.foreach_get(values)
     # 1 um: coordinates of 30 mm are held in float32, which rounds them to 2 nm; dents steepen that sideways.
     np.testing.assert_allclose(values.reshape(320, 240, 4)[::-1, :, 0], 1e3 * heights, atol=1e-3)
-    picture = part("tactile_core.shading").Shader()(heights)
+    picture = part("tactile_core.pictures.shading").Shader()(heights)
     bpy.data.images["DIGIT picture"].pixels.foreach_get(values)
     drawn = np.rint(255 * values.reshape(320, 240, 4)[::-1, :, :3])
     assert np.abs(drawn - picture.astype(float)).max() <= 1  # a level: the same rounding of coordinates
@@ -77,11 +77,11 @@ def test_the_picture_and_height_map_are_those_of_the_library(gel, part):
 
 def test_low_confidence_is_marked_on_the_timeline(scene, part):
     confidence = np.array([1, 0.2, 0.3, 1, 1, 0.1])
-    assert part("addon.timeline").mark_low_confidence(scene, confidence, np.arange(10, 16)) == 2
+    assert part("addon.ui.timeline").mark_low_confidence(scene, confidence, np.arange(10, 16)) == 2
     assert [(m.frame, m.name) for m in scene.timeline_markers] == [
         (11, "low confidence to 12"), (15, "low confidence to 15"),
     ]  # fmt: skip
-    part("addon.timeline").mark_low_confidence(scene, np.ones(6), np.arange(6))
+    part("addon.ui.timeline").mark_low_confidence(scene, np.ones(6), np.arange(6))
     assert not scene.timeline_markers
 
 

@@ -29,27 +29,20 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from small_pairs import write_pairs  # noqa: E402
 
-from tactile_core import (  # noqa: E402
-    background,
-    calibration_file,
-    deformations,
-    networks,
-    paired_contacts,
-    recordings,
-    scene,
-    sealed,
-    tet_file,
-    translate,
-    weights,
-)
-from tactile_core.batch import dask_place, inputs, prepared, recipes  # noqa: E402
-from tactile_core.batch import job as jobs  # noqa: E402
+from tactile_core import recordings  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.indenters import mesh_file  # noqa: E402
-from tactile_core.live import Growing  # noqa: E402
-from tactile_core.optics import exr  # noqa: E402
-from tactile_core.optics import inputs as pictures  # noqa: E402
-from tactile_core.recordings import parts, sensor_file  # noqa: E402
+from tactile_core.files import checksummed, exr  # noqa: E402
+from tactile_core.geometry.indenters import mesh_file  # noqa: E402
+from tactile_core.jobs import gel_frames, prepared_signals  # noqa: E402
+from tactile_core.jobs.engine import dask_cluster, inputs, recipes  # noqa: E402
+from tactile_core.jobs.engine import job as jobs  # noqa: E402
+from tactile_core.jobs.live import Growing  # noqa: E402
+from tactile_core.mechanics.isaac import tet_file  # noqa: E402
+from tactile_core.pictures import background  # noqa: E402
+from tactile_core.recordings import chunks, electrode_gains  # noqa: E402
+from tactile_core.sensors import calibration_file  # noqa: E402
+from tactile_core.simulation import pairs_file, scene  # noqa: E402
+from tactile_core.translation import networks, translate, weights  # noqa: E402
 
 MEMORY = 4 * 2**30  # bytes of address space for the script; numpy's threads and libraries reserve the first of them
 WORDS = [b"nan", b"-1", b"1e308", b"99999999999999999999", b"../../x", b"\n", b",", b'"', b"[", b"{", b"\0", b"null"]
@@ -128,7 +121,7 @@ def read_bag_with(mark: Path) -> Loader:
 
 def prepare(path: Path) -> None:
     """All that a batch does with a recording before the networks."""
-    for part in parts.read_parts(path):
+    for part in chunks.read_parts(path):
         recordings.prepare(part.recording)
 
 
@@ -146,7 +139,6 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
     """Scenes, meshes, weights, sensor files, jobs, simulations of others."""
     tetrahedra = b"v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nt 0 1 2 3\n"
     faces = b"v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
-    narang = {"step_1/nodal_coords/env_0": np.zeros((4, 3)), "step_1/net_force_vecs/env_0": np.zeros(3)}
     header = {"a": {"dtype": "F32", "shape": [2, 2], "data_offsets": [0, 16]},
               "b": {"dtype": "F16", "shape": [4], "data_offsets": [16, 24]}}  # fmt: skip
     text = json.dumps(header).encode()
@@ -154,7 +146,8 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
     job = jobs.make([jobs.Input("00000_a", "/a", "0" * 64, 1)], recipes.Translate(["latent"], "0" * 64), None)
     (folder / "job").mkdir()
     jobs.write(folder / "job", job)
-    sensor_file.write(folder / "sensor.toml", sensor_file.Sensor(sensor_file.FORMAT, "made up", [1.0] * 19, [0.0] * 19))
+    unit = electrode_gains.ElectrodeGains("made up", [1.0] * 19, [0.0] * 19)
+    electrode_gains.write(folder / "sensor.toml", electrode_gains.SensorFile(electrode_gains.FORMAT, unit=unit))
     scenes, unit = ROOT / "scenes" / "press_sphere" / "scene.toml", calibration_file.SHIPPED
     queue = b'queue = "slurm"\njobs = 10\n[options]\ncores = 1\nmemory = "4GB"\nwalltime = "01:00:00"\n'
     photograph = io.BytesIO()
@@ -170,10 +163,10 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         "scene": (scenes.read_bytes(), scene.load_scene),
         "calibration": (unit.read_bytes(), calibration_file.load_calibration),
         "list": (b"# two\na.csv\n\n./b.csv\n", read_list),
-        "queue": (queue, lambda path: dask_place._read(str(path))),
+        "queue": (queue, lambda path: dask_cluster._read(str(path))),
         "weights_card": ((networks.WEIGHTS_FOLDER / weights.CARD_NAME).read_bytes(), read_weights),
         "heights": (heights.getvalue(), read_heights),
-        "sensor": ((folder / "sensor.toml").read_bytes(), sensor_file.read),
+        "sensor": ((folder / "sensor.toml").read_bytes(), electrode_gains.read),
         "tet": (tetrahedra, tet_file.read_tet),
         "obj": (faces, read_mesh(".obj")),
         "stl": (bytes(80) + struct.pack("<I", 4) + triangles(), read_mesh(".stl")),
@@ -181,10 +174,9 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         "off": (OFF, read_mesh(".off")),
         "safetensors": (safetensors, lambda path: weights.from_safetensors(weights.read_bytes(path), path)),
         "job": ((folder / "job" / jobs.FILE).read_bytes(), read_job),
-        "deformations": (hdf5(narang), lambda path: list(deformations.read(path))),
-        "pairs": (write_pairs(folder / "pairs.h5", presses=2, steps=2).read_bytes(), paired_contacts.read_pairs),
+        "pairs": (write_pairs(folder / "pairs.h5", presses=2, steps=2).read_bytes(), pairs_file.read_pairs),
         "prepared": (good_prepared(), read_prepared),
-        "seal": (sealed.MAGIC + b"0" * 64 + b"\n" + bytes(500), sealed.digest_of),
+        "seal": (checksummed.MAGIC + b"0" * 64 + b"\n" + bytes(500), checksummed.verified_checksum),
     }
 
 
@@ -233,7 +225,7 @@ def read_weights(path: Path) -> None:
 def read_heights(path: Path) -> None:
     named = path.with_suffix(".npz")
     shutil.copy(path, named)
-    pictures.read_frames(named)
+    gel_frames.read_frames(named)
 
 
 def read_job(path: Path) -> None:
@@ -244,14 +236,14 @@ def read_job(path: Path) -> None:
 def good_prepared() -> bytes:
     about = {"recording": "a", "layout": "csv", "simulated": False, "start_time": 0.0, "kind": "raw", "warnings": [],
              "prepared": [], "sha256": "0" * 64, "frames": 8}  # fmt: skip
-    sizes = {"time": (), "quiet": (), "flags": ()}
-    arrays = {name: np.zeros((8, *sizes.get(name, (19,))), kind) for name, kind in prepared.COLUMNS.items()}
+    sizes = {"time": (), "pdc": (), "quiet": (), "flags": ()}
+    arrays = {name: np.zeros((8, *sizes.get(name, (19,))), kind) for name, kind in prepared_signals.COLUMNS.items()}
     parts = {"part": np.zeros(1, np.int64), "rest": np.zeros((1, 19))}
     return hdf5(arrays | parts | {"about": np.frombuffer(json.dumps(about).encode(), np.uint8)}, packing=None)
 
 
 def read_prepared(path: Path) -> None:
-    found = prepared.Prepared(path)
+    found = prepared_signals.Prepared(path)
     len(found), found.rows(0, 4)
 
 

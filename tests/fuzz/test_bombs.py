@@ -18,15 +18,20 @@ import h5py
 import numpy as np
 import pytest
 
-from tactile_core import deformations, hdf5_heaps, pack, paired_contacts, recordings, scene, tet_file, weights
-from tactile_core.background import background_picture, read_photograph
-from tactile_core.batch import dask_place, inputs, prepared
-from tactile_core.calibration_file import SHIPPED, load_calibration
+from tactile_core import recordings
 from tactile_core.errors import TactileError
-from tactile_core.indenters import mesh_file
-from tactile_core.optics.inputs import read_frames
-from tactile_core.recordings import parts, sensor_file
-from tactile_core.small_text import MOST
+from tactile_core.files import array_pack, hdf5_free_lists
+from tactile_core.files.text_file import MOST
+from tactile_core.geometry.indenters import mesh_file
+from tactile_core.jobs import prepared_signals
+from tactile_core.jobs.engine import dask_cluster, inputs
+from tactile_core.jobs.gel_frames import read_frames
+from tactile_core.mechanics.isaac import tet_file
+from tactile_core.pictures.background import background_picture, read_photograph
+from tactile_core.recordings import chunks, electrode_gains
+from tactile_core.sensors.calibration_file import SHIPPED, load_calibration
+from tactile_core.simulation import pairs_file, scene
+from tactile_core.translation import weights
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows limits no process's memory")
 BOUND = 512 * 2**20  # bytes beyond what the process has: two unpacked chunks of HDF5 of the largest size that is taken
@@ -62,7 +67,7 @@ def told_by_child(load, path) -> str:
 
 
 def prepare(path):
-    for part in parts.read_parts(path):
+    for part in chunks.read_parts(path):
         recordings.prepare(part.recording)
 
 
@@ -146,7 +151,7 @@ def endless_list(path):
         content = file.read()
         heap = content.index(b"HEAP")
         _, first, address = struct.unpack_from("<3Q", content, heap + 8)
-        assert struct.unpack_from("<Q", content, address + first)[0] == hdf5_heaps.END
+        assert struct.unpack_from("<Q", content, address + first)[0] == hdf5_free_lists.END
         file.seek(address + first)
         file.write(struct.pack("<Q", first))
 
@@ -164,7 +169,7 @@ def endless_list(path):
 @pytest.mark.parametrize(
     "load",
     [
-        prepare, lambda path: list(deformations.read(path)), paired_contacts.read_pairs, pack.read,
+        prepare, pairs_file.read_pairs, array_pack.read,
     ],
 )  # fmt: skip
 def test_hdf5(make, words, load, tmp_path):
@@ -192,7 +197,7 @@ SPOILED = {
 )
 def test_prepared_recordings_are_plain(name, options, words, tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        for column, kind in prepared.COLUMNS.items():
+        for column, kind in prepared_signals.COLUMNS.items():
             file[column] = np.zeros((8, 19) if column in ("change", "electrodes") else 8, kind)
         file["part"], file["rest"], file["about"] = np.zeros(1, int), np.zeros((1, 19)), np.zeros(2, np.uint8)
         del file[name]
@@ -207,7 +212,7 @@ def test_prepared_recordings_are_looked_at_first(make, words, tmp_path):
 
 
 def rows_of(path):
-    prepared.Prepared(path).rows(0, 4)
+    prepared_signals.Prepared(path).rows(0, 4)
 
 
 def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
@@ -215,11 +220,12 @@ def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
     said = told_by_child(prepare, tmp_path / "a.h5")
     assert said.startswith("told: "), said
     with h5py.File(tmp_path / "b.h5", "w") as file:
-        file.attrs.update(format=paired_contacts.FORMAT, **dict.fromkeys(paired_contacts.ATTRIBUTES, "x"))
+        words = dict.fromkeys(pairs_file.ATTRIBUTES, "x") | {"polarity": "falls"}
+        file.attrs.update(words, format=pairs_file.FORMAT)
         file.create_dataset("displacement_biotac", (10**6, 5000, 3), "i2", chunks=(1, 5000, 3))
-        for name in set(paired_contacts.DATASETS) - {"displacement_biotac"}:
+        for name in set(pairs_file.DATASETS) - {"displacement_biotac"}:
             file[name] = np.zeros(1)
-    refused(paired_contacts.read_pairs, tmp_path / "b.h5", "stored bytes")
+    refused(pairs_file.read_pairs, tmp_path / "b.h5", "stored bytes")
 
 
 def npy(shape, header=None) -> bytes:
@@ -370,7 +376,7 @@ LONG_TOML = {
 def test_long_toml_files(content, tmp_path):
     path = tmp_path / "a.toml"
     path.write_bytes(content)
-    for load in (scene.load_scene, load_calibration, sensor_file.read, lambda path: dask_place._read(str(path))):
+    for load in (scene.load_scene, load_calibration, electrode_gains.read, lambda path: dask_cluster._read(str(path))):
         refused(load, path, str(path))
 
 
@@ -410,7 +416,7 @@ def test_a_photograph_starts_no_program(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("width", "told"), [(10**7, "610 MB of pixels"), (2 * 10**8, "12207 MB"), (100, "damaged")])
 def test_a_wide_exr_picture(width, told, tmp_path):
     pytest.importorskip("OpenEXR", reason="OpenEXR is absent: pip install tactile-core[render]")
-    from tactile_core.optics.exr import read_height, write_exr
+    from tactile_core.files.exr import read_height, write_exr
 
     write_exr(tmp_path / "a.exr", {"height": np.zeros((16, 8), np.float32)}, {})
     content = bytearray((tmp_path / "a.exr").read_bytes())

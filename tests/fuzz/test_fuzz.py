@@ -21,7 +21,7 @@ NAMES = [
     *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3", "metadata"),
     *("scene", "calibration", "photograph", "sensor", "list", "queue", "heights", "exr"),
     *("tet", "obj", "stl", "ply", "off"),
-    *("safetensors", "weights_card", "job", "deformations", "pairs", "prepared", "seal"),
+    *("safetensors", "weights_card", "job", "pairs", "prepared", "seal"),
 ]
 FEW = settings(
     max_examples=40,

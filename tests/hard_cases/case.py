@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
-from tactile_core.rows import Row, row
 
 MECHANICS_FAST, MECHANICS_FULL = "mechanics, fast tier", "mechanics, full tier"
 TRANSLATION, HEIGHT_MAP = "translation", "height map"

@@ -7,9 +7,9 @@ import functools
 
 import numpy as np
 
-from tactile_core import metrics
-from tactile_core.flags import Flag
-from tactile_core.mechanics.electrodes import electrode_gaps, signal_of_gaps
+from tactile_core import accuracy
+from tactile_core.mechanics.electrodes.gap_law import electrode_gaps, signal_of_gaps
+from tactile_core.recordings.flags import Flag
 
 from .case import TRANSLATION, Found, case
 from .contacts import press
@@ -28,13 +28,18 @@ def _translated(name: str, share: float) -> Found:
         return Found(1.0, "said", 1.0, at_least=True, words="the fast tier says that it finds no contact of this force")
     change = signal_of_gaps(electrode_gaps(biotac.linear))[None]
     signals = dataclasses.replace(
-        prepared()[1], change=change, electrodes=3300 + change, quiet=np.zeros(1, bool), flags=np.zeros(1, np.uint16)
+        prepared()[1],
+        change=change,
+        electrodes=3300 + change,
+        quiet=np.zeros(1, bool),
+        flags=np.zeros(1, np.uint16),
+        pdc=np.zeros(1),
     )
     found = translator()(signals)
     worst, words = 0.0, []
     for sensor, truth in (("biotac", biotac), ("digit", digit)):
         error = float(
-            metrics.max_error(getattr(found, f"displacement_{sensor}"), truth.corrected.displacement[None])[0]
+            accuracy.max_error(getattr(found, f"displacement_{sensor}"), truth.corrected.displacement[None])[0]
         )
         bound = float(getattr(found, f"error_bound_{sensor}")[0])
         worst = max(worst, error / bound)

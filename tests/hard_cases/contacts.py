@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_core import sensors
-from tactile_core.indenters import Indenter, Pose
-from tactile_core.mechanics.compliance import compliance_of
-from tactile_core.mechanics.corrected_press import CorrectedPress, FastContact
+from tactile_core.geometry.indenters import Indenter, Pose
+from tactile_core.mechanics.fast.compliance import compliance_of
+from tactile_core.mechanics.fast.press import CorrectedPress, FastContact
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Solution, solve
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under

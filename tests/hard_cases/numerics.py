@@ -6,23 +6,24 @@ import dataclasses
 import functools
 
 import numpy as np
+from benchmarks.mechanics.bonded_layer import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN_THICKNESS, exact_layer
+from benchmarks.mechanics.pressed_disc import disc_mesh, pressed
 from slab import slab_compliance
 
-from tactile_core import digit_shape, networks, sensors
-from tactile_core.camera import HEIGHT_ZERO_Y
-from tactile_core.height_map import digit_mapper
-from tactile_core.indenters import Sphere, pose_on
-from tactile_core.mechanics.bonded_layer import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN_THICKNESS, exact_layer
-from tactile_core.mechanics.contact import ContactProblem
-from tactile_core.mechanics.finite_strain import FiniteStrainSolid, State
-from tactile_core.mechanics.finite_strain_tier import graded_body
-from tactile_core.mechanics.neo_hookean import NeoHookean
+from tactile_core import sensors
+from tactile_core.geometry.indenters import Sphere, pose_on
+from tactile_core.mechanics.fast.contact import ContactProblem
+from tactile_core.mechanics.finite_strain.body import graded_body
 from tactile_core.mechanics.placement import pose_at
-from tactile_core.mechanics.shared_bulk import SharedBulk
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, State
+from tactile_core.mechanics.solids.neo_hookean import NeoHookean
+from tactile_core.mechanics.solids.split_bulk_modulus import SplitBulkModulus
 from tactile_core.mechanics.solve import Step, solve, solve_path
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
-from tactile_core.mechanics.validation.pressed_disc import disc_mesh, pressed
-from tactile_core.sensors import Material
+from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.sensors import Material, digit
+from tactile_core.sensors.camera import HEIGHT_ZERO_Y
+from tactile_core.translation import networks
 
 from .case import HEIGHT_MAP, MECHANICS_FAST, MECHANICS_FULL, TRANSLATION, Found, case, refusal
 from .contacts import MIDDLE, broken_fast, broken_full, full, over_stated, press
@@ -50,7 +51,7 @@ def _gel_full(poisson: float) -> Found:
     """The gel itself, made of another material, 0.6 mm deep in one step from rest."""
     pose = pose_at("digit", BALL, MIDDLE)
     body = graded_body("digit", BALL, pose, 0.6e-3)
-    law = SharedBulk.of(NeoHookean.of(Material(sensors.DIGIT_GEL.youngs, poisson)))
+    law = SplitBulkModulus.of(NeoHookean.of(Material(sensors.DIGIT_GEL.youngs, poisson)))
     body = dataclasses.replace(body, solid=FiniteStrainSolid(body.solid.mesh, law, body.graded.pattern))
     problem = body.contact(BALL, pose, 0.6e-3, 0.0)
     touch = problem.move(pose.moved(0.6e-3), problem.start(), 5e-3)
@@ -180,7 +181,7 @@ def inverted() -> Found:
     body = graded_body("digit", BALL, pose, 0.3e-3)
     problem = body.contact(BALL, pose, 0.3e-3, 0.0)
     turned = np.zeros_like(body.solid.mesh.nodes)
-    turned[body.solid.mesh.surface, 1] = 3 * digit_shape.THICKNESS
+    turned[body.solid.mesh.surface, 1] = 3 * digit.THICKNESS
     start = dataclasses.replace(problem.start(), state=State(turned, problem.start().state.pressure))
     return refusal(lambda: problem.move(pose.moved(0.3e-3), start, 5e-3), "no equilibrium")
 

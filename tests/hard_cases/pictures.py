@@ -16,12 +16,12 @@ from plain_unit import LEVELS, plain_unit
 from scipy.ndimage import distance_transform_edt
 
 from tactile_core import sensors
-from tactile_core.camera import HEIGHT_ZERO_Y, Led
-from tactile_core.cubic_spline import EvenSpline
-from tactile_core.height_map import HeightMapper, digit_mapper, rest_height_map
-from tactile_core.optics.renderer import Renderer
-from tactile_core.shading import Shader
-from tactile_core.view import bilinear
+from tactile_core.geometry.cubic_spline import EvenSpline
+from tactile_core.pictures.height_map import HeightMapper, digit_mapper, rest_height_map
+from tactile_core.pictures.perspective import bilinear
+from tactile_core.pictures.renderer import Renderer
+from tactile_core.pictures.shading import Shader
+from tactile_core.sensors.camera import HEIGHT_ZERO_Y, Led
 
 from .case import FAST_PICTURE, HEIGHT_MAP, MITSUBA, Found, case, refusal
 from .contacts import press
@@ -267,7 +267,7 @@ def folded() -> Found:
     gel, heard = sensors.digit_surface(), []
     watch = logging.Handler()
     watch.emit = heard.append
-    log = logging.getLogger("tactile_core.height_map")
+    log = logging.getLogger("tactile_core.pictures.height_map")
     log.addHandler(watch)
     off = gel.rest[:, [0, 2]] - [-7e-3, 0.0]
     bell = np.exp(-(off**2).sum(axis=1) / (2 * (1.4e-3) ** 2))

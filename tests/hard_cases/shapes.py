@@ -10,7 +10,7 @@ import functools
 
 import numpy as np
 
-from tactile_core.indenters import Box, BumpyCube, Edge, Indenter, Pose, Ring, Several, Sphere
+from tactile_core.geometry.indenters import Box, BumpyCube, Edge, Indenter, Pose, Ring, Several, Sphere
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import solve
 

@@ -13,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tactile_core import metrics, networks, recordings
-from tactile_core.convert import Options, convert, load_tools
-from tactile_core.flags import Flag
-from tactile_core.height_map import digit_mapper
+from tactile_core import accuracy, recordings
+from tactile_core.jobs.convert import Options, convert, load_tools
+from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.shading import Shader
 from tactile_core.recordings import Recording, Signals
-from tactile_core.shading import Shader
-from tactile_core.translate import UNTRAINED_CONFIDENCE, Translation, load_translator
+from tactile_core.recordings.flags import Flag
+from tactile_core.translation import networks
+from tactile_core.translation.translate import UNTRAINED_CONFIDENCE, Translation, load_translator
 
 from .case import FAST_PICTURE, HEIGHT_MAP, TRANSLATION, Found, case
 
@@ -66,7 +67,7 @@ def _error(found: Translation, frames: np.ndarray) -> float:
 def _cover(found: Translation, frames: np.ndarray) -> float:
     """Share of frames, %, whose largest node error lies below the stated bound."""
     truth = shipped().truth.displacement_digit[frames]
-    return 100 * float((metrics.max_error(found.displacement_digit, truth) <= found.error_bound_digit).mean())
+    return 100 * float((accuracy.max_error(found.displacement_digit, truth) <= found.error_bound_digit).mean())
 
 
 def _flagged(found: Translation, signals: Signals, flag: Flag, share: float) -> tuple[str, ...]:

@@ -6,10 +6,10 @@ import functools
 
 import numpy as np
 
-from tactile_core import digit_shape
-from tactile_core.indenters import Sphere
+from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Step, solve_path
+from tactile_core.sensors import digit
 
 from .case import MECHANICS_FAST, MECHANICS_FULL, Found, case, refusal
 from .contacts import MIDDLE, broken_fast, broken_full, press
@@ -63,7 +63,7 @@ def rolled() -> Found:
 
 def _off_the_rim(friction: float) -> Found:
     """From 2 mm inside the gel's side outward, past its outline, until nothing touches."""
-    place = Placement(-8e-3, digit_shape.HALF_WIDTH - 2e-3)
+    place = Placement(-8e-3, digit.HALF_WIDTH - 2e-3)
     one = press("digit", BALL, place, friction)
     out = float(np.sign(one.pose.axes[:, 1] @ [0, 0, 1]))
     found, forces, broken = one.at_depth(0.4e-3), [], []
@@ -89,7 +89,7 @@ for _friction in (0.0, 0.5):
       "a path that ends above the gel ends without force, the gel at rest to 0.01 um")  # fmt: skip
 def lifted() -> Found:
     """0.3 mm deep at the rim, then back to first touch."""
-    place = Placement(-8e-3, digit_shape.HALF_WIDTH - 0.6e-3)
+    place = Placement(-8e-3, digit.HALF_WIDTH - 0.6e-3)
     found = list(solve_path("digit", BALL, place, [Step(depth=0.3e-3), Step(depth=0.0)], "full", 0.0))[-1]
     broken = () if not found.force.any() else (f"{np.linalg.norm(found.force):.2g} N are left",)
     return Found(float(np.abs(found.displacement).max()) * 1e6, "um", 0.01, broken=broken)
@@ -103,5 +103,5 @@ def lifted() -> Found:
 )
 def beside() -> Found:
     """1 mm outside the outline."""
-    place = Placement(-8e-3, digit_shape.HALF_WIDTH + 1e-3)
+    place = Placement(-8e-3, digit.HALF_WIDTH + 1e-3)
     return refusal(lambda: next(solve_path("digit", BALL, place, [Step(depth=0.1e-3)])), "a place on the DIGIT's gel")

@@ -1,4 +1,4 @@
-"""Every quick hard case by its name, with what is expected of it; the slow ones run in `scripts/hard_cases.py`."""
+"""Every quick hard case by its name, with what is expected of it; the slow ones run in ``benchmarks/hard_cases.py``."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from gel_pictures import NO_MITSUBA
 
 from hard_cases.case import MITSUBA
 from hard_cases.table import CASES, HARD, covered
-from tactile_core.rows import line
+from tactile_core.accuracy import line
 
 QUICK = [case for case in CASES if not case.slow]
 

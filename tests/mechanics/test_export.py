@@ -8,10 +8,11 @@ import trimesh
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics import export, stress
+from tactile_core.mechanics import export
 from tactile_core.mechanics.export import outer_surface, write_rest, write_solution, write_surface
-from tactile_core.mechanics.finite_strain import FiniteStrainSolid
-from tactile_core.mechanics.hex_mesh import gel_mesh, skin_mesh
+from tactile_core.mechanics.solids import stress
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
+from tactile_core.mechanics.solids.hex_mesh import gel_mesh, skin_mesh
 
 
 @pytest.mark.parametrize(("make", "surface"), [(gel_mesh, sensors.digit_surface), (skin_mesh, sensors.biotac_surface)])

@@ -9,13 +9,14 @@ import pytest
 import trimesh
 from slab import slab_mesh
 
-from tactile_core import sensors, surface
+from tactile_core import sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics import mesh_files, stress
-from tactile_core.mechanics.finite_strain import FiniteStrainSolid
-from tactile_core.mechanics.hex_mesh import gel_mesh, skin_mesh
+from tactile_core.mechanics import mesh_files
 from tactile_core.mechanics.mesh_files import vtk_order, write_cells, write_ply, write_stl, write_vtu
-from tactile_core.sensors import Material
+from tactile_core.mechanics.solids import stress
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
+from tactile_core.mechanics.solids.hex_mesh import gel_mesh, skin_mesh
+from tactile_core.sensors import Material, unrolling
 
 GEL = sensors.digit_surface()
 NUMBERS = {"Float32": "<f4", "Float64": "<f8", "Int64": "<i8", "UInt8": "u1"}
@@ -53,7 +54,7 @@ def test_a_surface_reads_back_from_ply(tmp_path):
     np.testing.assert_array_equal(read.vertices.astype(np.float32), GEL.rest.astype(np.float32))
     columns = read.metadata["_ply_raw"]["vertex"]["data"]
     normals = np.column_stack([columns[name].ravel() for name in ("nx", "ny", "nz")])
-    np.testing.assert_allclose(normals, surface.node_normals(GEL.rest, GEL.faces), atol=1e-6)  # float32
+    np.testing.assert_allclose(normals, unrolling.node_normals(GEL.rest, GEL.faces), atol=1e-6)  # float32
     np.testing.assert_array_equal(columns["force_y"].ravel(), force[:, 1].astype(np.float32))
     np.testing.assert_array_equal(columns["contact"].ravel(), force[:, 0] > 0)
 

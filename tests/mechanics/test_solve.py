@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.indenters import Sphere
+from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import Step, solve, solve_path
 

@@ -17,20 +17,25 @@ SLIDE_HEADER = [
     *(f"ele{i}" for i in range(1, 20)),
 ]
 VECTORS = [f"{word}_{axis}" for word in ("position", "force") for axis in "xyz"]
+# Counts of a simulated contact at full press: raw ones, which fall where the film thins.
+CONTACT = np.array([
+    253.0, 106.0, 118.0, 256.0, 115.0, 204.0, 78.0, 37.0, -6.0, -18.0,
+    116.0, -20.0, -38.0, 276.0, -70.0, 209.0, -115.0, -300.0, -156.0,
+])  # fmt: skip
 HEADER_31 = ["time", *VECTORS, "pac0", "pac1", "pdc", "tac", "tdc", *(f"electrodes{i}" for i in range(19))]
 
 
 def make_press(frames: int = 700, seed: int = 0, slope: float = 0.2, rise: float = 0.1) -> SimpleNamespace:
     """Rest, a press that is held and trembles, rest again: raw whole counts with drift and noise of 1.2 counts.
 
-    frames at 100 Hz; slope: drift in counts/s; rise: s from rest to full press, up to 300 counts.
+    frames at 100 Hz; slope: drift in counts/s; rise: s from rest to full press, down to -300 counts.
     """
     random = np.random.default_rng(seed)
     time = np.arange(frames) / 100.0
     up, down = 0.25 * time[-1], 0.75 * time[-1]
     ramp = np.clip((time - up) / rise, 0, 1) * np.clip((down - time) / rise, 0, 1)
     strength = ramp**2 * (3 - 2 * ramp) * (1 + 0.15 * np.sin(2 * np.pi * 3 * time))
-    gains = np.linspace(-300, 300, 19) + 10
+    gains = CONTACT
     rest = np.linspace(3000, 3400, 19)
     drift = slope * np.linspace(0.5, 1, 19)
     change = strength[:, None] * gains
@@ -140,6 +145,10 @@ def write_container(layout: str, folder: Path, press: SimpleNamespace) -> Path:
         from bags import write_bag
 
         write_bag(path, press, "mcap", "hand")
+    elif layout == "mat_phac":
+        scipy_io = pytest.importorskip("scipy.io", reason="scipy is absent: pip install tactile-core[matlab]")
+        fingers = {"F0Electrodes": press.electrodes.T, "F0pdc": press.pdc[None], "F1Electrodes": press.electrodes.T + 1}
+        scipy_io.savemat(path, fingers, appendmat=False)
     else:
         raise ValueError(layout)
     return path

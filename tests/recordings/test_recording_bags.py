@@ -15,7 +15,7 @@ from bags import write_bag
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
-from tactile_core.recordings import bag, parts
+from tactile_core.recordings import bag, chunks
 from tactile_core.recordings.formats import bag_biotac_all, bag_biotac_hand
 
 
@@ -49,8 +49,8 @@ def test_a_single_mcap_file_and_parts(make, tmp_path, monkeypatch):
     press = make(frames=700)
     write_bag(tmp_path / "touch", press, "mcap", "hand")
     (path,) = (tmp_path / "touch").glob("*.mcap")
-    monkeypatch.setattr(parts, "PART_FRAMES", 300)
-    found = list(parts.read_parts(path))
+    monkeypatch.setattr(chunks, "PART_FRAMES", 300)
+    found = list(chunks.read_parts(path))
     assert [(len(one.recording), one.repeated) for one in found] == [(300, 0), (500, 200), (300, 200)]
     joined = np.concatenate([one.recording.electrodes[one.repeated :] for one in found])
     np.testing.assert_array_equal(joined, press.electrodes)

@@ -9,7 +9,7 @@ import pytest
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
-from tactile_core.flags import Flag
+from tactile_core.recordings.flags import Flag
 
 
 def repaired(recording):

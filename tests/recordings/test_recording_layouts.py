@@ -14,6 +14,7 @@ LAYOUTS = [
     ("npz", True, {"pdc", "pac"}),
     ("hdf5_electrode_vals", False, {"position", "force"}),
     ("hdf5_simulated", True, {"pdc", "tac", "tdc"}),
+    ("mat_phac", False, {"pdc"}),
     ("bag_biotac_all", True, {"pdc", "tac", "tdc", "pac"}),
     ("bag_biotac_hand", True, {"pdc", "tac", "tdc", "pac"}),
 ]

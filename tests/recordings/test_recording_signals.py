@@ -7,10 +7,11 @@ import pytest
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
-from tactile_core.flags import Flag
 from tactile_core.recordings import PrepareOptions
 from tactile_core.recordings.assemble import assemble
-from tactile_core.recordings.kinds import KINDS
+from tactile_core.recordings.electrode_faults import _still
+from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.signal_kind import KINDS
 
 NOISE = 0.6  # counts; 1.2 over 175 quiet and 225 held frames deviate by 0.13; 4.5 deviations for the largest of 19
 
@@ -172,6 +173,16 @@ def test_a_dead_channel_is_flagged_only_where_time_enough_passed(press):
     signals = recordings.prepare(make_recording(press))
     assert (signals.flags == Flag.DEAD_CHANNEL).all() and signals.warnings == ("E7 never changes: dead channel",)
     assert not (recordings.prepare(make_recording(press, part=slice(0, 99))).flags & Flag.DEAD_CHANNEL).any()
+
+
+def test_standing_still_is_a_fault_only_while_others_move(press):
+    random = np.random.default_rng(0)
+    steady = 3000 + np.rint(random.normal(0, 0.8, (600, 19)))
+    steady[100:300, 6] = steady[100, 6]
+    assert not _still(steady).any()  # a steady grip
+    moving = steady + np.outer(np.linspace(0, 60, 600).round(), np.arange(19) > 8)
+    moving[100:300, 6] = moving[100, 6]
+    assert np.flatnonzero(_still(moving).any(axis=1)).tolist() == list(range(100, 300))
 
 
 def test_repair_is_reported_with_its_line_and_can_be_turned_off(press, slide_lines, write):

@@ -8,12 +8,12 @@ from small_pairs import frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from tactile_core.paired_contacts import read_pairs, split_presses  # noqa: E402
-from tactile_core.training.basis import principal_basis  # noqa: E402
+from tactile_core.simulation.pairs_file import read_pairs, split_presses  # noqa: E402
 from tactile_core.training.data import Contacts  # noqa: E402
+from tactile_core.training.noise_model import measured  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
-from tactile_core.training.readings import measured  # noqa: E402
-from tactile_core.training.surface import SILENT  # noqa: E402
+from tactile_core.training.pca import principal_basis  # noqa: E402
+from tactile_core.training.surface_codec import SILENT  # noqa: E402
 
 OPTIONS = Options(wide_biotac=10, near_biotac=10, half_biotac=3, wide_digit=10, near_digit=10, half_digit=3, mirrored=0)
 FRAMES = {"biotac": frame("biotac", 3), "digit": frame("digit", 3)}
@@ -66,14 +66,14 @@ def test_readings_have_the_errors_they_should():
 
 
 def test_rectified_readings_lose_their_sign_and_some_channels():
-    true = np.full((4000, 19), -400, np.float32)
+    true = np.full((4000, 19), 120, np.float32)  # a bulge; six times the offset's noise, a sixth of what the bits hold
     read = measured(true, np.random.default_rng(0), OPTIONS, 0.5)
     folded = read[:, -1] == 1
     assert folded.mean() == pytest.approx(0.5, abs=0.04)  # 4,000 draws: five standard errors
-    assert (read[folded, :-1] >= 0).all() and (read[~folded, :-1] < 0).all()
-    missing = read[folded, :-1] < 6 * OPTIONS.rectified_offset
-    assert missing.mean() == pytest.approx(OPTIONS.rectified_missing, abs=0.01)  # 38,000 draws; whose true is 400
-    size = np.log(read[folded, :-1][~missing] / 400)
+    assert (read[folded, :-1] <= 0).all() and (read[~folded, :-1] > 0).all()
+    missing = -read[folded, :-1] < 6 * OPTIONS.rectified_offset
+    assert missing.mean() == pytest.approx(OPTIONS.rectified_missing, abs=0.01)  # 38,000 draws; whose true is 120
+    size = np.log(-read[folded, :-1][~missing] / 120)
     # a frame's bulge and a channel's gain, independent; five standard errors of 2,000 frames' bulges
     expected = np.hypot(OPTIONS.rectified_gain, OPTIONS.rectified_bulge)
     assert size.std() == pytest.approx(expected, abs=0.04)

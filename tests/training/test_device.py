@@ -9,12 +9,12 @@ from small_pairs import frame, write_pairs
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.paired_contacts import read_pairs, split_presses  # noqa: E402
+from tactile_core.simulation.pairs_file import read_pairs, split_presses  # noqa: E402
 from tactile_core.training.data import Contacts  # noqa: E402
 from tactile_core.training.device import device_of, label  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.stages import STAGES, Model  # noqa: E402
-from tactile_core.training.surface import Surface  # noqa: E402
+from tactile_core.training.surface_codec import SurfaceCodec  # noqa: E402
 
 SIZES = {"wide_biotac": 4, "near_biotac": 4, "half_biotac": 3, "wide_digit": 4, "near_digit": 4, "half_digit": 3}
 OPTIONS = Options(**SIZES, width=16, latent_biotac=6, latent_digit=7, mirrored=0)
@@ -33,9 +33,11 @@ def elsewhere(tmp_path_factory):
 
 def unread(monkeypatch):
     """Let the steps that read numbers back give numbers of the right shape: elsewhere there are none."""
-    cells = Surface._at_cells
-    monkeypatch.setattr(Surface, "_at_cells", lambda self, rows, _: cells(self, rows, torch.zeros(len(rows), 2).long()))
-    monkeypatch.setattr(Surface, "field", lambda self, modes, _: torch.zeros(len(modes), self.nodes, 3))
+    cells = SurfaceCodec._at_cells
+    monkeypatch.setattr(
+        SurfaceCodec, "_at_cells", lambda self, rows, _: cells(self, rows, torch.zeros(len(rows), 2).long())
+    )
+    monkeypatch.setattr(SurfaceCodec, "field", lambda self, modes, _: torch.zeros(len(modes), self.nodes, 3))
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)

@@ -9,10 +9,12 @@ from labelled_recording import labelled_arrays, write_labelled
 torch = pytest.importorskip("torch", reason="training needs torch")
 h5py = pytest.importorskip("h5py")
 
-from tactile_core import cli, networks, sensors  # noqa: E402
+from tactile_core import sensors  # noqa: E402
+from tactile_core.cli.main import main  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.training.fine_tune import fine_tune, on_skin  # noqa: E402
-from tactile_core.training.labelled import read_labelled  # noqa: E402
+from tactile_core.training.labelled_recording import read_labelled  # noqa: E402
+from tactile_core.translation import networks  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +24,7 @@ def arrays():
 
 def test_it_learns_the_sensor(arrays, tmp_path, capsys):
     path = write_labelled(tmp_path / "labelled.hdf5", arrays)
-    assert cli.main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
+    assert main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
     assert "real_force_percent" in capsys.readouterr().out
     before, after = networks.load(), networks.load(tmp_path / "tuned" / "weights")
     rows = {(row["name"], row["set"].rsplit(" ", 1)[1]): row for row in after.card["fine_tuned"]["errors"]}
@@ -88,5 +90,5 @@ def test_refusals(arrays, tmp_path, spoil, said):
 
 def test_options_that_do_not_fit(tmp_path, capsys):
     for words in (["s2mpn"], ["s2mpn", "--real", "x", "--effort", "2"], ["pairs.h5", "--real", "x"]):
-        assert cli.main(["train", *words, "--out", str(tmp_path / "out")]) == 2
+        assert main(["train", *words, "--out", str(tmp_path / "out")]) == 2
         assert "--" in capsys.readouterr().err

@@ -7,15 +7,15 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from tactile_core.moving_frame import MovingFrame  # noqa: E402
-from tactile_core.network_sizes import NETS, SURFACES  # noqa: E402
-from tactile_core.networks import FORCE_SCALE, Networks, compress  # noqa: E402
 from tactile_core.training import modules  # noqa: E402
 from tactile_core.training.data import Contacts  # noqa: E402
 from tactile_core.training.export import net_sizes, net_tensors  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.stages import Model  # noqa: E402
-from tactile_core.training.surface import Surface  # noqa: E402
+from tactile_core.training.surface_codec import SurfaceCodec  # noqa: E402
+from tactile_core.translation.contact_frame import ContactFrame  # noqa: E402
+from tactile_core.translation.network_sizes import NETS, SURFACES  # noqa: E402
+from tactile_core.translation.networks import FORCE_SCALE, Networks, compress  # noqa: E402
 
 OPTIONS = Options()
 SHAPES = {"biotac": (30, 28), "digit": (36, 34)}  # smaller lattices: how long a basis is does not matter
@@ -26,10 +26,10 @@ TOLERANCE = 1e-5
 def random_surface(name, rng):
     """A surface with random bases of the shipped sizes, as far as networks look at it."""
     rows, columns = SHAPES[name]
-    surface = Surface.__new__(Surface)
+    surface = SurfaceCodec.__new__(SurfaceCodec)
     wide, near, half = (getattr(OPTIONS, f"{what}_{name}") for what in ("wide", "near", "half"))
     turn = rng.uniform(-1, 1, rows * columns).astype(np.float32)
-    surface.frame = MovingFrame(rows, columns, half, turn)
+    surface.frame = ContactFrame(rows, columns, half, turn)
     surface.data = np.zeros((1, rows * columns, 3), np.int16)
     sizes = {"wide": (wide, 3 * rows * columns), "near": (near, 3 * surface.frame.width**2)}
     for basis, size in sizes.items():  # float16, as they ship
@@ -81,7 +81,8 @@ def signals():
     """Changes (40, 19) from light to firm, whether they are rectified (40,), and both as torch sees them."""
     change = (np.random.default_rng(0).standard_normal((40, 19)) * np.logspace(0, 3, 40)[:, None]).astype(np.float32)
     rectified = np.arange(40) % 3 == 0
-    both = np.concatenate([change, rectified[:, None]], -1).astype(np.float32)
+    read = np.where(rectified[:, None], -np.abs(change), change)  # rectified readings have the sign of a thinning film
+    both = np.concatenate([read, rectified[:, None]], -1).astype(np.float32)
     return change, rectified, torch.from_numpy(both)
 
 

@@ -14,13 +14,13 @@ from small_pairs import bodies, frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from tactile_core import error_bounds, network_sizes, networks, weights  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.paired_contacts import read_pairs  # noqa: E402
+from tactile_core.simulation.pairs_file import read_pairs  # noqa: E402
 from tactile_core.training.checkpoint import read  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.stages import STAGES  # noqa: E402
 from tactile_core.training.train import deterministic, train  # noqa: E402
+from tactile_core.translation import error_bounds, network_sizes, networks, weights  # noqa: E402
 
 BASES = {"wide_biotac": 8, "near_biotac": 8, "half_biotac": 3, "wide_digit": 8, "near_digit": 8, "half_digit": 3}
 # The small surfaces have no mirror images.

@@ -7,8 +7,8 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from tactile_core import network_sizes, networks  # noqa: E402
 from tactile_core.training import modules  # noqa: E402
+from tactile_core.translation import network_sizes, networks  # noqa: E402
 
 # float32 sums of up to 11,000 terms through eight layers; measured 1e-7 to 2e-6 of the largest value
 TOLERANCE = 1e-5
@@ -62,7 +62,7 @@ def same(found, expected):
 def test_the_chain(nets, change, rectified):
     svb = filled(modules.signal_vae(nets.sizes["SVB"]["latent"]), nets, "SVB")
     told = np.full((len(change), 1), rectified, np.float32)
-    change = np.abs(change) if rectified else change
+    change = -np.abs(change) if rectified else change
     latent = nets.encode_signal(change, rectified)
     same(latent, svb.mean(modules.compress(torch.from_numpy(np.concatenate([change, told], -1)))))
     biotac = nets.s2m(latent, rectified)

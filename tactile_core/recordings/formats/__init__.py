@@ -1,12 +1,13 @@
 """One file a layout. Each module here is found by itself and has four names:
 
-``CONTAINER``  "csv", "hdf5", "npz" or "bag"
+``CONTAINER``  "csv", "hdf5", "npz", "mat" or "bag"
 ``NAME``       the layout in words, for messages
 ``score(keys) -> float``  share (0..1) of the layout's own columns or arrays among those of the file
-``read(source) -> Recording``  source is a ``table.Table`` for CSV, a ``store.Store`` for HDF5 and NPZ;
+``read(source) -> Recording``  source is a ``table.Table`` for CSV, a ``array_store.Store`` for HDF5 and NPZ;
                it picks its columns and hands them to ``assemble.assemble``, which checks them.
-Those of bags have no ``read``, but the message they know: see ``bag_biotac_hand``. Those of HDF5 have
-``ELECTRODES_NAME`` too, the array whose length is the number of frames: see ``parts``.
+Those of bags have no ``read``, but the message they know: see ``bag_biotac_hand``; those of MATLAB also have
+``fingers(keys)``, and ``read(store, finger)``. Those of HDF5 have
+``ELECTRODES_NAME`` too, the array whose length is the number of frames: see ``chunks``.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ..array_store import Store
 from ..assemble import assemble, check_electrodes
 from ..recording import ELECTRODES, Recording
-from ..store import Store
 from ..table import Table
 
 

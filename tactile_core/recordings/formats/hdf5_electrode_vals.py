@@ -10,9 +10,9 @@ from collections.abc import Collection
 import numpy as np
 
 from ...errors import TactileError
+from ..array_store import Store
 from ..assemble import assemble
 from ..recording import Recording
-from ..store import Store
 from . import electrodes_of
 
 CONTAINER = "hdf5"

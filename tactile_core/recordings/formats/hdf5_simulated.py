@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from ..array_store import Store
 from ..recording import Recording
 from ..simulated import FORMAT, read_simulated
-from ..store import Store
 
 CONTAINER = "hdf5"
 ELECTRODES_NAME = "electrodes"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from ..array_store import Store
 from ..assemble import assemble
 from ..recording import Recording
-from ..store import Store
 from . import electrodes_of
 
 CONTAINER = "npz"

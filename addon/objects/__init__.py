@@ -1,0 +1,1 @@
+"""What stands in the scene: sensors, indenters, electrodes, their meshes, keys and colours."""

@@ -1,0 +1,40 @@
+"""The recording's numbers as keyframed custom properties of the skin, for drivers of the user's own."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..operators.recording_data import Translated
+from . import curves
+
+ABOUT = {
+    "electrodes": "Change of the 19 electrodes against rest, counts",
+    "pdc": "Fluid pressure as recorded, counts",
+    "force": "Force of the object on the BioTac, N, along the finger, across it, and into the pad (negative Z)",
+    "confidence": "1: signals like those of the training, 0: far from them",
+    "expected_error_um": "Largest node error of this surface that half of such frames stay below, micrometres",
+}
+
+
+def columns(found: Translated) -> dict[str, np.ndarray]:
+    """Name -> (T,) or (T, k) of each property; the force in Blender's axes."""
+    translation = found.translation
+    values = {
+        "electrodes": found.signals.change,
+        "force": translation.force[:, [0, 2, 1]] * np.array([1, 1, -1]),
+        "confidence": translation.confidence,
+        "expected_error_um": 1e6 * translation.expected_error_biotac,
+    }
+    if found.recording.pdc is not None:
+        values["pdc"] = found.recording.pdc[found.chosen]
+    return values
+
+
+def write(thing: bpy.types.Object, values: dict[str, np.ndarray], frames: np.ndarray) -> None:
+    """Set and keyframe custom properties."""
+    for name, numbers in values.items():
+        numbers = np.nan_to_num(np.asarray(numbers, np.float64))
+        thing[name] = numbers[0].tolist()
+        thing.id_properties_ui(name).update(description=ABOUT[name])
+        curves.write_curves(thing, f'["{name}"]', frames, numbers.reshape(len(frames), -1))

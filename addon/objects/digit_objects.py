@@ -1,0 +1,46 @@
+"""A DIGIT's gel in the scene, and its displacement read back from whatever moves it."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...tactile_core import sensors
+from ...tactile_core.errors import TactileError
+from ...tactile_core.sensors import digit
+from ..ui import properties
+from . import axes, surfaces
+
+GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
+BESIDE = 7.1e-3 + digit.HALF_WIDTH + 6e-3  # m: half widths of BioTac (sensors.md) and DIGIT, and a gap
+
+
+def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None) -> bpy.types.Object:
+    """The resting gel, beside a BioTac's skin where there is one."""
+    surface = sensors.digit_surface()
+    gel = surfaces.new_mesh_object("DIGIT gel", axes.to_blender(surface.rest, per_metre), surface.faces)
+    properties.set_up(gel, "DIGIT", per_metre)
+    group.objects.link(gel)
+    surfaces.paint(gel, GEL_COLOUR)
+    if beside is not None:
+        gel.location = beside.location
+        gel.location.y += BESIDE * per_metre
+    return gel
+
+
+def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    """Displacement (n, 3) m of the gel's nodes as the scene has them now, all keys and modifiers applied.
+
+    Raises TactileError where modifiers have changed the number of vertices.
+    """
+    rest = sensors.digit_surface().rest
+    vertices = gel.evaluated_get(depsgraph).data.vertices
+    if len(vertices) != len(rest):
+        raise TactileError(
+            gel.name, f"{len(vertices)} vertices", f"the gel's {len(rest)}", "Remove modifiers that add or merge some"
+        )
+    nodes = np.empty(len(rest) * 3, np.float32)
+    vertices.foreach_get("co", nodes)
+    # Less the rest as Blender holds it: rounded to float32, so that an untouched gel gives zeros.
+    rest = axes.to_blender(rest, gel.tactile.per_metre)
+    return axes.to_sensor(nodes.reshape(-1, 3) - rest, gel.tactile.per_metre)

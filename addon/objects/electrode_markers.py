@@ -1,0 +1,55 @@
+"""Nineteen small balls under the skin, coloured by their signal."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...tactile_core import sensors
+from ..ui import properties
+from . import axes, curves, surfaces
+
+_RADIUS = 0.45e-3  # m, of a marker: electrodes themselves are smaller, and hard to see
+_REST = np.array([0.85, 0.85, 0.85])
+_HIGH, _LOW = np.array([0.9, 0.05, 0.02]), np.array([0.02, 0.15, 0.9])  # film thinner, film thicker
+
+
+def add_markers(
+    skin: bpy.types.Object, group: bpy.types.Collection, change: np.ndarray, frames: np.ndarray
+) -> list[bpy.types.Object]:
+    """Markers E1..E19, children of the skin; red where the reading rose, blue where it fell.
+
+    change : (T, 19) counts; the strongest colour stands for the recording's largest change
+    """
+    colours = colours_of(change)
+    ball = _ball(skin.tactile.per_metre)
+    markers = []
+    for k, place in enumerate(axes.to_blender(sensors.electrodes(), skin.tactile.per_metre)):
+        marker = bpy.data.objects.new(f"E{k + 1}", ball)
+        properties.set_up(marker, "ELECTRODE", skin.tactile.per_metre)
+        group.objects.link(marker)
+        marker.parent, marker.location = skin, place
+        if not ball.materials:
+            surfaces.paint(marker, (*_REST, 1.0))
+        marker.color = (*colours[0, k], 1.0)
+        curves.write_curves(marker, "color", frames, colours[:, k])
+        markers.append(marker)
+    return markers
+
+
+def colours_of(change: np.ndarray) -> np.ndarray:
+    """(T, 19) counts -> (T, 19, 3) colours, grey at rest."""
+    share = change / max(float(np.abs(change).max(initial=0.0)), 1.0)
+    strength = np.sqrt(np.abs(share))[..., None]  # light touches show too
+    return _REST + strength * (np.where(share[..., None] > 0, _HIGH, _LOW) - _REST)
+
+
+def _ball(per_metre: float) -> bpy.types.Mesh:
+    import bmesh
+
+    mesh = bpy.data.meshes.new("Electrode")
+    shape = bmesh.new()
+    bmesh.ops.create_icosphere(shape, subdivisions=2, radius=_RADIUS * per_metre)
+    shape.to_mesh(mesh)
+    shape.free()
+    return mesh

@@ -1,0 +1,124 @@
+"""Indenters as objects: of a spec, or of the user's own mesh; and the spec and mesh file read back from them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...tactile_core.errors import TactileError
+from ..ui import properties
+from . import axes, surfaces
+
+COLOUR = (0.85, 0.55, 0.2, 1.0)
+_LOWEST = 1e-7  # m: vertices this near to the lowest one belong to one flat, as mesh_file has it
+
+
+def add_indenter(group: bpy.types.Collection, spec: Any, per_metre: float) -> bpy.types.Object:
+    """An object of a spec of ``indenter_specs``; its origin is where the body touches."""
+    import msgspec
+
+    from .indenter_shapes import shape_of
+
+    nodes, faces = shape_of(spec)
+    # Own frame and Blender's axes agree where the pad looks up: z out of the sensor, x along the finger.
+    thing = surfaces.new_mesh_object(spec.name, nodes * per_metre, faces, smooth=False)
+    about = properties.set_up(thing, "INDENTER", per_metre)
+    about.spec = json.dumps(msgspec.to_builtins(spec))
+    thing["tactile_shape"] = fingerprint(thing)
+    group.objects.link(thing)
+    surfaces.paint(thing, COLOUR)
+    return thing
+
+
+def fingerprint(thing: bpy.types.Object) -> str:
+    """Changes when the mesh's own vertices do."""
+    nodes = np.empty(len(thing.data.vertices) * 3, np.float32)
+    thing.data.vertices.foreach_get("co", nodes)
+    return hashlib.sha256(nodes.tobytes()).hexdigest()[:16]
+
+
+def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
+    """Raises TactileError for what no indenter can be: mirrored, or a spec's body that is scaled or turned.
+
+    relative : (3, 3) of the object's axes in those of the sensor
+    """
+    if np.linalg.det(relative) <= 0:
+        raise TactileError(
+            thing.name, "its scale is negative or zero", "a scale above 0", "Apply the scale (Ctrl A) and flip normals"
+        )
+    if thing.tactile.spec and not np.allclose(relative, np.eye(3), atol=1e-4):
+        advice = "Clear its rotation and scale, or clear its Shape in the sidebar to press with the mesh as it is"
+        raise TactileError(thing.name, "turned or scaled", "an upright body of the sizes it was made with", advice)
+    if thing.tactile.spec and (thing.modifiers or fingerprint(thing) != thing.get("tactile_shape")):
+        advice = "Undo that, or clear its Shape in the sidebar to press with the mesh as it is"
+        raise TactileError(thing.name, "its mesh was edited or has modifiers", "the body it was made as", advice)
+
+
+def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> tuple[Any, bytes | None]:
+    """The spec of an indenter object, and the STL of its mesh where it needs one.
+
+    relative : (3, 3), see ``check_pose``. Raises TactileError.
+    """
+    import msgspec
+
+    from ...tactile_core.simulation.indenter_specs import IndenterSpec, MeshSpec
+
+    check_pose(thing, relative)
+    if not thing.tactile.spec:
+        name = bpy.path.clean_name(thing.name)
+        return MeshSpec(name=name, file=f"{name}.stl"), stl_of(thing, relative, depsgraph)
+    spec = msgspec.convert(json.loads(thing.tactile.spec), IndenterSpec)
+    if not isinstance(spec, MeshSpec):
+        return spec, None
+    path = Path(spec.file)
+    try:
+        return msgspec.structs.replace(spec, file=path.name), path.read_bytes()
+    except OSError as error:
+        found = f"its mesh cannot be read ({error.strerror})"
+        raise TactileError(f"{thing.name}, {path}", found, "the file it came from", "Import the scene again") from error
+
+
+def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    """Triangles (m, 3, 3) in Blender units, all modifiers applied, in the sensor's axes, from the object's origin."""
+    mesh = thing.evaluated_get(depsgraph).data
+    mesh.calc_loop_triangles()
+    nodes, corners = np.empty(len(mesh.vertices) * 3, np.float32), np.empty(len(mesh.loop_triangles) * 3, np.int32)
+    mesh.vertices.foreach_get("co", nodes)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    if not len(corners):
+        raise TactileError(thing.name, "no faces", "a closed mesh", "Select a mesh with a surface")
+    return (nodes.reshape(-1, 3) @ relative.T)[corners].reshape(-1, 3, 3)
+
+
+def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> bytes:
+    """The object's surface as a binary STL in mm, z out of the sensor."""
+    corners = triangles_of(thing, relative, depsgraph) * np.float32(1e3 / thing.tactile.per_metre)
+    record = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]))
+    record["corners"] = corners
+    return b"Tactile, mm".ljust(80, b" ") + struct.pack("<I", len(corners)) + record.tobytes()
+
+
+def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    """From the object's origin to where it touches first, (3,) Blender units: zero for a spec's body."""
+    if thing.tactile.spec:
+        return np.zeros(3)
+    nodes = triangles_of(thing, relative, depsgraph).reshape(-1, 3)
+    low = nodes[nodes[:, 2] < nodes[:, 2].min() + _LOWEST * thing.tactile.per_metre]
+    return np.array([*(low.min(axis=0) + low.max(axis=0))[:2] / 2, low[:, 2].min()])
+
+
+def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
+    """(3, 3): the object's axes, scaled, in those of a sensor object."""
+    return np.array(sensor.matrix_world.inverted() @ thing.matrix_world)[:3, :3]
+
+
+def place_of(thing: bpy.types.Object, sensor: bpy.types.Object, foot: np.ndarray) -> np.ndarray:
+    """Where the indenter touches, (3,) m in the sensor's frame."""
+    origin = np.array((sensor.matrix_world.inverted() @ thing.matrix_world).translation)
+    return axes.to_sensor(origin + foot, sensor.tactile.per_metre)

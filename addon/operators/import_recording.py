@@ -1,0 +1,123 @@
+"""File > Import > BioTac Recording, and the same by drag and drop."""
+
+import os
+
+import bpy
+import numpy as np
+from bpy_extras.io_utils import ImportHelper
+
+from ...tactile_core import sensors
+from ...tactile_core.errors import TactileError
+from ..objects import axes, biotac_objects, custom_properties, electrode_markers, motion
+from ..ui import timeline, view
+from ..ui.progress import shown
+from ..ui.properties import MOTIONS, POLARITIES, POLARITY_TOLD
+from ..ui.reports import TactileOperator
+from . import recording_data
+
+SUFFIXES = "*.csv;*.h5;*.hdf5;*.npz"
+LONG = 2000  # frames; beyond it a mesh cache loads and saves faster than shape keys
+
+
+class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
+    """Import a BioTac recording as an animated skin with its core and electrodes"""
+
+    bl_idname = "tactile.import_recording"
+    bl_label = "Import BioTac Recording"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}  # noqa: RUF012
+
+    filename_ext = ".csv"
+    filter_glob: bpy.props.StringProperty(default=SUFFIXES, options={"HIDDEN"})
+    tare: bpy.props.StringProperty(
+        name="Tare", description="Frames without contact as A:B, auto to find them, none to keep the file's own zero",
+        default="auto",
+    )  # fmt: skip
+    polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_TOLD, items=POLARITIES)
+    frames: bpy.props.StringProperty(
+        name="Frames", description="Part of the recording, A:B:STEP as in Python; a colon alone takes all", default=":"
+    )
+    first_frame: bpy.props.IntProperty(
+        name="First Frame", description="Scene frame on which the recording's frame 0 is put", default=0
+    )
+    motion: bpy.props.EnumProperty(name="Animation", description="How the skin's movement is stored", items=MOTIONS)
+    millimetres: bpy.props.BoolProperty(
+        name="Scene in Millimetres",
+        description="Set the scene's unit to 1 mm, so that a fingertip is workable; else the scene's own unit is kept",
+        default=True,
+    )
+    set_timeline: bpy.props.BoolProperty(
+        name="Set Frame Rate and Range", description="Let the scene play the recording in its own time", default=True
+    )
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        path = bpy.path.abspath(self.filepath)
+        if self.motion == "MESH_CACHE" and not bpy.data.is_saved:
+            raise TactileError(path, "a mesh cache of an unsaved file", "a saved .blend", "Save it first")
+        with shown(context) as progress:
+            found = recording_data.load(path, self.tare, self.frames, progress, self.polarity)
+        scene = context.scene
+        if self.millimetres:
+            axes.use_millimetres(scene)
+        frames = self.first_frame + found.chosen.astype(float)
+        skin = self._objects(scene, path, found, frames)
+        told = motion.animate(
+            skin, sensors.biotac_surface().rest, found.translation.displacement_biotac, frames, self.motion
+        )
+        if self.set_timeline:
+            timeline.set_timeline(scene, found.recording.rate, int(frames[0]), int(frames[-1]))
+        view.show(context, [skin])
+        for warning in found.signals.warnings:
+            self.report({"WARNING"}, warning)
+        if len(frames) > LONG and self.motion != "MESH_CACHE":
+            self.report({"WARNING"}, f"{len(frames)} frames: a mesh cache makes a smaller, faster file")
+        self.report({"INFO"}, f"{len(frames)} frames at {found.recording.rate:.4g} Hz. {told}")
+
+    def _objects(
+        self, scene: bpy.types.Scene, path: str, found: recording_data.Translated, frames: np.ndarray
+    ) -> bpy.types.Object:
+        group = biotac_objects.new_collection(scene, found.recording.name)
+        skin = biotac_objects.add_skin(group, axes.units_per_metre(scene))
+        about = skin.tactile
+        about.recording = bpy.path.relpath(path) if bpy.data.is_saved else os.path.abspath(path)
+        about.tare, about.frames, about.first_frame = self.tare, self.frames, self.first_frame
+        about.polarity = self.polarity
+        biotac_objects.add_core(group, skin)
+        electrode_markers.add_markers(skin, group, found.signals.change, frames)
+        custom_properties.write(skin, custom_properties.columns(found), frames)
+        return skin
+
+
+class TACTILE_FH_recording(bpy.types.FileHandler):
+    """Recordings dropped on a 3D view"""
+
+    bl_idname = "TACTILE_FH_recording"
+    bl_label = "BioTac recording"
+    bl_import_operator = "tactile.import_recording"
+    bl_file_extensions = SUFFIXES.replace("*", "")
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Only on 3D views."""
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator(TACTILE_OT_import_recording.bl_idname, text="BioTac Recording (.csv, .h5, .npz)")
+
+
+CLASSES = (TACTILE_OT_import_recording, TACTILE_FH_recording)
+
+
+def register() -> None:
+    """Called by the package."""
+    for kind in CLASSES:
+        bpy.utils.register_class(kind)
+    bpy.types.TOPBAR_MT_file_import.append(_menu)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    bpy.types.TOPBAR_MT_file_import.remove(_menu)
+    for kind in reversed(CLASSES):
+        bpy.utils.unregister_class(kind)

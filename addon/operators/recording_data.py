@@ -1,0 +1,77 @@
+"""A recording file as ``tactile_core`` reads and translates it, kept for the next operator that asks."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import os
+from collections.abc import Callable
+
+import numpy as np
+
+from ...tactile_core import recordings
+from ...tactile_core.jobs import frame_range
+from ...tactile_core.recordings import PrepareOptions, Recording, Signals
+from ...tactile_core.recordings.polarity import AUTO
+from ...tactile_core.recordings.signals import FRAMEWISE
+from ...tactile_core.translation import translate
+from ...tactile_core.translation.translate import Translation
+from ..process import recording_reader
+
+CHUNK = 64  # frames between two steps of the progress: the networks' own block
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Translated:
+    """A recording, which frames of it (T,), their signals and what they become."""
+
+    recording: Recording
+    chosen: np.ndarray
+    signals: Signals
+    translation: Translation
+
+
+@functools.cache
+def translator() -> translate.Translator:
+    """The shipped networks, loaded once."""
+    return translate.load_translator()
+
+
+def load(
+    path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str = AUTO
+) -> Translated:
+    """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there."""
+    try:
+        changed = os.stat(path).st_mtime_ns
+    except OSError:
+        changed = 0  # the reader says what is wrong
+    key = (path, changed, tare, frames, polarity)
+    if key not in _KEPT:
+        found = _translated(path, tare, frames, progress, polarity)
+        _KEPT.clear()
+        _KEPT[key] = found
+    return _KEPT[key]
+
+
+_KEPT: dict[tuple, Translated] = {}  # the last one: importing and translating ask for the same
+
+
+def _translated(
+    path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str
+) -> Translated:
+    recording = recording_reader.read(path)
+    chosen = frame_range.select(frame_range.parse_frames(frames), len(recording))
+    options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)
+    signals = recordings.prepare(recording, options)
+    signals = _part(signals, chosen)
+    parts = []
+    for start in range(0, len(chosen), CHUNK):
+        parts.append(translator()(_part(signals, np.arange(start, min(start + CHUNK, len(chosen))))))
+        progress(min(1.0, (start + CHUNK) / len(chosen)))
+    names = [field.name for field in dataclasses.fields(Translation)]
+    whole = Translation(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+    return Translated(recording, chosen, signals, whole)
+
+
+def _part(signals: Signals, frames: np.ndarray) -> Signals:
+    return dataclasses.replace(signals, **{name: getattr(signals, name)[frames] for name in FRAMEWISE})

@@ -1,0 +1,105 @@
+"""The render engine "Tactile DIGIT (Mitsuba)": F12, Render Animation and `blender -b` give the DIGIT's picture."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...tactile_core.errors import TactileError
+from ...tactile_core.pictures.height_map import height_map
+from ..objects import digit_objects
+from ..process import tracer
+from ..ui import properties, render_settings, reports
+from . import pictures
+
+ID = "TACTILE_DIGIT"
+# Panels of these kinds suit any engine; Blender shows them for engines that add themselves.
+_SHARED = {"properties_output", "properties_render", "properties_view_layer"}
+_OWN_KIND = ("eevee", "cycles", "freestyle", "hair", "grease", "motion_blur", "simplify", "curves_render")
+
+
+class TactileRenderEngine(bpy.types.RenderEngine):
+    """Pictures of the scene's DIGIT gel, as its camera sees it"""
+
+    bl_idname = ID
+    bl_label = "Tactile DIGIT (Mitsuba)"
+    bl_use_preview = False
+    bl_use_eevee_viewport = True  # the 3D view's Rendered shading shows the meshes, not the camera inside the gel
+
+    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Called by Blender for each frame."""
+        try:
+            picture = self._picture(depsgraph)
+        except (TactileError, OSError, ModuleNotFoundError) as error:
+            self.report({"ERROR"}, _told(error))
+            return
+        except tracer.Stopped:
+            tracer.close_all()
+            return
+        height, width = picture.shape[:2]
+        result = self.begin_result(0, 0, width, height)
+        # Flat: a two-dimensional array takes fifty times as long (blender.md).
+        result.layers[0].passes["Combined"].rect.foreach_set(to_linear(picture).ravel())
+        self.end_result(result)
+        self.update_progress(1.0)
+
+    def _picture(self, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+        scene = depsgraph.scene
+        gel = properties.of_role(scene, "DIGIT")
+        if gel is None:
+            raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
+        share = scene.render.resolution_percentage / 100
+        width, height = (int(size * share) for size in (scene.render.resolution_x, scene.render.resolution_y))
+        unit = render_settings.calibration_of(scene, (width, height))
+        preset = render_settings.preset_of(scene)
+        self.update_stats("", f"Frame {scene.frame_current}: {preset}")
+        heights = height_map(digit_objects.displacement_of(gel, depsgraph), unit.camera)
+        self.update_progress(0.1)
+        if preset == "fast":
+            return pictures.shader_of(unit)(heights)
+        reports.require("mitsuba")
+        return tracer.tracer_for(unit, preset).draw(heights, self.test_break)
+
+
+def _told(error: Exception) -> str:
+    if isinstance(error, ModuleNotFoundError):
+        return f"{error.name} is missing. {reports.ADVICE}"
+    return str(error)
+
+
+def to_linear(picture: np.ndarray) -> np.ndarray:
+    """Picture (H, W, 3) uint8 as Blender's scene-linear float32 (H, W, 4), last row first.
+
+    By the inverse of sRGB's curve, so that the view transform Standard writes the same 8-bit values again.
+    """
+    levels = np.arange(256) / 255
+    curve = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    pixels = np.ones((*picture.shape[:2], 4), np.float32)
+    pixels[..., :3] = curve[picture[::-1]]
+    return pixels
+
+
+def _panels() -> list[type]:
+    """Panels of the Properties editor that every engine shares: output, resolution, colour management."""
+    found = []
+    for panel in bpy.types.Panel.__subclasses__():
+        engines, module = getattr(panel, "COMPAT_ENGINES", ()), panel.__module__.rsplit(".", 1)[-1]
+        own = any(word in panel.__name__.lower() for word in _OWN_KIND)
+        if "BLENDER_RENDER" in engines and module in _SHARED and not own:
+            found.append(panel)
+    return found
+
+
+def register() -> None:
+    """Called by the package."""
+    bpy.utils.register_class(TactileRenderEngine)
+    for panel in _panels():
+        panel.COMPAT_ENGINES.add(ID)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    for panel in _panels():
+        panel.COMPAT_ENGINES.discard(ID)
+    tracer.close_all()
+    bpy.utils.unregister_class(TactileRenderEngine)

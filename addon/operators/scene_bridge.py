@@ -1,0 +1,150 @@
+"""A Blender scene as a ``tactile_core`` scene: which indenter, where it goes, how hard it presses."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...tactile_core.errors import TactileError
+from ..objects import curves, indenter_objects
+from ..ui import properties
+
+DEFAULTS = {"format": "tactile-scene-1", "name": "scene", "description": "Made in Blender.", "pairs": None}
+DIGITS_S, DIGITS_MM, DIGITS_N = 6, 5, 7  # decimals kept of float32 keyframes
+
+
+@dataclasses.dataclass(frozen=True)
+class Authored:
+    """scene : of ``tactile_core.simulation.scene``; meshes : file name -> content; apexes : (P, 3) m, where the
+    indenter stood at each point, or None where the scene's forces say how hard it presses.
+    """
+
+    scene: Any
+    meshes: dict[str, bytes]
+    apexes: np.ndarray | None
+
+
+def indenter_of(context: bpy.types.Context) -> bpy.types.Object:
+    """The indenter to simulate: the active object if it is one, else the scene's first. Raises TactileError."""
+    found = properties.of_role(context.scene, "INDENTER", context.object)
+    if found is None:
+        raise TactileError("Tactile", "no indenter", "one in the scene", "Add > Tactile > an indenter")
+    if found.type != "MESH":
+        raise TactileError(found.name, f"a {found.type.lower()}", "a mesh", "Convert it to a mesh")
+    return found
+
+
+def sensor_of(context: bpy.types.Context) -> bpy.types.Object:
+    """What places refer to: the DIGIT's gel, else the BioTac's skin. Raises TactileError."""
+    found = properties.of_role(context.scene, "DIGIT") or properties.of_role(context.scene, "BIOTAC")
+    if found is None:
+        raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
+    return found
+
+
+def authored(context: bpy.types.Context) -> Authored:
+    """The scene as Blender has it now. Raises TactileError for what cannot be simulated."""
+    from ...tactile_core.simulation.scene import Scene
+
+    thing, sensor, scene = indenter_of(context), sensor_of(context), context.scene
+    properties.check_format(thing)
+    if scene.frame_end <= scene.frame_start:
+        raise TactileError(
+            scene.name, f"frames {scene.frame_start} to {scene.frame_end}", "two frames or more",
+            "Set the scene's frame range to the motion",
+        )  # fmt: skip
+    document = DEFAULTS | json.loads(thing.tactile.document or "{}")
+    meshes: dict[str, bytes] = {}
+    specs = [_spec(thing, sensor, context, meshes)]
+    # Other indenters of the file stand in the scene as well, in the order they were added.
+    specs += [_spec(other, sensor, context, meshes) for other in _others(scene, thing)]
+    kept = document.pop("recording", None) or {}
+    by_height = thing.tactile.press_by == "HEIGHT"
+    frames = _sampled(scene) if by_height else _key_frames(scene, thing, sensor)
+    values = _motion(context, thing, sensor, frames)
+    points = _points(scene, frames, values, kept.get("points", []))
+    pressing = specs[0].name
+    order = {name: k for k, name in enumerate(document.pop("order", []))}
+    specs.sort(key=lambda spec: order.get(spec.name, len(order)))
+    recording = {"noise_counts": 1.0, "drift_counts": 3.0, "tilt_deg": 0.0} | kept
+    recording |= {"indenter": pressing, "points": points}
+    return Authored(_scene(Scene, document, specs, recording), meshes, values["apex"] if by_height else None)
+
+
+def _scene(kind: type, document: dict, specs: list, recording: dict) -> Any:
+    import msgspec
+
+    whole = document | {"indenters": msgspec.to_builtins(specs), "recording": recording}
+    try:
+        return msgspec.convert(whole, kind)
+    except msgspec.ValidationError as error:
+        raise TactileError("Tactile scene", str(error), "what a scene file may hold") from error
+
+
+def _others(scene: bpy.types.Scene, thing: bpy.types.Object) -> list[bpy.types.Object]:
+    return [other for other in scene.objects if other.tactile.role == "INDENTER" and other != thing]
+
+
+def _spec(thing, sensor, context, meshes: dict[str, bytes]) -> Any:  # noqa: ANN001
+    relative = indenter_objects.world_axes(thing, sensor)
+    spec, content = indenter_objects.spec_of(thing, relative, context.evaluated_depsgraph_get())
+    if content is not None:
+        meshes[spec.file] = content
+    return spec
+
+
+def _sampled(scene: bpy.types.Scene) -> np.ndarray:
+    return np.arange(scene.frame_start, scene.frame_end + 1, dtype=float)
+
+
+def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
+    """The frames of the keys where all curves are straight lines between them, else every frame."""
+    animation = thing.animation_data
+    free = thing.parent in (None, sensor) and not thing.constraints
+    if not free or animation is None or animation.action is None or animation.nla_tracks:
+        return _sampled(scene)
+    moving = [c for c in curves.fcurves_of(thing) if c.data_path in ("location", "tactile.force")]
+    points = [point for curve in moving for point in curve.keyframe_points]
+    if animation.drivers or not points or any(point.interpolation != "LINEAR" for point in points):
+        return _sampled(scene)
+    inside = {float(point.co.x) for point in points if scene.frame_start <= point.co.x <= scene.frame_end}
+    return np.array(sorted(inside | {float(scene.frame_start), float(scene.frame_end)}))
+
+
+def _motion(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001
+    """apex (P, 3) m in the sensor's frame and force (P,) N; the scene is left on the frame it was on."""
+    scene, now = context.scene, (context.scene.frame_current, context.scene.frame_subframe)
+    apex, force = [], []
+    try:
+        for frame in frames:
+            scene.frame_set(int(frame // 1), subframe=float(frame % 1))
+            relative = indenter_objects.world_axes(thing, sensor)
+            foot = indenter_objects.foot_of(thing, relative, context.evaluated_depsgraph_get())
+            apex.append(indenter_objects.place_of(thing, sensor, foot))
+            force.append(thing.tactile.force)
+    finally:
+        scene.frame_set(now[0], subframe=now[1])
+    return {"apex": np.array(apex), "force": np.array(force)}
+
+
+def _points(scene: bpy.types.Scene, frames: np.ndarray, values: dict, originals: list[dict]) -> list[dict]:
+    rate = scene.render.fps / scene.render.fps_base
+    seconds = (frames - scene.frame_start) / rate
+    points = [
+        {"time_s": round(float(second), DIGITS_S), "x_mm": round(1e3 * float(apex[0]), DIGITS_MM),
+         "z_mm": round(1e3 * float(apex[2]), DIGITS_MM), "force_n": round(float(force), DIGITS_N)}
+        for second, apex, force in zip(seconds, values["apex"], values["force"], strict=True)
+    ]  # fmt: skip
+    return originals if _same(points, originals) else points
+
+
+def _same(points: list[dict], originals: list[dict]) -> bool:
+    """Whether the points are those of the file, but for what float32 keyframes round away."""
+    if len(points) != len(originals):
+        return False
+    found, wanted = ([list(point.values()) for point in each] for each in (points, originals))
+    return bool(np.allclose(found, wanted, rtol=1e-6, atol=1e-5))

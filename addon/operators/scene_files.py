@@ -1,0 +1,146 @@
+"""Import Scene and Export Scene: ``scene.toml`` to objects and back."""
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ...tactile_core import sensors
+from ...tactile_core.errors import TactileError
+from ..objects import axes, biotac_objects, curves, digit_objects, indenter_objects
+from ..ui import timeline, view
+from ..ui.reports import TactileOperator, require
+from . import scene_bridge
+
+_HOVER = 12e-3  # m above the sensors' frame: an indenter that presses by force is shown clear of the gel
+
+
+class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
+    """Open a scene.toml: both sensors, its indenters, and its motion as keyframes"""
+
+    bl_idname = "tactile.import_scene"
+    bl_label = "Import Tactile Scene"
+
+    filename_ext = ".toml"
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        require("msgspec")
+        from ...tactile_core.simulation.scene import load_scene
+
+        path = bpy.path.abspath(self.filepath)
+        found = load_scene(path)[0]
+        shapes = [_shape_needs(spec) for spec in found.indenters]
+        require(*(name for needed in shapes for name in needed))
+        scene = context.scene
+        axes.use_millimetres(scene)
+        group = biotac_objects.new_collection(scene, found.name)
+        skin = biotac_objects.add_skin(group, axes.units_per_metre(scene))
+        biotac_objects.add_core(group, skin)
+        gel = digit_objects.add_gel(group, skin.tactile.per_metre, skin)
+        things = [indenter_objects.add_indenter(group, spec, skin.tactile.per_metre) for spec in found.indenters]
+        for thing in things:
+            thing.parent, thing.location.z = gel, _HOVER * skin.tactile.per_metre
+        chosen = _set_motion(scene, found, things)
+        view.show(context, [chosen, skin, gel])
+        self.report({"INFO"}, f"{found.name}: {found.description}")
+
+
+def _shape_needs(spec) -> tuple[str, ...]:  # noqa: ANN001
+    return ("trimesh", "rtree", "scipy") if hasattr(spec, "file") else ()
+
+
+def _set_motion(scene: bpy.types.Scene, found, things: list[bpy.types.Object]) -> bpy.types.Object:  # noqa: ANN001
+    """Keyframe the recording's indenter; returns it, or the first where the scene holds no recording."""
+    import msgspec
+
+    document = msgspec.to_builtins(found)
+    document["order"] = [spec["name"] for spec in document.pop("indenters")]
+    spec = found.recording
+    chosen = things[0] if spec is None else things[document["order"].index(spec.indenter)]
+    for thing in things:
+        thing.tactile.press_by = "FORCE"
+    chosen.tactile.document = json.dumps(document)
+    if spec is None:
+        return chosen
+    points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
+    rate = sensors.SAMPLE_RATE
+    # A motion may begin later than 0 s: frame 0 stays time 0.
+    timeline.set_timeline(scene, rate, 0, int(np.ceil(points[-1, 0] * rate - 1e-9)))
+    frames = points[:, 0] * rate
+    per_mm = chosen.tactile.per_metre * 1e-3
+    curves.write_curve(chosen, "location", frames, points[:, 1] * per_mm, index=0)
+    curves.write_curve(chosen, "location", frames, points[:, 2] * per_mm, index=1)
+    curves.write_curve(chosen, "tactile.force", frames, points[:, 3])
+    scene.frame_set(scene.frame_start)
+    return chosen
+
+
+class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
+    """Write the indenters and their motion as a folder with scene.toml, for `tactile simulate`"""
+
+    bl_idname = "tactile.export_scene"
+    bl_label = "Export Tactile Scene"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (changes no scene)
+
+    filename_ext = ".toml"
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Offer the name that `tactile simulate FOLDER` looks for."""
+        self.filepath = "//scene.toml" if bpy.data.is_saved else "scene.toml"
+        return super().invoke(context, event)
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        require("msgspec")
+        from ...tactile_core.simulation.scene_text import write_scene
+
+        path = Path(bpy.path.abspath(self.filepath))
+        if path.name != "scene.toml":
+            raise TactileError(path, "another file name", "scene.toml", "Name a folder for each scene")
+        thing = scene_bridge.indenter_of(context)
+        if thing.tactile.press_by == "HEIGHT" and not _has_force(thing):
+            raise TactileError(
+                thing.name, "no forces yet", "what a scene file holds of a press", "Simulate first, or press by force"
+            )
+        found = scene_bridge.authored(context)
+        write_scene(path.parent, found.scene, found.meshes)
+        self.report({"INFO"}, f"{path}: {len(found.scene.recording.points)} points")
+
+
+def _has_force(thing: bpy.types.Object) -> bool:
+    animation = thing.animation_data
+    if animation is None or animation.action is None:
+        return False
+    return curves.fcurves_of(thing).find("tactile.force") is not None
+
+
+def _menu_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator(TACTILE_OT_import_scene.bl_idname, text="Tactile Scene (scene.toml)")
+
+
+def _menu_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator(TACTILE_OT_export_scene.bl_idname, text="Tactile Scene (scene.toml)")
+
+
+CLASSES = (TACTILE_OT_import_scene, TACTILE_OT_export_scene)
+
+
+def register() -> None:
+    """Called by the package."""
+    for kind in CLASSES:
+        bpy.utils.register_class(kind)
+    bpy.types.TOPBAR_MT_file_import.append(_menu_import)
+    bpy.types.TOPBAR_MT_file_export.append(_menu_export)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    bpy.types.TOPBAR_MT_file_export.remove(_menu_export)
+    bpy.types.TOPBAR_MT_file_import.remove(_menu_import)
+    for kind in reversed(CLASSES):
+        bpy.utils.unregister_class(kind)

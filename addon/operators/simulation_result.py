@@ -1,0 +1,103 @@
+"""What a simulation leaves in the scene: moving sensors, force curves, the indenter where it stood, pictures."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...tactile_core import sensors
+from ...tactile_core.translation import contact_patch
+from ..objects import axes, curves, custom_properties, motion, patch_nodes
+from ..ui import properties
+from . import pictures
+
+STANDING = "{} simulated"
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """seconds (T,), force (T, 3) N; apex (T, 3) m, turn (T, 3, 3): where the indenter stood, on the DIGIT if any.
+
+    moved : displacement (T, n, 3) m of each sensor that was solved, by ``"biotac"`` and ``"digit"``
+    picked : which tiers, in words, where a bound was given
+    """
+
+    seconds: np.ndarray
+    force: np.ndarray
+    apex: np.ndarray
+    turn: np.ndarray
+    moved: dict[str, np.ndarray]
+    picked: tuple[str, ...]
+
+
+def read(folder: Path) -> Result:
+    """The result in a job's folder."""
+    with np.load(folder / "result.npz") as stored:
+        moved = {sensor: stored[sensor] for sensor in ("biotac", "digit") if sensor in stored}
+        picked = tuple(str(text) for text in stored["picked"])
+        return Result(stored["seconds"], stored["force"], stored["apex"], stored["axes"], moved, picked)
+
+
+def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) -> str:
+    """Bake onto the scene's frames; a sentence for the user."""
+    scene = context.scene
+    frames = np.arange(scene.frame_start, scene.frame_end + 1, dtype=float)
+    rate = scene.render.fps / scene.render.fps_base
+    seconds = result.seconds - result.seconds[0]
+    # The mechanics run at the sensor's 100 Hz: each frame shows the nearest of its samples.
+    sample = np.abs((frames - scene.frame_start)[:, None] / rate - seconds[None, :]).argmin(axis=1)
+    told = [*result.picked]
+    force = result.force[sample][:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
+    for role, surface, moved in (
+        ("BIOTAC", sensors.biotac_surface(), result.moved.get("biotac")),
+        ("DIGIT", sensors.digit_surface(), result.moved.get("digit")),
+    ):
+        sensor = properties.of_role(scene, role)
+        if sensor is None or moved is None:  # it was added, or removed, while the other process worked
+            continue
+        told.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
+        custom_properties.write(sensor, {"force": force}, frames)
+        if role == "DIGIT":
+            patch_nodes.add_patch(sensor, contact_patch.contact_patch(moved[sample], surface), frames[0], 1.0)
+            pictures.update(sensor, context.evaluated_depsgraph_get())
+    if thing.tactile.press_by == "HEIGHT":
+        curves.write_curve(thing, "tactile.force", frames, np.linalg.norm(force, axis=1))
+    _stand(context, thing, result, sample, frames)
+    return "; ".join(told)
+
+
+def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarray) -> None:  # noqa: ANN001
+    """A solid twin of the indenter that stands where the mechanics had it; the one to move by hand turns to wires."""
+    from ..objects import indenter_objects
+    from .scene_bridge import sensor_of
+
+    sensor = sensor_of(context)
+    name = STANDING.format(thing.name)
+    twin = context.scene.objects.get(name)
+    if twin is None:
+        twin = bpy.data.objects.new(name, thing.data)
+        thing.users_collection[0].objects.link(twin)
+        twin.color = thing.color
+    twin.parent, twin.rotation_mode, thing.display_type, thing.hide_render = sensor, "QUATERNION", "WIRE", True
+    relative = indenter_objects.world_axes(thing, sensor)
+    foot = indenter_objects.foot_of(thing, relative, context.evaluated_depsgraph_get())
+    size = np.linalg.norm(relative, axis=0)
+    twin.scale = size
+    places = axes.to_blender(result.apex[sample], sensor.tactile.per_metre)
+    # Columns of the pose are the body's axes in the sensor's frame; Blender's axes are that frame turned.
+    turns = axes.to_blender(result.turn[sample].swapaxes(1, 2), 1.0).swapaxes(1, 2)
+    own = relative / size
+    from mathutils import Matrix
+
+    quaternions = []
+    for turn in turns:
+        found = Matrix((turn @ own).tolist()).to_quaternion()
+        if quaternions and found.dot(quaternions[-1]) < 0:
+            found.negate()  # the same turn, on the near side: curves between keys then take the short way
+        quaternions.append(found)
+    places = places - np.einsum("tij,j->ti", turns, foot)
+    curves.write_curves(twin, "location", frames, places)
+    curves.write_curves(twin, "rotation_quaternion", frames, np.array([q[:] for q in quaternions]))

@@ -1,0 +1,58 @@
+"""One button: the imported recording as a DIGIT would have felt it."""
+
+import bpy
+
+from ...tactile_core import sensors
+from ...tactile_core.errors import TactileError
+from ...tactile_core.translation import contact_patch
+from ..objects import custom_properties, digit_objects, motion, patch_nodes
+from ..ui import properties, timeline, view
+from ..ui.progress import shown
+from ..ui.reports import TactileOperator
+from . import pictures, recording_data
+
+
+class TACTILE_OT_translate(TactileOperator):
+    """Translate the BioTac recording: add a DIGIT's gel that moves as it would have, with its contact patch"""
+
+    bl_idname = "tactile.translate"
+    bl_label = "Translate to DIGIT"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Only where there is a BioTac to translate."""
+        if properties.of_role(context.scene, "BIOTAC", context.object) is None:
+            cls.poll_message_set("Import a BioTac recording first")
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        skin = properties.of_role(context.scene, "BIOTAC", context.object)
+        properties.check_format(skin)
+        about = skin.tactile
+        if not about.recording:
+            raise TactileError(skin.name, "no recording", "an imported BioTac", "Import a BioTac recording")
+        with shown(context) as progress:
+            path = bpy.path.abspath(about.recording)
+            found = recording_data.load(path, about.tare, about.frames, progress, about.polarity)
+        frames = about.first_frame + found.chosen.astype(float)
+        group = skin.users_collection[0]
+        for old in [thing for thing in group.objects if thing.tactile.role == "DIGIT"]:
+            bpy.data.objects.remove(old)
+        gel = digit_objects.add_gel(group, about.per_metre, skin)
+        surface, moved = sensors.digit_surface(), found.translation.displacement_digit
+        told = motion.animate(gel, surface.rest, moved, frames, about.motion)
+        step = frames[1] - frames[0] if len(frames) > 1 else 1.0
+        patch_nodes.add_patch(gel, contact_patch.contact_patch(moved, surface), frames[0], step)
+        values = custom_properties.columns(found)
+        told_of_gel = {"expected_error_um": 1e6 * found.translation.expected_error_digit}
+        told_of_gel |= {name: values[name] for name in ("force", "confidence")}
+        custom_properties.write(gel, told_of_gel, frames)
+        low = timeline.mark_low_confidence(context.scene, found.translation.confidence, frames)
+        view.show(context, [skin, gel])
+        pictures.update(gel, context.evaluated_depsgraph_get())
+        self.report({"INFO"}, f"{told}; {low} parts of low confidence")
+
+
+register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_translate,))

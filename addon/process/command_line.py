@@ -1,0 +1,174 @@
+"""``blender -b --command tactile VERB ...``: the add-on's jobs without a window."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+
+from ...tactile_core.errors import TactileError
+
+DESCRIPTION = """\
+Convert recordings, simulate scenes and render pictures inside Blender, unattended. Each input gets the folder
+DIR/<its name>. An input that fails is named and does not stop the others; the exit status is then 1."""
+RECORDINGS = (".csv", ".h5", ".hdf5", ".npz")
+EPILOG = """\
+examples:
+  blender -b --command tactile convert touch.csv --out results       touch.blend: BioTac and DIGIT, animated
+  blender -b --command tactile simulate scenes/press --out results   press.blend and its recording
+  blender -b --command tactile render results/touch/touch.blend --out pictures
+  blender -b --command tactile batch day1 --out results              every recording, scene and .blend of a folder"""
+
+
+def main(arguments: list[str]) -> int:
+    """Called by Blender with what follows ``--command tactile``; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    inputs = [Path(name) for name in options.inputs]
+    if options.verb == "batch":
+        inputs = _found_in(inputs)
+    if not inputs:
+        print("tactile: error: nothing to do: no recording, scene or .blend there", file=sys.stderr)
+        return 1
+    failed = []
+    for path in inputs:
+        work = VERBS[options.verb] if options.verb != "batch" else _for(path)
+        try:
+            folder = _folder(options.out, path)
+            work(path, folder, options)
+            print(folder)
+        except (TactileError, RuntimeError, OSError) as error:  # Blender's operators raise RuntimeError
+            print(f"tactile: error: {path}: {' '.join(str(error).split())}", file=sys.stderr)
+            failed.append(path)
+    if failed:
+        print(f"tactile: {len(failed)} of {len(inputs)} failed: {', '.join(map(str, failed))}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="blender -b --command tactile", description=DESCRIPTION, epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    verbs = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
+    for name, brief, what in (
+        ("convert", "recordings to .blend files with both sensors", "recording: CSV, HDF5 or NPZ"),
+        ("simulate", "scenes to .blend files and recordings", "scene.toml, or the folder that holds one"),
+        ("render", "pictures of every frame", ".blend file, or a recording"),
+        ("batch", "all of that for whatever a folder holds", "folder"),
+    ):
+        verb = verbs.add_parser(name, help=brief, description=brief)
+        verb.add_argument("inputs", nargs="+", metavar="INPUT", help=what)
+        verb.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder of the results")
+        verb.add_argument("--pictures", action="store_true", help="render every frame too")
+        verb.add_argument("--preset", default="fast", help="of the pictures (default: fast)")
+        verb.add_argument("--error", default="", help="largest error to add: 50um (tier), 0.6levels (preset), or both")
+        verb.add_argument("--tare", default="auto", help="of recordings: auto, none or frames A:B")
+        verb.add_argument("--polarity", choices=("auto", "falls", "rises"), default="auto",
+                          help="of recordings: what counts do where a film thins")  # fmt: skip
+        verb.add_argument("--frames", default=":", help="of recordings: A:B:STEP")
+        verb.add_argument("--seed", type=int, default=0, help="of simulated noise")
+        verb.add_argument("--overwrite", action="store_true", help="write into result folders that exist")
+        verb.set_defaults(verb=name)
+    return parser
+
+
+def _found_in(folders: list[Path]) -> list[Path]:
+    found = []
+    for folder in folders:
+        for path in sorted(folder.iterdir()) if folder.is_dir() else [folder]:
+            scene = path.is_dir() and (path / "scene.toml").is_file()
+            if scene or path.suffix.lower() in (*RECORDINGS, ".blend"):
+                found.append(path)
+    return found
+
+
+def _folder(out: Path, path: Path) -> Path:
+    return out / (path.parent.resolve().name if path.name == "scene.toml" else path.resolve().stem)
+
+
+def _claimed(folder: Path, options: argparse.Namespace) -> Path:
+    """The folder of a result, made; raises TactileError where it holds something and may not."""
+    if folder.exists() and any(folder.iterdir()) and not options.overwrite:
+        raise TactileError(folder, "already holds something", "a new folder", "Add --overwrite, or another --out")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
+    """A recording as a .blend."""
+    _fresh()
+    words = {"tare": options.tare, "frames": options.frames, "polarity": options.polarity}
+    bpy.ops.tactile.import_recording(filepath=str(path.resolve()), **words)
+    bpy.ops.tactile.translate()
+    _claimed(folder, options)
+    _finish(folder, options, options.pictures)
+
+
+def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
+    """A scene as a .blend, its recording beside it."""
+    file = path / "scene.toml" if path.is_dir() else path
+    _fresh()
+    bpy.ops.tactile.import_scene(filepath=str(file.resolve()))
+    _claimed(folder, options)
+    bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
+    bpy.context.scene.tactile_render.error = options.error
+    bpy.ops.tactile.simulate(seed=options.seed)
+    _finish(folder, options, options.pictures)
+
+
+def render(path: Path, folder: Path, options: argparse.Namespace) -> None:
+    """Pictures of a .blend or a recording."""
+    if path.suffix.lower() != ".blend":
+        options.pictures = True
+        convert(path, folder, options)
+        return
+    if not path.is_file():
+        raise TactileError(path, "there is no such file", "a .blend", "Check the path")
+    bpy.ops.wm.open_mainfile(filepath=str(path.resolve()))
+    _claimed(folder, options)
+    _pictures(folder, options)
+
+
+def _for(path: Path) -> Callable:
+    if path.suffix.lower() == ".blend":
+        return render
+    return simulate if path.is_dir() or path.suffix.lower() == ".toml" else convert
+
+
+def _fresh() -> None:
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+
+
+def _finish(folder: Path, options: argparse.Namespace, pictures: bool) -> None:
+    bpy.ops.tactile.set_up_render()
+    bpy.context.scene.tactile_render.preset, bpy.context.scene.tactile_render.error = options.preset, options.error
+    bpy.context.scene.render.filepath = "//images/"
+    bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
+    if pictures:
+        _pictures(folder, options)
+
+
+def _pictures(folder: Path, options: argparse.Namespace) -> None:
+    scene = bpy.context.scene
+    bpy.ops.tactile.set_up_render()
+    scene.tactile_render.preset, scene.tactile_render.error = options.preset, options.error
+    scene.render.filepath = str((folder / "images").resolve()) + "/"
+    bpy.ops.render.render(animation=True)
+
+
+VERBS = {"convert": convert, "simulate": simulate, "render": render}
+_command = None
+
+
+def register() -> None:
+    """Called by the package."""
+    global _command
+    _command = bpy.utils.register_cli_command("tactile", main)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    bpy.utils.unregister_cli_command(_command)

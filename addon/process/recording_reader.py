@@ -1,0 +1,63 @@
+"""Recordings, read here or, where HDF5 does not work in Blender's own process, in another one.
+
+Blenders of Linux distributions are linked against the system's HDF5, whose functions then take the place of those that
+h5py's wheel brings: importing it fails (measured: Debian's 4.3.2). A plain Python process is free of that.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import os
+
+import numpy as np
+
+from ...tactile_core import recordings
+from ...tactile_core.recordings import Recording, Truth
+from .jobs import Job, JobFolder
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_LOOK = 0.05  # s between two looks at the worker
+
+
+def read(path: str | os.PathLike) -> Recording:
+    """See ``tactile_core.recordings.read``."""
+    return _read_elsewhere(os.fspath(path)) if _is_hdf5(path) and not _hdf5_works() else recordings.read(path)
+
+
+def _is_hdf5(path: str | os.PathLike) -> bool:
+    try:
+        with open(path, "rb") as file:
+            return file.read(len(_HDF5)) == _HDF5
+    except OSError:
+        return False  # the reader says what is wrong
+
+
+@functools.cache
+def _hdf5_works() -> bool:
+    """Whether h5py can be imported; where it is missing altogether, the reader says so."""
+    try:
+        import h5py  # noqa: F401
+    except ModuleNotFoundError:
+        return True
+    except Exception:  # whatever a library of another version does to it
+        return False
+    return True
+
+
+def _read_elsewhere(path: str) -> Recording:
+    """Raises TactileError as the reader does."""
+    with JobFolder() as folder:
+        job = Job("read", folder, path=path)
+        while not job.poll(_LOOK):
+            pass
+        about = json.loads((folder / "about.json").read_text(encoding="utf-8"))
+        with np.load(folder / "arrays.npz", allow_pickle=False) as stored:
+            arrays = dict(stored)
+    names = [field.name for field in dataclasses.fields(Truth)]
+    truth = None
+    if "truth.force" in arrays:
+        truth = Truth(*(arrays.pop(f"truth.{name}", None) for name in names))
+    about["warnings"] = tuple(about["warnings"])
+    return Recording(**about, **arrays, truth=truth)

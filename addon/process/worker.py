@@ -1,0 +1,165 @@
+"""The other process: long jobs run here, so that Blender lives on when they stall, are stopped or abort.
+
+Started by ``jobs.Job`` as `python worker.py FOLDER` with ``tactile_core`` on its path. FOLDER/job.json says what to do;
+each line on stdout is a JSON object: {"done": 3, "total": 10}, {"error": "..."} or {"finished": true}. No bpy here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Progress = Callable[[int, int], None]
+
+
+def main(folder: Path) -> int:
+    """Run the job in a folder; returns the exit status."""
+    from tactile_core.errors import TactileError
+
+    job = json.loads((folder / "job.json").read_text(encoding="utf-8"))
+    try:
+        JOBS[job["kind"]](folder, job, lambda done, total: say(done=done, total=total))
+    except TactileError as error:
+        say(error=str(error))
+        return 2
+    except ModuleNotFoundError as error:
+        say(error=f"{error.name} is missing in Blender's Python. Install the extension's zip for this platform")
+        return 2
+    except OSError as error:
+        say(error=f"{error.filename or folder}: cannot be written or read ({error.strerror or error})")
+        return 2
+    say(finished=True)
+    return 0
+
+
+def say(**message: Any) -> None:
+    """One line for Blender."""
+    sys.stdout.write(json.dumps(message) + "\n")
+    sys.stdout.flush()
+
+
+def simulate(folder: Path, job: dict, progress: Progress) -> None:
+    """FOLDER/scene.toml -> recording.h5, and result.npz: its truth, and where the indenter stands on each frame.
+
+    job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None.
+    With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
+    """
+    from tactile_core.simulation.recording import sensors_of, simulate_recording
+    from tactile_core.simulation.tier_choice import choose_for_scene
+
+    if (folder / "heights.npz").exists():
+        _forces_from_heights(folder, progress)
+    choices = {} if job["um"] is None else choose_for_scene(folder, sensors_of(job["keep"]), job["um"])
+    tiers = {sensor: choice.tier for sensor, choice in choices.items()}
+    scene, out = folder / "scene.toml", folder / "recording.h5"
+    simulate_recording(scene, out, job["seed"], progress, keep=job["keep"], tiers=tiers)
+    _result(folder, [choice.told(sensor) for sensor, choice in choices.items()])
+
+
+def _forces_from_heights(folder: Path, progress: Progress) -> None:
+    """Write the scene's forces anew: those that the DIGIT answers at each depth."""
+    import msgspec
+
+    from tactile_core.mechanics.placement import Placement, pose_at
+    from tactile_core.mechanics.solve import solve
+    from tactile_core.simulation.scene import load_scene
+    from tactile_core.simulation.scene_text import to_toml
+
+    scene = load_scene(folder)[0]
+    spec = scene.recording
+    indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
+    with np.load(folder / "heights.npz") as stored:
+        apexes = stored["apex"]
+    points = []
+    for k, (point, apex) in enumerate(zip(spec.points, apexes, strict=True)):
+        place = Placement(point.x_mm * 1e-3, point.z_mm * 1e-3, np.radians(spec.tilt_deg))
+        pose = pose_at("digit", indenter, place)
+        depth = float((apex - pose.apex) @ pose.direction)
+        force = 0.0
+        if depth > 0:
+            solution = solve("digit", indenter, place, depth=depth, friction=0.0)
+            force = max(float(solution.force @ pose.direction), 0.0)
+        points.append(msgspec.structs.replace(point, force_n=force))
+        progress(k + 1, 2 * len(apexes))
+    # The rest of the scene as it was written: load_scene has made its file names absolute.
+    text = msgspec.toml.decode((folder / "scene.toml").read_bytes(), type=type(scene))
+    recording = msgspec.structs.replace(text.recording, points=points)
+    (folder / "scene.toml").write_text(to_toml(msgspec.structs.replace(text, recording=recording)), encoding="utf-8")
+
+
+def _result(folder: Path, picked: list[str]) -> None:
+    """The truth; what was picked, in words; and apex (T, 3) m and axes (T, 3, 3) of the indenter.
+
+    It has sunk until it touches the dented gel: on the DIGIT, or on the BioTac where that alone was solved.
+    """
+    from tactile_core import sensors
+    from tactile_core.mechanics.placement import Placement, pose_at
+    from tactile_core.recordings.simulated import read_truth
+    from tactile_core.simulation.scene import load_scene
+
+    scene = load_scene(folder)[0]
+    spec = scene.recording
+    indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
+    seconds, truth = read_truth(folder / "recording.h5")
+    moved = {"biotac": truth.displacement_biotac, "digit": truth.displacement_digit}
+    moved = {sensor: values for sensor, values in moved.items() if values is not None}
+    sensor = "digit" if "digit" in moved else "biotac"
+    columns = [(p.time_s, p.x_mm, p.z_mm) for p in spec.points]
+    times, x, z = np.array(columns).T
+    rest = sensors.sensor_surface(sensor).rest
+    apex, axes = [], []
+    for k, second in enumerate(seconds):
+        at = Placement(
+            np.interp(second, times, x) * 1e-3, np.interp(second, times, z) * 1e-3, np.radians(spec.tilt_deg)
+        )
+        pose = pose_at(sensor, indenter, at)
+        nodes = rest + moved[sensor][k]
+        for _ in range(STEPS if truth.force[k].any() else 0):
+            pose = pose.moved(float(pose.distance(indenter, nodes)[0].min()))
+        apex.append(pose.apex), axes.append(pose.axes)
+    arrays = {"apex": np.array(apex), "axes": np.array(axes), "seconds": seconds, "force": truth.force}
+    arrays["picked"] = np.array(picked, np.str_)
+    np.savez(folder / "result.npz", **arrays, **moved)
+
+
+def render(folder: Path, job: dict, progress: Progress) -> None:
+    """For each line on stdin: FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8, by FOLDER/unit.toml."""
+    from tactile_core.pictures.renderer import Renderer
+    from tactile_core.sensors.calibration_file import load_calibration
+
+    renderer = Renderer(load_calibration(folder / "unit.toml"), job["preset"])
+    for line in sys.stdin:
+        number = json.loads(line)["picture"]
+        picture = renderer(np.load(folder / "heights.npy", allow_pickle=False))
+        np.save(folder / "partial.npy", picture)
+        (folder / "partial.npy").replace(folder / "picture.npy")
+        progress(number, number)
+
+
+def read(folder: Path, job: dict, progress: Progress) -> None:
+    """The recording at job["path"] -> arrays.npz and about.json, which ``recording_reader`` puts together again."""
+    from tactile_core import recordings
+
+    found = recordings.read(job["path"])
+    whole = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+    truth = whole.pop("truth")
+    if truth is not None:
+        held = {f"truth.{field.name}": getattr(truth, field.name) for field in dataclasses.fields(truth)}
+        whole |= {name: values for name, values in held.items() if values is not None}
+    arrays = {name: value for name, value in whole.items() if isinstance(value, np.ndarray)}
+    np.savez(folder / "arrays.npz", **arrays)
+    about = {name: value for name, value in whole.items() if name not in arrays}
+    (folder / "about.json").write_text(json.dumps(about), encoding="utf-8")
+
+
+STEPS = 8  # of sinking by the free distance; each leaves a small part of it, far below a pixel after eight
+JOBS = {"simulate": simulate, "render": render, "read": read}
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

@@ -1,0 +1,185 @@
+"""Add > Tactile: sensors and indenters."""
+
+import bpy
+
+from ...tactile_core.errors import TactileError
+from ..objects import axes, biotac_objects, digit_objects, indenter_objects
+from ..operators.scene_bridge import sensor_of
+from . import properties, view
+from .reports import TactileOperator, require
+
+SENSORS = (
+    ("BIOTAC", "BioTac", "A BioTac's skin with its core"),
+    ("DIGIT", "DIGIT", "A DIGIT's gel"),
+)
+SHAPES = (
+    ("sphere", "Sphere", "A ball"),
+    ("cylinder", "Cylinder", "The flat end of an upright cylinder"),
+    ("lying_cylinder", "Lying Cylinder", "The side of a cylinder along the finger"),
+    ("box", "Box", "A flat face"),
+    ("ring", "Ring", "A ring of round wire that lies flat"),
+    ("edge", "Edge", "The rounded ridge of a wedge along the finger"),
+)
+_ABOVE = 10e-3  # m over the sensors' frame: 1.7 mm above the pads, in the middle of both (sensors.md)
+_MIDDLE = -8e-3  # m, x of the middle of the pads
+
+
+class TACTILE_OT_add_sensor(TactileOperator):
+    """Add a resting sensor"""
+
+    bl_idname = "tactile.add_sensor"
+    bl_label = "Add Sensor"
+
+    sensor: bpy.props.EnumProperty(name="Sensor", description="Which sensor to add", items=SENSORS)
+    millimetres: bpy.props.BoolProperty(
+        name="Scene in Millimetres", description="Set the scene's unit to 1 mm; else its own unit is kept", default=True
+    )
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        scene = context.scene
+        if properties.of_role(scene, self.sensor) is not None:
+            raise TactileError(self.sensor, "already in the scene", "one of each sensor", "Use a scene for each pair")
+        if self.millimetres:
+            axes.use_millimetres(scene)
+        group, per_metre = context.collection, axes.units_per_metre(scene)
+        if self.sensor == "BIOTAC":
+            thing = biotac_objects.add_skin(group, per_metre)
+            biotac_objects.add_core(group, thing)
+            gel = properties.of_role(scene, "DIGIT")
+            if gel is not None:
+                thing.location = gel.location
+                thing.location.y -= digit_objects.BESIDE * per_metre
+        else:
+            thing = digit_objects.add_gel(group, per_metre, properties.of_role(scene, "BIOTAC"))
+        view.show(context, [thing])
+
+
+class TACTILE_OT_add_indenter(TactileOperator):
+    """Add an indenter over the middle of the sensor; move and keyframe it like any object"""
+
+    bl_idname = "tactile.add_indenter"
+    bl_label = "Add Indenter"
+
+    shape: bpy.props.EnumProperty(name="Shape", description="What presses", items=SHAPES)
+    radius: bpy.props.FloatProperty(
+        name="Radius", description="Of the body or of the ring's middle, mm", default=3.0, min=0.5, max=20
+    )
+    tube: bpy.props.FloatProperty(name="Wire", description="Radius of the ring's wire, mm", default=1.0, min=0.2, max=5)
+    edge: bpy.props.FloatProperty(
+        name="Edge Radius", description="By which edges are rounded, mm", default=0.5, min=0.1, max=5
+    )
+    length: bpy.props.FloatProperty(
+        name="Length", description="Of cylinder and edge; of the box's sides, mm", default=10.0, min=1, max=50
+    )
+    angle: bpy.props.FloatProperty(
+        name="Angle", description="Between the flanks of the edge, degrees", default=60.0, min=10, max=170
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Only the sizes that the shape has."""
+        self.layout.prop(self, "shape")
+        for name in SIZES[self.shape].values():
+            self.layout.prop(self, name)
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        require("msgspec")
+        import msgspec
+
+        from ...tactile_core.simulation.indenter_specs import IndenterSpec
+
+        sensor = sensor_of(context)
+        sizes = {field: getattr(self, name) for field, name in SIZES[self.shape].items()}
+        if self.shape == "box":
+            sizes["sizes_mm"] = [sizes["sizes_mm"]] * 3
+        names = {thing.name for thing in context.scene.objects}
+        name = next(n for n in (self.shape, *(f"{self.shape}_{k}" for k in range(2, 1000))) if n not in names)
+        sizes = {field: _tidy(value) for field, value in sizes.items()}
+        spec = msgspec.convert({"kind": self.shape, "name": name} | sizes, IndenterSpec)
+        thing = indenter_objects.add_indenter(context.collection, spec, sensor.tactile.per_metre)
+        thing.parent = sensor
+        thing.location = (_MIDDLE * sensor.tactile.per_metre, 0, _ABOVE * sensor.tactile.per_metre)
+        view.show(context, [thing])
+
+
+def _tidy(value: float | list[float]) -> float | list[float]:
+    """Sizes as they were typed: Blender's float32 makes 0.4 to 0.4000000059604645."""
+    return [_tidy(item) for item in value] if isinstance(value, list) else round(value, 5)
+
+
+# shape -> field of its spec: property of the operator
+SIZES = {
+    "sphere": {"radius_mm": "radius"},
+    "cylinder": {"radius_mm": "radius", "edge_mm": "edge", "length_mm": "length"},
+    "lying_cylinder": {"radius_mm": "radius", "edge_mm": "edge", "length_mm": "length"},
+    "box": {"sizes_mm": "length", "edge_mm": "edge"},
+    "ring": {"radius_mm": "radius", "tube_mm": "tube"},
+    "edge": {"angle_deg": "angle", "radius_mm": "edge", "length_mm": "length"},
+}
+
+
+class TACTILE_OT_use_as_indenter(TactileOperator):
+    """Let the active mesh press, as it is: its modifiers, scale and rotation count"""
+
+    bl_idname = "tactile.use_as_indenter"
+    bl_label = "Use Mesh as Indenter"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Only for a mesh that is no sensor."""
+        thing = context.object
+        if thing is None or thing.type != "MESH" or thing.tactile.role not in ("NONE", "INDENTER"):
+            cls.poll_message_set("Select a mesh of your own")
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        thing, sensor = context.object, sensor_of(context)
+        indenter_objects.check_pose(thing, indenter_objects.world_axes(thing, sensor))
+        about = properties.set_up(thing, "INDENTER", sensor.tactile.per_metre)
+        about.spec = ""
+
+
+class TACTILE_MT_add(bpy.types.Menu):
+    """Sensors and indenters"""
+
+    bl_idname = "TACTILE_MT_add"
+    bl_label = "Tactile"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Called by Blender."""
+        for name, label, _ in SENSORS:
+            self.layout.operator(TACTILE_OT_add_sensor.bl_idname, text=label, icon="OUTLINER_OB_META").sensor = name
+        self.layout.separator()
+        for name, label, _ in SHAPES:
+            self.layout.operator(TACTILE_OT_add_indenter.bl_idname, text=label, icon=ICONS[name]).shape = name
+        self.layout.operator(TACTILE_OT_use_as_indenter.bl_idname, icon="MESH_MONKEY")
+
+
+ICONS = {
+    "sphere": "MESH_UVSPHERE", "cylinder": "MESH_CYLINDER", "lying_cylinder": "MESH_CAPSULE", "box": "MESH_CUBE",
+    "ring": "MESH_TORUS", "edge": "MESH_CONE",
+}  # fmt: skip
+
+
+def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.menu(TACTILE_MT_add.bl_idname, icon="HAND")
+
+
+CLASSES = (TACTILE_OT_add_sensor, TACTILE_OT_add_indenter, TACTILE_OT_use_as_indenter, TACTILE_MT_add)
+
+
+def register() -> None:
+    """Called by the package."""
+    for kind in CLASSES:
+        bpy.utils.register_class(kind)
+    bpy.types.VIEW3D_MT_add.append(_menu)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    bpy.types.VIEW3D_MT_add.remove(_menu)
+    for kind in reversed(CLASSES):
+        bpy.utils.unregister_class(kind)

@@ -1,0 +1,100 @@
+"""The tab "Tactile" in the 3D view's sidebar."""
+
+import bpy
+
+from ..operators import preview
+from ..operators.import_recording import TACTILE_OT_import_recording
+from ..operators.preview import TACTILE_OT_live_picture
+from ..operators.render_setup import draw_settings
+from ..operators.scene_files import TACTILE_OT_export_scene, TACTILE_OT_import_scene
+from ..operators.simulate import TACTILE_OT_simulate
+from ..operators.translate_recording import TACTILE_OT_translate
+from . import properties, timeline
+from .add_menu import TACTILE_MT_add
+
+
+class _Panel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Tactile"
+
+
+class TACTILE_PT_recording(_Panel, bpy.types.Panel):
+    """Import and translate"""
+
+    bl_idname = "TACTILE_PT_recording"
+    bl_label = "Recording"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender."""
+        layout = self.layout
+        layout.operator(TACTILE_OT_import_recording.bl_idname, icon="IMPORT")
+        skin = properties.of_role(context.scene, "BIOTAC", context.object)
+        if skin is not None and skin.tactile.recording:
+            box = layout.column(align=True)
+            box.prop(skin.tactile, "recording", text="")
+            box.prop(skin.tactile, "tare")
+            box.prop(skin.tactile, "polarity")
+        layout.operator(TACTILE_OT_translate.bl_idname, icon="MOD_MESHDEFORM")
+        _numbers(layout, skin)
+
+
+def _numbers(layout: bpy.types.UILayout, skin: bpy.types.Object | None) -> None:
+    """The current frame's force, confidence, and how far a node may be off."""
+    if skin is None or "force" not in skin:
+        return
+    force = skin["force"]
+    size = sum(part * part for part in force) ** 0.5
+    column = layout.column(align=True)
+    column.label(text=f"Force {size:.3f} N", icon="FORCE_FORCE")
+    if "confidence" in skin:
+        trusted = skin["confidence"] >= timeline.LOW
+        column.label(text=f"Confidence {skin['confidence']:.2f}", icon="CHECKMARK" if trusted else "ERROR")
+    if "expected_error_um" in skin:
+        column.label(text=f"Expected error {skin['expected_error_um']:.0f} µm", icon="BLANK1")
+
+
+class TACTILE_PT_picture(_Panel, bpy.types.Panel):
+    """What the DIGIT's camera sees"""
+
+    bl_idname = "TACTILE_PT_picture"
+    bl_label = "Picture"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender."""
+        layout = self.layout
+        layout.operator(TACTILE_OT_live_picture.bl_idname, icon="HIDE_OFF" if preview.is_on() else "HIDE_ON",
+                        depress=preview.is_on())  # fmt: skip
+        if preview.failure():
+            layout.label(text=preview.failure(), icon="ERROR")
+        draw_settings(layout, context)
+
+
+class TACTILE_PT_author(_Panel, bpy.types.Panel):
+    """Author and simulate a contact"""
+
+    bl_idname = "TACTILE_PT_author"
+    bl_label = "Author"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender."""
+        layout = self.layout
+        layout.menu(TACTILE_MT_add.bl_idname, text="Add Sensor or Indenter", icon="ADD")
+        thing = properties.of_role(context.scene, "INDENTER", context.object)
+        if thing is not None:
+            column = layout.column(align=True)
+            column.label(text=thing.name, icon="MESH_ICOSPHERE")
+            column.prop(thing.tactile, "press_by")
+            if thing.tactile.press_by == "FORCE":
+                column.prop(thing.tactile, "force")
+            if thing.tactile.spec:
+                column.prop(thing.tactile, "spec")
+        layout.prop(context.scene.tactile_render, "error")
+        layout.operator(TACTILE_OT_simulate.bl_idname, icon="PHYSICS")
+        row = layout.row(align=True)
+        row.operator(TACTILE_OT_import_scene.bl_idname, text="Import Scene", icon="IMPORT")
+        row.operator(TACTILE_OT_export_scene.bl_idname, text="Export Scene", icon="EXPORT")
+
+
+CLASSES = (TACTILE_PT_recording, TACTILE_PT_picture, TACTILE_PT_author)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -1,0 +1,108 @@
+"""What the add-on remembers in a .blend: which object is what, and where its recording lies."""
+
+import bpy
+
+from ...tactile_core.errors import TactileError
+
+FORMAT = 1  # of these properties; raised when an older file needs to be read differently
+
+# Blender 4.5 asks for this word before it lets a path begin with "//"; older ones do not know it.
+_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+
+ROLES = (
+    ("NONE", "None", "Nothing of this add-on"),
+    ("BIOTAC", "BioTac skin", "The skin of an imported or simulated BioTac"),
+    ("DIGIT", "DIGIT gel", "The gel of a translated or simulated DIGIT"),
+    ("CORE", "BioTac core", "The rigid core under the skin"),
+    ("ELECTRODE", "Electrode", "A marker of one electrode"),
+    ("INDENTER", "Indenter", "A body that presses"),
+)
+PRESS_BY = (
+    ("HEIGHT", "Height", "It presses as deep as it is moved into the DIGIT's gel"),
+    ("FORCE", "Force", "It presses with the keyframed force, wherever its height is"),
+)
+MOTIONS = (
+    ("SHAPE_KEYS", "Shape Keys", "One shape key a frame along one curve: exact, and fast to play"),
+    ("COMPACT", "Compact", "A few basis shape keys with animated weights: a small file; its largest error is reported"),
+    ("MESH_CACHE", "Mesh Cache", "A PC2 file beside the saved .blend: for recordings of thousands of frames"),
+)
+
+
+POLARITY_TOLD = "What the electrodes' counts do where the film over them thins"
+POLARITIES = (
+    ("auto", "Automatic", "As the file says, or the recording shows"),
+    ("falls", "Falls", "Counts fall, as raw readings of a BioTac do"),
+    ("rises", "Rises", "Counts rise: the file holds rest minus reading"),
+)
+
+
+class TactileObject(bpy.types.PropertyGroup):
+    """Of each object."""
+
+    role: bpy.props.EnumProperty(name="Role", description="What this object is to the Tactile add-on", items=ROLES)
+    format: bpy.props.IntProperty(name="Format", description="Of these properties, to tell older files", default=0)
+    per_metre: bpy.props.FloatProperty(name="Units a Metre", description="Blender units a metre", default=1000.0)
+    recording: bpy.props.StringProperty(
+        name="Recording", description="The file this was imported from", subtype="FILE_PATH", options=_RELATIVE
+    )
+    tare: bpy.props.StringProperty(name="Tare", description="Frames without contact A:B, auto or none", default="auto")
+    polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_TOLD, items=POLARITIES)
+    frames: bpy.props.StringProperty(name="Frames", description="Part of the recording, A:B:STEP", default=":")
+    motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
+    spec: bpy.props.StringProperty(
+        name="Shape", description="An indenter's kind and sizes, as in a scene file; empty: the object's own mesh"
+    )
+    document: bpy.props.StringProperty(
+        name="Document", description="What else the scene file held that this indenter came from"
+    )
+    press_by: bpy.props.EnumProperty(
+        name="Press by", description="What says how hard the indenter presses", items=PRESS_BY
+    )
+    force: bpy.props.FloatProperty(
+        name="Force", description="Force of the press, in newtons; keyframe it like a location", min=0.0, soft_max=2.0,
+        default=0.0, precision=3, options={"ANIMATABLE"},
+    )  # fmt: skip
+    first_frame: bpy.props.IntProperty(name="First Frame", description="Scene frame of the recording's first frame")
+
+
+def set_up(thing: bpy.types.Object, role: str, per_metre: float) -> TactileObject:
+    """Mark an object of ours."""
+    about = thing.tactile
+    about.role, about.per_metre, about.format = role, per_metre, FORMAT
+    return about
+
+
+def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
+    """The scene's object of a role: ``near`` itself, else one in its collections, else the scene's first."""
+    if near is not None:
+        beside = [near, *(thing for group in near.users_collection for thing in group.objects)]
+        found = next((thing for thing in beside if thing.tactile.role == role), None)
+        if found is not None and scene.objects.get(found.name) is not None:
+            return found
+    return next((thing for thing in scene.objects if thing.tactile.role == role), None)
+
+
+def check_format(thing: bpy.types.Object) -> None:
+    """Raises TactileError for an object that a newer version of the add-on made."""
+    if thing.tactile.format > FORMAT:
+        raise TactileError(
+            thing.name, f"made by a newer version of the add-on (format {thing.tactile.format})",
+            f"format {FORMAT} or older", "Update the add-on",
+        )  # fmt: skip
+
+
+CLASSES = (TactileObject,)
+
+
+def register() -> None:
+    """Called by the package."""
+    for kind in CLASSES:
+        bpy.utils.register_class(kind)
+    bpy.types.Object.tactile = bpy.props.PointerProperty(type=TactileObject, name="Tactile")
+
+
+def unregister() -> None:
+    """Called by the package."""
+    del bpy.types.Object.tactile
+    for kind in reversed(CLASSES):
+        bpy.utils.unregister_class(kind)

@@ -1,0 +1,72 @@
+"""How an operator ends: errors of the library become Blender's own error reports, and the scene is left as it was."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+
+from ...tactile_core.errors import TactileError
+
+# module -> what it is needed for
+MODULES = {
+    "h5py": "reading HDF5 recordings",
+    "msgspec": "scene files",
+    "scipy": "simulating contacts",
+    "trimesh": "meshes as indenters",
+    "rtree": "meshes as indenters",
+    "mitsuba": "the Mitsuba presets",
+}
+ADVICE = "Install the extension's zip for this platform, which brings it"
+
+
+def missing(*names: str) -> list[str]:
+    """Which of these modules Blender's Python does not have."""
+    return [name for name in names if importlib.util.find_spec(name) is None]
+
+
+def require(*names: str) -> None:
+    """Raises TactileError naming the modules that are not there."""
+    lacking = missing(*names)
+    if lacking:
+        uses = ", ".join(dict.fromkeys(MODULES[name] for name in lacking))
+        raise TactileError("Tactile", f"{', '.join(lacking)} missing", f"it for {uses}", ADVICE)
+
+
+class Refused(Exception):
+    """An operator has reported why it cannot go on."""
+
+
+@contextmanager
+def reported(operator: bpy.types.Operator) -> Iterator[None]:
+    """Turn TactileError, and a module or a disk that is not there, into an error report and ``Refused``."""
+    try:
+        yield
+    except TactileError as error:
+        text = str(error)
+    except ModuleNotFoundError as error:
+        if error.name not in MODULES:
+            raise
+        text = f"Tactile: {error.name} missing; expected it for {MODULES[error.name]}. {ADVICE}"
+    except OSError as error:
+        text = f"{error.filename or 'Tactile'}: cannot be written or read ({error.strerror or error})"
+    else:
+        return
+    operator.report({"ERROR"}, text)
+    raise Refused(text)
+
+
+class TactileOperator(bpy.types.Operator):
+    """What the add-on's operators share: ``work`` does it, and whatever it cannot do is reported."""
+
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads plain class attributes)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Called by Blender."""
+        try:
+            with reported(self):
+                return self.work(context) or {"FINISHED"}
+        except Refused:
+            return {"CANCELLED"}

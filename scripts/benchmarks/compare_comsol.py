@@ -1,0 +1,44 @@
+"""Hold our BioTac SP against the presses of an independent COMSOL model.
+
+    python scripts/benchmarks/compare_comsol.py FOLDER [--json FILE]
+
+FOLDER holds one folder a press, as ../shared/data/biotac_comsol does. Prints a table; exits 1 when a row misses its
+target, 2 when a file cannot be read. Under a minute a press. Needs the extra [fem].
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
+
+from benchmarks.mechanics.comsol import comsol
+from tactile_core.accuracy import failed
+from tactile_core.errors import TactileError
+from tactile_core.files import atomic
+
+
+def main() -> int:
+    """Run, print, write; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", metavar="FOLDER", type=Path)
+    parser.add_argument("--json", metavar="FILE", type=Path, help="write the rows here")
+    options = parser.parse_args()
+    rows = []
+    try:
+        for found in comsol(options.folder):
+            rows.append(found)
+            cells = [found[key] for key in ("name", "value", "unit", "target", "null", "set", "ok")]
+            print("| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |", flush=True)
+    except TactileError as error:
+        print(error, file=sys.stderr)
+        return 2
+    if options.json:
+        atomic.write_json(options.json, rows)
+    return int(bool(failed(rows)))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

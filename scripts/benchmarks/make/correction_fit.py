@@ -1,0 +1,121 @@
+"""Kernel ridge regression of the correction's forces and fields, on contacts known in both tiers."""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_core.mechanics.fast.correction import (
+    ALL,
+    ESSENTIAL,
+    LINES,
+    MIRRORED,
+    Learned,
+    alike,
+    kernel,
+    rubs,
+    squares,
+)
+
+FIELDS = 32  # learned fields a sensor
+_WIDTHS = 2.0, 4.0, 8.0, 16.0  # of the kernel, in standard deviations of a feature
+# Over the kernel's mean diagonal. With a hundredth of it, contacts unlike those learned from were farther off: a ring
+# without tilt by 25 % of force.
+_RIDGES = 1e-1, 1.0
+MOST = 0.6  # of the logarithm of a force's factor: beyond lie contacts too small for the fast tier's lattice
+WHOLE = np.array([[0.0, 1.0, 1.0]])  # all of what is predicted is trusted
+
+
+class Known(NamedTuple):
+    """Of n samples: features x (n, f), logarithms of the forces' ratios (n,), fields (n, g, 3), folds (n,) and whether
+    they rub (n,)."""
+
+    x: np.ndarray
+    log_ratio: np.ndarray
+    fields: np.ndarray
+    fold: np.ndarray
+    rubbing: np.ndarray
+
+    def some(self, which: np.ndarray) -> Known:
+        """Those of them."""
+        return Known(*(values[which] for values in self))
+
+
+def mirrored(field: np.ndarray) -> np.ndarray:
+    """A field on the grid (..., g, 3) under z -> -z."""
+    grid = field.reshape(*field.shape[:-2], LINES, LINES, 3)[..., :, ::-1, :]
+    return (grid * [1.0, 1.0, -1.0]).reshape(field.shape)
+
+
+class Choice(NamedTuple):
+    """Of a kernel regression: width in standard deviations of a feature, ridge over the kernel's mean diagonal."""
+
+    width: float
+    ridge: float
+
+    def near(self, a: np.ndarray, b: np.ndarray, a_rubs: np.ndarray, b_rubs: np.ndarray) -> np.ndarray:
+        """Kernel (n, m) between scaled features (n, j) and (m, j) of samples that ``rubs`` so."""
+        return kernel(a, b, squares(b), self.width) * alike(a_rubs[:, None], b_rubs)
+
+    def weights(self, scaled: np.ndarray, rubbing: np.ndarray, goals: np.ndarray) -> np.ndarray:
+        """Of supports (n, f), for goals (n, k)."""
+        near = self.near(scaled, scaled, rubbing, rubbing)
+        return np.linalg.solve(near + self.ridge * np.eye(len(near)) * np.trace(near) / len(near), goals)
+
+
+def fit(known: Known, for_force: Choice, by_few: Choice, for_fields: Choice) -> Learned:
+    """Kernel ridge regression on samples and their mirror images."""
+    x = np.concatenate([known.x, known.x * MIRRORED])
+    fields = np.concatenate([known.fields, mirrored(known.fields)])
+    log_ratio = np.clip(np.tile(known.log_ratio, 2), -MOST, MOST)
+    shift, scale = x.mean(axis=0) * (MIRRORED > 0), x.std(axis=0) + 1e-9
+    scaled, rubbing = (x - shift) / scale, rubs(x)
+    flat = fields.reshape(len(fields), -1)
+    _, _, basis = np.linalg.svd(flat, full_matrices=False) if len(flat) < flat.shape[1] else _by_covariance(flat)
+    basis = basis[:FIELDS]
+    few = scaled[:, ESSENTIAL]
+    return Learned(
+        shift, scale, scaled.astype(np.float32), rubbing.astype(np.float32),
+        np.array([for_force.width, by_few.width, for_fields.width]),
+        np.array([for_force.weights(scaled, rubbing, log_ratio), by_few.weights(few, rubbing, log_ratio)]),
+        for_fields.weights(scaled, rubbing, flat @ basis.T).astype(np.float32),
+        basis.reshape(len(basis), LINES * LINES, 3).astype(np.float16), WHOLE,
+    )  # fmt: skip
+
+
+def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
+    values, vectors = np.linalg.eigh(flat.T @ flat)
+    return None, None, vectors[:, np.argsort(values)[::-1]].T
+
+
+def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
+    """What leaves the least error on presses of one kind kept apart, for forces by all features and by the essential
+    ones, whose mean counts, and for fields."""
+    coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
+    forces = np.clip(known.log_ratio, -MOST, MOST)[:, None]
+    every = [Choice(width, ridge) for width in _WIDTHS for ridge in _RIDGES]
+    both = [_left(known, kind, ALL, np.column_stack([forces, coarse]), choice) for choice in every]
+    few = [_left(known, kind, ESSENTIAL, forces, choice) for choice in every]
+    pairs = itertools.product(range(len(every)), repeat=2)
+    one, other = min(pairs, key=lambda pair: _size((both[pair[0]][:, :1] + few[pair[1]]) / 2))
+    fields = min(range(len(every)), key=lambda i: _size(both[i][:, 1:]))
+    return every[one], every[other], every[fields]
+
+
+def _left(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.ndarray, choice: Choice) -> np.ndarray:
+    """Errors (m, k) of goals (n, k) of the samples of one kind in each fold, learned from the rest."""
+    error, rubbing = np.zeros_like(goals), rubs(known.x)
+    for f in np.unique(known.fold):
+        rest, held = known.fold != f, (known.fold == f) & (known.rubbing == kind)
+        scaled = ((known.x - known.x[rest].mean(axis=0)) / (known.x[rest].std(axis=0) + 1e-9))[:, parts]
+        near = choice.near(scaled[held], scaled[rest], rubbing[held], rubbing[rest])
+        error[held] = near @ choice.weights(scaled[rest], rubbing[rest], goals[rest]) - goals[held]
+    return error[known.rubbing == kind]
+
+
+def _size(error: np.ndarray) -> float:
+    """Of errors (m, k): the median and the mean of their root mean squares."""
+    size = np.sqrt((error**2).mean(axis=1))
+    return float(np.median(size) + size.mean())

@@ -1,0 +1,32 @@
+"""Make tactile_core/data/contact_patterns.npy: the electrodes' answer to simulated contacts, which tells polarities.
+
+    python scripts/benchmarks/make/make_contact_patterns.py [WEIGHTS]     of the weights that ship, or of others
+
+The reference signals of the weights, in counts against rest, with the sign of a raw reading (``sensors.COUNT_SIGN``).
+Run it again when the weights were trained anew.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import numpy as np
+
+from tactile_core.files import atomic
+from tactile_core.files.shipped import shipped
+from tactile_core.recordings.polarity import PATTERNS
+from tactile_core.translation import networks, reference_signals
+
+
+def main(arguments: list[str]) -> int:
+    """Write the table; the exit status."""
+    folder = arguments[0] if arguments else networks.WEIGHTS_FOLDER
+    content = io.BytesIO()
+    np.save(content, reference_signals.read(folder).typical.astype(np.float16))
+    atomic.write_bytes(shipped(PATTERNS), content.getvalue())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,112 @@
+"""Make the fast tier's correction: solve a sample of presses in the full tier, learn from them, write one small file.
+
+    python scripts/benchmarks/make/make_correction.py --work DIR [--presses 155] [--rubbing 49] [--seed 0] [--workers 2]
+
+Stop it at any time: presses that are solved stay in DIR and are not solved again. Writes
+tactile_core/data/mechanics_correction.npz and prints how far the corrected fast tier is from the full tier on presses
+kept apart. All presses are solved without friction, the first ones with friction too. Two hours on two cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import logging
+import os
+import pathlib
+import sys
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
+
+from benchmarks.make import learn_correction  # noqa: E402
+from benchmarks.mechanics.random_contacts import random_contacts  # noqa: E402
+from tactile_core.files import atomic  # noqa: E402
+from tactile_core.mechanics.fast import correction  # noqa: E402
+from tactile_core.mechanics.placement import FRICTION  # noqa: E402
+
+SENSORS = "digit", "biotac"
+
+
+def file_of(folder: pathlib.Path, sensor: str, seed: int, number: int, friction: float) -> pathlib.Path:
+    """Where a press's contacts in the full tier are kept."""
+    return folder / f"{sensor}_{seed}_{number:05d}_friction_{friction:g}.npz"
+
+
+def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
+    """Solve one press in the full tier, unless its file is there; returns a line to print."""
+    _, sensor, seed, number, friction = job
+    path = file_of(*job)
+    if path.exists():
+        return f"{path.name}: was there"
+    press = list(random_contacts(number + 1, seed))[-1]
+    found = learn_correction.full_press(sensor, press, friction)
+    with atomic.new_file(path) as partial, open(partial, "wb") as file:
+        np.savez(file, **found)
+    solved = len(found["force"])
+    return f"{path.name}: {press.name}, {solved} of {len(found['depths'])} contacts, {found['seconds'].sum():.1f} s"
+
+
+def wanted_contacts(arguments: argparse.Namespace) -> list[tuple[int, float]]:
+    """Number and friction of each press to solve."""
+    rubbing = [(number, FRICTION) for number in range(min(arguments.rubbing, arguments.presses))]
+    return [(number, 0.0) for number in range(arguments.presses)] + rubbing
+
+
+def learn_all(arguments: argparse.Namespace) -> list[dict]:
+    """Read every solved press, learn both sensors' corrections and write them; returns rows of errors."""
+    rows, arrays = [], {}
+    for sensor in SENSORS:
+        samples, wanted, solved = [], 0, 0
+        presses = list(random_contacts(arguments.presses, arguments.seed))
+        for number, friction in wanted_contacts(arguments):
+            press = presses[number]
+            with np.load(file_of(arguments.work, sensor, arguments.seed, number, friction), allow_pickle=False) as file:
+                full = dict(file)
+            wanted, solved = wanted + len(full["depths"]), solved + len(full["force"])
+            samples += learn_correction.paired(sensor, number, press, friction, full)
+        print(f"{sensor}: {solved} of {wanted} contacts solved in the full tier, {len(samples)} in both", flush=True)
+        learned, found = learn_correction.learn(sensor, samples)
+        rows += found
+        for kind, parts in vars(learned).items():
+            arrays |= {f"{sensor}_{kind}_{name}": values for name, values in vars(parts).items()}
+    path = ROOT / "tactile_core" / "data" / correction.FILE
+    with atomic.new_file(path) as partial, open(partial, "wb") as file:
+        np.savez_compressed(file, **arrays)
+    print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
+    return rows
+
+
+def main() -> int:
+    """Solve, learn, write, report."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
+    parser.add_argument("--presses", type=int, default=155, help="presses a sensor, three contacts each (155)")
+    parser.add_argument("--rubbing", type=int, default=49, help="of them also with friction (49)")
+    parser.add_argument("--seed", type=int, default=0, help="of the presses (0)")
+    parser.add_argument("--workers", type=int, default=2, help="processes (2)")
+    parser.add_argument("--json", type=pathlib.Path, help="write the rows of errors here")
+    arguments = parser.parse_args()
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
+    jobs = [
+        (arguments.work, sensor, arguments.seed, number, friction)
+        for number, friction in wanted_contacts(arguments)
+        for sensor in SENSORS
+    ]
+    with concurrent.futures.ProcessPoolExecutor(arguments.workers) as pool:
+        for done, line in enumerate(pool.map(solve_one, jobs), 1):
+            print(f"{done}/{len(jobs)} {line}", flush=True)
+    rows = learn_all(arguments)
+    for row in rows:
+        print(f"{row['name']}: {row['value']:.3g} {row['unit']} (uncorrected {row['null']:.3g}), {row['set']}")
+    if arguments.json:
+        atomic.write_json(arguments.json, rows)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

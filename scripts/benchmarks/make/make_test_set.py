@@ -1,0 +1,122 @@
+"""Make the test set of the translation networks: paired contacts solved by the full tier on both sensors.
+
+    python3 scripts/benchmarks/make/make_test_set.py --work DIR --out FILE [--presses 210] [--seed 1] [--workers 1]
+
+Stop it at any time: presses that are solved stay in DIR and are not solved again. At its end all presses in DIR are
+merged into FILE, replacing it, with its card beside it; ``--presses 0`` solves none and merges what there is so far.
+Presses with an odd number lie in the region that networks can be kept from. About half a minute a press on one core.
+The set that ships has the presses 0 to 127, 129, and, of box and ring alone, 213:341:8 and 215:343:8.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import os
+import pathlib
+import sys
+import tempfile
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT))
+SCENE = ROOT / "scenes" / "training"
+
+from tactile_core.files import array_pack, atomic  # noqa: E402
+from tactile_core.simulation import full_pairs, pairs_file  # noqa: E402
+from tactile_core.simulation.pairs_card import card, card_path  # noqa: E402
+from tactile_core.simulation.scene import load_scene  # noqa: E402
+
+STEP = 1e-6  # m, of the displacements in the file: 0.3 um rms of rounding, a tenth of the least target of issue 4
+Job = tuple[pathlib.Path, int, int]  # folder, seed, number
+
+
+def file_of(folder: pathlib.Path, seed: int, number: int) -> pathlib.Path:
+    """Where a press's contacts are kept."""
+    return folder / f"press_{seed}_{number:05d}.h5"
+
+
+def solve_one(job: Job) -> str:
+    """Solve one press, unless its file is there; returns a line to print."""
+    path = file_of(*job)
+    if path.exists():
+        return f"{path.name}: was there"
+    scene, _ = load_scene(SCENE)
+    press = full_pairs.draw_press(scene, *job[1:])
+    rows, told = full_pairs.full_rows(scene, press)
+    columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
+    why = np.frombuffer(str(told["lost"]).encode(), np.uint8)
+    array_pack.write(path, {**columns, **told, "lost": why, "count": np.int32(len(rows))})
+    what = f"{scene.indenters[press.which].name} {press.depth * 1e3:.2f} mm, {len(rows)} of {told['wanted']} contacts"
+    return f"{path.name}: {what}, {told['seconds']:.1f} s {told['lost']}"
+
+
+def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
+    """All solved presses of a folder as one file of pairs of the full tier, and its card; returns the card."""
+    files = sorted(folder.glob(f"press_{seed}_*.h5"))
+    counts, wanted, lost = [], 0, {}
+    for path in files:
+        told = array_pack.read(path, names=("count", "wanted", "lost"))
+        counts.append(int(told["count"]))
+        wanted += int(told["wanted"])
+        if len(told["lost"]):
+            lost[path.stem] = told["lost"].tobytes().decode()
+    scene, text = load_scene(SCENE)
+    with atomic.new_file(out) as partial, tempfile.TemporaryDirectory() as scratch:
+        fine = pathlib.Path(scratch) / "fine.h5"
+        pairs_file.merge(files, sum(counts), fine, text, seed, [spec.name for spec in scene.indenters])
+        _coarsen(fine, partial)
+    told = {**card(out), "tier": "full", "contacts_wanted": wanted, "presses_solved": len(files), "lost": lost}
+    atomic.write_json(card_path(out), told)
+    return told
+
+
+def _coarsen(fine: pathlib.Path, out: pathlib.Path) -> None:
+    """The same file in a third of the bytes: displacements in steps of STEP, packed as well as gzip can."""
+    import h5py
+
+    with h5py.File(fine) as source, h5py.File(out, "w") as file:
+        file.attrs.update(source.attrs)
+        file.attrs.update(tier="full", unseen_region_x=full_pairs.REGION_X)
+        for name, data in source.items():
+            values, attributes = data[()], dict(data.attrs)
+            if "scale" in attributes:
+                values = np.rint(values * (attributes["scale"] / STEP)).astype(np.int16)
+                attributes["scale"] = STEP
+            packed = {"chunks": True, "compression": "gzip", "compression_opts": 9, "shuffle": True}
+            file.create_dataset(name, data=values, track_times=False, **packed).attrs.update(attributes)
+
+
+def _numbers(text: str) -> range:
+    """N or FROM:TO:STEP."""
+    return range(*map(int, text.split(":")))
+
+
+def main() -> int:
+    """Solve, merge, report."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
+    parser.add_argument("--out", type=pathlib.Path, required=True, help="the HDF5 file to write")
+    parser.add_argument("--presses", type=_numbers, default=range(210), metavar="N", help="how many presses to solve,"
+                        " three or four contacts each, or FROM:TO:STEP, which ones (210)")  # fmt: skip
+    parser.add_argument("--seed", type=int, default=1, help="of the presses (1; the training pairs have 0)")
+    parser.add_argument("--workers", type=int, default=1, help="processes (1)")
+    arguments = parser.parse_args()
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
+    jobs = [(arguments.work, arguments.seed, number) for number in arguments.presses]
+    with concurrent.futures.ProcessPoolExecutor(arguments.workers) as pool:
+        for done, line in enumerate(pool.map(solve_one, jobs), 1):
+            print(f"{done}/{len(jobs)} {line}", flush=True)
+    told = merge(arguments.work, arguments.seed, arguments.out)
+    print(
+        f"{arguments.out}: {told['contacts']} of {told['contacts_wanted']} contacts, {told['presses_solved']} presses"
+    )
+    for name, why in told["lost"].items():
+        print(f"{name}: {why}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,141 @@
+"""What each part of a simulation, a conversion and a rendering costs, as `tactile plan` reads it.
+
+    python scripts/benchmarks/measure_costs.py                       writes data/costs.json, about five minutes
+    python scripts/benchmarks/measure_costs.py --quick --json FILE   one sensor, and writes rows alone
+
+Each command runs in processes of its own on few and on many frames: what is left at none is its start, the rest is
+each frame's. Times are CPU time of one thread; memory is the peak resident size; sizes are those of the files written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_core.files.shipped import shipped
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
+
+from benchmarks.profile_verbs import RECORDING, Case, run, write_scene
+from tactile_core.accuracy import HEADER, Row, line, row
+from tactile_core.files import atomic, provenance
+from tactile_core.geometry.indenters import Sphere
+from tactile_core.mechanics.placement import Placement
+from tactile_core.simulation.frame_contact import frame_contact
+
+TABLE = shipped("costs.json")
+FEW, MANY = 10, 130  # frames in contact of the two scenes
+FRAMES = 20, 300  # of the two conversions
+SETS = {  # what is added -> the outputs asked for, each beside those before it
+    "digit": "displacement_digit", "biotac": "displacement_biotac", "electrodes": "electrodes",
+    "both": "displacement_biotac,displacement_digit", "all": "electrodes,displacement_biotac,displacement_digit",
+}  # fmt: skip
+
+
+class Part(NamedTuple):
+    """start : s before the first frame; ms : a frame; mb : peak resident; kb : on disk, a frame."""
+
+    start: float
+    ms: float
+    mb: float
+    kb: float
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="the DIGIT alone, and leave the table as it is")
+    parser.add_argument("--json", metavar="FILE", help="write the rows here")
+    options = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        parts = {f"simulate_{each}": simulate(folder, SETS[each]) for each in (["digit"] if options.quick else SETS)}
+        if not options.quick:
+            parts["simulate_nothing"] = simulate(folder, SETS["digit"], force=0.0)
+            parts |= conversions(folder)
+    full = {} if options.quick else full_tier()
+    rows = as_rows(parts, full)
+    print("\n".join([HEADER, *map(line, rows)]))
+    if options.json:
+        atomic.write_json(Path(options.json), rows)
+    if not options.quick:
+        how = "scripts/benchmarks/measure_costs.py: CPU s of one thread, MB resident, kB a frame on disk"
+        named = {name: part._asdict() for name, part in parts.items()}
+        about = {"how": how, "machine": provenance.machine(), "versions": provenance.versions()}
+        atomic.write_json(TABLE, about | {"parts": named, "full_ms": full})
+    return 0
+
+
+def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:
+    """A ball that presses at constant force and moves over the pad, one frame free of it."""
+    return [(0.0, -10.0, -2.0, 0.0), (0.01, -10.0, -2.0, force), (contacts / 100, -6.0, 2.0, force)]
+
+
+def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
+    """A part from what few and many frames cost."""
+    few, many = frames
+    ms = 1e3 * (costs[1].cpu - costs[0].cpu) / (many - few)
+    return Part(max(costs[0].cpu - few * ms / 1e3, 0.0), ms, costs[1].peak, (sizes[1] - sizes[0]) / (many - few) / 1e3)
+
+
+def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
+    """Of `tactile simulate --keep`."""
+    costs, sizes = [], []
+    scene, out = folder / "scene", folder / "out.h5"
+    scene.mkdir(exist_ok=True)
+    for contacts in (FEW, MANY):
+        write_scene(scene, *ball_way(contacts, force))
+        costs.append(run(Case("simulate", f"simulate {scene} --keep {keep} --out {out}"), folder))
+        sizes.append(out.stat().st_size)
+        out.unlink()
+    return between(costs, sizes, (FEW, MANY))
+
+
+def conversions(folder: Path) -> dict[str, Part]:
+    """Of `tactile convert` by what it keeps, and of `tactile render` by the fast preset."""
+    found = {}
+    keeps = "latent", "displacement", "height", "image"
+    words = {f"convert_{keep}": f"convert {RECORDING} --keep {keep}" for keep in keeps}
+    for name, command in (words | {"render_fast": f"render {RECORDING} --preset fast"}).items():
+        costs, sizes = [], []
+        for frames in FRAMES:
+            out = folder / "out"
+            costs.append(run(Case(name, f"{command} --out {out} --frames 40:{40 + frames}"), folder))
+            sizes.append(sum(file.stat().st_size for file in out.rglob("*") if file.is_file()))
+            shutil.rmtree(out)
+        found[name] = between(costs, sizes, FRAMES)
+    return found
+
+
+def full_tier() -> dict[str, float]:
+    """ms a contact of the full tier at a force, by sensor: the median of three forces."""
+    found = {}
+    for sensor in ("biotac", "digit"):
+        times = []
+        for force in (0.1, 0.3, 0.6):
+            began = time.process_time()
+            frame_contact(sensor, Sphere(3.5e-3), Placement(-8e-3, 0.0, 0.0), force, "full")
+            times.append(1e3 * (time.process_time() - began))
+        found[sensor] = float(np.median(times))
+    return found
+
+
+def as_rows(parts: dict[str, Part], full: dict[str, float]) -> list[Row]:
+    """Three rows a part."""
+    rows = []
+    for name, part in parts.items():
+        rows.append(row(f"cost_{name}", part.ms, "ms", of=f"a frame; {part.start:.2f} s before the first"))
+        rows.append(row(f"memory_{name}", part.mb, "MB", of=f"peak resident; {part.kb:.1f} kB a frame on disk"))
+    of = "a contact at a force, without friction"
+    return rows + [row(f"cost_full_{sensor}", ms, "ms", of=of) for sensor, ms in full.items()]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,232 @@
+"""Measure each preset of `tactile render`: its error beside its time, on ten random contact fields.
+
+    python scripts/benchmarks/measure_presets.py                       everything; writes data/optics_presets.json
+    python scripts/benchmarks/measure_presets.py --quick --json FILE   two fields, 240 x 320; writes FILE alone
+
+Errors are grey levels rms over the picture, its channels and the fields, before rounding: `_direct` from converged
+direct light, the others from the full model (the preset `reference`), whose own noise is the difference of two seeds.
+Times are CPU time on one core, so that other programs do not count. Prints a table; exits 1 when an error row misses
+its target. Needs the extras [render] and [fem]; rows of llvm_ad_rgb only where LLVM works.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
+
+from benchmarks.mechanics.random_contacts import DEEPEST as DRAWN_TO
+from benchmarks.mechanics.random_contacts import random_contacts
+from tactile_core.accuracy import HEADER, Row, failed, line, row
+from tactile_core.errors import TactileError
+from tactile_core.files import atomic, provenance
+from tactile_core.mechanics.placement import pose_at
+from tactile_core.mechanics.solve import solve
+from tactile_core.mechanics.thickness import thickness_under
+from tactile_core.pictures.height_map import digit_mapper, of_unit, rest_height_map
+from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR, choose_variant
+from tactile_core.pictures.presets import FAST, NAMES, PRESETS, REFERENCE, TABLE, Preset
+from tactile_core.pictures.renderer import MitsubaLight, Renderer
+from tactile_core.sensors.calibration import Calibration
+from tactile_core.sensors.calibration_file import load_calibration
+
+SEED = 20261122  # of the fields
+FIELDS = 10
+# Depths are drawn evenly up to this share of the gel's thickness: 1.2 mm, as deep as a ball of 6 mm is photographed.
+# Farther down, the walls round a small punch fold over, where a height map is a guess.
+DEEPEST = 0.3
+LARGE = (480, 640)
+# Grey levels and ms on one core that the presets are meant to reach, by variant.
+DIRECT_TARGET = {FAST: 0.5, "standard": 0.6}
+FULL_TARGET = {"quality": 1.0}
+MS_TARGET = {(FAST, None): 8, ("standard", LLVM): 100, ("quality", LLVM): 250, ("standard", SCALAR): 1500}
+QUICK_PASSES = 8  # of the reference in a quick run
+REPEATS = 5  # of a frame whose time is taken
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print, write; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="two fields, the small size")
+    parser.add_argument("--json", metavar="FILE", help="write the rows here")
+    parser.add_argument("--calibration", metavar="FILE", help="another than the shipped one")
+    options = parser.parse_args(arguments)
+    unit = load_calibration(options.calibration)
+    rows = []
+    print(HEADER)
+    for found in measure(unit, 2 if options.quick else FIELDS, options.quick):
+        rows.append(found)
+        print(line(found), flush=True)
+    if options.json:
+        atomic.write_json(Path(options.json), rows)
+    if not options.quick and not options.calibration:
+        atomic.write_json(TABLE, table(rows))
+    for missed in failed(rows):
+        print(f"MISSED: {missed['name']} = {missed['value']}, target {missed['target']}", file=sys.stderr)
+    return int(bool(failed(rows)))
+
+
+def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
+    """All rows; errors are measured with the faster variant, and once between the variants."""
+    heights = fields(unit, count)
+    variants = working_variants()
+    best = variants[0]
+    yield from errors(unit, heights, best, dataclasses.replace(REFERENCE, passes=QUICK_PASSES) if quick else REFERENCE)
+    if len(variants) == 2:
+        yield from agreement(unit, heights[0])
+    for variant in variants:
+        for name in NAMES:
+            slow = name == REFERENCE.name and (quick or variant != best)
+            if not slow and (name != FAST or variant == best):
+                yield speed(unit, name, variant, heights, quick)
+    if not quick:
+        large = unit.at_size(*LARGE)
+        large_heights = fields(large, 2)
+        for name in NAMES[:-1]:
+            yield speed(large, name, best, large_heights, quick)
+
+
+def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
+    """Height maps (H, W) m of random contacts in the picture, up to ``DEEPEST`` deep, solved by the fast tier."""
+    camera, found = unit.camera, []
+    for contact in random_contacts(40 * count, seed):
+        row, column = camera.to_pixel(contact.place.x, contact.place.z)
+        if not (0 <= row < camera.height and 0 <= column < camera.width):
+            continue
+        pose = pose_at("digit", contact.indenter, contact.place)
+        share = contact.depth * DEEPEST / DRAWN_TO
+        depth = share * thickness_under("digit", contact.indenter, pose)
+        displacement = solve("digit", contact.indenter, contact.place, depth=depth).displacement
+        found.append(digit_mapper(camera)(displacement))
+        if len(found) == count:
+            break
+    return found
+
+
+def working_variants() -> list[str]:
+    """The variants that work here, the faster one first."""
+    found = []
+    for variant in (LLVM, SCALAR):
+        try:
+            found.append(choose_variant(variant).name)
+        except TactileError as trouble:
+            print(f"{variant}: {trouble}", file=sys.stderr)
+    return found
+
+
+def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset) -> Iterator[Row]:
+    """Rows of every preset's error, from converged direct light and from the full model; null: the background alone."""
+    renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
+    of, levels = f"{len(heights)} fields", renderers[FAST].in_levels
+    changes = {
+        name: [levels(renderer.radiance(height) - renderer.rest_radiance) for height in heights]
+        for name, renderer in renderers.items()
+    }
+    converged, full = zip(*converge(unit, heights, variant, truth, seed=0, levels=levels), strict=True)
+    for name, change in changes.items():
+        yield row(f"{name}_error_direct", rms(change, converged), "levels", DIRECT_TARGET.get(name),
+                  null=rms(converged), of=of)  # fmt: skip
+        yield row(f"{name}_error", rms(change, full), "levels", FULL_TARGET.get(name), null=rms(full), of=of)
+    _, other = zip(*converge(unit, heights[:2], variant, truth, seed=1, levels=levels), strict=True)
+    noise = rms(other, full[:2]) / np.sqrt(2)
+    target = 0.1 if truth is REFERENCE else None
+    yield row(f"{REFERENCE.name}_error", noise, "levels", target, null=rms(full[:2]),
+              of=f"noise: two seeds, 2 fields, {truth.passes} passes")  # fmt: skip
+
+
+def converge(
+    unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int, levels: Callable
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Change of the picture of each field, grey levels (H, W, 3): by direct light alone, and by the full model."""
+    rest = of_unit(rest_height_map(unit.camera), unit)
+    light = MitsubaLight(unit, truth, variant, rest, seed)
+    resting, seen = light.direct(rest)
+    whole = light.completed(rest, resting, seen)
+    for number, height in enumerate(heights, 1):
+        height = of_unit(height, unit)
+        direct, seen = light.direct(height)
+        yield levels(direct - resting), levels(light.completed(height, direct, seen) - whole)
+        print(f"reference, seed {seed}: {number} of {len(heights)}", file=sys.stderr)
+
+
+def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> float:
+    """Root mean square of all numbers, or of their differences."""
+    difference = np.asarray(pictures) - (0 if others is None else np.asarray(others))
+    return float(np.sqrt(np.mean(np.square(difference, dtype=float))))
+
+
+def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
+    """How far the two variants' pictures differ."""
+    for name in ("standard", "quality"):
+        one, other = (Renderer(unit, name, variant) for variant in (LLVM, SCALAR))
+        difference = one.in_levels(one.radiance(height) - other.radiance(height))
+        yield row(f"{name}_variants_differ", rms([difference]), "levels", 0.02, of="rms, one field")
+
+
+def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray], quick: bool) -> Row:
+    """CPU ms of a frame on one thread, after one that compiles: the median over fields of the best of a few."""
+    one_thread(variant)
+    renderer = Renderer(unit, name, None if name == FAST else variant)
+    slow = name == REFERENCE.name
+    if not slow:
+        renderer(heights[0])
+    spent = [best_ms(renderer, height, 1 if slow else REPEATS) for height in heights[: 1 if slow or quick else None]]
+    small = unit.camera.width == 240
+    target = MS_TARGET.get((name, None if name == FAST else variant)) if small else None
+    label = "numpy" if name == FAST else variant
+    size = f"{unit.camera.width}x{unit.camera.height}"
+    return row(f"{name}_{label}_{size}_ms", float(np.median(spent)), "ms", target, of=f"{size}, one core, CPU time")
+
+
+def best_ms(renderer: Renderer, height: np.ndarray, repeats: int) -> float:
+    """Least CPU time: other programs on the machine make it longer, through caches that they empty."""
+    spent = []
+    for _ in range(repeats):
+        start = time.process_time()
+        renderer(height)
+        spent.append(1e3 * (time.process_time() - start))
+    return min(spent)
+
+
+def one_thread(variant: str) -> None:
+    """As the targets are for one core."""
+    if variant == LLVM:
+        import drjit
+        import mitsuba
+
+        mitsuba.set_variant(LLVM)
+        drjit.set_thread_count(1)
+
+
+def table(rows: list[Row]) -> dict:
+    """The data file of the presets: what was measured, by preset."""
+    value = {found["name"]: found["value"] for found in rows}
+    presets = {}
+    for name in NAMES:
+        times = {label: value.get(f"{name}_{label}_240x320_ms") for label in ("numpy", LLVM, SCALAR)}
+        large = {label: value.get(f"{name}_{label}_480x640_ms") for label in ("numpy", LLVM)}
+        presets[name] = {
+            "error": value[f"{name}_error"],
+            "error_direct": value.get(f"{name}_error_direct"),
+            "ms": {label: ms for label, ms in times.items() if ms is not None},
+            "ms_480x640": {label: ms for label, ms in large.items() if ms is not None},
+            "says": PRESETS[name].says if name in PRESETS else "direct light, soft shadows on a height field, numpy",
+        }
+    import drjit
+    import mitsuba
+
+    versions = provenance.versions() | {"mitsuba": mitsuba.__version__, "drjit": drjit.__version__}
+    how = "scripts/benchmarks/measure_presets.py: grey levels rms on ten random contact fields; CPU ms a frame, "
+    how += "one core"
+    return {"how": how, "machine": provenance.machine(), "presets": presets, "versions": versions}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

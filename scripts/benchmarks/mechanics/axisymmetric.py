@@ -1,0 +1,153 @@
+"""The reference tier's solid with axial symmetry: the same material and contact on a mesh of the half plane.
+
+Quadratic quadrilaterals with a linear discontinuous pressure a cell. Coordinates (x, y, z) = (radius, axis, hoop).
+A node keeps three degrees of freedom, of which the hoop's is fixed, so that ``newton.FiniteStrainContact`` takes this
+solid as it takes the one in space. Forces and energies are those of the whole turn.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from tactile_core.mechanics.solids.block_pattern import BlockPattern
+from tactile_core.mechanics.solids.elasticity import quadratic
+from tactile_core.mechanics.solids.finite_strain import Linearised, State
+from tactile_core.mechanics.solids.neo_hookean import Law
+
+_POINT, _WEIGHT = np.polynomial.legendre.leggauss(3)
+_ENTRIES = [0, 1, 3, 4, 8]  # of F (3, 3) as 9 numbers: those that axial symmetry leaves
+
+
+@dataclasses.dataclass(frozen=True)
+class QuadMesh:
+    """nodes : (n, 3) m, x >= 0 and z = 0; cells : (n_cells, 9), node a + 3 b at (xi, eta) = (a, b) - 1
+
+    clamped : (n,) bool; surface : (k,) nodes of the free side, outward
+    """
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    clamped: np.ndarray
+    surface: np.ndarray
+
+    @property
+    def fixed(self) -> np.ndarray:
+        """(3 n,) bool: clamped nodes, the hoop, and the radius on the axis."""
+        fixed = np.repeat(self.clamped, 3).reshape(-1, 3)
+        fixed[:, 2] = True
+        fixed[self.nodes[:, 0] == 0, 0] = True
+        return fixed.ravel()
+
+
+def disc(radii: np.ndarray, heights: np.ndarray) -> QuadMesh:
+    """A disc bonded at y = 0 with its free side toward -y.
+
+    radii, heights : m, from 0, both of odd length
+    The second node of a row is moved outward by a tenth of its step: were it in the middle of its cell, a constant
+    pressure would put no force on the node of the axis, contact would lose that node, and the cell would buckle.
+    """
+    radii = np.r_[radii[0], 1.1 * radii[1], radii[2:]]
+    nodes = np.zeros((len(radii), len(heights), 3))
+    nodes[..., 0], nodes[..., 1] = radii[:, None], -heights
+    ids = np.arange(nodes[..., 0].size).reshape(nodes.shape[:2])
+    up = ids[:, ::-1]
+    cells = [up[a : up.shape[0] - 2 + a : 2, b : up.shape[1] - 2 + b : 2] for b in range(3) for a in range(3)]
+    clamped = np.zeros(ids.size, bool)
+    clamped[ids[:, 0]] = True
+    return QuadMesh(nodes.reshape(-1, 3), np.stack(cells, -1).reshape(-1, 9), clamped, ids[:, -1])
+
+
+def graded(even: float, spacing: float, end: float, growth: float) -> np.ndarray:
+    """Node places (odd count) from 0: ``spacing`` apart up to ``even``, then steps growing by ``growth`` to ``end``."""
+    inside = np.linspace(0, even, 2 * max(round(even / spacing / 2), 1) + 1)
+    steps = [spacing * growth]
+    while sum(steps) < end - even:
+        steps.append(steps[-1] * growth)
+    steps += [steps[-1] * growth] * (len(steps) % 2)
+    outside = even + np.cumsum(steps) * (end - even) / sum(steps)
+    return np.r_[inside, outside]
+
+
+class AxisymmetricSolid:
+    """Residual and tangent of a ``QuadMesh`` of one material; the counterpart of ``FiniteStrainSolid``."""
+
+    def __init__(self, mesh: QuadMesh, law: Law) -> None:
+        self.mesh, self.law = mesh, law
+        points, weights, shape, slopes = _reference()
+        corners = mesh.nodes[mesh.cells][..., :2]
+        jacobian = np.einsum("qak,ead->eqkd", slopes, corners)
+        radius = np.einsum("qa,ea->eq", shape, corners[..., 0])
+        self.weight = 2 * np.pi * radius * weights * np.linalg.det(jacobian)
+        if not (self.weight > 0).all():
+            raise ValueError("the mesh holds cells that are turned inside out")
+        gradient = np.einsum("qak,eqdk->eqad", slopes, np.linalg.inv(jacobian))
+        n, q = self.weight.shape
+        self.strain = np.zeros((n, q, 5, 9, 3))  # d(entries of F) / d(node, axis)
+        self.strain[:, :, 0, :, 0], self.strain[:, :, 1, :, 0] = gradient[..., 0], gradient[..., 1]
+        self.strain[:, :, 2, :, 1], self.strain[:, :, 3, :, 1] = gradient[..., 0], gradient[..., 1]
+        self.strain[:, :, 4, :, 0] = shape / radius[..., None]
+        self.strain = self.strain.reshape(n, q, 5, 27)
+        self.linear = np.column_stack([np.ones(len(points)), points])
+        self.mass = np.einsum("eq,qp,qr->epr", self.weight, self.linear, self.linear) / law.bulk
+        self.dofs = (3 * mesh.cells[..., None] + np.arange(3)).reshape(n, 27)
+        self.pattern = BlockPattern(mesh.cells, mesh.clamped)
+
+    def rest(self) -> State:
+        """No displacement, no pressure."""
+        return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 3)))
+
+    def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Deformation gradient F (n_cells, 9, 3, 3) and its determinant J (n_cells, 9)."""
+        f, change = self._deformation(displacement)
+        return f, 1 + change
+
+    def _deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """F and the volume change J - 1.
+
+        J - 1 is summed from F - 1, not from J: a bulk modulus a million times the shear's would show its rounding.
+        """
+        h = np.einsum("eqci,ei->eqc", self.strain, displacement.ravel()[self.dofs], optimize=True)
+        rr, ra, ar, aa, hoop = np.moveaxis(h, -1, 0)
+        plane = rr + aa + rr * aa - ra * ar
+        f = np.zeros((*self.weight.shape, 9))
+        f[..., _ENTRIES] = h
+        return f.reshape(*self.weight.shape, 3, 3) + np.eye(3), plane + hoop + plane * hoop
+
+    def energy(self, state: State) -> float:
+        """Stored elastic energy, J."""
+        f, change = self._deformation(state.displacement)
+        p = state.pressure @ self.linear.T
+        density = self.law.energy(f, 1 + change) + p * change - p**2 / (2 * self.law.bulk)
+        return float((density * self.weight).sum())
+
+    def linearise(self, state: State) -> Linearised:
+        """Residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
+        f, change = self._deformation(state.displacement)
+        j = 1 + change
+        if not (j > 0).all():
+            raise FloatingPointError("a cell is turned inside out")
+        stress, tangent = self.law.stress_tangent(f, j, state.pressure @ self.linear.T)
+        cofactor = j[..., None, None] * np.linalg.inv(f).swapaxes(-1, -2)
+        tangent = tangent.reshape(*j.shape, 9, 9)[..., _ENTRIES, :][..., _ENTRIES]
+        stress, cofactor = (values.reshape(*j.shape, 9)[..., _ENTRIES] for values in (stress, cofactor))
+        weighted = self.strain * self.weight[..., None, None]
+        residual = np.einsum("eqci,eqc->ei", weighted, stress, optimize=True)
+        couple = np.einsum("eqi,qp->epi", np.einsum("eqci,eqc->eqi", weighted, cofactor, optimize=True), self.linear)
+        stiffness = (weighted.swapaxes(2, 3) @ (tangent @ self.strain)).sum(1)
+        gap = (self.weight * change) @ self.linear - np.einsum("epr,er->ep", self.mass, state.pressure)
+        to_pressure = np.linalg.solve(self.mass, couple)
+        pressure_gap = np.linalg.solve(self.mass, gap[..., None])[..., 0]
+        stiffness += couple.swapaxes(1, 2) @ to_pressure
+        condensed = residual + np.einsum("epi,ep->ei", couple, pressure_gap)
+        by_block = stiffness.reshape(len(j), 9, 3, 9, 3).swapaxes(3, 4)
+        return Linearised(self, residual, condensed, by_block, to_pressure, pressure_gap)
+
+
+def _reference() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Gauss points (9, 2), weights (9,), shape functions (9, 9) and slopes (9, 9, 2) in the reference square."""
+    xi, eta = (axis.ravel() for axis in np.meshgrid(_POINT, _POINT, indexing="ij"))
+    (fx, dx), (fy, dy) = (quadratic(t) for t in (xi, eta))
+    shape, along, across = (np.einsum("qa,qb->qba", x, y).reshape(9, 9) for x, y in ((fx, fy), (dx, fy), (fx, dy)))
+    return np.column_stack([xi, eta]), np.outer(_WEIGHT, _WEIGHT).ravel(), shape, np.stack([along, across], -1)

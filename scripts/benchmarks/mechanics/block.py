@@ -1,0 +1,48 @@
+"""A block of brick cells, and its equilibrium where the boundary is given: what small checks are made of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, State
+from tactile_core.mechanics.solids.hex_mesh import HexMesh, hex_cells
+from tactile_core.mechanics.solids.sparse_cholesky import factor
+
+_MAX_ITERATIONS = 30
+_SETTLED = 1e-15  # of the block's size: rounding
+
+
+def block(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> HexMesh:
+    """Node planes x, z (m) and y (m, falling from the clamped back to the surface); odd counts."""
+    grid = np.stack(np.meshgrid(x, z, y, indexing="ij"), -1)[..., [0, 2, 1]]
+    ids = np.arange(grid[..., 0].size).reshape(grid.shape[:-1])
+    clamped = np.zeros(ids.size, bool)
+    clamped[ids[..., 0]] = True
+    return HexMesh(grid.reshape(-1, 3), hex_cells(ids), clamped, ids[..., -1].ravel(), np.empty(0, int))
+
+
+def inside(mesh: HexMesh) -> np.ndarray:
+    """(n,) bool, nodes of a block that do not lie on its sides."""
+    low, high = mesh.nodes.min(0), mesh.nodes.max(0)
+    margin = 1e-6 * (high - low)
+    return ((mesh.nodes > low + margin) & (mesh.nodes < high - margin)).all(1)
+
+
+def equilibrium(solid: FiniteStrainSolid, start: State, free: np.ndarray, load: np.ndarray | None = None) -> State:
+    """The state in which forces on ``free`` (n,) nodes are ``load`` (3 n,) N; other nodes stay as in ``start``.
+
+    Raises ArithmeticError where Newton's method does not settle.
+    """
+    state, loose = start.copy(), np.repeat(free, 3)
+    size = np.ptp(solid.mesh.nodes, axis=0).max()
+    for _ in range(_MAX_ITERATIONS):
+        lines = solid.linearise(state)
+        force = lines.internal_force() - (0 if load is None else load)
+        step = np.zeros(force.size)
+        matrix = lines.matrix()[loose][:, loose].tocsc()
+        step[loose] = factor(matrix)(-force[loose, None])[:, 0]
+        state.displacement += step.reshape(-1, 3)
+        state.pressure += lines.pressure_step(step.reshape(-1, 3))
+        if np.abs(step).max() < _SETTLED * size:
+            return state
+    raise ArithmeticError(f"no equilibrium after {_MAX_ITERATIONS} iterations")

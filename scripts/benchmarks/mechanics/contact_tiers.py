@@ -1,0 +1,108 @@
+"""How far each tier of contact mechanics is from a finer one, contact by contact, and as a table by depth."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_core import accuracy, sensors
+from tactile_core.mechanics.fast.compliance import compliance_of
+from tactile_core.mechanics.fast.press import CorrectedPress
+from tactile_core.mechanics.first_touch import fall
+from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.solve import Sensor, Solution, Step, Tier, solve_path
+from tactile_core.mechanics.thickness import DEPTH_LIMIT, depth_at, thickness_under
+from tactile_core.simulation.pairs_file import Pairs
+from tactile_core.simulation.scene import Scene
+from tactile_core.training.step_errors import true_displacement
+
+from .random_contacts import DEEPEST, RandomContact, random_contacts
+
+SENSORS: tuple[Sensor, ...] = ("digit", "biotac")
+_ALMOST = 0.999  # of the greatest depth: a rounding beyond it is refused
+Bin = dict[str, float | int]
+
+
+@dataclass(frozen=True)
+class Miss:
+    """How far one contact is from the truth at the same depth.
+
+    press : of contacts that follow each other, none in two; share : depth from first touch over the thickness there
+    shape : rms m over nodes that truly move more than 10 um; force : relative; null : rms m of no displacement
+    """
+
+    press: int
+    share: float
+    shape: float
+    force: float
+    null: float
+
+
+def miss(press: int, share: float, found: np.ndarray, force: float, true: np.ndarray, true_force: float) -> Miss:
+    """Of displacements (n, 3) m and forces N."""
+    error, null = (float(accuracy.rms_in_contact(moved[None], true[None])[0]) for moved in (found, np.zeros_like(true)))
+    return Miss(press, share, error, abs(force / true_force - 1), null)
+
+
+def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
+    """The fast tier at the depths of a scene's contacts that the full tier solved with friction, where it settles."""
+    for press in np.unique(pairs.press):
+        rows = np.flatnonzero(pairs.press == press)
+        indenter = scene.indenters[int(pairs.indenter[rows[0]])].build()
+        place = Placement(*map(float, pairs.place[rows[0]]))
+        pose, turned = pose_at(sensor, indenter, place), pose_at("biotac", indenter, place)
+        limit, thick = depth_at(DEPTH_LIMIT, sensor, indenter, pose), thickness_under(sensor, indenter, pose)
+        fast = CorrectedPress(compliance_of(sensor), indenter, pose, limit, scene.pairs.friction)
+        for row in rows:
+            slid = pose.slid(*map(float, pairs.slide[row]))
+            found = fast.at_depth(float(getattr(pairs, f"depth_{sensor}")[row]), slid)
+            if found.linear.converged:
+                true = true_displacement(pairs, sensor, np.array([row]))[0]
+                along = float(pairs.force[row] @ turned.direction)  # the same on both sensors
+                share = (found.linear.depth - fall(sensors.sensor_surface(sensor), indenter, pose, slid)) / thick
+                yield miss(int(press), share, found.corrected.displacement, found.axial_force, true, along)
+
+
+def drawn(count: int, seed: int) -> list[RandomContact]:
+    """Random contacts, depths even up to the greatest that mechanics is asked for."""
+    return list(random_contacts(count, seed))
+
+
+def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution, float, float]:
+    """A contact from rest, without friction, with its depth over the thickness and the CPU seconds it took.
+
+    Raises TactileError where the tier finds none.
+    """
+    pose = pose_at(sensor, contact.indenter, contact.place)
+    share = contact.depth / DEEPEST * DEPTH_LIMIT * _ALMOST
+    depth, thick = depth_at(share, sensor, contact.indenter, pose), thickness_under(sensor, contact.indenter, pose)
+    began = time.process_time()
+    found = next(solve_path(sensor, contact.indenter, contact.place, [Step(depth)], tier, 0.0))
+    return found, depth / thick, time.process_time() - began
+
+
+def by_depth(misses: Iterable[Miss], edges: Sequence[float]) -> list[Bin]:
+    """Median and 95 % of the errors in bins of depth over thickness with these upper ends; bins without are left out.
+
+    shape_um, force : rms um and relative, the median; shape_95_um, force_95 : 95 of 100 contacts have less
+    """
+    misses, found = list(misses), []
+    for low, high in itertools.pairwise((0.0, *edges)):
+        here = [each for each in misses if low < each.share <= high]
+        if here:
+            shape, force = ([getattr(each, name) for each in here] for name in ("shape", "force"))
+            found.append({
+                "depth_share_to": high, "contacts": len(here),
+                "shape_um": _digits(1e6 * np.median(shape)), "shape_95_um": _digits(1e6 * np.quantile(shape, 0.95)),
+                "force": _digits(np.median(force)), "force_95": _digits(np.quantile(force, 0.95)),
+                "null_um": _digits(1e6 * np.median([each.null for each in here])),
+            })  # fmt: skip
+    return found
+
+
+def _digits(value: float) -> float:
+    return float(f"{value:.4g}")

@@ -1,0 +1,119 @@
+"""The golden forces of mechanics.md: a ball of 3.5 mm on a bonded layer of 3 mm, down to 60 % of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from tactile_core import accuracy
+from tactile_core.accuracy import Row, order, row
+from tactile_core.geometry.indenters import Sphere, pose_on
+from tactile_core.mechanics.finite_strain.contact_state import ContactState
+from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
+from tactile_core.sensors import Material
+
+from .bonded_layer import GOLDEN_BALL, GOLDEN_FORCE, GOLDEN_RADIUS, GOLDEN_THICKNESS, quarter_disc
+from .pressed_disc import disc_mesh, pressed
+
+TARGET = 0.5  # percent, issue MECHANICS
+MATERIAL = Material(1e6, 0.49)
+_REACH = 4e-3  # m; the contact of 1.8 mm depth ends at 2.5 mm
+_STEP = 0.2e-3  # m
+# node intervals inside and outside of the even part, its side in m, layers from the back, depths in m
+_QUARTERS = (
+    ((16, 12), 1.6e-3, [0, 0.3, 0.55, 0.75, 0.87, 0.935, 1], [0.2e-3]),
+    ((20, 8), 4.0e-3, [0, 0.2, 0.4, 0.575, 0.75, 0.825, 0.9, 0.95, 1], [0.6e-3, 1.0e-3, 1.4e-3, 1.8e-3]),
+)
+
+
+def disc(spacing: float) -> FiniteStrainContact:
+    """The contact of mechanics.md with nodes ``spacing`` m apart near it."""
+    mesh = disc_mesh(GOLDEN_RADIUS, GOLDEN_THICKNESS, _REACH, spacing, 0.4e-3)
+    return pressed(mesh, MATERIAL, Sphere(GOLDEN_BALL), _REACH)
+
+
+def path(contact: FiniteStrainContact) -> Iterator[ContactState]:
+    """Touches at the depths of the golden forces."""
+    touch = None
+    for depth in GOLDEN_FORCE:
+        touch = contact.press(depth, touch, _STEP)
+        yield touch
+
+
+def rows(quick: bool) -> Iterator[Row]:
+    """Error of each force at 0.05 mm."""
+    started = time.perf_counter()
+    of = "axisymmetric, nodes 0.05 mm apart"
+    contact = disc(0.05e-3)
+    for touch in path(contact):
+        error = 100 * (touch.force[1] / GOLDEN_FORCE[touch.depth] - 1)
+        yield row(f"golden_force_{touch.depth * 1e3:.1f}mm_error", error, "percent", TARGET, null=-100.0, of=of)
+    quality = float(contact.solid.deformation(touch.state.displacement)[1].min())
+    yield row("golden_smallest_volume_ratio_1.8mm", quality, "1", 0.5, of=of, at_least=True)
+    yield row("golden_time", time.perf_counter() - started, "s", of="five depths")
+    if not quick:
+        yield from refinement()
+        yield from in_space()
+
+
+def in_space() -> Iterator[Row]:
+    """The production cell, on quarter discs: a finer one for the smallest contact."""
+    for (inside, outside), side, layers, depths in _QUARTERS:
+        mesh, fixed = quarter_disc(GOLDEN_RADIUS, GOLDEN_THICKNESS, side, (inside, outside), np.array(layers))
+        ball = Sphere(GOLDEN_BALL)
+        pose = pose_on(ball, np.array([0, -GOLDEN_THICKNESS, 0]), np.array([0, -1.0, 0]))
+        near = np.hypot(*mesh.nodes[mesh.surface][:, [0, 2]].T) < side
+        contact = FiniteStrainContact(
+            FiniteStrainSolid(mesh, MATERIAL), mesh.surface[near], ball, pose, fixed=fixed
+        )  # fmt: skip
+        touch, of = None, f"quarter disc in space, nodes {1e3 * side / inside:.1f} mm apart"
+        for depth in depths:
+            started = time.perf_counter()
+            touch = contact.press(depth, touch, step=0.2e-3)
+            error = 100 * (4 * touch.force[1] / GOLDEN_FORCE[depth] - 1)
+            name = f"golden_quarter_{depth * 1e3:.1f}mm"
+            yield row(f"{name}_error", error, "percent", TARGET, null=-100.0, of=of)
+            yield row(f"{name}_time", time.perf_counter() - started, "s", of=of)
+
+
+def refinement() -> Iterator[Row]:
+    """Force and surface against a mesh of half the spacing, and the orders that follow."""
+    spacings = [0.4e-3, 0.2e-3, 0.1e-3, 0.05e-3]
+    finest = disc(0.025e-3)
+    exact = list(path(finest))
+    errors: dict[str, list[float]] = {"force": [], "shape": []}
+    for spacing in spacings:
+        contact = disc(spacing)
+        of = f"nodes {spacing * 1e3:g} mm apart, against 0.025 mm"
+        found = list(path(contact))
+        for index in (1, 3):
+            force = 100 * (found[index].force[1] / exact[index].force[1] - 1)
+            depth = f"{found[index].depth * 1e3:.1f}mm"
+            yield row(f"disc_force_error_{depth}_{spacing * 1e3:g}", force, "percent", of=of)
+            shape, largest = _shape(contact, found[index], finest, exact[index])
+            yield row(f"disc_shape_rms_{depth}_{spacing * 1e3:g}", 1e6 * shape, "um", of=of)
+            yield row(f"disc_shape_max_{depth}_{spacing * 1e3:g}", 1e6 * largest, "um", of=of)
+        errors["force"].append(abs(force))
+        errors["shape"].append(shape)
+    for name, values in errors.items():
+        # the contact's edge falls between nodes: the first order in the spacing is certain, the second usual
+        yield row(f"disc_{name}_order", order(spacings, values), "1", 1.0, of="1.4 mm deep", at_least=True)
+
+
+def _shape(
+    contact: FiniteStrainContact, touch: ContactState, finer: FiniteStrainContact, exact: ContactState
+) -> tuple[float, float]:
+    """Vector rms over surface nodes that move more than 10 um, and the maximum, m."""
+    import scipy.interpolate
+
+    def moved(of: FiniteStrainContact, at: ContactState):  # noqa: ANN202
+        surface = of.solid.mesh.surface
+        return of.solid.mesh.nodes[surface, 0], at.state.displacement[surface]
+
+    radii, displacement = moved(contact, touch)
+    truth = scipy.interpolate.CubicSpline(*moved(finer, exact))(radii)
+    pair = displacement[None], truth[None]
+    return float(accuracy.rms_in_contact(*pair)[0]), float(accuracy.max_error(*pair)[0])

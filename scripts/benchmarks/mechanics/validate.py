@@ -1,0 +1,110 @@
+"""Hold contact mechanics against known answers, and its fast tier against its reference tier.
+
+    python scripts/validate_mechanics.py                       every row; docs/mechanics.md and its plots
+    python scripts/validate_mechanics.py --quick --json FILE   under five minutes; writes FILE alone
+    python scripts/validate_mechanics.py --only hertz golden   some checks; writes no report
+
+Prints a table as it goes; exits 1 when an error row misses its target. Needs the extra [fem]; scikit-fem for `oracle`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from benchmarks.mechanics import (
+    comsol,
+    electrode_law,
+    fluid,
+    golden,
+    hertz,
+    incompressible,
+    layers,
+    manufactured,
+    many,
+    oracle,
+    patch,
+    public_mesh,
+    symmetry,
+    tiers,
+    work,
+)
+from benchmarks.mechanics.report import write
+from benchmarks.translation import rest_impedance
+from tactile_core.accuracy import HEADER, Row, failed, line
+from tactile_core.accuracy import row as make_row
+from tactile_core.files import atomic
+
+ROOT = Path(__file__).resolve().parents[3]
+REPORT = ROOT / "docs" / "mechanics.md"
+DATA = Path(os.environ.get("TACTILE_TEST_DATA") or ROOT.parent / "shared" / "data")  # outside data, where it is present
+
+# name -> function(quick) that yields rows, and what it shows, for the report
+CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
+    "patch": (patch.rows, "Patch test: distorted cells reproduce an affine deformation, small and finite"),
+    "order": (manufactured.rows, "Order of accuracy on a manufactured finite deformation (theory: 3 and 2)"),
+    "oracle": (oracle.rows, "scikit-fem as oracle: the same equations assembled by another library"),
+    "golden": (golden.rows, "Golden forces: a ball of 3.5 mm on a bonded layer of 3 mm, to 60 % of its thickness"),
+    "hertz": (hertz.rows, "Hertz: a small contact on a deep block"),
+    "layers": (layers.rows, "Bonded layers: Dimitriadis's formula, the exact solution, the thin incompressible limit"),
+    "work": (work.rows, "The indenter's work is the stored energy, and comes back"),
+    "symmetry": (symmetry.rows, "Turned and mirrored sensors give the turned and mirrored answer"),
+    "fluid": (fluid.rows, "The fluid keeps its volume"),
+    "incompressible": (incompressible.rows, "Poisson's ratio up to .4999"),
+    "electrodes": (
+        lambda quick: electrode_law.electrode_rows(*((40,) if quick else ()), each=not quick),
+        "The electrodes' gap law against the thin-sheet solve",
+    ),
+    "rest_impedance": (
+        lambda quick: rest_impedance.rows(quick, DATA),
+        "Electrodes of two real fingers at rest, by models of the film (needs the outside data)",
+    ),
+    "public_mesh": (
+        lambda quick: public_mesh.rows(quick, DATA),
+        "Isaac-like settings on the public meshes against our own model (needs the outside data)",
+    ),
+    "comsol": (lambda quick: comsol.rows(quick, DATA), "COMSOL's presses of a BioTac SP (needs the outside data)"),
+    "many": (many.rows, "Random contacts of nine indenters: how many settle in the fast tier, and how long one takes"),
+    "tiers": (tiers.rows, "The fast and the full tier against the reference tier: error beside time"),
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run, print, write; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer depths and meshes")
+    parser.add_argument("--json", metavar="FILE", help="write the rows here")
+    parser.add_argument("--only", nargs="+", choices=CHECKS, metavar="CHECK", help=f"of {', '.join(CHECKS)}")
+    options = parser.parse_args(arguments)
+    found: dict[str, list[Row]] = {}
+    print(HEADER)
+    for name in options.only or CHECKS:
+        started = time.perf_counter()
+        print(f"{name} ...", file=sys.stderr, flush=True)
+        found[name] = []
+        for row in measured(name, options.quick):
+            found[name].append(row)
+            print(line(row), flush=True)
+        print(f"{name}: {time.perf_counter() - started:.0f} s", file=sys.stderr, flush=True)
+    rows = [row for part in found.values() for row in part]
+    if options.json:
+        atomic.write_json(Path(options.json), rows)
+    if not options.quick and not options.only:
+        write(REPORT, {CHECKS[name][1]: part for name, part in found.items()})
+    for row in failed(rows):
+        print(f"MISSED: {row['name']} = {row['value']} {row['unit']}, target {row['target']}", file=sys.stderr)
+    return int(bool(failed(rows)))
+
+
+def measured(name: str, quick: bool) -> Iterator[Row]:
+    """Rows of a check; one that breaks off ends with a row that says so, and the others go on."""
+    try:
+        yield from CHECKS[name][0](quick)
+    except Exception:
+        traceback.print_exc()
+        yield make_row(f"{name}_completed", 0, "1", 1, of="broke off, see the error", at_least=True)

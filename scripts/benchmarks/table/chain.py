@@ -1,0 +1,76 @@
+"""The whole chain, from signals to pictures: against the reference picture of the true deformation."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from benchmarks.measure_presets import QUICK_PASSES, one_thread, rms
+from benchmarks.translation.noise import as_read
+from benchmarks.translation.test_set import SEED
+from tactile_core.jobs.frame_pass import CHUNK
+from tactile_core.pictures.height_map import digit_mapper, of_unit, rest_height_map
+from tactile_core.pictures.mitsuba.variant import choose_variant
+from tactile_core.pictures.presets import FAST, REFERENCE
+from tactile_core.pictures.renderer import MitsubaLight, Renderer
+from tactile_core.sensors.calibration_file import load_calibration
+from tactile_core.simulation.pairs_file import Pairs, read_pairs
+from tactile_core.training.step_errors import true_displacement
+from tactile_core.translation.translate import load_translator
+
+from .method import TEST_SET, Method, best_ms, peak_mb
+from .translation import plain_signals
+
+NAMES = ("truth", FAST, "standard", "quality")
+CONTACTS, QUICK_CONTACTS = 8, 3
+PASSES = 16  # of the reference: its noise, 0.12 levels, is far below what is measured here
+LEAST = 0.1e-3  # m, that a contact moves the gel: lighter ones are hardly seen
+SEED_OF_CONTACTS = 5
+
+
+def measure(name: str, quick: bool, truth: str) -> Method | None:
+    """Signals of test contacts to pictures by one preset; ``truth`` makes what the others are held against.
+
+    Raises ModuleNotFoundError where mitsuba is missing.
+    """
+    unit, pairs = load_calibration(), _contacts(QUICK_CONTACTS if quick else CONTACTS)
+    mapper = digit_mapper(unit.camera)
+    if name == "truth":
+        _draw_truth(unit, mapper, pairs, QUICK_PASSES if quick else PASSES, truth)
+        return None
+    translator, renderer = load_translator(), Renderer(unit, name)
+    if renderer.variant:
+        one_thread(renderer.variant)
+    change = as_read(pairs.signal, SEED)
+    frames = np.resize(change, (CHUNK, change.shape[1]))
+    found = translator(plain_signals(change)).displacement_digit
+    height = mapper(found[0])
+    ms = best_ms(lambda: translator(plain_signals(frames)), CHUNK)
+    ms += best_ms(lambda: mapper(found[0])) + best_ms(lambda: renderer(height))
+    mb = peak_mb()
+    levels = [renderer.in_levels(renderer.radiance(each) - renderer.rest_radiance) for each in mapper(found)]
+    with np.load(truth, allow_pickle=False) as file:
+        true = list(file["pictures"])
+    of = f"{len(true)} test contacts, signal to picture, against the reference picture of the true deformation"
+    label = name if name == FAST else f"{name}_{renderer.variant}"
+    return Method("chain", label, ms, mb, rms(levels, true), "levels", rms(true), of)
+
+
+def _contacts(count: int) -> Pairs:
+    """Some test contacts in the picture, the same in every run."""
+    pairs, camera = read_pairs(TEST_SET), load_calibration().camera
+    deep = np.abs(pairs.displacement_digit[..., 1]).max(axis=1) * pairs.scale_digit > LEAST
+    row, column = camera.to_pixel(pairs.contact_center[:, 0], pairs.contact_center[:, 1])
+    seen = deep & (row >= 0) & (row < camera.height) & (column >= 0) & (column < camera.width)
+    rows = np.random.default_rng(SEED_OF_CONTACTS).permutation(np.flatnonzero(seen))[:count]
+    return pairs.some(np.sort(rows))
+
+
+def _draw_truth(unit, mapper, pairs, passes, file) -> None:  # noqa: ANN001
+    variant = choose_variant().name
+    one_thread(variant)
+    rest, in_levels = of_unit(rest_height_map(unit.camera), unit), Renderer(unit, FAST).in_levels
+    light = MitsubaLight(unit, dataclasses.replace(REFERENCE, passes=passes), variant, rest, 0)
+    resting, true = light.radiance(rest), true_displacement(pairs, "digit", np.arange(len(pairs.press)))
+    np.savez(file, pictures=[in_levels(light.radiance(of_unit(height, unit)) - resting) for height in mapper(true)])

@@ -1,0 +1,78 @@
+"""Contact mechanics: each tier against the reference tier, on random contacts that it solved once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.mechanics.contact_tiers import fast_misses, miss, solved
+from benchmarks.mechanics.tier_truth import read_truth
+from tactile_core.accuracy import Row, row
+from tactile_core.errors import TactileError
+from tactile_core.mechanics.error_estimate import REFERENCE_SHARE, measured
+from tactile_core.simulation.pairs_file import read_pairs
+from tactile_core.simulation.scene import load_scene
+
+from .method import TEST_SET, TRAINING, Method, peak_mb
+
+NAMES = tuple(f"{sensor}_{tier}" for sensor in ("digit", "biotac") for tier in ("fast", "full", "reference"))
+TRUTH = TRAINING / "reference_contacts.npz"
+QUICK = 2  # contacts that the full tier solves in a quick run
+EVERY = 7  # of as many test presses one, in a quick run
+REPEATS = {"fast": 3, "full": 1}
+
+
+def measure(name: str, quick: bool) -> Method:
+    """One tier on one sensor: median time and error of the contacts."""
+    sensor, tier = name.split("_")
+    if tier == "reference":
+        return _reference(sensor, quick)
+    truths, found, ms = read_truth(TRUTH, sensor), [], []
+    for truth in truths[: QUICK if quick and tier == "full" else None]:
+        tries = [_solved(sensor, truth.contact, tier) for _ in range(REPEATS[tier])]
+        if tries[0] is not None:
+            found.append((truth, tries[0][0]))
+            ms.append(1e3 * min(seconds for _, seconds in tries))
+    mb, misses = peak_mb(), []
+    for truth, solution in found:
+        pair = solution.displacement, float(np.linalg.norm(solution.force)), truth.displacement, truth.force
+        misses.append(miss(truth.number, truth.share, *pair))
+    shape, force, null = (np.median([getattr(each, of) for each in misses]) for of in ("shape", "force", "null"))
+    of = f"{len(misses)} random contacts, without friction, against the reference tier"
+    more = [row(f"mechanics_{name}_force_error", 100 * force, "percent", null=100, of=of)]
+    more += _on_test_contacts(sensor, quick) if tier == "fast" else []
+    return Method("mechanics", name, float(np.median(ms)), mb, 1e6 * shape, "um", 1e6 * null, of, tuple(more))
+
+
+def _solved(sensor, contact, tier):  # noqa: ANN001, ANN202 (as `solved`)
+    try:
+        found, _, seconds = solved(sensor, contact, tier)
+    except TactileError:
+        return None
+    return found, seconds
+
+
+def _reference(sensor: str, quick: bool) -> Method:
+    """As `measure_tiers.py` found it, for a contact takes a minute or more; a whole run solves the quickest."""
+    truths = read_truth(TRUTH, sensor)
+    if not quick:
+        _solved(sensor, min(truths, key=lambda truth: truth.seconds).contact, "reference")
+    full = measured()["tiers"]["full"][sensor]["against_reference"]
+    ms, error = 1e3 * np.median([truth.seconds for truth in truths]), REFERENCE_SHARE * full["shape_um"]
+    of = f"{len(truths)} random contacts, by measure_tiers.py: a third of the full tier's error (assumed)"
+    mb = None if quick else peak_mb()
+    return Method("mechanics", f"{sensor}_reference", float(ms), mb, error, "um", full["null_um"], of)
+
+
+def _on_test_contacts(sensor: str, quick: bool) -> list[Row]:
+    """The fast tier against the full tier, with friction."""
+    pairs, (scene, _) = read_pairs(TEST_SET), load_scene(TRAINING)
+    if quick:
+        pairs = pairs.some(np.flatnonzero(pairs.press % EVERY == 0))
+    found = list(fast_misses(sensor, pairs, scene))
+    shape, force, null = (np.median([getattr(each, name) for each in found]) for name in ("shape", "force", "null"))
+    of = f"{len(found)} test contacts with friction, against the full tier"
+    name = f"mechanics_{sensor}_fast_from_full"
+    return [
+        row(f"{name}_error", 1e6 * shape, "um", null=1e6 * null, of=of),
+        row(f"{name}_force_error", 100 * force, "percent", null=100, of=of),
+    ]

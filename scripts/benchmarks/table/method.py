@@ -1,0 +1,70 @@
+"""What is measured of a method, and how: CPU time, peak memory, error beside doing nothing."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tactile_core.accuracy import Row, row
+
+ROOT = Path(__file__).resolve().parents[3]
+TRAINING = ROOT / "scenes" / "training"
+TEST_SET = TRAINING / "test_contacts.h5"
+
+
+@dataclass(frozen=True)
+class Method:
+    """One method of a stage.
+
+    ms : CPU a frame on one core; mb : peak memory of a process that does this alone, without what measures the error
+    error, null : in ``unit``, of this method and of doing nothing; of : on what set the error was measured
+    more : further rows
+    """
+
+    stage: str
+    name: str
+    ms: float | None
+    mb: float | None
+    error: float | None
+    unit: str
+    null: float | None
+    of: str
+    more: tuple[Row, ...] = ()
+
+    def rows(self) -> list[Row]:
+        """Time, memory and error as rows."""
+        name = f"{self.stage}_{self.name}"
+        found = [row(f"{name}_ms", self.ms, "ms", of="one core, CPU"), row(f"{name}_MB", self.mb, "MB", of="peak")]
+        return [*found, row(f"{name}_error", self.error, self.unit, null=self.null, of=self.of), *self.more]
+
+
+def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 0.5, most: int = 50) -> float:
+    """CPU ms a frame of a call, the best of some after one that may read and compile.
+
+    Other programs only ever slow it: through caches that they empty.
+    """
+    work()
+    took, began = [], time.process_time()
+    while len(took) < 3 or (time.process_time() - began < least_seconds and len(took) < most):
+        start = time.process_time()
+        work()
+        took.append(time.process_time() - start)
+    return 1e3 * min(took) / frames
+
+
+def peak_mb() -> float:
+    """Peak memory of this process so far, MB.
+
+    On Linux by the high-water mark of its own pages: getrusage begins with that of the process that started it.
+    """
+    if sys.platform == "linux":
+        for text in Path("/proc/self/status").read_text().splitlines():
+            if text.startswith("VmHWM:"):
+                return int(text.split()[1]) / 1024
+    import resource
+
+    size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return size / (1024 * 1024 if sys.platform == "darwin" else 1024)

@@ -1,0 +1,76 @@
+"""Pictures beside photographs: the DIGIT's pictures, ours beside others', on presses that were not fitted.
+
+Photographs are of a 6 mm ball pressed into a DIGIT; those that the calibration was not fitted on are the truth. Null is
+the background alone; a table after Taxim is fitted on the photographs the calibration was fitted on
+(tests/benchmarks/taxim_like.py); each preset of `tactile render`. Where and how deep the ball was pressed is three
+numbers a photograph, found once by the fast picture; the table finds its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from taxim_like import TableBench, fit_table, try_table
+
+from tactile_core.accuracy import row
+from tactile_core.pictures.calibrate.ball_pictures import BallPictures
+from tactile_core.pictures.calibrate.ball_print import print_on
+from tactile_core.pictures.calibrate.evaluate import Evaluation, evaluate_unit, mean_figures
+from tactile_core.pictures.calibrate.photo_metrics import figures
+from tactile_core.pictures.calibrate.photographs import chosen, read_photographs
+from tactile_core.pictures.mitsuba.variant import choose_variant
+from tactile_core.pictures.renderer import Renderer
+from tactile_core.sensors.calibration import Calibration
+from tactile_core.sensors.calibration_file import load_calibration
+
+from .method import Method, best_ms, peak_mb
+
+BALL = 3e-3  # m, radius
+TABLE = "taxim_like"
+NAMES = (TABLE, "fast", "standard", "quality")  # the reference takes minutes: see docs/optics.md
+UNITS = {"roi_l1": "levels", "roi_psnr": "dB", "roi_ssim": "1", "frame_l1": "levels", "lobe_iou": "1"}
+
+
+def measure(name: str, quick: bool, presses: str) -> Method:
+    """One way of drawing the photographs in the folder ``presses``; a quick run takes no fewer.
+
+    Raises TactileError for photographs that cannot be read, ModuleNotFoundError where mitsuba is missing.
+    """
+    unit, photographs = load_calibration(), read_photographs(presses)
+    fitted = [press.name for press in photographs.presses if press.name in unit.fit.photographs]
+    test = chosen(photographs, [press.name for press in photographs.presses if press.name not in fitted])
+    tried = evaluate_unit(unit, test, BALL, search_radius=False)
+    null, of = mean_figures(tried)[1], f"{len(test.presses)} photographs kept apart"
+    label = name
+    if name == TABLE:
+        table = fit_table(unit, chosen(photographs, fitted), BALL)
+        change = TableBench(BallPictures(unit), table).change
+        ms = best_ms(lambda: change(tried[0].ball.numbers))
+        each = try_table(table, unit, test, BALL)
+    else:
+        renderer = Renderer(unit, name, background=test.background, rest=BallPictures(unit).rest)
+        label = name if name == "fast" else f"{name}_{choose_variant().name}"
+        heights = [_heights(unit, each) for each in tried]
+        ms = best_ms(lambda: renderer(heights[0]))
+        each = [
+            figures(renderer(height), one.press.picture, test.background, one.press.region)
+            for height, one in zip(heights, tried, strict=True)
+        ]
+    values = _means(each)
+    more = [
+        row(f"photographs_{label}_{what}", values[what], unit_, null=null[what], of=of) for what, unit_ in UNITS.items()
+    ]
+    more += [
+        row(f"photographs_{label}_of_{one.press.name}", found["roi_l1"], "levels", null=one.null["roi_l1"], of="region")
+        for found, one in zip(each, tried, strict=True)
+    ]
+    error = values["roi_l1"], "levels", null["roi_l1"]
+    return Method("photographs", label, ms, peak_mb(), *error, f"{of}, mean error in the region", tuple(more))
+
+
+def _heights(unit: Calibration, tried: Evaluation) -> np.ndarray:
+    bench = BallPictures(unit)
+    return print_on(bench.rest, bench.right, bench.down, tried.ball.numbers).astype(np.float32)
+
+
+def _means(rows: list[dict]) -> dict[str, float]:
+    return {name: float(np.nanmean([found[name] for found in rows])) for name in UNITS}

@@ -1,0 +1,157 @@
+"""What a whole run leaves in docs: the rows as JSON, a table for people, the plot of error over time."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from tactile_core.accuracy import Row
+from tactile_core.files import atomic, provenance
+
+from .method import Method
+from .translation import SAME_PAIRS
+
+TITLES = {
+    "mechanics": "Contact mechanics", "translation": "Translation, signals to the DIGIT's gel",
+    "pictures": "Pictures of known deformations", "photographs": "Pictures beside photographs",
+    "chain": "Whole chain, signals to pictures",
+}  # fmt: skip
+TABLE = "| method | ms a frame | MB | error | doing nothing | measured on |\n|---|---|---|---|---|---|"
+INTRODUCTION = """\
+# Speed against error
+
+Made by `python scripts/benchmark.py` on one machine: {machine}.
+Times are CPU ms a frame (a contact) on one core, the best of several, so that other programs count little; memory is
+the peak of a process that does this alone, Python and libraries included; errors are on held-out sets, beside those of
+doing nothing. `docs/benchmark.json` holds every row. What is missing: {missing}.
+
+![error over time](benchmark.png)
+"""
+SAME = """\
+## Ours and ACROSS's networks on the same {count:,} pairs
+
+{how}, {date}. ACROSS's networks (`tests/benchmarks/across_networks.py`) have the published sizes, losses and rates, and
+as many passes over the data as about the CPU time of our training holds: one of the mesh networks in place of 300. So
+the rows tell what a budget buys, not how far those networks come in hours. Errors: um rms over moving nodes of the test
+contacts, solved by the full tier.
+
+| step | ACROSS's shapes | ours | doing nothing |
+|---|---|---|---|
+"""
+
+
+def write_report(
+    folder: Path, methods: Sequence[Method], rows: Sequence[Row], missing: dict[str, str], more: str
+) -> None:
+    """``benchmark.json``, ``benchmark.md`` and ``benchmark.png``; more : Markdown that follows the tables."""
+    machine = provenance.machine()
+    atomic.write_json(folder / "benchmark.json", {"machine": machine, "missing": missing, "rows": list(rows)})
+    told = ", ".join(f"{name} ({why})" for name, why in missing.items()) or "nothing"
+    load = f", {os.getloadavg()[0]:.0f} programs competing for them at the end" if hasattr(os, "getloadavg") else ""
+    text = INTRODUCTION.format(machine=f"{machine['processor']}, {machine['cores']} cores{load}", missing=told)
+    for stage, title in TITLES.items():
+        lines = [as_line(method) for method in methods if method.stage == stage]
+        if lines:
+            text += "\n".join(["", f"## {title}", "", TABLE, *lines, ""])
+    text += "\n" + same_pairs() + "\n" + more
+    atomic.write_bytes(folder / "benchmark.md", text.encode())
+    atomic.write_bytes(folder / "benchmark.png", plot(methods))
+
+
+def as_line(method: Method) -> str:
+    """A method as a line of the table; the fastest with the least error of its stage stand in the plot."""
+    cells = [f"`{method.name}`", *map(short, (method.ms, method.mb))]
+    cells += [f"{short(method.error)} {method.unit}", f"{short(method.null)} {method.unit}", method.of]
+    return "| " + " | ".join(cells) + " |"
+
+
+def short(value: float | None) -> str:
+    """Three digits."""
+    return "" if value is None else f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def same_pairs() -> str:
+    """The table of both trainings."""
+    told = json.loads(SAME_PAIRS.read_text())
+    ours, across = ({each["name"]: each for each in told[name]} for name in ("ours", "across"))
+    lines = [
+        f"| {name.removesuffix('_rms_um')} | {short(found['value'])} um | {short(ours[name]['value'])} um"
+        f" | {short(found['null'])} um |"
+        for name, found in across.items() if name.endswith("_rms_um")
+    ]  # fmt: skip
+    spent = [f"{short(each['training_s']['value'])} s ({each['training_s']['set']})" for each in (across, ours)]
+    lines.append(f"| training | {spent[0]} | {spent[1]} | |")
+    return SAME.format(count=told["pairs"], how=told["how"], date=told["date"]) + "\n".join(lines) + "\n"
+
+
+def plot(methods: Sequence[Method]) -> bytes:
+    """PNG: error over time, both logarithmic, one panel a stage; the Pareto front, and doing nothing, as lines."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    panels = [(stage, title, part) for stage, title in TITLES.items() for part in split(stage, methods) if part]
+    columns = 3
+    figure = Figure(figsize=(5.2 * columns, 4.2 * -(-len(panels) // columns)), layout="constrained")
+    for number, (stage, title, part) in enumerate(panels, 1):
+        axes = figure.add_subplot(-(-len(panels) // columns), columns, number)
+        sensor = f", {part[0].name.split('_')[0]}" if stage == "mechanics" else ""
+        draw(axes, part, title + sensor)
+    content = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(content, metadata={"Software": None})
+    return content.getvalue()
+
+
+def split(stage: str, methods: Sequence[Method]) -> list[list[Method]]:
+    """The methods of a stage that have time and error, a panel each; mechanics has one a sensor."""
+    found = [each for each in methods if each.stage == stage and each.ms and each.error]
+    if stage != "mechanics":
+        return [found]
+    return [[each for each in found if each.name.startswith(sensor)] for sensor in ("digit", "biotac")]
+
+
+def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
+    """One panel."""
+    front = pareto([(each.ms, each.error) for each in methods])
+    axes.plot(*zip(*steps(front), strict=True), color="tab:orange", linewidth=1, zorder=1, label="Pareto front")
+    nulls = {each.null for each in methods if each.null}
+    axes.axhline(max(nulls), color="grey", linestyle="--", linewidth=1, label="doing nothing")
+    for number, each in enumerate(sorted(methods, key=lambda one: one.ms)):
+        best = (each.ms, each.error) in front
+        axes.plot(each.ms, each.error, "o", color="tab:orange" if best else "tab:blue", zorder=2)
+        up = number % 2 == 0
+        axes.annotate(label(each), (each.ms, each.error), xytext=(3, 4 if up else -4), textcoords="offset points",
+                      rotation=40 if up else -40, va="bottom" if up else "top", fontsize=8)  # fmt: skip
+    axes.set(xscale="log", yscale="log", title=title, xlabel="CPU ms a frame, one core",
+             ylabel=f"error, {methods[0].unit}")  # fmt: skip
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_major_formatter("{x:g}")
+    if max(nulls) < 10 * min(each.error for each in methods):  # fewer than two powers of ten to read
+        axes.yaxis.set_minor_formatter("{x:g}")
+    axes.margins(x=0.3, y=0.45)
+    axes.legend(fontsize=8)
+
+
+def label(method: Method) -> str:
+    """Without what all methods of a panel share."""
+    name = method.name.split("_", 1)[1] if method.stage == "mechanics" else method.name
+    return name.removesuffix("_llvm_ad_rgb").removesuffix("_scalar_rgb").replace("_", " ")
+
+
+def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The (time, error) that no other point beats in both, by growing time."""
+    front: list[tuple[float, float]] = []
+    for point in sorted(points):
+        if not front or point[1] < front[-1][1]:
+            front.append(point)
+    return front
+
+
+def steps(front: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The front as a staircase: between two methods there is none."""
+    corners = [front[0]]
+    for point in front[1:]:
+        corners += [(point[0], corners[-1][1]), point]
+    return corners

@@ -1,0 +1,42 @@
+"""Each method in a process of its own, so that its memory and its first call are its own."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import importlib
+import multiprocessing
+import sys
+import time
+from collections.abc import Iterator, Sequence
+
+from .method import Method
+
+STAGES = ("mechanics", "translation", "pictures", "chain", "photographs")
+WITH_FILE = ("pictures", "chain", "photographs")  # which are told a file or a folder
+
+
+def measured(stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()) -> Iterator[Method]:
+    """Every method of a stage; what cannot run here is put down in ``missing``.
+
+    file : where the first method of pictures and chain leaves the others' truth; the photographs
+    only : words that name a stage, or a stage and a method; none for all
+    """
+    for name in importlib.import_module(f"benchmarks.table.{stage}").NAMES:
+        if only and stage not in only and f"{stage} {name}" not in only:
+            continue
+        began = time.perf_counter()
+        with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            try:
+                found = pool.submit(one, stage, name, quick, file).result()
+            except ModuleNotFoundError as error:
+                missing[f"{stage} {name}"] = f"no {error.name}"
+                continue
+        print(f"{stage} {name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
+        if found is not None:
+            yield found
+
+
+def one(stage: str, name: str, quick: bool, file: str) -> Method | None:
+    """What a process of its own does."""
+    measure = importlib.import_module(f"benchmarks.table.{stage}").measure
+    return measure(name, quick, file) if stage in WITH_FILE else measure(name, quick)

@@ -1,0 +1,125 @@
+"""Translation from signals to both displacements: our networks in numpy and in torch, and ACROSS's shapes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from benchmarks.translation.noise import as_read
+from benchmarks.translation.test_set import SEED
+from tactile_core import accuracy, sensors
+from tactile_core.accuracy import Row, row
+from tactile_core.simulation.pairs_file import Pairs, read_pairs
+from tactile_core.training.error_summary import figure_rows
+from tactile_core.training.step_errors import joined, mesh_columns, parts, true_displacement
+from tactile_core.translation.networks import COUNT_SCALE
+from tactile_core.translation.translate import load_translator
+
+from .method import ROOT, TEST_SET, Method, best_ms, peak_mb
+
+BATCHES = 1, 500  # frames a call
+NAMES = (
+    *(f"{kind}_{batch}" for kind in ("numpy", "numpy_confidence", "torch", "across") for batch in BATCHES),
+    "numpy_same_pairs_1",
+)
+QUOTED = {"across": "across", "numpy_same_pairs": "ours"}  # whose errors come from SAME_PAIRS
+SAME_PAIRS = ROOT / "tests" / "benchmarks" / "across_rows.json"  # ours and ACROSS's, trained on the same pairs
+EVERY = 3  # of as many test presses one, in a quick run; prime to how box, ring and others take turns
+Change = np.ndarray  # (B, 19) counts
+Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
+
+
+def measure(name: str, quick: bool) -> Method:
+    """One way of calculating; raises ModuleNotFoundError where torch is missing."""
+    kind, batch = name.rsplit("_", 1)
+    pairs = read_pairs(TEST_SET)
+    if quick:
+        pairs = pairs.some(np.flatnonzero(pairs.press % EVERY == 0))
+    change = as_read(pairs.signal, SEED)
+    work = KINDS[kind]()
+    some = np.resize(change, (int(batch), change.shape[1]))
+    ms, mb = best_ms(lambda: work(some), int(batch), most=200), peak_mb()
+    if kind in QUOTED:
+        told = json.loads(SAME_PAIRS.read_text())
+        found = {each["name"]: each for each in told[QUOTED[kind]]}
+        of = f"{told['contacts']} test contacts, trained on {told['pairs']:,} pairs (across_rows.json)"
+    else:
+        found = {each["name"]: each for each in _errors(work, pairs, change)}
+        of = f"{len(pairs.press)} test contacts, signal to DIGIT"
+    chain, skin = found["chain_rms_um"], found["S2MPN_rms_um"]
+    more = row(
+        f"translation_{name}_biotac_error", skin["value"], "um", null=skin["null"], of=of.replace("DIGIT", "BioTac")
+    )
+    return Method("translation", name, ms, mb, chain["value"], "um", chain["null"], of, (more,))
+
+
+def _numpy() -> Surfaces:
+    nets = load_translator().nets
+
+    def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
+        biotac = nets.s2m(nets.encode_signal(change))
+        return nets.decode_biotac(biotac), nets.decode_digit(nets.m2m(biotac))
+
+    return surfaces
+
+
+def _numpy_confidence() -> Surfaces:
+    """With force, contact place, expected errors, confidence and flags: all that `tactile convert` takes from it."""
+    translator = load_translator()
+
+    def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
+        found = translator(plain_signals(change))
+        return found.displacement_biotac, found.displacement_digit
+
+    return surfaces
+
+
+def plain_signals(change: Change) -> Any:
+    """Signals without a fault."""
+    from tactile_core.recordings import Signals
+
+    count = len(change)
+    return Signals(
+        change=change, rest=np.zeros(19), drift=np.zeros(19), electrodes=change, kind="tared",
+        quiet=np.zeros(count, bool), flags=np.zeros(count, np.uint16), pdc=np.full(count, np.nan), warnings=(),
+        report={},
+    )  # fmt: skip
+
+
+def _torch() -> Surfaces:
+    from torch_chain import TorchChain
+
+    return TorchChain(load_translator().nets)
+
+
+def _across() -> Surfaces:
+    from across_networks import untrained
+
+    surfaces = untrained(sensors.biotac_surface(), sensors.digit_surface())  # its time does not depend on its weights
+    return lambda change: surfaces(np.arcsinh(change / np.float32(COUNT_SCALE)))
+
+
+KINDS = {
+    "numpy": _numpy, "numpy_same_pairs": _numpy, "numpy_confidence": _numpy_confidence, "torch": _torch,
+    "across": _across,
+}  # fmt: skip
+
+
+def _errors(work: Surfaces, pairs: Pairs, change: Change) -> list[Row]:
+    rows = np.arange(len(pairs.press))
+    columns = joined(map(partial(_columns, work, pairs, change), parts(len(rows))))
+    return figure_rows(columns, pairs, rows, "seen indenters", {})
+
+
+def _columns(work: Surfaces, pairs: Pairs, change: Change, part: slice) -> dict[str, np.ndarray]:
+    rows = np.arange(len(pairs.press))[part]
+    skin, gel = (true_displacement(pairs, sensor, rows) for sensor in ("biotac", "digit"))
+    on_skin, on_gel = work(change[part])
+    return {
+        **mesh_columns("null_biotac", 0 * skin, skin, accuracy.lengths), **mesh_columns("null_digit", 0 * gel, gel),
+        **mesh_columns("S2MPN", on_skin, skin, accuracy.lengths), **mesh_columns("chain", on_gel, gel),
+    }  # fmt: skip

@@ -1,0 +1,103 @@
+"""Judge the translation against the simulated truth and on recordings of a real BioTac, beside doing nothing.
+
+    python scripts/evaluate_translation.py --json FILE              on the test contacts that ship
+    python scripts/evaluate_translation.py --kept-apart FOLDER      and networks kept from some of it (again for more)
+    python scripts/evaluate_translation.py --recordings DIR         on real recordings: slides (but sample 7 of each
+                                                                    material) or grips; --quick: six slides
+
+Prints a table; exits 1 when an error row misses its target. Needs scipy, of the extra [fem]. The recordings'
+translations are left in --out, in the form that judge_recordings.py, the tool beside the recordings, reads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.translation import grips, prints, recordings, slide_set, test_set
+from benchmarks.translation.model_card import write_model_card
+from tactile_core.accuracy import HEADER, Row, failed, line
+from tactile_core.errors import TactileError
+from tactile_core.files import atomic
+from tactile_core.recordings import electrode_gains, read
+from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
+from tactile_core.simulation.pairs_file import read_pairs
+from tactile_core.training.step_errors import our_bodies
+from tactile_core.translation import translate
+
+QUICK = 6  # recordings
+QUICK_PRESSES = 7  # of as many one is looked at; prime to how box, ring and others take turns
+TEST_SET = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_contacts.h5"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Translate, measure, print, write; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--test-set", default=TEST_SET, metavar="FILE", help="pairs of the full tier (%(default)s)")
+    parser.add_argument(
+        "--kept-apart",
+        action="append",
+        default=[],
+        metavar="FOLDER",
+        help="weights of `tactile train --without ...`; may be given several times",
+    )
+    real = "slides (matM_K_bio.csv, ...) or grips (*_HOLD.mat) in its place"
+    parser.add_argument("--recordings", metavar="DIR", help=real)
+    parser.add_argument("--weights", metavar="FOLDER", help="networks of your own training instead of the shipped ones")
+    parser.add_argument("--sensor", metavar="FILE", help="gains and offsets of their sensor, from `tactile adapt`")
+    parser.add_argument("--out", default="out/translated", metavar="FOLDER", help="translations (default: %(default)s)")
+    parser.add_argument("--json", metavar="FILE", help="write the rows here")
+    parser.add_argument("--card", metavar="FILE", help="write the model card (Markdown, and a picture beside it) here")
+    parser.add_argument("--sweep", metavar="FILE", help="rows of sweep_networks.py, for the card")
+    parser.add_argument("--quick", action="store_true", help="a few recordings, or a few test presses")
+    options = parser.parse_args(arguments)
+    try:
+        network = translate.load_translator(options.weights)
+        found = on_recordings(network, options) if options.recordings else on_test_set(network, options)
+    except TactileError as error:
+        print(error, file=sys.stderr)
+        return 2
+    print(HEADER)
+    for row in found:
+        print(line(row))
+    if options.json:
+        atomic.write_json(Path(options.json), found)
+    for row in failed(found):
+        print(f"MISSED: {row['name']} = {row['value']} {row['unit']}, target {row['target']}", file=sys.stderr)
+    return int(bool(failed(found)))
+
+
+def on_recordings(network: translate.Translator, options: argparse.Namespace) -> list[Row]:
+    """Rows of real recordings: grips of the PHAC set, or slides."""
+    folder, file = Path(options.recordings), options.sensor
+    if grips.find(folder):
+        return grips.rows(folder, network)
+    sensor = None if file is None else electrode_gains.read(file).of(folder, None, file)
+    most = QUICK if options.quick else None
+    return [*recordings.rows(folder, network, options.out, most, sensor), *_slide_prints(folder, network, most, sensor)]
+
+
+def _slide_prints(
+    folder: Path, network: translate.Translator, most: int | None, sensor: ElectrodeGains | None
+) -> list[Row]:
+    paths = slide_set.reporting(folder)[:most]
+    return prints.rows("recordings", (prepare_unit(read(path), None, sensor) for path in paths), network)
+
+
+def on_test_set(network: translate.Translator, options: argparse.Namespace) -> list[Row]:
+    """Rows of simulated contacts."""
+    pairs, bodies = read_pairs(options.test_set), our_bodies()
+    if options.quick:
+        pairs = pairs.some(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
+    found = [*test_set.seen_rows(network, pairs, bodies), *test_set.speed_rows(network, pairs)]
+    apart = [translate.load_translator(folder) for folder in options.kept_apart]
+    for unaware in apart:
+        found += test_set.unseen_rows(unaware, pairs, bodies)
+    if options.card:
+        sweep = json.loads(Path(options.sweep).read_text()) if options.sweep else []
+        write_model_card(Path(options.card), found, network, pairs, apart, sweep)
+    return found

@@ -1,0 +1,124 @@
+"""Grips of real fingers, the PHAC set: where a flat object is felt, against the electrodes that it squeezes.
+
+Two fingers of a robot's gripper hold hard and soft objects; the hand never opens, so rest is found in the soft objects'
+trials 01 to 03, and the hard objects' trials 04 and 05 are judged: nothing was chosen by these.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from tactile_core import recordings
+from tactile_core.accuracy import Row, row
+from tactile_core.errors import TactileError
+from tactile_core.recordings import Recording
+from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile, prepare_unit
+from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.readers import each_finger
+from tactile_core.recordings.signals import FRAMEWISE
+from tactile_core.sensors import electrodes
+from tactile_core.translation import adapt, networks, reference_signals
+from tactile_core.translation.translate import Translator
+from tactile_core.translation.unit_rest import find_rest
+
+from . import prints
+
+PATTERN = "*_HOLD.mat"  # <object>_<number>_<trial>_HOLD.mat
+HARD = ("acrylic", "steel_vase")
+SOFT = "found in the soft objects"
+CHOOSING, REPORTING = ("01", "02", "03"), ("04", "05")
+SQUEEZED = np.array([6, 7, 8, 9, 16])  # E7 to E10 and E17 lie under a flat object (data README)
+MARGIN, LARGEST_Z = 1.5e-3, 3e-3  # m, round the squeezed electrodes
+EVERY = 20  # frames between two that are judged: a grip hardly changes
+
+
+def find(folder: Path) -> list[Path]:
+    """Files of the set in a folder, by name; none where it holds others."""
+    return sorted(folder.glob(PATTERN))
+
+
+def soft_to_choose_by(files: list[Path]) -> list[Path]:
+    """Grips of soft objects in the trials that rest is found in."""
+    return [path for path in files if _trial(path) in CHOOSING and not path.name.startswith(HARD)]
+
+
+def rows(folder: Path, network: Translator) -> list[Row]:
+    """Rows of a folder. Raises TactileError where trials to choose or to report by are missing."""
+    files = find(folder)
+    soft = soft_to_choose_by(files)
+    hard = [path for path in files if _trial(path) in REPORTING and path.name.startswith(HARD)]
+    if not soft or not hard:
+        raise TactileError(folder, f"{len(soft)} soft and {len(hard)} hard grips", "some of each, by their trials")
+    sensor, _ = adapt.adapt_hand(soft, reference_signals.read(networks.WEIGHTS_FOLDER))
+    held = [(one, finger) for path in hard for finger, one in enumerate(each_finger(path))]
+    prepared = (prepare_unit(recordings.read(one), None, sensor.of(one, finger, SOFT)) for one, finger in held)
+    return [*_place_rows(hard, network, sensor), *prints.rows("grip", prepared, network), *_rest_rows(files)]
+
+
+def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> list[Row]:
+    shuffle = np.random.default_rng(0).permutation(len(electrodes()))
+    told, null = [], []
+    for path in hard:
+        for finger, one in enumerate(each_finger(path)):
+            unit = sensor.of(one, finger, SOFT)
+            told.append(_judged(recordings.read(one), unit, network))
+            null.append(_judged(recordings.read(one), unit, network, shuffle))
+    of = f"{len(told)} grips of hard flat objects, trials 04 and 05; null: electrodes shuffled"
+    figures = [np.array([one[k] for one in told]) for k in range(3)]
+    shuffled = [np.array([one[k] for one in null]) for k in range(3)]
+    return [
+        row("grip_place_in_box", figures[0].mean(), "1", 0.95, null=shuffled[0].mean(), of=of, at_least=True),
+        row("grip_place_found", figures[1].mean(), "1", 0.9, null=shuffled[1].mean(), of=of, at_least=True),
+        row("grip_out_of_range", figures[2].mean(), "1", 0.2, null=shuffled[2].mean(), of=of),
+    ]
+
+
+def _judged(
+    recording: Recording, unit: ElectrodeGains, network: Translator, order: np.ndarray | slice = slice(None)
+) -> tuple[float, float, float]:
+    """Whether the median place lies in the box; shares of frames with a place, and of those out of range."""
+    signals = prepare_unit(recording, None, unit)
+    some = {name: getattr(signals, name)[::EVERY] for name in FRAMEWISE}
+    found = network(dataclasses.replace(signals, **(some | {"change": some["change"][:, order]})))
+    known = np.isfinite(found.contact_center[:, 0])
+    within = known.any() and in_box(np.median(found.contact_center[known], axis=0))
+    return float(within), float(known.mean()), float((found.flags & Flag.OUT_OF_RANGE > 0).mean())
+
+
+def in_box(place: np.ndarray) -> bool:
+    """Whether a place (2,) m = (x, z) lies over the electrodes that a flat object squeezes."""
+    x = electrodes()[SQUEEZED, 0]
+    return bool(x.min() - MARGIN <= place[0] <= x.max() + MARGIN and abs(place[1]) <= LARGEST_Z)
+
+
+def _rest_rows(files: list[Path]) -> list[Row]:
+    """How far rest is off when it is found in other trials, and with each soft object left out."""
+    soft = [path for path in files if not path.name.startswith(HARD)]
+    names = sorted({_object(path) for path in soft})
+    for finger, _ in enumerate(each_finger(soft[0])):
+        levels = {path: recordings.read(f"{path}#{finger}") for path in soft}
+        rest = find_rest([levels[path] for path in soft if _trial(path) in CHOOSING])
+        later = find_rest([levels[path] for path in soft if _trial(path) in REPORTING])
+        yield _rest_row(f"rest_finger{finger}_other_trials", later.counts - rest.counts, rest.spread)
+        for name in names:
+            rest = find_rest([levels[path] for path in soft if _trial(path) in CHOOSING])
+            left = find_rest([levels[path] for path in soft if _trial(path) in CHOOSING and _object(path) != name])
+            yield _rest_row(f"rest_finger{finger}_without_{name}", left.counts - rest.counts, rest.spread)
+
+
+def _rest_row(name: str, off: np.ndarray, spread: np.ndarray) -> Row:
+    worst = int(np.abs(off).argmax())
+    by_channel = " ".join(f"{value:.0f}" for value in off)
+    of = f"largest at E{worst + 1}, whose spread is told as {spread[worst]:.0f}; E1 to E19: {by_channel}"
+    return row(name, float(np.sqrt(np.mean(off**2))), "counts rms", of=of)
+
+
+def _trial(path: Path) -> str:
+    return path.stem.split("_")[-2]
+
+
+def _object(path: Path) -> str:
+    return "_".join(path.stem.split("_")[:-3])

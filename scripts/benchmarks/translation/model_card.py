@@ -1,0 +1,141 @@
+"""The model card for people: what the networks were trained on, their errors, their best and worst answers."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tactile_core import sensors
+from tactile_core.accuracy import HEADER, Row, line
+from tactile_core.files import atomic
+from tactile_core.simulation.pairs_file import Pairs
+from tactile_core.training.step_errors import mesh_columns, true_displacement
+from tactile_core.translation.translate import Translator
+
+from .noise import as_read
+from .test_set import SEED
+
+PICTURE = "translation_cases.png"
+SWEEP = """\
+## Sweep
+
+Other latent sizes and KL weights, each a training of its own on the same fewer pairs, against the test contacts
+(`scripts/benchmarks/make/sweep_networks.py`): to be compared with each other, not with the rows above. `published` has
+the latents and the KL weight of the method's authors. Rows of seeds: one direct network from signals to the DIGIT
+beside the chain, each from three seeds, on the trainings' own test presses.
+"""
+LIMITS = """\
+## Limits
+
+- All truth here is simulated. Real recordings are judged apart (`--recordings`): there only the fluid's pressure is
+  known, and how strong, silent and smooth the translation is can be told, not how right a deformation is.
+- The gap law and the BioTac's stiffness and filling are assumed (see `docs/mechanics.md` and
+  `tactile_core/sensors/`). A real unit's gains differ from the simulated ones by half: `tactile adapt` fits them.
+- Rectified recordings are read by networks that know they are; expect larger errors, as their bounds say.
+- Light touches drown in the electrodes' noise: see the places in the rows of shallow contacts.
+- Contacts beyond the DIGIT's gel, deeper than trained, or with shapes far from the nine indenters are not learned.
+"""
+
+
+def write_model_card(
+    path: Path,
+    rows: list[Row],
+    translator: Translator,
+    pairs: Pairs,
+    apart: Sequence[Translator] = (),
+    sweep: Sequence[Row] = (),
+) -> None:
+    """Write the card as Markdown, and the picture of cases beside it.
+
+    apart : the networks of the unseen rows; sweep : rows of scripts/benchmarks/make/sweep_networks.py
+    """
+    card = translator.card
+    text = [
+        "# Model card: the networks that translate touch",
+        "",
+        "Made by `scripts/evaluate_translation.py --card`; the numbers are of the weights that ship.",
+        "",
+        _training(card),
+        "## Errors",
+        "",
+        f"Test set: {len(pairs.press)} contacts of {len(np.unique(pairs.press))} presses, solved by the full tier of"
+        " mechanics on both sensors; signals read with 1.5 counts of noise and gains 10 % off. Depth bins (0.1-0.3,"
+        " 0.3-0.6, 0.6-0.9, 0.9-1.2 mm on the BioTac) and indenters count alike, without slides; null: no deformation.",
+        "",
+        *([_apart([each.card["options"] for each in apart]), ""] if apart else []),
+        HEADER,
+        *map(line, rows),
+        "",
+        *([SWEEP, HEADER, *map(line, sweep), ""] if sweep else []),
+        "## Cases",
+        "",
+        f"![best, median and worst contact]({PICTURE})",
+        "",
+        "From signals to the DIGIT's gel: the contact with the least, the median and the largest error over the true"
+        " deformation's size, among those the gel is moved 0.1 mm by and more.",
+        "",
+        LIMITS,
+    ]
+    atomic.write_bytes(path, "\n".join(text).encode())
+    atomic.write_bytes(path.with_name(PICTURE), _cases(translator, pairs))
+
+
+def _training(card: dict) -> str:
+    data, options = card["pairs"], card["options"]
+    counts = ", ".join(f"{number} for {what}" for what, number in data["contacts"].items())
+    names = ", ".join(json.loads(data["indenters"]))
+    return (
+        f"Data: {sum(data['contacts'].values())} simulated paired contacts ({counts}; no press in two of them), fast"
+        f" tier with friction and the learned correction, sha256 `{data['sha256'][:16]}...`. Indenters: {names}.\n"
+        f"Latents: signal {options['latent_signal']}, BioTac {options['latent_biotac']},"
+        f" DIGIT {options['latent_digit']};"
+        f" KL weight {options['beta']:g}; seed {card['seed']}; torch {card['versions']['torch']}.\n"
+    )
+
+
+def _apart(trainings: list[dict]) -> str:
+    each = []
+    for options in trainings:
+        left = [*options["without"]]
+        if options["without_below_x"] is not None:
+            left.append(f"the pad beyond x = {1e3 * options['without_below_x']:g} mm")
+        each.append(f"one without {' and '.join(left)} for {options['effort']:g} of the usual epochs")
+    return (
+        f"Rows of unseen sets are of networks of their own: {', '.join(each)};"
+        " the weights that ship have seen all of it."
+    )
+
+
+def _cases(translator: Translator, pairs: Pairs) -> bytes:
+    """PNG: true, translated and difference of the gel's depth, for three contacts."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    nets, gel = translator.nets, sensors.digit_surface()
+    change = as_read(pairs.signal, SEED)
+    found = nets.decode_digit(nets.m2m(nets.s2m(nets.encode_signal(change))))
+    true = true_displacement(pairs, "digit", np.arange(len(change)))
+    figures = mesh_columns("chain", found, true) | mesh_columns("null", 0 * true, true)
+    share = np.where(true[..., 1].max(1) >= 1e-4, figures["chain_rms_um"] / figures["null_rms_um"], np.nan)
+    order = np.argsort(share)[: np.isfinite(share).sum()]
+    names = pairs.indenter_names
+    figure = Figure(figsize=(9, 9), layout="constrained")
+    axes = figure.subplots(3, 3)
+    for row, (word, contact) in enumerate(
+        zip(("best", "median", "worst"), order[[0, len(order) // 2, -1]], strict=True)
+    ):
+        depth = [1e3 * each[contact, :, 1] for each in (true, found, found - true)]
+        peak = np.abs(depth[0]).max()
+        for ax, values, title in zip(axes[row], depth, ("true", "translated", "difference"), strict=True):
+            drawn = ax.tripcolor(1e3 * gel.rest[:, 2], 1e3 * gel.rest[:, 0], gel.faces, values, shading="gouraud",
+                                 cmap="RdBu_r", vmin=-peak, vmax=peak)  # fmt: skip
+            ax.set(aspect="equal", title=title, xlabel="z, mm")
+        axes[row, 0].set_ylabel(f"{word}: {names[pairs.indenter[contact]]}\nx, mm")
+        figure.colorbar(drawn, ax=axes[row], label="depth, mm")
+    content = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(content, metadata={"Software": None})
+    return content.getvalue()

@@ -1,0 +1,138 @@
+"""Rows of the translation on a test set: paired contacts that the full tier of mechanics solved."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from tactile_core import accuracy
+from tactile_core.accuracy import Row, row
+from tactile_core.simulation.pairs_file import Pairs
+from tactile_core.training.error_summary import figure_row, figure_rows, slices
+from tactile_core.training.step_errors import Bodies, error_columns, joined, parts, translation_figures
+from tactile_core.translation.network_sizes import SURFACES
+from tactile_core.translation.translate import Translator
+
+from .noise import as_read
+from .slide_metrics import rank_correlation
+
+# Targets of issue 4, without shear, depth bins and indenters alike.
+TARGETS = {
+    "MVB_rms_um": 3.0, "MVD_rms_um": 6.0,
+    "M2MPN_rms_um": 12.0, "M2MPN_core_height_um": 30.0, "M2MPN_peak_depth_percent": 5.0, "M2MPN_iou": 0.85,
+    "S2MPN_rms_um": 12.0, "S2MPN_position_mm": 0.5, "force_percent": 10.0, "chain_rms_um": 35.0,
+}  # fmt: skip
+UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter that was kept from the training
+EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
+NULL_FIGURES = ("null_biotac_rms_um", "null_digit_rms_um", "null_digit_core_height_um")
+FROM_SIGNALS = ("S2MPN_rms_um", "S2MPN_position_mm", "force_percent", "chain_rms_um")
+WINDOW, RATE = 3, 100.0  # frames; Hz, of the electrodes (sensors.md)
+BATCHES = {1: 0.8, 500: 0.25}  # frames a call -> target, ms a frame
+ROUNDS = 7  # calls, of which the fastest counts: what else runs only ever slows
+SEED = 7  # of the readings' noise
+
+
+def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
+    """Everything on all contacts: the figures with their targets, the slices without, how good expected errors are."""
+    rows = np.arange(len(pairs.press))
+    change = as_read(pairs.signal, SEED)
+    columns = translation_figures(translator.nets, pairs, rows, change, bodies)
+    found = figure_rows(columns, pairs, rows, "seen indenters", TARGETS)
+    for name, mask in slices(pairs, rows):
+        for step, body in (("S2MPN", "biotac"), ("M2MPN", "digit"), ("chain", "digit")):
+            value, null = (accuracy.mean(columns[f"{each}_rms_um"][mask]) for each in (step, f"null_{body}"))
+            found.append(figure_row(f"{step}_rms_um", value, null, None, name))
+        for figure in ("S2MPN_position_mm", "force_percent"):
+            known = columns[figure][mask & np.isfinite(columns[figure])]
+            if known.size:
+                found.append(figure_row(figure, float(np.median(known)), None, None, name))
+    for number, name in enumerate(pairs.indenter_names):
+        at = pairs.indenter == number
+        each = {figure: np.where(at, columns[figure], np.nan) for figure in (*EACH_INDENTER, *NULL_FIGURES)}
+        found += [one for one in figure_rows(each, pairs, rows, name, {}) if one["value"] is not None]
+    found += window_rows(translator, pairs, bodies)
+    return [*found, *expected_error_rows(translator, pairs, rows, change, bodies, "seen indenters")]
+
+
+def window_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
+    """What a short causal window gains over single frames, and how much later its answer comes."""
+    rows, name = np.arange(len(pairs.press)), f"causal mean over {WINDOW} frames"
+    columns = translation_figures(translator.nets, pairs, rows, as_read(pairs.signal, SEED, WINDOW), bodies)
+    found = figure_rows({figure: columns[figure] for figure in (*FROM_SIGNALS, *NULL_FIGURES)}, pairs, rows, name, {})
+    return [*found, row("window_delay_ms", 1e3 * (WINDOW - 1) / 2 / RATE, "ms", of=name)]
+
+
+def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
+    """Networks that some indenters and a region of the pad were kept from, as their card says, on just those."""
+    options, names = translator.card["options"], np.array(pairs.indenter_names)
+    there = pairs.place[:, 0] < (-np.inf if options["without_below_x"] is None else options["without_below_x"])
+    known = ~np.isin(names[pairs.indenter], options["without"])
+    sets = {f"unseen {name}": ~there & (names[pairs.indenter] == name) for name in options["without"]}
+    sets |= {"unseen region": there & known, "unseen region and indenter": there & ~known}
+    found = []
+    for name, mask in sets.items():
+        rows = np.flatnonzero(mask)
+        if len(rows):
+            change = as_read(pairs.signal[rows], SEED)
+            columns = translation_figures(translator.nets, pairs, rows, change, bodies)
+            target = UNSEEN.get(name.removeprefix("unseen "))
+            targets = {} if target is None else {"M2MPN_rms_um": target}
+            found += figure_rows(columns, pairs, rows, name, targets)
+            found += expected_error_rows(translator, pairs, rows, change, bodies, name)
+    return found
+
+
+def expected_error_rows(
+    translator: Translator, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies, name: str
+) -> list[Row]:
+    """Rank correlation of expected and true largest error, share below the bound, share flagged as out of range."""
+    nets, silent = translator.nets, translator.silent("digit_m")
+    columns = joined(error_columns(nets, pairs, rows[part], change[part], bodies, silent) for part in parts(len(rows)))
+    flagged = translator.out_of_range(change)
+    seen = name.startswith("seen")
+    found = []
+    for surface in SURFACES:
+        expected, true = columns[f"{surface}_expected_m"], columns[f"{surface}_max_m"]
+        covered = true <= translator.bound(expected, columns["x_m"], surface)
+        rank = rank_correlation(expected, true)
+        found.append(_share_row(f"{surface}_error_rank", rank, 0.6 if seen else None, None, name))
+        low, high = (0.9, 0.98) if seen else (None, None)
+        found.append(_share_row(f"{surface}_error_covered", float(covered.mean()), low, high, name))
+        if not seen:
+            either = float((covered | flagged).mean())
+            found.append(_share_row(f"{surface}_error_covered_or_flagged", either, 0.85, None, name))
+    found.append(_share_row("frames_flagged", float(flagged.mean()), None, 0.1 if seen else None, name))
+    return found
+
+
+def _share_row(name: str, value: float, low: float | None, high: float | None, set_name: str) -> Row:
+    """A row with a target from below, from above, or both."""
+    found = row(name, value, "1", high if low is None else low, of=set_name, at_least=low is not None)
+    return found if None in (low, high) else found | {"ok": bool(low <= value <= high)}
+
+
+def speed_rows(translator: Translator, pairs: Pairs) -> list[Row]:
+    """ms a frame, from changes to both displacements, and with expected errors and confidence."""
+    nets, found = translator.nets, []
+
+    def surfaces(change: np.ndarray) -> None:
+        biotac = nets.s2m(nets.encode_signal(change))
+        nets.decode_biotac(biotac), nets.decode_digit(nets.m2m(biotac))
+
+    def trust(change: np.ndarray) -> None:
+        surfaces(change)
+        nets.expected_error(change)
+        translator.out_of_range(change)
+
+    for frames, target in BATCHES.items():
+        change = np.resize(pairs.signal, (frames, pairs.signal.shape[1]))
+        for name, work, aim in (("translation_ms", surfaces, target), ("translation_with_confidence_ms", trust, None)):
+            took = []
+            for _ in range(ROUNDS * (1 + 200 // frames)):
+                began = time.perf_counter()
+                work(change)
+                took.append(time.perf_counter() - began)
+            value = 1e3 * min(took) / frames
+            found.append(figure_row(name, value, None, aim, f"{frames} frames a call"))
+    return found

@@ -1,0 +1,197 @@
+"""Errors of displacements, forces and contact places against the truth, rows of reports, and bounds on errors.
+
+The truth is a finite-element mesh or a known load.
+Each figure has a null answer, the figure of doing nothing: no displacement, no force, the mean place.
+All displacements are (C, n, 3) m, one contact a row; every function works contact by contact.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .errors import TactileError
+
+Depth = Callable[[np.ndarray], np.ndarray]  # (C, n, 3) m -> (C, n) m
+MOVING = 10e-6  # m: nodes that move less do not belong to a contact (networks.md)
+CORE = 0.3  # share of the peak height above which a node belongs to the core of a contact (networks.md)
+Row = dict[str, Any]
+HEADER = "| name | value | unit | target | null | set | |\n|---|---|---|---|---|---|---|"
+COSTS = ("s", "ms", "MB")  # units of time and memory: their rows may miss a target without failing a run
+EXPECTED = "a number and its unit, such as 5um or 0.6levels, or both: 5um,0.6levels"
+
+
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """Euclidean length over the last axis, in float64."""
+    return np.sqrt(np.square(vectors, dtype=np.float64).sum(-1))
+
+
+def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """(C,) m: root mean square of the vector error over the nodes whose true displacement exceeds 10 um.
+
+    NaN where no node moves that far. The average over contacts is the rmsC of networks.md.
+    """
+    moving = lengths(true) > MOVING
+    squares = np.where(moving, lengths(predicted - true) ** 2, 0.0).sum(-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.sqrt(squares / moving.sum(-1))
+
+
+def max_error(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """(C,) m: largest vector error of a node."""
+    return lengths(predicted - true).max(-1)
+
+
+def height(displacement: np.ndarray) -> np.ndarray:
+    """(C, n) m: how far nodes moved along +y, into the DIGIT's gel."""
+    return np.asarray(displacement[..., 1], np.float64)
+
+
+def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
+    """(C,) m: rms error of the depth over the core, the nodes above 30 % of the true peak; NaN without contact.
+
+    depth : what depth means on this surface: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved
+    """
+    found, truth = depth(predicted), depth(true)
+    peak = truth.max(-1, keepdims=True)
+    core = (truth > CORE * peak) & (peak > MOVING)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.sqrt((np.square(found - truth) * core).sum(-1) / core.sum(-1))
+
+
+def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
+    """(C,): error of the depth of the deepest node, share of the true one; NaN without contact."""
+    peak, truth = depth(predicted).max(-1), depth(true).max(-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(truth > MOVING, np.abs(peak - truth) / truth, np.nan)
+
+
+def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """(C, 2) m: (x, z) of the dent, mean place of its core weighted with depth; NaN where nothing moves 10 um.
+
+    displacement : (C, n, 3) m
+    rest : (n, 3) m
+    """
+    return core_center(height(displacement), np.asarray(rest, np.float64)[:, [0, 2]])
+
+
+def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) -> np.ndarray:
+    """(C, 2), mean of the places (n, 2) of a dent's core, weighted with depth (C, n) m; NaN if none is above least."""
+    peak = depth.max(-1, keepdims=True)
+    weight = np.where((depth > CORE * peak) & (peak > least), depth, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return weight @ places / weight.sum(-1, keepdims=True)
+
+
+def mean(values: np.ndarray) -> float | None:
+    """Mean over contacts without the NaN ones; None if none is left (JSON knows no NaN)."""
+    values = np.asarray(values)[np.isfinite(values)]
+    return float(values.mean()) if len(values) else None
+
+
+def mesh_figures(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
+    """The four figures of a mesh for each contact: micrometres, and per cent for the peak."""
+    return {
+        "rms_um": 1e6 * rms_in_contact(predicted, true),
+        "max_um": 1e6 * max_error(predicted, true),
+        "core_height_um": 1e6 * core_height_error(predicted, true, depth),
+        "peak_depth_percent": 1e2 * peak_depth_error(predicted, true, depth),
+    }
+
+
+def row(
+    name: str,
+    value: float | None,
+    unit: str,
+    target: float | None = None,
+    *,
+    null: float | None = None,
+    of: str = "",
+    at_least: bool = False,
+) -> Row:
+    """One figure, rounded to four digits; ``of`` says on what it was measured.
+
+    ok : |value| <= target, or value >= target for ``at_least``; None where there is no target
+    """
+    ok = None if target is None else bool(value >= target if at_least else abs(value) <= target)
+    value, target, null = (None if number is None else float(f"{number:.4g}") for number in (value, target, null))
+    return {"name": name, "value": value, "unit": unit, "target": target, "ok": ok, "null": null, "set": of}
+
+
+def line(row: Row) -> str:
+    """A row as a line of the table."""
+    mark = {None: "", True: "ok", False: "MISSED"}[row["ok"]]
+    cells = [row["name"], row["value"], row["unit"], row["target"], row["null"], row["set"], mark]
+    return "| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |"
+
+
+def failed(rows: list[Row]) -> list[Row]:
+    """Rows of errors that miss their target."""
+    return [found for found in rows if found["ok"] is False and found["unit"] not in COSTS]
+
+
+def order(sizes: list[float], errors: list[float]) -> float:
+    """Observed order of accuracy: slope of a straight line through log(error) over log(size)."""
+    return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
+
+
+@dataclasses.dataclass(frozen=True)
+class Budget:
+    """The largest error that will do; None where the user does not say.
+
+    um : micrometres rms of a surface, or of a height map; levels : grey levels rms of a picture
+    """
+
+    um: float | None = None
+    levels: float | None = None
+
+    def __str__(self) -> str:
+        """As `parse_budget` reads it."""
+        given = {"um": self.um, "levels": self.levels}
+        return ",".join(f"{value:g}{unit}" for unit, value in given.items() if value is not None)
+
+    def only(self, unit: str, why: str) -> float:
+        """The bound in one unit, where the other has no meaning. Raises TactileError where it is asked for."""
+        other = "levels" if unit == "um" else "um"
+        if getattr(self, other) is not None:
+            raise TactileError("--error", f"{getattr(self, other):g}{other}", f"a bound in {unit}", why)
+        return getattr(self, unit)
+
+
+def parse_budget(text: str) -> Budget:
+    """``"5um"``, ``"0.6levels"`` or ``"5um,0.6levels"``. Raises TactileError for anything else."""
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d*\.?\d+(?:e[+-]?\d+)?)\s*(um|µm|μm|levels?)\s*", part, re.IGNORECASE)
+        unit = "" if not match else "levels" if match[2].lower().startswith("level") else "um"
+        value = float(match[1]) if match else 0.0
+        if not match or unit in found or not (value > 0 and math.isfinite(value)):
+            raise TactileError("--error", repr(text), EXPECTED, "Give a bound above 0 once for each unit")
+        found[unit] = value
+    return Budget(**found)
+
+
+class Candidate(NamedTuple):
+    """One way to do it: its measured error, in the unit of the bound, and what it costs, ms."""
+
+    name: str
+    error: float
+    ms: float
+
+
+def cheapest(candidates: Sequence[Candidate], bound: float, unit: str, what: str = "") -> Candidate:
+    """The candidate of least cost whose error is at most the bound; what : of which they are, for the message.
+
+    Raises TactileError, naming the best there is, where none is.
+    """
+    good = [each for each in candidates if each.error <= bound]
+    if not good:
+        best = min(candidates, key=lambda each: each.error)
+        found = f"{bound:g} {unit}" + (f" of {what}" if what else "")
+        raise TactileError("--error", found, f"{best.error:.3g} or more, which {best.name} has", "Allow more")
+    return min(good, key=lambda each: each.ms)

@@ -1,0 +1,95 @@
+"""The command ``tactile``: its parser, and how each verb ends. The verbs are in ``verbs/``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+from .. import __version__
+from ..errors import TactileError
+from .stop_signals import Stopped, stopping
+from .terminal import complain, say
+from .verbs import VERBS
+
+DESCRIPTION = """\
+Translate touch between robot fingertips: BioTac electrode recordings become the deformation of a BioTac,
+of a DIGIT, and the pictures that the DIGIT's camera would have seen."""
+
+EPILOG = """\
+example:
+  tactile info touch.csv                   what the recording holds, and what is wrong with it
+  tactile convert touch.csv --out results  pictures in results/touch/images, numbers in results/touch/frames.h5
+
+`tactile VERB --help` explains a verb. Exit status: 0 done, 2 bad input, 130 interrupted, 143 or 129 stopped by
+SIGTERM or SIGHUP."""
+
+# module -> extra that brings it
+EXTRAS = {
+    "torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem",
+    "mitsuba": "render", "drjit": "render", "OpenEXR": "render", "rosbags": "ros", "lz4": "ros",
+    "distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch",
+}  # fmt: skip
+# Options that name something; that of --keep may be empty.
+PATHS = (
+    "frames", "press", "weights", "cluster", "calibration", "sensor", "start", "background", "json", "sheet", "test",
+)  # fmt: skip
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one verb; returns the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a path may hold what the terminal cannot show
+    options = _parser().parse_args(arguments)
+    try:
+        with stopping():
+            _check_out(options)
+            status = options.run(options)
+            sys.stdout.flush()
+    except TactileError as error:
+        complain(str(error))
+        return 2
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRAS:
+            raise
+        complain(f'this verb needs {error.name}. Install it: pip install "tactile-core[{EXTRAS[error.name]}]"')
+        return 2
+    except KeyboardInterrupt as stop:
+        return _stopped(stop, options.leaves)
+    except BrokenPipeError:
+        # The reader of our output has gone, as in `tactile info … | head`; the exit must not flush into it again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return status
+
+
+def _stopped(stop: KeyboardInterrupt, left: str) -> int:
+    """Say what an interrupted verb leaves; returns the exit status that shells give: 128 + the signal's number."""
+    with suppress(OSError):  # after SIGHUP the terminal is gone
+        say(f"stopped by {stop}; {left}" if isinstance(stop, Stopped) else f"interrupted; {left}")
+    return 128 + (stop.number if isinstance(stop, Stopped) else signal.SIGINT)
+
+
+def _check_out(options: argparse.Namespace) -> None:
+    """An empty name, as a script's unset variable gives it, would be the current folder, or as if it were not given."""
+    if getattr(options, "out", None) == "":
+        raise TactileError("--out", "an empty name", "a file or folder to write", "Name one")
+    for name in PATHS:
+        if getattr(options, name, None) == "":
+            raise TactileError(f"--{name}", "an empty value", "a value", "Leave the option out, or name one")
+
+
+def _parser() -> argparse.ArgumentParser:
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog="tactile", description=DESCRIPTION, epilog=EPILOG, formatter_class=raw)
+    parser.add_argument("--version", action="version", version=f"tactile {__version__}")
+    verbs = parser.add_subparsers(metavar="VERB", required=True, title="verbs")
+    for name, verb in VERBS.items():
+        sub = verbs.add_parser(name, help=verb.BRIEF, description=verb.TEXT, epilog=verb.EPILOG, formatter_class=raw)
+        verb.arguments(sub)
+        sub.set_defaults(run=verb.run, leaves=verb.LEAVES)
+    return parser

@@ -1,0 +1,50 @@
+"""``tactile adapt``: the gains of an unknown sensor, from its own recordings."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..terminal import say, tell
+from .common import NOTHING, polarity_argument
+
+BRIEF = "rest, gains and offsets of a sensor, from its recordings"
+TEXT = """\
+Fit a gain and an offset to each electrode of a BioTac, so that its readings in contact look like the simulated ones
+that the networks were trained on. Recordings of one sensor are taken together; what touched it need not be known. The
+more places were touched, softly and hard, the better. An electrode that the recordings do not tell enough of keeps
+gain 1, and a warning says so. Rectified recordings give no offsets.
+
+Three raw recordings or more also give the unit's rest, from those of the lowest fluid pressure (of the least squeezed
+electrodes where there is no PDC), with how far each electrode may be off: `tactile convert --sensor` takes it for
+recordings that begin and end in contact. Files of several fingers give a section a finger: these are units of their
+own."""
+EPILOG = """\
+example:
+  tactile adapt day1/*.csv --out sensor.toml
+  tactile convert day2/touch.csv --out results --sensor sensor.toml"""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("recordings", nargs="+", metavar="RECORDING", help="of one sensor, in any known layout")
+    verb.add_argument("--out", required=True, metavar="FILE", help="new TOML file to write")
+    polarity_argument(verb)
+    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fit and write."""
+    from ...files import atomic
+    from ...recordings import PrepareOptions, electrode_gains
+    from ...translation import adapt, networks, reference_signals
+
+    atomic.claim(options.out)
+    typical = reference_signals.read(options.weights or networks.WEIGHTS_FOLDER)
+    sensor, warnings = adapt.adapt_hand(options.recordings, typical, PrepareOptions(polarity=options.polarity))
+    for warning in warnings:
+        say(f"warning: {warning}")
+    electrode_gains.check(sensor, options.out)
+    electrode_gains.write(options.out, sensor)
+    tell(options.out)
+    return 0

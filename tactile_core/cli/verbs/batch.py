@@ -1,0 +1,170 @@
+"""``tactile batch``: many recordings, in many processes or on many machines."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import TactileError
+from ..terminal import bar, complain, say, tell
+from . import engine
+from .common import PRESETS, RESUMES, prepare_arguments, prepare_words, progress_argument
+
+if TYPE_CHECKING:
+    from ...jobs.engine.job import Job
+    from ...jobs.engine.recipes import Translate
+
+BRIEF = "many recordings to shards, resumable, on one machine or many"
+TEXT = """\
+Convert recordings into the job folder DIR:
+  job.json      inputs and their hashes, weights, options; written once
+  shards/       HDF5, some frames of one recording each, in the layout of frames.h5; pictures inside
+  aside/        what could not be done and why; the next run tries it again
+  manifest.json all shards and their hashes, once the job is done
+Only what is missing or damaged is made, so the same command goes on after any interruption; without INPUTS it goes on
+without looking whether they changed. The bytes do not depend on the number of workers. INPUTS are files, folders, globs
+(quoted) and @LIST, a text file with one path a line."""
+EPILOG = """\
+examples:
+  tactile batch day1 'day2/*.csv' --out job --workers 8
+  tactile batch --out job --status
+  tactile batch --out job --verify
+  tactile batch --out job --array $SLURM_ARRAY_TASK_ID/100     one of 100 that share the work, without a scheduler
+  tactile batch --out job --cluster tcp://head:8786            on the workers of a Dask scheduler
+  tactile batch day1 --out job --plan                          write job.json alone, as arrays need it"""
+LEAVES = RESUMES
+RECIPE = (  # option, its value where it is not given
+    *((name, None) for name in ("keep", "shard_frames", "weights", "sensor", "calibration", "preset")),
+    *((name, None) for name in ("kind", "counts_per_unit", "smooth")),
+    *(("tare", "auto"), ("no_drift", False), ("polarity", "auto")),
+)
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; none: go on with the job in DIR")
+    verb.add_argument("--out", required=True, metavar="DIR", help="folder of the job")
+    verb.add_argument(
+        "--keep", metavar="WORDS", help="out of latent,displacement,height,image (default: latent,displacement)"
+    )
+    verb.add_argument("--shard-frames", type=int, metavar="N", help="frames a shard (default: 1000)")
+    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+    verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
+    verb.add_argument("--calibration", metavar="FILE", help="the DIGIT whose pictures to make (`tactile calibrate`)")
+    verb.add_argument("--preset", choices=PRESETS, help="of the pictures, see `tactile render --help` (default: fast)")
+    prepare_arguments(verb)
+    engine.place_arguments(verb)
+    verb.add_argument("--array", metavar="I/N", help="do part I of N, from 0, beside other processes that do theirs")
+    doing = verb.add_mutually_exclusive_group()
+    doing.add_argument("--plan", action="store_true", help="write job.json and stop")
+    doing.add_argument("--status", action="store_true", help="say how far the job is; reads files, changes nothing")
+    doing.add_argument("--verify", action="store_true", help="read every shard; status 2 if one is damaged or gone")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Start, go on with, or look at a job."""
+    from ...jobs.engine import job as jobs
+    from ...jobs.engine import run as runs
+
+    folder, part = Path(options.out), engine.part(options.array)
+    if options.status or options.verify:
+        if options.inputs:
+            raise TactileError("--status and --verify", "given with INPUTS", "--out DIR alone")
+        job = jobs.read(folder)
+        return _status(folder, job) if options.status else _verify(folder, job, options.progress)
+    engine.check_counts(options, "workers", "restart", "shard_frames")
+    if part is not None and not jobs.exists(folder):
+        raise TactileError(folder, "no job yet", "a job that all parts share", "Make it once with --plan")
+    with runs.opened(folder, part):
+        job = _job(folder, options)
+        if options.plan:
+            tell(str(folder / jobs.FILE))
+            return 0
+        place = engine.place(folder, options)
+        with bar("batch", "task", options.progress) as shown:
+            done = runs.run(folder, job, place, part, shown)
+    status = engine.told(done)
+    tell(f"{folder}: {done.made} shards made, {done.kept} kept, {len(done.aside)} set aside")
+    return status
+
+
+def _job(folder: Path, options: argparse.Namespace) -> Job:
+    """The job of the folder, made from the options where there is none. Raises TactileError where the two differ."""
+    from ...jobs.engine import inputs
+    from ...jobs.engine import job as jobs
+
+    there = jobs.read(folder) if jobs.exists(folder) else None
+    if not options.inputs:
+        if there is None:
+            raise TactileError(folder, "no job here", "INPUTS, or the folder of a job", "Name recordings to convert")
+        told = [name for name, usual in RECIPE if getattr(options, name) != usual]
+        if told:
+            raise TactileError("--" + told[0].replace("_", "-"), "given without INPUTS", "the job as it was begun")
+        return there
+    paths = inputs.find(options.inputs, folder)
+    with bar("reading", "file", options.progress) as shown:
+        found = inputs.hashed(paths, shown)
+    job = jobs.make(found, _recipe(options), options.weights, options.calibration)
+    if there is None:
+        jobs.check_empty(folder, "Name another --out")
+        jobs.write(folder, job)
+        return job
+    if job.id != there.id:
+        found, advice = "holds another job (other recordings, contents or options)", "Name another --out folder"
+        raise TactileError(folder, found, "the same command that began it", advice)
+    return there
+
+
+def _recipe(options: argparse.Namespace) -> Translate:
+    """The recipe that the options say."""
+    from ...jobs import results
+    from ...jobs.engine.inputs import unit_hash
+    from ...jobs.engine.recipes import MAX_SHARD_FRAMES, SHARD_FRAMES, Prepare, Translate
+    from ...pictures.mitsuba.variant import variant_for
+    from ...recordings import electrode_gains
+    from ...translation import translate
+
+    keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
+    prepare = Prepare(**prepare_words(options))
+    prepare.options().check()
+    sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
+    sha256 = translate.load_translator(options.weights).sha256
+    frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
+    if frames > MAX_SHARD_FRAMES:
+        raise TactileError("--shard-frames", str(frames), f"1 to {MAX_SHARD_FRAMES}")
+    unit = "" if options.calibration is None else unit_hash(Path(options.calibration))
+    preset = options.preset or "fast"
+    if options.preset is not None and "image" not in keep:
+        raise TactileError("--preset", preset, "--keep image", "Keep the pictures that it makes")
+    return Translate(list(keep), sha256, frames, prepare, sensor, unit, preset, variant_for(preset))
+
+
+def _status(folder: Path, job: Job) -> int:
+    from ...jobs.engine import manifest
+
+    found = manifest.status(folder, job)
+    tell(f"inputs      {found.prepared} of {found.recordings} prepared, {found.frames} frames")
+    tell(f"shards      {found.there} of {found.shards} of the prepared inputs")
+    tell(f"set aside   {len(found.aside)}")
+    for name, why in found.aside.items():
+        tell(f"  {name}: {why}")
+    tell("complete" if found.complete else "not complete: the same command goes on")
+    return 0
+
+
+def _verify(folder: Path, job: Job, progress: bool) -> int:
+    from ...jobs.engine import manifest
+
+    with bar("verify", "file", progress) as shown:
+        bad = manifest.damaged(folder, shown)
+    for file in bad:
+        found = "damaged, or another's" if file.exists() else "missing"
+        complain(f"{file}: {found}; the same command makes it anew")
+    if bad:
+        return 2
+    found = manifest.status(folder, job)
+    rest = "" if found.complete else f"; not complete: {found.there} of {found.shards} shards of the prepared inputs"
+    say(f"{folder}: every file is as it was written{rest}")
+    return 0

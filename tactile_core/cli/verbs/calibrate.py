@@ -1,0 +1,136 @@
+"""``tactile calibrate``: a DIGIT unit's camera, lights and colours, from photographs of a ball pressed into it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import TactileError
+from ..terminal import bar, say, tell
+from .common import NOTHING, progress_argument
+
+if TYPE_CHECKING:
+    from ...pictures.calibrate.photographs import Photographs
+
+BRIEF = "camera, lights and colours of a DIGIT, from presses of a ball"
+TEXT = """\
+Fit a DIGIT unit's calibration to photographs of a ball pressed into it, anywhere and to any depth: positions of camera
+and lights, their extent, colours, scale. Without a photograph of the untouched gel, its median over the photographs
+takes its place. Ten presses spread over the gel tell most; one or five do, from a calibration of another unit. What
+they tell too little of is held near that one, and named. Writes the calibration, and a sheet to look at (.png).
+
+With --test, a calibration is tried on photographs instead: place and depth of each press are fitted, all else is the
+calibration's, and the picture is compared with the photograph, beside the null answer of the background alone."""
+EPILOG = """\
+examples:
+  tactile calibrate presses/ --ball-diameter 6 --out unit.toml
+  tactile calibrate presses/ --ball-diameter 6 --background untouched.png --out unit.toml
+  tactile calibrate --test unit.toml more_presses/ --json trial.json"""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("presses", metavar="PRESSES", help="folder of photographs of one unit, fingertip up")
+    verb.add_argument("--out", metavar="FILE", help="new TOML file to write")
+    verb.add_argument("--ball-diameter", type=float, metavar="MM", help="of the ball (with --test: as fitted)")
+    verb.add_argument("--background", metavar="FILE", help="photograph of the untouched gel (default: estimated)")
+    verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
+    verb.add_argument("--unit", metavar="TEXT", help="the unit's name in the file (default: the file's)")
+    verb.add_argument("--only", metavar="NAMES", help="photographs to use, file names separated by commas")
+    verb.add_argument("--test", metavar="FILE", help="try this calibration instead of fitting one")
+    verb.add_argument("--json", metavar="FILE", help="with --test: write the rows")
+    verb.add_argument("--sheet", metavar="FILE", help="with --test: write photographs, renders, differences as PNG")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fit and write, or try and tell."""
+    from ...pictures.calibrate.photographs import chosen, read_photographs
+
+    _check_options(options)
+    photographs = read_photographs(options.presses, options.background)
+    if options.only is not None:
+        photographs = chosen(photographs, [name.strip() for name in options.only.split(",")])
+    return _test(options, photographs) if options.test else _fit(options, photographs)
+
+
+def _check_options(options: argparse.Namespace) -> None:
+    from ...files import atomic
+    from ...pictures.calibrate.fit import check_diameter
+
+    if options.test:
+        for name in ("out", "start", "unit"):
+            if getattr(options, name) is not None:
+                raise TactileError(f"--{name}", "given with --test", "one or the other")
+        for path in (options.json, options.sheet):
+            if path is not None:
+                atomic.claim(path)
+        if options.json is not None and options.json == options.sheet:
+            raise TactileError("--json and --sheet", options.json, "two files")
+        if options.ball_diameter is not None:
+            check_diameter(1e-3 * options.ball_diameter)
+        return
+    for name in ("json", "sheet"):
+        if getattr(options, name) is not None:
+            raise TactileError(f"--{name}", "given without --test", "a trial", "Name a calibration: --test FILE")
+    if options.out is None or options.ball_diameter is None:
+        missing = "--out" if options.out is None else "--ball-diameter"
+        raise TactileError(missing, "missing", "a file to write and the ball's diameter in mm", "Or try one: --test")
+    check_diameter(1e-3 * options.ball_diameter)
+    if _sheet_beside(options.out) == Path(options.out):
+        raise TactileError("--out", options.out, "a file to write that ends in .toml: the sheet is the .png beside it")
+    atomic.claim(options.out)
+    atomic.claim(_sheet_beside(options.out))
+
+
+def _sheet_beside(out: str) -> Path:
+    return Path(out).with_suffix(".png")
+
+
+def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
+    from ...pictures.calibrate.fit import calibrate
+    from ...pictures.calibrate.report import rows_of, write_sheet
+    from ...sensors.calibration_file import load_calibration, write_calibration
+
+    start = load_calibration(options.start)
+    with bar("calibrate", "step", options.progress) as progress:
+        name = options.unit or Path(options.out).stem
+        done = calibrate(photographs, 1e-3 * options.ball_diameter, start, unit=name, progress=progress)
+    for warning in done.warnings:
+        say(f"warning: {warning}")
+    say(f"these photographs tell too little of: {', '.join(done.calibration.fit.not_identified)}")
+    write_calibration(options.out, done.calibration)
+    write_sheet(_sheet_beside(options.out), done.tried)
+    _tell_rows(rows_of(done.tried, "presses it was fitted on"))
+    tell(options.out)
+    return 0
+
+
+def _test(options: argparse.Namespace, photographs: Photographs) -> int:
+    from ...files import atomic
+    from ...pictures.calibrate.evaluate import evaluate_unit
+    from ...pictures.calibrate.report import rows_by_press, rows_of, write_sheet
+    from ...sensors.calibration_file import load_calibration
+
+    calibration = load_calibration(options.test)
+    diameter = calibration.fit.ball_diameter if options.ball_diameter is None else 1e-3 * options.ball_diameter
+    with bar("test", "press", options.progress) as progress:
+        tried = evaluate_unit(calibration, photographs, diameter / 2, progress=progress)
+    for each in tried:
+        for flag in each.flags:
+            say(f"warning: {each.press.name}: {flag}")
+    rows = rows_of(tried, photographs.folder.name)
+    if options.json:
+        atomic.write_json(options.json, rows + rows_by_press(tried))
+    if options.sheet:
+        write_sheet(options.sheet, tried)
+    _tell_rows(rows)
+    return 0
+
+
+def _tell_rows(rows: list[dict]) -> None:
+    from ...accuracy import HEADER, line
+
+    tell("\n".join([HEADER, *map(line, rows)]))

@@ -1,0 +1,80 @@
+"""What several verbs share."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ...errors import TactileError
+
+# What a stopped verb leaves.
+NOTHING = "no half file is left"
+RESUMES = "the same command goes on where it stopped"
+
+PRESETS = ("fast", "standard", "quality", "reference")  # of optics.presets, without importing it
+MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
+
+
+def progress_argument(verb: argparse.ArgumentParser) -> None:
+    """``--progress``."""
+    verb.add_argument("--progress", action="store_true", help="show progress even where stderr is no terminal")
+
+
+def prepare_arguments(verb: argparse.ArgumentParser) -> None:
+    """How readings become signals."""
+    verb.add_argument(
+        "--tare",
+        default="auto",
+        metavar="auto|none|A:B",
+        help="frames without contact that give the resting reading (default: found automatically)",
+    )
+    verb.add_argument(
+        "--kind",
+        choices=("raw", "tared", "scaled", "rectified"),
+        help="what the file holds, where the automatic answer is wrong",
+    )
+    polarity_argument(verb)
+    verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor to counts, for a scaled recording")
+    verb.add_argument(
+        "--smooth", type=int, metavar="N", help="average over N frames, odd (default: 3 if rectified, else 1)"
+    )
+    verb.add_argument("--no-drift", action="store_true", help="do not remove drift")
+
+
+def polarity_argument(verb: argparse.ArgumentParser) -> None:
+    """``--polarity``."""
+    verb.add_argument(
+        "--polarity",
+        choices=("auto", "falls", "rises"),
+        default="auto",
+        help="what counts do where the film over an electrode thins: fall, as raw ones do, or rise, in files that hold"
+        " rest minus reading (default: as the file says, or the recording shows)",
+    )
+
+
+def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
+    """``--error``; what : the units that mean something here, in words."""
+    verb.add_argument("--error", metavar="BOUND", help=f"the largest error that the toolkit itself may add: {what}")
+
+
+def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
+    """``--seed``; ``same`` : what the same seed makes again."""
+    verb.add_argument("--seed", type=int, default=0, metavar="S", help=f"same seed, same {same} (default: 0)")
+
+
+def check_seed(seed: int) -> None:
+    """Raises TactileError for a seed that the generators do not take."""
+    if not 0 <= seed <= MAX_SEED:
+        raise TactileError("--seed", str(seed), f"0 to {MAX_SEED}", "Give another one")
+
+
+def prepare_words(options: argparse.Namespace) -> dict[str, Any]:
+    """What ``recordings.PrepareOptions`` is told, from the arguments of a verb that prepares recordings."""
+    return {
+        "kind": options.kind,
+        "tare": None if options.tare == "auto" else options.tare,
+        "drift": not options.no_drift,
+        "counts_per_unit": options.counts_per_unit,
+        "smooth": options.smooth,
+        "polarity": options.polarity,
+    }

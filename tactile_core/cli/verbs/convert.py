@@ -1,0 +1,115 @@
+"""``tactile convert``: recordings to DIGIT pictures."""
+
+from __future__ import annotations
+
+import argparse
+
+from ...errors import TactileError
+from ...files.threads import one_thread
+from ..terminal import bar, complain, say, tell
+from .common import NOTHING, error_argument, prepare_arguments, prepare_words, progress_argument
+
+BRIEF = "recordings to DIGIT pictures"
+TEXT = """\
+Read, tare, translate and shade recordings. Each gets the folder DIR/<file name without extension> with
+  frames.h5          numbers of every frame: time, electrodes, force, contact_center, confidence, flags; and what
+                     --keep names
+  images/%05d.png    DIGIT pictures, 240 x 320, numbered by the frame's index in the recording (from 0)
+  contact_sheet.png  a few frames to look at
+  note.json          versions, weights, options, warnings
+  timings.json       ms a frame of each stage
+One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all.
+A file of several fingers gives one result a finger, <name>_finger0, <name>_finger1, ...; hand.bag#1 picks one.
+
+--error bounds what the toolkit adds to its networks' answer: levels, of a picture, picks the cheapest preset of
+`tactile render` that was measured to meet it (fast without it); um, of heights and displacements, is what is added
+anyway, or refused. What the networks themselves leave is told beside it, and is no part of it."""
+# 4 B a number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
+# noisy real one), packed height maps at 200 kB.
+SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
+EPILOG = f"""\
+examples:
+  tactile convert touch.csv --out results
+  tactile convert day1/*.csv --out results --keep latent --overwrite
+  tactile convert touch.csv --out results --frames 200:300:5 --tare 0:50
+
+Size of a 700-frame result, measured: {SIZES}."""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument(
+        "recordings", nargs="+", metavar="RECORDING", help="CSV, HDF5, NPZ, MAT or bag files, in any known layout"
+    )
+    verb.add_argument("--out", required=True, metavar="DIR", help="folder of the results; may exist and hold others")
+    verb.add_argument(
+        "--frames",
+        default=":",
+        metavar="A:B:STEP",
+        help="only these frames, counted from 0 as in Python; for a negative A write --frames=-50: ."
+        " Pictures keep their number in the recording, and the tare still sees the whole of it",
+    )
+    verb.add_argument(
+        "--keep",
+        default="latent,displacement,image",
+        metavar="WORDS",
+        help="what to write beside the numbers that are always there, out of"
+        " latent,displacement,height,image (default: %(default)s)",
+    )
+    verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
+    prepare_arguments(verb)
+    verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
+    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+    error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Convert; one bad recording does not stop the others."""
+    one_thread()  # before numpy is imported
+    from ... import accuracy
+    from ...jobs import convert, frame_range, results
+    from ...recordings import PrepareOptions, electrode_gains
+
+    prepare = PrepareOptions(**prepare_words(options))
+    keep, frames = results.parse_keep(options.keep), frame_range.parse_frames(options.frames)
+    sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
+    budget = None if options.error is None else accuracy.parse_budget(options.error)
+    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget)
+    paths, failed = _fingers(options.recordings), 0
+    folders = results.result_folders(paths, options.out, options.overwrite)
+    tools = convert.load_tools(options.weights)
+    if budget is not None and budget.levels is not None:
+        tools, why = convert.within(tools, budget.levels)
+        say(why)
+    for path, folder in zip(paths, folders, strict=True):
+        try:
+            with bar(folder.name, "frame", options.progress) as shown:
+                done = convert.convert(path, folder, job, tools, shown)
+        except TactileError as error:
+            complain(str(error))
+            failed += 1
+            continue
+        for warning in done.warnings:
+            say(f"warning: {folder.name}: {warning}")
+        if budget is not None:
+            for told in filter(None, (done.added, done.left)):
+                say(f"{folder.name}: {told}")
+        tell(str(done.folder))
+    if failed and len(folders) > 1:
+        complain(f"{failed} of {len(folders)} recordings were not converted")
+    return 2 if failed else 0
+
+
+def _fingers(recordings: list[str]) -> list[str]:
+    """Each recording, each finger of those that hold a hand; what is no recording is told of when its turn comes."""
+    from ...recordings.readers import each_finger
+
+    found = []
+    for path in recordings:
+        try:
+            found += each_finger(path)
+        except TactileError:
+            found.append(path)
+    return found

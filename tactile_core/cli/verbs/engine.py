@@ -1,0 +1,81 @@
+"""What the verbs that run jobs share: where the work is done."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import TactileError
+from ..terminal import complain, say
+
+if TYPE_CHECKING:
+    from ...jobs.engine.run import Done, Place
+
+
+def place_arguments(verb: argparse.ArgumentParser) -> None:
+    """``--workers``, ``--cluster``, ``--restart``, ``--plan``."""
+    where = verb.add_mutually_exclusive_group()
+    where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; changes no byte")
+    where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
+    verb.add_argument("--restart", type=int, metavar="N", help="replace a worker after N tasks (default: 200)")
+
+
+def parts_arguments(verb: argparse.ArgumentParser) -> None:
+    """As `place_arguments`, for a verb whose job is in a folder beside its result."""
+    place_arguments(verb)
+    verb.add_argument(
+        "--plan",
+        action="store_true",
+        help="write the job into OUT.parts and stop: `tactile batch --out OUT.parts --array I/N`, and --status or"
+        " --verify, work there; the same command without --plan goes on, and makes OUT",
+    )
+
+
+def check_counts(options: argparse.Namespace, *names: str) -> None:
+    """Raises TactileError for a number of workers or the like below 1."""
+    for name in names:
+        value = getattr(options, name)
+        if value is not None and value < 1:
+            raise TactileError("--" + name.replace("_", "-"), str(value), "1 or more")
+
+
+def part(text: str | None) -> tuple[int, int] | None:
+    """``"3/8"`` -> (3, 8). Raises TactileError."""
+    if text is None:
+        return None
+    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+    if not found or not int(found[1]) < int(found[2]):
+        raise TactileError("--array", repr(text), "I/N with I from 0 to N - 1", "Such as 0/8")
+    return int(found[1]), int(found[2])
+
+
+def place(folder: Path, options: argparse.Namespace) -> Place:
+    """Where the tasks of the job in `folder` are done."""
+    if options.cluster is not None:
+        from ...jobs.engine.dask_cluster import Cluster
+
+        if options.cluster.startswith("tcp://") and not options.cluster.startswith("tcp://127."):
+            say(
+                "warning: tcp:// is neither secret nor signed, and Dask's messages run code: private network, or tls://"
+            )
+        return Cluster(folder, options.cluster, say)
+    from ...jobs.engine.local import RESTART, Local
+
+    return Local(folder.resolve(), options.workers or 1, options.restart or RESTART)
+
+
+def place_or_none(options: argparse.Namespace) -> Callable[[Path], Place] | None:
+    """Makes the place that was asked for; None for this process alone."""
+    if options.cluster is None and (options.workers or 1) == 1:
+        return None
+    return lambda folder: place(folder, options)
+
+
+def told(done: Done) -> int:
+    """Complain of what was set aside; the exit status."""
+    for name, why in done.aside.items():
+        complain(f"{name}: {why}")
+    return 2 if done.aside else 0

@@ -1,0 +1,42 @@
+"""``tactile export``: a finished job in a layout that others read."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..terminal import bar, say, tell
+from .common import NOTHING, progress_argument
+
+BRIEF = "a finished batch job as NPZ, PNG, OpenEXR or LeRobot data set"
+TEXT = """\
+Write the shards of a finished job (see `tactile batch`) as
+  npz      one NPZ file a recording, all arrays
+  png      a folder of pictures a recording (the job must have kept image)
+  exr      a folder of OpenEXR files a recording: heights in metres and pictures, as far as they were kept
+           (needs OpenEXR: pip install "tactile-core[render]")
+  lerobot  a LeRobot v3.0 data set: one recording is one episode (needs pyarrow: pip install "tactile-core[batch]")"""
+EPILOG = """\
+example:
+  tactile export job --to lerobot --out dataset"""
+LEAVES = NOTHING
+LAYOUTS = ("npz", "png", "exr", "lerobot")
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("job", metavar="JOB", help="folder of the job")
+    verb.add_argument("--to", required=True, choices=LAYOUTS, help="layout")
+    verb.add_argument("--out", required=True, metavar="DIR", help="new folder")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write."""
+    from ...jobs import export
+
+    with bar("export", "frame", options.progress) as shown:
+        source = export.export(options.job, options.to, options.out, shown)
+    for name, why in source.aside.items():
+        say(f"warning: {name} was set aside and is left out: {why}")
+    tell(options.out)
+    return 0

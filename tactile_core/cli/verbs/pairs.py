@@ -1,0 +1,53 @@
+"""``tactile pairs``: paired contacts of both sensors."""
+
+from __future__ import annotations
+
+import argparse
+
+from ...files.threads import one_thread
+from ..terminal import bar, tell
+from . import engine
+from .common import RESUMES, check_seed, progress_argument, seed_argument
+
+BRIEF = "simulate paired contacts"
+TEXT = "Simulate contacts of a scene's indenters with both sensors: same force, angle and place."
+EPILOG = """\
+example:
+  tactile pairs scenes/press_sphere/scene.toml --count 2000 --seed 1 --out pairs.h5 --workers 4
+
+  tactile pairs SCENE --count 50000 --out pairs.h5 --plan       and then, on each of 8 machines:
+  tactile batch --out pairs.h5.parts --array 0/8                then the first line again, which puts all together
+
+An interrupted run goes on where it stopped when the same command is given again."""
+LEAVES = RESUMES
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("scene", metavar="SCENE", help="scene.toml: indenters and their range of places, angles, depths")
+    verb.add_argument("--count", type=int, required=True, metavar="N", help="number of paired contacts")
+    seed_argument(verb, "file")
+    verb.add_argument(
+        "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json, what is in it, goes beside"
+    )
+    engine.parts_arguments(verb)
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Make the pairs."""
+    one_thread()  # before numpy is imported
+    engine.check_counts(options, "workers", "restart")
+    check_seed(options.seed)
+    from ...jobs import pairs
+    from ...jobs.engine import result_parts
+
+    if options.plan:
+        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out)
+        tell(str(result_parts.write(options.out, job)))
+        return 0
+    place = engine.place_or_none(options)
+    with bar("pairs", "block", options.progress) as shown:
+        pairs.make_pairs(options.scene, options.count, options.seed, options.out, progress=shown, place=place)
+    tell(options.out)
+    return 0

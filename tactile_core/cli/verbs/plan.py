@@ -1,0 +1,49 @@
+"""``tactile plan``: what a scene or a recording will build, and what it will cost."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..terminal import tell
+from .common import NOTHING, error_argument
+
+BRIEF = "what will be built, and what it will cost"
+TEXT = """\
+Say, before anything is run, what a scene's `tactile simulate` (and `convert` and `render` after it), or a recording's
+`tactile convert`, will build for the outputs asked for: sensors and their nodes, matrices (cached, or to be built),
+contacts and their tiers, networks, lights; and what time, memory and disk to expect, from measured tables that ship.
+Nothing is written. Of a scene whose matrices are cached, the points of its motion are solved, to see how deep it is."""
+EPILOG = """\
+examples:
+  tactile plan scenes/press
+  tactile plan scenes/press --keep electrodes
+  tactile plan scenes/press --keep image --error 50um,0.5levels --json
+  tactile plan scenes/press_roll_slide/press_roll_slide.h5 --keep latent"""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("input", metavar="INPUT", help="scene (scene.toml or its folder), or a recording")
+    verb.add_argument(
+        "--keep",
+        metavar="WORDS",
+        help="outputs; of a scene out of electrodes,displacement_biotac,displacement_digit,translation,image;"
+        " of a recording latent,displacement,height,image (default: all of a scene, those of `convert`)",
+    )
+    verb.add_argument("--preset", metavar="NAME", help="of the pictures (default: as `render` and `convert` have it)")
+    error_argument(verb, "um of surfaces, levels of pictures, or both: 50um,0.6levels")
+    verb.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Plan and tell."""
+    import json
+
+    from ... import accuracy
+    from ...jobs import plan
+
+    budget = accuracy.Budget() if options.error is None else accuracy.parse_budget(options.error)
+    found = plan.plan(options.input, options.keep, budget, options.preset)
+    tell(json.dumps(found.as_json(), indent=2) if options.json else "\n".join(found.lines()))
+    return 0

@@ -1,0 +1,116 @@
+"""``tactile render``: pictures by preset, from fast to physically based."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from typing import TYPE_CHECKING
+
+from ...errors import TactileError
+from ..terminal import bar, say, tell
+from . import engine
+from .common import NOTHING, PRESETS, error_argument, progress_argument
+
+if TYPE_CHECKING:
+    from ...jobs.render import Options
+
+BRIEF = "pictures of deformed gels, physically based"
+TEXT = """\
+Draw what the DIGIT's camera sees of a deformed gel. INPUT is one of
+  frames.h5          of `tactile convert`, with displacement kept
+  recording.h5       simulated, with its true gel
+  heights.npz, .exr  heights in metres under the camera's pixels: array height_map, (H, W) or (T, H, W); channel height
+  a scene's folder   (or its scene.toml) with a [recording], which is simulated first
+
+DIR is a new folder, which appears whole or not at all:
+  images/%05d.png  8-bit pictures: background + C (L in contact - L at rest)
+  exr/%05d.exr     with --exr, float32: basis.red, .green, .blue = L of each LED; R, G, B = C L in grey levels
+  rest.exr         the same of the undeformed gel
+  note.json        input, calibration, preset, versions;  timings.json  ms a frame
+
+Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (pip install "tactile-core[render]").
+  fast       direct light, soft shadows            standard   direct light, traced
+  quality    and the light of one bounce           reference  everything, seconds a frame
+A picture is the same with LLVM and without it, but for rounding; `tactile doctor` says which runs here.
+
+--error 0.6levels picks the cheapest preset whose measured error, rms from the full model of the same gel, is at most
+that; --error 50um, for a scene, the tier of contact as `tactile simulate` does. It says what it picked, and why.
+
+With --workers, --cluster or --plan frames are rendered in other processes, by the same bytes. They wait in OUT.parts
+until all are there, and the same command goes on after any interruption; no timings.json is written."""
+EPILOG = """\
+examples:
+  tactile render results/touch/frames.h5 --out pictures --frames 100:200
+  tactile render scenes/press_roll_slide --out pictures --preset quality --exr
+  tactile render heights.npz --out pictures --error 0.5levels --calibration unit.toml
+  tactile render scenes/press --out pictures --error 50um,0.6levels"""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("input", metavar="INPUT")
+    verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
+    verb.add_argument("--preset", choices=PRESETS, help="how exactly (default: standard)")
+    error_argument(verb, "levels of the picture (picks the preset), um of the gel (picks a scene's tier), or both")
+    verb.add_argument("--calibration", metavar="UNIT.toml", help="of your sensor (default: the one that ships)")
+    verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="only these, counted from 0 as in Python")
+    verb.add_argument("--size", metavar="WxH", help="pixels, such as 480x640 (default: the calibration's)")
+    verb.add_argument("--exr", action="store_true", help="write OpenEXR beside PNG")
+    verb.add_argument("--noise", action="store_true", help="add the unit's camera noise to PNG pictures")
+    verb.add_argument("--variant", choices=("llvm", "scalar"), help="of Mitsuba (default: the faster one that works)")
+    verb.add_argument("--overwrite", action="store_true", help="replace an older result")
+    engine.parts_arguments(verb)
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Render."""
+    engine.check_counts(options, "workers", "restart")
+    size = _size(options.size)
+    from ... import accuracy
+    from ...jobs import frame_range, render
+    from ...pictures.mitsuba import variant
+
+    wanted = {None: None, "llvm": variant.LLVM, "scalar": variant.SCALAR}[options.variant]
+    asked = render.Options(
+        preset=options.preset,
+        error=None if options.error is None else accuracy.parse_budget(options.error),
+        calibration=options.calibration,
+        size=size,
+        frames=frame_range.parse_frames(options.frames),
+        exr=options.exr,
+        variant=wanted,
+        noise=options.noise,
+        overwrite=options.overwrite,
+    )
+    if options.plan or options.workers or options.cluster:
+        if asked.error is not None:
+            asked.error.only("levels", "Simulate the scene first, with --error, and render that")
+        return _run_in_parts(options, asked)
+    done = render.render(options.input, options.out, asked, lambda word: bar(word, "frame", options.progress), say)
+    tell(str(done))
+    return 0
+
+
+def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
+    """Render in other processes, or write the plan of that."""
+    from ...jobs.engine import result_parts
+    from ...jobs.render_shards import plan, render_in_parts
+
+    if options.plan:
+        tell(str(result_parts.write(options.out, plan(options.input, options.out, asked))))
+        return 0
+    with bar("render", "task", options.progress) as shown:
+        done = render_in_parts(options.input, options.out, asked, lambda folder: engine.place(folder, options), shown)
+    tell(str(done))
+    return 0
+
+
+def _size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    if not found:
+        raise TactileError("--size", repr(text), "WIDTHxHEIGHT in pixels, such as 480x640")
+    return int(found[1]), int(found[2])

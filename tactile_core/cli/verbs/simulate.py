@@ -1,0 +1,139 @@
+"""``tactile simulate``: the recording of a scene."""
+
+from __future__ import annotations
+
+import argparse
+
+from ...errors import TactileError
+from ..terminal import bar, say, tell
+from . import engine
+from .common import NOTHING, check_seed, error_argument, progress_argument, seed_argument
+
+BRIEF = "simulate a recording"
+TEXT = """\
+Simulate the recording that a scene describes, marked so and with its true meshes. A sensor that nothing of --keep
+needs is not solved: electrodes and displacement_biotac need the BioTac, displacement_digit the DIGIT.
+
+--error 50um picks for each sensor the cheapest tier of contact whose measured error (rms of the surface; 95 of 100
+contacts stay below), to the depth that the scene reaches, is at most that, and says which; fast without it.
+
+With --isaac-like the scene's motion presses a BioTac skin of your own, as Isaac Gym computed it: linear tetrahedra,
+E 1.552 MPa, nu 0.316, no fluid, hence no electrodes, and no friction. Ten frames a second of displacement, force and
+depth come out, for comparison with data that was made that way. Such meshes lock: the force is too high.
+
+With --grid many recordings are simulated into a folder, with grid.json, which tells the values of each. They wait in
+OUT.parts until all are there, and the same command goes on after any interruption."""
+EPILOG = """\
+examples:
+  tactile simulate scenes/press_roll_slide/scene.toml --seed 1 --out press_roll_slide.h5
+  tactile simulate scenes/press --keep electrodes --out press.h5          the BioTac alone
+  tactile simulate scenes/press --error 50um --out press.h5
+  tactile simulate scenes/press_roll_slide --isaac-like skin.tet --core core.obj --out isaac.h5
+  tactile simulate scenes/press_roll_slide --grid force_n=0.2:1:5 --grid recording.tilt_deg=0,10 --out many"""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("scene", metavar="SCENE", help="scene.toml with a [recording]")
+    seed_argument(verb, "file")
+    verb.add_argument("--out", required=True, metavar="FILE", help="HDF5 file to write")
+    verb.add_argument(
+        "--keep",
+        metavar="WORDS",
+        help="what the file holds, out of electrodes,displacement_biotac,displacement_digit (default: all)",
+    )
+    error_argument(verb, "um of the surface, such as 50um")
+    verb.add_argument(
+        "--isaac-like",
+        metavar="FILE.tet",
+        help="a skin in Isaac Gym's text layout (lines `v x y z` in metres and `t a b c d`), in the frame"
+        " of the public BioTac mesh; a frame takes some seconds, and --seed changes nothing",
+    )
+    verb.add_argument(
+        "--core",
+        metavar="FILE.obj",
+        help="for --isaac-like: the rigid core that holds the skin, a closed triangle mesh in metres"
+        " (default: our own table of it, which moves forces by 1 %%)",
+    )
+    verb.add_argument(
+        "--grid",
+        action="append",
+        metavar="NAME=A:B:N",
+        help="a recording for each of N values from A to B, or NAME=V,V,...; given again, for each combination."
+        " NAME is force_n (the greatest force), x_mm, z_mm (where that is), or a field of the scene such as"
+        " recording.tilt_deg or indenters.0.radius_mm. --out is then a folder; the first recording has --seed, each"
+        " one more than that before it",
+    )
+    engine.parts_arguments(verb)
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate."""
+    check_seed(options.seed)
+    if options.grid:
+        return _run_grid(options)
+    for name in ("workers", "cluster", "restart", "plan"):
+        if getattr(options, name):
+            raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
+    if options.core and not options.isaac_like:
+        raise TactileError("--core", options.core, "--isaac-like FILE.tet beside it", "Our own skin has its core")
+    for name in ("keep", "error"):
+        if getattr(options, name) is not None and options.isaac_like:
+            raise TactileError(f"--{name}", getattr(options, name), "no --isaac-like beside it, which has its own way")
+    bound = None if options.error is None else _bound(options.error)
+    with bar("simulate", "frame", options.progress) as shown:
+        if options.isaac_like:
+            from ...simulation.isaac_recording import simulate_isaac_like
+
+            missed = simulate_isaac_like(options.scene, options.isaac_like, options.out, options.core, shown)
+            if missed:
+                say(f"warning: {missed} frames did not reach their force and are marked (converged is false)")
+        else:
+            from ...jobs import results
+            from ...simulation.recording import ALL, simulate_recording
+
+            keep = results.parse_words(options.keep, ALL)
+            tiers = {} if bound is None else _tiers(options.scene, keep, bound)
+            simulate_recording(options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers)
+    tell(options.out)
+    return 0
+
+
+def _bound(text: str) -> float:
+    from ... import accuracy
+
+    return accuracy.parse_budget(text).only("um", "Pictures are drawn by `tactile render`")
+
+
+def _tiers(scene: str, keep: tuple[str, ...], bound: float) -> dict[str, str]:
+    """The cheapest within the bound, um, and why."""
+    from ...simulation.recording import sensors_of
+    from ...simulation.tier_choice import choose_for_scene
+
+    found = choose_for_scene(scene, sensors_of(keep), bound)
+    for sensor, choice in found.items():
+        say(choice.told(sensor))
+    return {sensor: choice.tier for sensor, choice in found.items()}
+
+
+def _run_grid(options: argparse.Namespace) -> int:
+    """Simulate many."""
+    engine.check_counts(options, "workers", "restart")
+    for name in ("isaac_like", "error"):
+        if getattr(options, name):
+            raise TactileError("--grid", f"given with --{name.replace('_', '-')}", "one of the two")
+    from ...jobs import results, simulate
+    from ...jobs.engine import result_parts
+    from ...simulation.recording import ALL
+
+    keep = results.parse_words(options.keep, ALL)
+    job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep)
+    if options.plan:
+        tell(str(result_parts.write(options.out, job)))
+        return 0
+    with bar("simulate", "task", options.progress) as shown:
+        simulate.simulate_grid(job, options.out, shown, engine.place_or_none(options))
+    tell(options.out)
+    return 0

@@ -1,0 +1,95 @@
+"""``tactile train``: the networks, from pairs."""
+
+from __future__ import annotations
+
+import argparse
+
+from ...errors import TactileError
+from ...training.options import DEVICES
+from ..terminal import bar, tell
+from .common import RESUMES, check_seed, progress_argument, seed_argument
+
+BRIEF = "train the networks on pairs"
+TEXT = """\
+Train the networks and the force estimate on simulated pairs; or, with the word s2mpn in place of the pairs, fine-tune
+that one network on a real sensor's recording that says where and how hard it was touched (HDF5 with
+electrode_vals/data, contact_loc/data, force_vec/data). DIR/weights then holds weights and card."""
+EPILOG = """\
+example:
+  tactile train pairs.h5 --out trained --seed 1
+  tactile convert touch.csv --out results --weights trained/weights
+  tactile train s2mpn --real labelled.hdf5 --out tuned      starts from the shipped weights, or from --weights DIR
+
+Needs torch: pip install "tactile-core[train]". An interrupted run goes on where it stopped."""
+LEAVES = RESUMES
+MAX_EFFORT = 1000.0
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("pairs", metavar="PAIRS", help="HDF5 file of `tactile pairs`, or the word s2mpn")
+    verb.add_argument("--real", metavar="FILE", help="of s2mpn: the labelled recording")
+    verb.add_argument("--weights", metavar="DIR", help="of s2mpn: where it starts (default: the shipped weights)")
+    verb.add_argument("--out", required=True, metavar="DIR", help="folder to write")
+    seed_argument(verb, "weights")
+    verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="times the usual epochs (default: 1)")
+    verb.add_argument("--without", action="append", default=[], metavar="NAME", help="an indenter to keep apart")
+    verb.add_argument("--without-below-x", type=float, metavar="MM", help="keep apart what touches the pad below x")
+    what = "auto (default): a GPU when torch sees one; cpu; cuda. The same bytes again on the same device alone"
+    verb.add_argument("--device", choices=DEVICES, default="auto", help=what)
+    verb.add_argument("--overwrite", action="store_true", help="train anew over older weights in DIR")
+    progress_argument(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Train, or fine-tune."""
+    check_seed(options.seed)
+    if options.pairs == "s2mpn":
+        return _fine_tune(options)
+    for name in ("real", "weights"):
+        if getattr(options, name) is not None:
+            raise TactileError(f"--{name}", f"beside pairs, {options.pairs}", "the word s2mpn in their place")
+    if not 0 < options.effort <= MAX_EFFORT:
+        raise TactileError("--effort", str(options.effort), f"above 0, at most {MAX_EFFORT}", "1 is the usual training")
+    from ...training.options import Options
+    from ...training.train import train
+
+    region = None if options.without_below_x is None else 1e-3 * options.without_below_x
+    chosen = Options(effort=options.effort, without=tuple(options.without), without_below_x=region)
+    with bar("training", "%", options.progress) as shown:
+        train(
+            options.pairs,
+            options.out,
+            options.seed,
+            chosen,
+            lambda share, text: shown(round(100 * share), 100),
+            overwrite=options.overwrite,
+            device=options.device,
+        )
+    tell(options.out)
+    return 0
+
+
+def _fine_tune(options: argparse.Namespace) -> int:
+    """S2MPN on a labelled recording."""
+    for name, usual in (("effort", 1.0), ("without", []), ("without_below_x", None), ("device", "auto")):
+        if getattr(options, name) != usual:
+            raise TactileError(f"--{name.replace('_', '-')}", "beside s2mpn", "--real, --weights, --out and --seed")
+    if options.real is None:
+        raise TactileError("--real", "none", "a recording with contact places and forces")
+    from ...accuracy import HEADER, line
+    from ...training.fine_tune import fine_tune
+
+    with bar("fine-tuning", "%", options.progress) as shown:
+        rows = fine_tune(
+            options.real,
+            options.out,
+            options.weights,
+            options.seed,
+            lambda share, text: shown(round(100 * share), 100),
+            options.overwrite,
+        )
+    for text in (HEADER, *map(line, rows)):
+        tell(text)
+    tell(options.out)
+    return 0

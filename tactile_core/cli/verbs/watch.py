@@ -1,0 +1,195 @@
+"""``tactile watch``: a live view of a recording that is being made, or is played again."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from ...errors import TactileError
+from ...files.threads import one_thread
+from ..terminal import say, tell
+from .common import NOTHING, polarity_argument
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ...recordings import Recording
+
+BRIEF = "live view of a recording that is being written"
+TEXT = """\
+Follow a CSV recording while another program writes it, and show the newest frame's DIGIT picture: in a window, or in
+a PNG file that is replaced with each picture. With --play or --rosbag-play a finished recording is played at its own
+pace, or --speed times as fast. Rest is taken from the first quiet part: begin without contact. The time from frame to
+picture, and how much of it was computing, is told each second and at the end."""
+EPILOG = """\
+examples:
+  tactile watch touch.csv
+  tactile watch touch.csv --out now.png --idle 10
+  tactile watch touch.csv --play
+  tactile watch --rosbag-play touch.bag --speed 2"""
+LEAVES = NOTHING
+POLL = 0.002  # s between two looks at the file
+LONGEST_WAIT = 10.0  # s without a frame that are played; a longer gap is skipped
+TOLD = 1.0  # s between two lines of figures
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Of this verb."""
+    verb.add_argument("recording", nargs="?", metavar="PATH", help="a CSV file that grows; with --play any recording")
+    verb.add_argument("--play", action="store_true", help="play a finished recording, of any layout, bags too")
+    verb.add_argument("--rosbag-play", metavar="FILE", help="play this ROS 1 or 2 bag or MCAP file (bag#2: a finger)")
+    verb.add_argument(
+        "--speed",
+        type=float,
+        metavar="X",
+        help="of playing: times the recording's own pace; 0: every frame, as fast as pictures come (default: 1)",
+    )
+    verb.add_argument("--out", metavar="FILE", help="write each picture to this PNG file instead of a window")
+    verb.add_argument("--idle", type=float, metavar="S", help="end when no frame came for S seconds (default: never)")
+    verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the recording (default: 100)")
+    polarity_argument(verb)
+    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show until the recording ends, the window is closed, or Ctrl-C."""
+    one_thread()  # before numpy is imported
+    from ...jobs import live
+    from ...jobs.convert import load_tools
+    from ...recordings.readers import container_of
+
+    _check(options)
+    path = options.rosbag_play or options.recording
+    container = container_of(path)
+    if container != "csv" and not (options.play or options.rosbag_play):
+        raise TactileError(path, f"a finished recording ({container})", "a CSV file that grows", "Play it: add --play")
+    if not 1 <= options.rate <= 1e4:
+        raise TactileError("--rate", f"{options.rate:g}", "1 to 10,000 Hz")
+    playing = options.play or options.rosbag_play
+    source = _played(path, 1.0 if options.speed is None else options.speed) if playing else _followed(options)
+    view = live.View(load_tools(options.weights), options.rate, options.polarity)
+    draw = _window(path) if options.out is None else _file(options.out)
+    told, failed = time.perf_counter(), False
+    try:
+        for rows, came in source:
+            shown = None if rows is None else view.show(rows, came)
+            if shown is not None and not draw(shown.picture):
+                break
+            if time.perf_counter() - told >= TOLD:
+                told = time.perf_counter()
+                say(view.told() + (f"; force {shown.force:.2f} N" if shown else ""))
+    except TactileError:
+        failed = not view.frames
+        raise
+    finally:
+        if not failed:
+            say(f"rest from {view.rest_found}" if view.rest_found else "rest was not found")
+            say(f"counts that {view.polarity.name[:-1]}: {view.polarity.evidence}")
+            tell(f"{view.frames} frames: {view.told()}")
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Raises TactileError for words that do not go together."""
+    if (options.recording is None) == (options.rosbag_play is None):
+        raise TactileError("tactile watch", "no recording, or two", "PATH or --rosbag-play FILE")
+    if options.speed is not None:
+        if not (options.play or options.rosbag_play):
+            raise TactileError("--speed", f"{options.speed:g}", "--play or --rosbag-play beside it")
+        if not 0 <= options.speed <= 1000:
+            raise TactileError("--speed", f"{options.speed:g}", "0 to 1000")
+    if options.rosbag_play is not None:
+        from ...recordings.readers import container_of
+
+        if container_of(options.rosbag_play) != "bag":
+            raise TactileError(options.rosbag_play, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
+
+
+def _followed(options: argparse.Namespace) -> Iterator[tuple[Recording | None, float]]:
+    """New rows of a growing file and when they came; None now and then while there are none."""
+    from ...jobs.live import Growing
+
+    growing, last, bad = Growing(options.recording), time.perf_counter(), 0
+    while options.idle is None or time.perf_counter() - last < options.idle:
+        came = time.perf_counter()
+        rows = growing.poll()
+        if growing.bad > bad:
+            bad = growing.bad
+            say(f"{bad} of {growing.rows} rows were bad and are passed over")
+        if rows is None:
+            time.sleep(POLL)
+        else:
+            last = came
+        yield rows, came
+
+
+def _played(path: str, speed: float) -> Iterator[tuple[Recording | None, float]]:
+    """The rows of a finished recording when their time has come, a part of it in memory; speed 0: one after another."""
+    from ...recordings.chunks import read_parts
+
+    began = time.perf_counter()
+    for part in read_parts(path):
+        recording, done = part.recording, part.repeated
+        while done < len(recording):
+            ahead = recording.time[done] / speed - (time.perf_counter() - began) if speed else 0.0
+            if ahead > LONGEST_WAIT:
+                say(f"nothing for {ahead:.0f} s before frame {done}: skipped")
+                began -= ahead
+            due = done + 1 if speed == 0 else _due(recording, speed * (time.perf_counter() - began))
+            if due <= done:
+                time.sleep(POLL)
+                continue
+            pdc = None if recording.pdc is None else recording.pdc[done:due]
+            rows = dataclasses.replace(recording, electrodes=recording.electrodes[done:due], pdc=pdc)
+            yield rows, time.perf_counter()
+            done = due
+
+
+def _due(recording: Recording, passed: float) -> int:
+    """Frames whose time is within `passed` s of the first."""
+    return int(recording.time.searchsorted(passed, side="right"))
+
+
+def _file(path: str) -> Callable[[np.ndarray], bool]:
+    """Writes pictures to a file that is always whole."""
+    import io
+
+    from ...files import atomic
+    from ...files.png import write_png
+
+    def draw(picture: np.ndarray) -> bool:
+        out = io.BytesIO()
+        write_png(out, picture)
+        try:
+            atomic.write_bytes(path, out.getvalue())
+        except OSError as error:
+            raise TactileError(path, f"cannot be written ({error.strerror})", "a file in a writable folder") from error
+        return True
+
+    return draw
+
+
+def _window(title: str) -> Callable[[np.ndarray], bool]:
+    """Shows pictures in a window; False when it was closed. Raises TactileError without a display."""
+    from matplotlib import pyplot
+
+    if pyplot.get_backend().lower() == "agg":
+        raise TactileError("the window", "no display", "a screen", "Write the pictures to a file: --out now.png")
+    figure, axes = pyplot.subplots(num=title, figsize=(3, 4))
+    axes.set_axis_off()
+    shown = None
+
+    def draw(picture: np.ndarray) -> bool:
+        nonlocal shown
+        if shown is None:
+            shown = axes.imshow(picture)
+            pyplot.show(block=False)
+        shown.set_data(picture)
+        figure.canvas.draw_idle()
+        figure.canvas.flush_events()
+        return pyplot.fignum_exists(figure.number)
+
+    return draw

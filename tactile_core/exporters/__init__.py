@@ -1,9 +1,0 @@
-"""From a finished job to the layouts that others read.
-
-A new layout is one new file in ``formats/``, with ``BRIEF`` and ``write``; see there.
-"""
-
-from .finished import Finished, Recorded
-from .writers import export, layouts
-
-__all__ = ["Finished", "Recorded", "export", "layouts"]

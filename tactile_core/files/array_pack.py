@@ -1,0 +1,67 @@
+"""Arrays, or whole files, in one sealed HDF5 file: a shard of what is put together at the end of a job."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import TactileError
+from . import atomic, checksummed
+from .hdf5_checked import open_checked
+
+
+def write(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write arrays by name, in the order of their names; the same arrays give the same bytes."""
+    import h5py
+
+    memory = io.BytesIO()
+    with h5py.File(memory, "w", userblock_size=checksummed.ROOM) as out:
+        for name, values in sorted(arrays.items()):
+            out.create_dataset(name, data=values, track_times=False)
+    with atomic.new_file(file, shared=True) as partial:
+        partial.write_bytes(memory.getbuffer())
+        checksummed.write_checksum(partial)
+
+
+def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
+    """All arrays or those of some names, or some rows of them. Raises TactileError for a damaged file."""
+    import h5py
+
+    found: dict[str, np.ndarray] = {}
+
+    def note(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and (not names or name in names):
+            found[name] = item[rows] if item.shape else item[()]
+
+    try:
+        with open_checked(file) as opened:
+            opened.visititems(note)
+    except TactileError:
+        raise
+    except Exception as error:  # the library raises a dozen types on damaged bytes
+        raise TactileError(file, f"damaged ({error})", "a shard", "Run the job again: it is made anew") from error
+    return found
+
+
+def write_files(file: Path, folder: Path) -> None:
+    """Pack all files of a folder and below it."""
+    paths = [path for path in sorted(folder.rglob("*")) if path.is_file()]
+    write(file, {path.relative_to(folder).as_posix(): _bytes(path) for path in paths})
+
+
+def unpack(file: Path, folder: Path) -> None:
+    """The files of a pack, into a folder that has none of those names. Raises TactileError for a damaged pack."""
+    for name, content in read(file).items():
+        path = folder / name
+        if not path.resolve().is_relative_to(folder.resolve()):
+            raise TactileError(file, f"the name {name!r:.80}", "a name inside the folder")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content.tobytes())
+
+
+def _bytes(path: Path) -> np.ndarray:
+    return np.frombuffer(path.read_bytes(), np.uint8)

@@ -1,0 +1,51 @@
+"""HDF5 files that prove themselves whole: the hash of all that follows stands in the file's first 512 bytes.
+
+HDF5 lets a file begin with room for others (its "user block"), which every HDF5 reader skips.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+ROOM = 512  # bytes, the smallest user block of HDF5
+MAGIC = b"tactile-sealed-1 sha256 "
+_DIGITS = 64
+
+
+def write_checksum(path: Path) -> str:
+    """Write the seal into the room of a closed file; returns the hash of what follows it."""
+    digest = _digest(path)
+    with open(path, "rb+") as file:
+        file.write(_line(digest))
+    return digest
+
+
+def verified_checksum(path: Path) -> str | None:
+    """The hash of a whole sealed file; None for one that is missing, cut, changed, or never sealed."""
+    try:
+        digest = stated_checksum(path)
+        return digest if digest is not None and _digest(path) == digest else None
+    except OSError:
+        return None
+
+
+def stated_checksum(path: Path) -> str | None:
+    """The hash that a file's seal names, whether or not its content still has it; None where there is no seal."""
+    try:
+        with open(path, "rb") as file:
+            room = file.read(ROOM)
+    except OSError:
+        return None
+    digest = room[len(MAGIC) : len(MAGIC) + _DIGITS].decode("ascii", "replace")
+    return digest if room == _line(digest) else None
+
+
+def _line(digest: str) -> bytes:
+    return (MAGIC + digest.encode(errors="replace") + b"\n").ljust(ROOM, b"\0")
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as file:
+        file.seek(ROOM)
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,70 @@
+"""OpenEXR pictures: float32 channels with names, and text beside them; needs the extra [render]."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..errors import TactileError
+from . import atomic
+
+MOST_BYTES = 2**28  # of all channels, unpacked; a render of four times the camera's pixels has 15 MB (assumed enough)
+HEIGHT_CHANNELS = ("height", "Y", "Z", "R")  # where a height map of others is looked for, in this order
+
+
+def write_exr(path: str | os.PathLike, channels: Mapping[str, np.ndarray], about: Mapping[str, str]) -> None:
+    """Write channels (H, W) as float32, lossless, whole or not at all; about : attributes, text by name."""
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **about}
+    planes = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
+    with atomic.new_file(path) as partial, OpenEXR.File(header, planes) as file:
+        file.write(os.fspath(partial))
+
+
+def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Channels (H, W) by name, as they are, and the text attributes; raises TactileError for what is no EXR file."""
+    import OpenEXR
+
+    try:
+        _check_size(path)
+        with OpenEXR.File(os.fspath(path), separate_channels=True) as file:
+            if not file.parts:  # where the library warned that it cannot read them
+                raise ValueError("its pixels are damaged")
+            planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+            about = {name: value for name, value in file.header().items() if isinstance(value, str)}
+    except Exception as error:  # the library raises RuntimeError and others
+        raise TactileError(path, f"cannot be read as OpenEXR ({error})", "an EXR file") from error
+    return planes, about
+
+
+def _check_size(path: str | os.PathLike) -> None:
+    """Raises ValueError for a file whose parts declare more than MOST_BYTES in all, and for deep ones."""
+    import OpenEXR
+
+    size, flat = 0, (OpenEXR.scanlineimage, OpenEXR.tiledimage)
+    with OpenEXR.File(os.fspath(path), header_only=True) as file:
+        for part in file.parts:
+            if part.header.get("type", flat[0]) not in flat:
+                raise ValueError("a deep picture")
+            (left, bottom), (right, top) = (corner.tolist() for corner in part.header["dataWindow"])
+            size += (right - left + 1) * (top - bottom + 1) * len(part.header["channels"]) * 4
+    if size > MOST_BYTES:
+        raise ValueError(f"{size / 2**20:.0f} MB of pixels, over {MOST_BYTES // 2**20} MB")
+
+
+def read_height(path: str | os.PathLike) -> np.ndarray:
+    """The height map (H, W) m in an EXR file: its channel "height", or its only one.
+
+    Raises TactileError for a file without such a channel.
+    """
+    planes, _ = read_exr(path)
+    if len(planes) == 1:
+        return next(iter(planes.values()))
+    for name in HEIGHT_CHANNELS:
+        if name in planes:
+            return planes[name]
+    expected = "one channel, or one called height"
+    raise TactileError(path, f"channels {', '.join(planes) or 'none'}", expected)

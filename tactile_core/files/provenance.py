@@ -1,0 +1,48 @@
+"""What a result is made of and by: hashes of files, versions of libraries, the machine."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from .. import __version__
+
+
+def sha256(path: str | os.PathLike) -> str:
+    """Hash of a file's bytes; of a folder (a bag): of its files' names and hashes."""
+    import hashlib
+
+    if os.path.isdir(path):
+        files = sorted(file for file in Path(path).iterdir() if file.is_file())
+        told = "".join(f"{sha256(file)} {file.name}\n" for file in files)
+        return hashlib.sha256(told.encode(errors="surrogateescape")).hexdigest()
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def versions(*more: str) -> dict[str, str]:
+    """What can change the bytes of a result, besides its input and the weights; more : libraries that made it too."""
+    import importlib
+    import platform
+
+    # Asked of the modules, not of the package index: inside Blender they have no metadata.
+    modules = {name: importlib.import_module(name).__version__ for name in ("numpy", "h5py", *more)}
+    return {"tactile_core": __version__, "python": platform.python_version(), **modules}
+
+
+def machine() -> dict[str, str | int | None]:
+    """What can change the timings."""
+    import platform
+
+    return {"system": platform.platform(), "processor": _processor(), "cores": os.cpu_count()}
+
+
+def _processor() -> str:
+    """The processor's name; Linux tells it only in /proc."""
+    import platform
+
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())

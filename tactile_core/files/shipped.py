@@ -1,0 +1,13 @@
+"""Where the tables and networks that ship with the package lie."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+# By this file and not by the package's name: inside Blender the package has another.
+_DATA = Path(__file__).parents[1] / "data"
+
+
+def shipped(name: str) -> Path:
+    """Path of a file or folder that ships, named relative to ``data/``."""
+    return _DATA / name

@@ -1,0 +1,35 @@
+"""Text files of strangers, read only as far as such a file can be long."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+
+from ..errors import TactileError
+
+MOST = 16 * 2**20  # bytes: a list of 100,000 paths, a scene of 100,000 points (assumed enough)
+
+MOST_DOTS = 100  # in a key; tomllib's time grows with the square of them (Python 3.11 to 3.13)
+
+
+def read_small(path: str | os.PathLike, most: int = MOST) -> str:
+    """UTF-8 text of a file of at most `most` bytes; a byte order mark is passed over.
+
+    Raises OSError and UnicodeDecodeError, TactileError for a longer file, a pipe or a device.
+    """
+    if not stat.S_ISREG(os.stat(path).st_mode):
+        raise TactileError(path, "no regular file", "a text file")
+    with open(path, "rb") as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise TactileError(path, f"more than {most // 2**20} MB", "a short text file")
+    return content.decode("utf-8-sig")
+
+
+def read_toml_text(path: str | os.PathLike) -> str:
+    """As `read_small`, of a TOML file. Raises TactileError for a key of over a hundred parts, too."""
+    text = read_small(path)
+    if any(piece.count(".") > MOST_DOTS for piece in re.split(r"[=,#{}\[\]\n]", text)):
+        raise TactileError(path, f"a key of over {MOST_DOTS} parts", "short keys")
+    return text

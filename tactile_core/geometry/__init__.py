@@ -1,0 +1,1 @@
+"""Shapes without a sensor: lattices, splines and indenters."""

@@ -1,0 +1,55 @@
+"""A cylinder that lies on its side."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...errors import TactileError
+from . import extrusion
+from .indenter import Indenter, check_length, sign_of
+
+_OWN = np.array([2, 0, 1])  # extrusions answer in the order y, z, x
+
+
+@dataclasses.dataclass(frozen=True)
+class LyingCylinder(Indenter):
+    """A cylinder along the own x that touches with its side; ``edge`` rounds both rims. Lengths in m.
+
+    An edge as large as the radius makes the ends half balls.
+    """
+
+    radius: float
+    edge: float
+    length: float = 20e-3
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "edge", "length"):
+            check_length("lying cylinder", name, getattr(self, name))
+        if self.edge > self.radius or 2 * self.edge >= self.length:
+            expected = "at most the radius and less than half the length"
+            raise TactileError("lying cylinder, edge", f"{self.edge * 1e3:g} mm", expected)
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See ``Indenter.distance``; exact."""
+        distance, gradient = extrusion.distance(*self._prism(points), self.edge)
+        return distance, gradient.take(_OWN, axis=1)
+
+    def curvature(self, points: np.ndarray) -> np.ndarray:
+        """See ``Indenter.curvature``."""
+        return extrusion.curvature(*self._prism(points))[:, _OWN][:, :, _OWN]
+
+    def support(self, direction: np.ndarray) -> np.ndarray:
+        """See ``Indenter.support``."""
+        ring = np.hypot(direction[1], direction[2])
+        radial = np.array([0.0, *direction[1:]]) / max(ring, 1e-300) * abs(sign_of(ring))
+        inner = (self.radius - self.edge) * radial
+        inner[0] = (self.length / 2 - self.edge) * sign_of(direction[0])
+        return np.array([0.0, 0.0, self.radius]) + inner + self.edge * direction
+
+    def _prism(self, points: np.ndarray) -> tuple[extrusion.Outline, np.ndarray, float]:
+        across = points[:, 1:].copy()
+        across[:, 1] -= self.radius
+        outline = extrusion.disc(across, self.radius - self.edge)
+        return outline, points[:, 0], self.length / 2 - self.edge

@@ -1,0 +1,144 @@
+"""Any closed triangle mesh, through a smooth grid of its signed distance."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import logging
+import os
+import pathlib
+import zipfile
+from typing import Any
+
+import numpy as np
+
+from ...errors import TactileError
+from ...files import atomic
+from ...files.cache import cache_folder
+from . import mesh_file, mesh_grid
+from .indenter import Indenter
+from .spline_grid import SplineGrid
+
+log = logging.getLogger(__name__)
+_FORMAT = 1  # raise when the meaning of the cached arrays changes
+_ARRAYS = ("coefficients", "origin", "hull", "error")
+_SPACING = (0.01e-3, 1e-3)  # m
+_FLATTEST = 0.5  # flatter than at any edge: deep inside, where opposite faces are equally near
+_LEVEL = 1e-7  # m, hull vertices this near to the farthest one lie equally far
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MeshIndenter(Indenter):
+    """A rigid body bounded by a triangle mesh.
+
+    Its surface is where a tricubic spline of the mesh's signed distance is zero: smooth, with sharp edges rounded over
+    about one grid spacing. Normals and curvatures are exactly those of the spline's level
+    surfaces.
+
+    grid : the spline, m; hull : (k, 3) m, vertices of the mesh's convex hull
+    error : rms and largest difference, m, of ``distance`` from the mesh's, measured within 0.3 mm of it
+    """
+
+    grid: SplineGrid
+    hull: np.ndarray
+    error: tuple[float, float]
+
+    @classmethod
+    def from_file(
+        cls, path: str | os.PathLike, scale: float = 1e-3, up: str = "z", spacing: float = 0.1e-3
+    ) -> MeshIndenter:
+        """The body in an STL, PLY, OBJ or OFF file; its grid is built once (seconds to a minute) and kept on disk.
+
+        scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
+        spacing : m, of the grid; the body's lowest point, or the middle of its lowest flat, becomes the own origin.
+        Raises TactileError for anything that is no closed, outward, uncrossed surface of an indenter's size.
+        """
+        _check(path, scale, up, spacing)
+        content = mesh_file.read_bytes(path)
+        settings = json.dumps([_FORMAT, pathlib.Path(path).suffix.lower(), scale, up, spacing]).encode()
+        digest = hashlib.sha256(settings + content).hexdigest()
+        file = _cache_file(digest)
+        try:
+            arrays = _load(file)
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):  # not built yet, or cut short
+            log.info("building the distance grid of %s in %s (up to a minute, once)", path, file)
+            mesh = mesh_file.solid(content, path, scale, up)
+            built = cls(mesh_grid.build(mesh, path, spacing), _hull(mesh), (0.0, 0.0))
+            error = mesh_grid.error_of(mesh, built.distance)
+            log.info("%s: distance within %.1f um rms, %.1f um at most", path, *(error * 1e6))
+            arrays = (built.grid.coefficients, built.grid.origin, built.hull, error)
+            _store(file, dict(zip(_ARRAYS, arrays, strict=True)))
+            arrays = _load(file)
+        coefficients, origin, hull, error = arrays
+        return cls(SplineGrid(origin, spacing, coefficients), hull, tuple(error.tolist()))
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See ``Indenter.distance``: the spline's value, and the unit normal of its level surface.
+
+        Across a sharp edge the spline is flatter than a distance, down to a slope of 0.7.
+        """
+        value, slope = self.grid.value_and_gradient(points)
+        return value, _unit(slope)[1]
+
+    def curvature(self, points: np.ndarray) -> np.ndarray:
+        """See ``Indenter.curvature``: how the unit normal turns along the level surface."""
+        slope, bend = self.grid.gradient_and_hessian(points)
+        steepness, normal = _unit(slope)
+        along = np.eye(3) - normal[:, :, None] * normal[:, None, :]
+        return along @ bend @ along / steepness[:, None, None]
+
+    def support(self, direction: np.ndarray) -> np.ndarray:
+        """See ``Indenter.support``; that of the mesh itself."""
+        reach = self.hull @ direction
+        return self.hull[reach > reach.max() - _LEVEL].mean(axis=0)
+
+
+def _unit(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Length (n,) of slopes (n, 3), at least _FLATTEST, and unit normals (n, 3) along them."""
+    length = np.linalg.norm(slope, axis=1)
+    flat = length < 1e-6
+    normal = slope / np.where(flat, 1, length)[:, None]
+    normal[flat] = [0.0, 0.0, -1.0]
+    return np.maximum(length, _FLATTEST), normal
+
+
+def _check(path: str | os.PathLike, scale: float, up: str, spacing: float) -> None:
+    if not (np.isfinite(scale) and scale > 0):
+        raise TactileError(path, f"scale {scale!r}", "metres per unit of the file, above zero")
+    if up not in mesh_file.UPS:
+        raise TactileError(path, f"up {up!r}", f"one of {', '.join(mesh_file.UPS)}")
+    if not _SPACING[0] <= spacing <= _SPACING[1]:
+        raise TactileError(path, f"a grid spacing of {spacing * 1e3:g} mm", "0.01 to 1 mm")
+
+
+def _hull(mesh: Any) -> np.ndarray:
+    """Vertices (k, 3) m of the convex hull of a mesh in mm."""
+    import scipy.spatial
+
+    return mesh.vertices[scipy.spatial.ConvexHull(mesh.vertices).vertices] * 1e-3
+
+
+def _cache_file(digest: str) -> pathlib.Path:
+    return cache_folder() / f"indenter-{digest[:16]}.npz"
+
+
+@functools.lru_cache(maxsize=4)  # a scene asks for its indenters at every press
+def _load(file: pathlib.Path) -> tuple[np.ndarray, ...]:
+    with np.load(file, allow_pickle=False) as stored:
+        arrays = tuple(stored[name] for name in _ARRAYS)
+    for array in arrays:
+        array.flags.writeable = False
+    return arrays
+
+
+def _store(file: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write arrays whole or not at all; two processes that build at once write the same bytes."""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with atomic.new_file(file) as partial, open(partial, "wb") as stream:
+            np.savez(stream, **arrays)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror})"
+        raise TactileError(file, found, "room for 40 MB", "Make room, or name a folder in TACTILE_CACHE") from error

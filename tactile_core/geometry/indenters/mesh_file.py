@@ -1,0 +1,133 @@
+"""Triangle meshes as indenters: read without running or fetching anything, and refused unless they bound a solid.
+
+Meshes are in mm here and wherever trimesh works on them: its tolerances are absolute, made for numbers of that size.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import pathlib
+from typing import Any
+
+import numpy as np
+
+from ...errors import TactileError
+from .mesh_self_intersection import first_crossing
+
+SUFFIXES = (".stl", ".ply", ".obj", ".off")
+UPS = ("x", "y", "z", "-x", "-y", "-z")
+MAX_BYTES, MAX_FACES = 100_000_000, 200_000
+# What MAX_FACES triangles take with normals and texture; parsers make a hundred times as many bytes of a word.
+MAX_WORDS, MAX_BINARY = 20 * MAX_FACES, 32_000_000
+EXTENT_MM = (0.2, 100.0)  # an indenter for a fingertip; outside of it the unit is wrong (assumed)
+_UNITS = {"metres": 1.0, "inches": 0.0254, "centimetres": 1e-2, "millimetres": 1e-3, "micrometres": 1e-6}
+_LOWEST_MM = 1e-4  # vertices this near to the lowest one belong to one flat
+
+
+def read_bytes(path: str | os.PathLike) -> bytes:
+    """The content of a mesh file. Raises TactileError for a kind that is not read, and for what cannot be read."""
+    path = pathlib.Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise TactileError(path, f"a {path.suffix or 'nameless'} file", f"a triangle mesh: {', '.join(SUFFIXES)}")
+    try:
+        with open(path, "rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise TactileError(path, f"cannot be read ({error.strerror})", "a triangle mesh") from error
+    if len(content) > MAX_BYTES:
+        raise TactileError(path, f"more than {MAX_BYTES // 10**6} MB", f"at most {MAX_FACES} triangles", "Simplify it")
+    return content
+
+
+def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> Any:
+    """The mesh (a trimesh, mm) in an indenter's own frame: its lowest flat or point touches z = 0 at the origin.
+
+    where : the file, for its suffix and for messages; scale : m per unit of the file
+    up : the file's axis, one of ``UPS``, that points out of the sensor
+    Raises TactileError unless it is closed, wound outward, does not cross itself, and has the size of an indenter.
+
+    It crosses itself when an edge goes through a triangle that it does not belong to; coplanar overlaps are left to
+    the count of crossings on the grid's columns.
+    """
+    import trimesh
+
+    vertices, faces = _parsed(content, pathlib.Path(where))
+    _check_size(where, np.ptp(vertices, axis=0).max(), scale)
+    mesh = trimesh.Trimesh(vertices @ _turn(up).T * (scale * 1e3), faces, process=False)
+    mesh.merge_vertices()
+    corners = np.sort(mesh.faces, axis=1)
+    mesh.update_faces((corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2]))
+    mesh.remove_unreferenced_vertices()
+    _check_solid(where, mesh)
+    low = mesh.vertices[mesh.vertices[:, 2] < mesh.vertices[:, 2].min() + _LOWEST_MM]
+    middle = (low.min(axis=0) + low.max(axis=0)) / 2
+    mesh.apply_translation(-np.array([*middle[:2], low[:, 2].min()]))
+    return mesh
+
+
+def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) in the file's unit and faces (m, 3)."""
+    import trimesh
+
+    _check_length(content, path)
+    options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
+    try:  # from memory: neither materials nor textures that the file names are looked up
+        mesh = trimesh.load_mesh(io.BytesIO(content), file_type=path.suffix[1:].lower(), process=False, **options)
+        vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+    except Exception as error:  # a damaged file fails wherever its parser happens to be
+        raise TactileError(path, f"cannot be read as a mesh ({error})", "a triangle mesh") from error
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise TactileError(path, f"vertices {vertices.shape}, faces {faces.shape}", "three coordinates, three corners")
+    if not len(faces):
+        raise TactileError(path, "no triangles", "a triangle mesh")
+    if len(faces) > MAX_FACES:
+        raise TactileError(path, f"{len(faces)} triangles", f"at most {MAX_FACES}", "Simplify it")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise TactileError(path, "triangles of missing vertices", "a triangle mesh")
+    vertices = vertices[np.unique(faces)]
+    if not np.isfinite(vertices).all():
+        raise TactileError(path, "a coordinate is nan or infinite", "finite coordinates")
+    return vertices, np.unique(faces, return_inverse=True)[1].reshape(-1, 3)
+
+
+def _check_length(content: bytes, path: pathlib.Path) -> None:
+    """Refuse what holds far more than MAX_FACES triangles before a parser unfolds it."""
+    words = sum(content.count(mark) for mark in b" \t\r\n")
+    if words > MAX_WORDS or (b"\0" in content and len(content) > MAX_BINARY):
+        raise TactileError(path, f"{len(content) / 1e6:.0f} MB", f"at most {MAX_FACES} triangles", "Simplify it")
+
+
+def _check_size(where: str | os.PathLike, extent: float, scale: float) -> None:
+    smallest, largest = EXTENT_MM
+    if smallest <= extent * scale * 1e3 <= largest:
+        return
+    fitting = [f"{name} (scale {unit:g} m)" for name, unit in _UNITS.items() if 1 <= extent * unit * 1e3 <= 50]
+    advice = f"The file seems to be in {' or '.join(fitting)}" if fitting else "Scale it to the size of an indenter"
+    found = f"{extent * scale * 1e3:.4g} mm across with {scale:g} m a unit"
+    raise TactileError(where, found, f"{smallest:g} to {largest:g} mm", advice)
+
+
+def _turn(up: str) -> np.ndarray:
+    """Rotation (3, 3) that takes the file's axis ``up`` to z."""
+    turn = np.roll(np.eye(3), 2 - "xyz".index(up[-1]), axis=0)
+    return turn * [[-1], [1], [-1]] if up[0] == "-" else turn
+
+
+def _check_solid(where: str | os.PathLike, mesh: Any) -> None:
+    if not mesh.is_watertight:
+        sides = np.sort(mesh.edges, axis=1)
+        count = np.unique(sides, axis=0, return_counts=True)[1]
+        found = f"not closed: {(count != 2).sum()} edges do not belong to exactly two triangles"
+        raise TactileError(
+            where, found, "a closed surface", "Fill its holes, for example in Blender's 3D-Print Toolbox"
+        )
+    if not mesh.is_winding_consistent:
+        raise TactileError(where, "neighbouring triangles face opposite ways", "one winding", "Recalculate its normals")
+    if not mesh.volume > 0:
+        raise TactileError(where, "it is inside out: its volume is negative", "outward normals", "Flip its normals")
+    crossing = first_crossing(mesh)
+    if crossing is not None:
+        place = ", ".join(f"{x:.3g}" for x in crossing)
+        found = f"it crosses itself near ({place}) mm, scaled and turned"
+        raise TactileError(where, found, "a surface that does not cross itself", "Unite its parts (boolean union)")

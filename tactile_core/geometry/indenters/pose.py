@@ -1,0 +1,78 @@
+"""Where an indenter stands, and how it is set onto a surface."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ...errors import TactileError
+from .indenter import Indenter
+
+
+@dataclasses.dataclass(frozen=True)
+class Pose:
+    """Where an indenter stands: its own origin at ``apex`` (3,) m, its own axes as the columns of ``axes`` (3, 3).
+
+    Raises TactileError for a number that is nan or infinite.
+    """
+
+    apex: np.ndarray
+    axes: np.ndarray
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(np.vdot(self.apex, self.apex) + np.vdot(self.axes, self.axes)):  # quicker than each
+            raise TactileError("pose", f"apex {self.apex} m, axes {self.axes.tolist()}", "finite numbers")
+
+    @property
+    def direction(self) -> np.ndarray:
+        """Unit vector (3,) into the sensor: the indenter's own -z."""
+        return -self.axes[:, 2]
+
+    def moved(self, depth: float) -> Pose:
+        """The pose after moving ``depth`` m along ``direction``."""
+        return Pose(self.apex + depth * self.direction, self.axes)
+
+    def slid(self, along: float, across: float) -> Pose:
+        """The pose after sliding, m, along the indenter's own x and y."""
+        return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes)
+
+    def to_own(self, points: np.ndarray) -> np.ndarray:
+        """Sensor points (n, 3) m in the indenter's frame: where they stay as it moves, if they stick."""
+        return (points - self.apex) @ self.axes
+
+    def from_own(self, points: np.ndarray) -> np.ndarray:
+        """The inverse of ``to_own``."""
+        return points @ self.axes.T + self.apex
+
+    def distance(self, indenter: Indenter, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Signed distance (n,) m and gradient (n, 3) of the placed indenter at sensor points (n, 3) m."""
+        distance, gradient = indenter.distance(self.to_own(points))
+        return distance, gradient @ self.axes.T
+
+    def curvature(self, indenter: Indenter, points: np.ndarray) -> np.ndarray:
+        """Second derivatives (n, 3, 3) 1/m of the placed indenter's distance at sensor points (n, 3) m."""
+        return self.axes @ indenter.curvature(self.to_own(points)) @ self.axes.T
+
+    def support(self, indenter: Indenter, direction: np.ndarray) -> np.ndarray:
+        """The placed indenter's farthest point (3,) m along a unit vector (3,) of the sensor."""
+        return self.apex + self.axes @ indenter.support(direction @ self.axes)
+
+
+def pose_on(
+    indenter: Indenter, point: np.ndarray, outward: np.ndarray, tilt: float = 0.0, tilt_heading: float = 0.0
+) -> Pose:
+    """An indenter that just touches ``point`` (3,) m of a surface with unit normal ``outward`` (3,).
+
+    tilt : rad, between its axis (the way it moves) and that normal
+    tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z
+    """
+    along = np.array([1.0, 0.0, 0.0]) - outward[0] * outward
+    along /= np.linalg.norm(along)
+    side = np.cross(along, outward)
+    axis = np.cos(tilt) * outward + np.sin(tilt) * (np.cos(tilt_heading) * along + np.sin(tilt_heading) * side)
+    first = along - axis * (along @ axis)
+    first /= np.linalg.norm(first)
+    axes = np.column_stack([first, np.cross(axis, first), axis])
+    return Pose(point - axes @ indenter.support(-outward @ axes), axes)

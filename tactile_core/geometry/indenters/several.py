@@ -1,0 +1,64 @@
+"""Several bodies that move as one."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...errors import TactileError
+from .indenter import SQUARE, Indenter
+from .pose import Pose
+
+_TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Several(Indenter):
+    """A rigid group of indenters, for several contacts at once: the nearest part counts.
+
+    Exact outside. Inside where parts overlap, the distance is at least as deep as said.
+
+    parts : pairs of an indenter and its ``Pose`` in the group's frame; the lowest of them touches z = 0
+    """
+
+    parts: tuple[tuple[Indenter, Pose], ...]
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise TactileError("several, parts", "none", "one indenter or more")
+        for _, pose in self.parts:
+            right_angles = np.abs(pose.axes.T @ pose.axes - np.eye(3)).max() < 1e-9 and np.linalg.det(pose.axes) > 0
+            if not right_angles:
+                raise TactileError("several, parts", f"axes {pose.axes.tolist()}", "right-handed unit axes")
+        lowest = float(self.support(np.array([0.0, 0.0, -1.0]))[2])
+        if abs(lowest) > _TOUCH:
+            advice = "Raise or lower all parts together"
+            raise TactileError("several, parts", f"the lowest reaches z = {lowest * 1e3:g} mm", "z = 0", advice)
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See ``Indenter.distance``."""
+        distance, gradient, _ = self._nearest(points)
+        return distance, gradient
+
+    def curvature(self, points: np.ndarray) -> np.ndarray:
+        """See ``Indenter.curvature``; that of the nearest part."""
+        nearest = self._nearest(points)[2]
+        curvature = np.empty((len(points), 3, 3))
+        for k, (indenter, pose) in enumerate(self.parts):
+            curvature[nearest == k] = pose.curvature(indenter, points[nearest == k])
+        return curvature
+
+    def support(self, direction: np.ndarray) -> np.ndarray:
+        """See ``Indenter.support``; the mean of those of the parts that lie equally far."""
+        places = np.array([pose.support(indenter, direction) for indenter, pose in self.parts])
+        reach = places @ direction
+        return places[reach > reach.max() - SQUARE].mean(axis=0)
+
+    def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Distance (n,) m and gradient (n, 3) of the nearest part, and which one that is (n,)."""
+        answers = [pose.distance(indenter, points) for indenter, pose in self.parts]
+        nearest = np.argmin([distance for distance, _ in answers], axis=0)
+        row = np.arange(len(points))
+        distance, gradient = (np.stack(values)[nearest, row] for values in zip(*answers, strict=True))
+        return distance, gradient, nearest

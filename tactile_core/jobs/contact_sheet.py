@@ -1,0 +1,127 @@
+"""The published result figure of one recording: a few frames as columns, from the electrodes down to the picture."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import textwrap
+import warnings as python_warnings
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..files import atomic
+from ..sensors.calibration_file import load_calibration
+from ..sensors.camera import Camera
+from .sheet_figure import FRAMES, LOW_CONFIDENCE, SheetFigure, scale
+
+WARNING_LINES, WARNING_WIDTH = 5, 200
+# Lines in pieces: Agg refuses a noisy line of a hundred thousand points as a whole.
+STYLE = {"font.size": 9, "axes.linewidth": 0.6, "agg.path.chunksize": 10_000}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Contents:
+    """What a sheet of a recording of T frames shows, in k columns. Raises ValueError where these do not count alike.
+
+    name : of the recording; time : (T,) s; electrodes : (T, 19) counts, change from rest
+    frames : (k,) which of the T frames are the columns
+    displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
+    force : (k, 3) N; confidence : (k,) 0..1; expected_error_digit : (k,) m, of the largest node
+    contact_center : (k, 2) m = (x, z), NaN without contact
+    true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
+    """
+
+    name: str
+    time: np.ndarray
+    electrodes: np.ndarray
+    frames: np.ndarray
+    displacement_biotac: np.ndarray
+    displacement_digit: np.ndarray
+    pictures: np.ndarray
+    force: np.ndarray
+    confidence: np.ndarray
+    expected_error_digit: np.ndarray
+    contact_center: np.ndarray | None = None
+    true_displacement_biotac: np.ndarray | None = None
+    simulated: bool = False
+    warnings: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        for what in COLUMNS:
+            values = getattr(self, what)
+            if values is not None and len(values) != len(self.frames):
+                raise ValueError(f"contact sheet: {len(values)} of {what} for {len(self.frames)} frames")
+
+
+COLUMNS = (
+    "displacement_biotac", "displacement_digit", "pictures", "force", "confidence", "expected_error_digit",
+    "contact_center", "true_displacement_biotac",
+)  # fmt: skip
+
+
+def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
+    """Indices (k,) of the frames to show, in order: the strongest ones that lie apart from each other.
+
+    Taken one by one, each at least half of a `count`-th of the recording away from those before.
+    strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none
+    """
+    left = np.where(np.isfinite(strength), strength, -1.0)
+    count = min(count, len(left))
+    frames, chosen = np.arange(len(left)), []
+    for _ in range(count):
+        best = int(np.argmax(left))
+        chosen.append(best)
+        left[np.abs(frames - best) < len(left) / (2 * count)] = -np.inf
+    return np.sort(chosen)
+
+
+def contact_sheet(path: str | os.PathLike, shown: Contents, camera: Camera | None = None) -> None:
+    """Draw the sheet and write it to `path` as a PNG; equal contents make equal bytes.
+
+    camera : None for the shipped calibration's
+    """
+    with _plain_matplotlib():
+        content = _drawn(shown, camera or load_calibration().camera).png()
+    atomic.write_bytes(path, content)
+
+
+@contextlib.contextmanager
+def _plain_matplotlib() -> Iterator[None]:
+    """Matplotlib in our style alone: a user's own settings must not change the bytes."""
+    import matplotlib
+
+    with matplotlib.rc_context(), python_warnings.catch_warnings():
+        # Names may hold characters that the font lacks, which are drawn as boxes.
+        python_warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
+        yield
+
+
+def _drawn(shown: Contents, camera: Camera) -> SheetFigure:
+    displacement, truth = shown.displacement_biotac, shown.true_displacement_biotac
+    figure = SheetFigure(len(shown.frames), camera, _sentences(shown.warnings, shown.confidence), truth is not None)
+    # File names may hold what is no text at all.
+    figure.title("".join(letter if letter.isprintable() else "?" for letter in shown.name), shown.simulated)
+    figure.electrodes(shown.time, shown.electrodes, shown.frames)
+    largest = scale(displacement, truth)
+    label = "BioTac, unrolled\n" + ("translated" if shown.simulated else "displacement")
+    figure.biotac_row(label, displacement, largest, shown.contact_center)
+    if truth is not None:
+        figure.biotac_row("BioTac, unrolled\ntrue (simulated)", truth, largest, None)
+    figure.digit_row("DIGIT gel\ndisplacement", shown.displacement_digit, shown.contact_center)
+    figure.picture_row("DIGIT picture", shown.pictures)
+    figure.captions(shown.force, shown.confidence, shown.expected_error_digit)
+    return figure
+
+
+def _sentences(warnings: Sequence[str], confidence: np.ndarray) -> list[str]:
+    """Warnings as lines that fit the sheet, no more than it has room for."""
+    lines = [line for text in warnings for line in textwrap.wrap(text, WARNING_WIDTH, subsequent_indent="   ")]
+    if len(confidence) and np.nanmax(confidence, initial=0) < LOW_CONFIDENCE:
+        lines.insert(0, "Low confidence in every frame shown: take this as a guess.")
+    if len(lines) > WARNING_LINES:
+        lines = [*lines[: WARNING_LINES - 1], f"... and {len(lines) - WARNING_LINES + 1} more lines: see note.json"]
+    return lines

@@ -1,0 +1,171 @@
+"""The main job: a recording becomes DIGIT pictures, deformations and a note, in a folder of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import TactileError
+from ..files import atomic, provenance
+from ..files.stopwatch import Stopwatch
+from . import results
+from .frame_pass import FramePass, Tools
+from .frame_range import frames_text, select
+
+if TYPE_CHECKING:
+    from ..accuracy import Budget
+    from ..recordings import PrepareOptions, Recording
+    from ..recordings.electrode_gains import SensorFile
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What to make of a recording.
+
+    frames : part of it, the same for every recording; keep : words of results.KEEPABLE
+    prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
+    sensor : the unit's rest, and gains and offsets to take off, as `tactile adapt` finds them
+    error : what the toolkit may add
+    """
+
+    frames: slice = dataclasses.field(default_factory=lambda: slice(None))
+    keep: tuple[str, ...] = results.DEFAULT_KEEP
+    prepare: PrepareOptions | None = None
+    overwrite: bool = False
+    sensor: SensorFile | None = None
+    error: Budget | None = None
+
+
+def load_tools(
+    weights: str | os.PathLike | None = None,
+    calibration: str | os.PathLike | None = None,
+    preset: str = "fast",
+    variant: str | None = None,
+) -> Tools:
+    """The shipped weights, or those in a folder, and the camera and lights of a DIGIT: the shipped unit's, or a file's.
+
+    preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
+    Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
+    ``renderer.Renderer`` raises.
+    """
+    from ..pictures import height_map, shading
+    from ..sensors.calibration_file import load_calibration
+    from ..translation import translate
+
+    translator, unit = translate.load_translator(weights), load_calibration(calibration)
+    mapper = height_map.digit_mapper(unit.camera)
+    if preset == "fast":
+        shade = shading.Shader(unit)
+    else:
+        from ..pictures.renderer import Renderer
+
+        shade = Renderer(unit, preset, variant)
+    return Tools(translator, translator.card, translator.sha256, mapper, shade, preset, unit.camera)
+
+
+def within(tools: Tools, levels: float) -> tuple[Tools, str]:
+    """Tools whose pictures are within a bound, grey levels, and in words what was chosen, and why.
+
+    Raises TactileError where none are.
+    """
+    from ..pictures import presets
+
+    chosen = presets.fitting(levels)
+    if chosen != presets.FAST:
+        from ..pictures.renderer import Renderer
+
+        tools = dataclasses.replace(tools, shade=Renderer(preset=chosen), preset=chosen)
+    return tools, presets.told(chosen, levels)
+
+
+@dataclasses.dataclass(frozen=True)
+class Done:
+    """A finished conversion. folder : the result; warnings : what the user should know of it.
+
+    added : what the toolkit added to displacements or heights, in words, where a bound was given
+    left : what the translation itself leaves, in words
+    """
+
+    folder: Path
+    warnings: tuple[str, ...]
+    added: str
+    left: str
+
+
+def convert(
+    recording_path: str | os.PathLike,
+    folder: str | os.PathLike,
+    options: Options,
+    tools: Tools,
+    progress: Callable[[int, int], None] | None = None,
+) -> Done:
+    """Convert one recording into `folder`, which appears whole or not at all.
+
+    progress : called with (frames done, frames in all)
+    Raises TactileError for a recording that cannot be read, a selection without frames, a disk that cannot be written.
+    """
+    from .. import recordings
+    from ..recordings import electrode_gains
+    from ..recordings.fingers import split
+
+    clock = Stopwatch()
+    with clock.stage("read"):
+        recording = recordings.read(recording_path)
+    frames = select(options.frames, len(recording))
+    with clock.stage("prepare"):
+        finger = split(os.fspath(recording_path))[1]
+        unit = None if options.sensor is None else options.sensor.of(recording_path, finger, "--sensor")
+        signals = electrode_gains.prepare_unit(recording, options.prepare, unit)
+    try:
+        with atomic.new_folder(folder, overwrite=options.overwrite) as partial:
+            made = FramePass(recording, signals, frames, options.keep, tools, clock)
+            made.write(partial, progress or _silent)
+            added = _added(options, made)
+            with clock.stage("sheet"):
+                made.draw_sheet(partial / results.SHEET)
+            atomic.write_json(partial / results.NOTE, note(recording, made, options, tools))
+            machine = provenance.machine()
+            timings = {"ms_a_frame": clock.per_frame(len(frames)), "frames": len(frames), "machine": machine}
+            atomic.write_json(partial / results.TIMINGS, timings)
+    except OSError as error:
+        file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
+        found = f"{file}cannot be written ({error.strerror or error})"
+        raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
+    return Done(Path(folder), made.warnings(), added, made.left())
+
+
+def _added(options: Options, made: FramePass) -> str:
+    """What the toolkit added to displacements or heights; raises TactileError where that is more than allowed."""
+    if options.error is None or options.error.um is None:
+        return ""
+    from . import sampling_error
+
+    return sampling_error.check(options.error.um, made.share if {"height", "image"} & set(options.keep) else None)
+
+
+def _silent(done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
+
+def note(recording: Recording, made: FramePass, options: Options, tools: Tools) -> dict:
+    """Where a result came from, fit for JSON: only what the same input makes again, so no paths and no time of day."""
+    prepare = None if options.prepare is None else dataclasses.asdict(options.prepare)
+    return {
+        "format": results.FORMAT,
+        "recording": {
+            "file": os.path.basename(recording.path), "sha256": provenance.sha256(recording.path),
+            "layout": recording.layout, "frames": len(recording), "simulated": recording.simulated,
+            "about": recording.about,
+        },
+        "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
+                    "error": None if options.error is None else str(options.error), "preset": tools.preset},
+        "frames_converted": len(made.frames),
+        "prepared": made.signals.report,
+        "warnings": list(made.warnings()),
+        "flagged_frames": made.flagged,
+        "weights": {"sha256": tools.sha256, "card": tools.card},
+        "versions": provenance.versions("PIL", "matplotlib"),
+    }  # fmt: skip

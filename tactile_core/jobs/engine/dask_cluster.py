@@ -1,0 +1,178 @@
+"""Dask workers on any machines that see the same job folder under the same path.
+
+Dask's messages are pickles, which run code: a scheduler on ``tcp://`` obeys whoever reaches it. Use it in a private
+network, or ``tls://`` with certificates (Dask's own settings ``distributed.comm.tls`` name the files).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import gc
+import queue
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from ...errors import TactileError
+from ...files.text_file import read_toml_text
+from . import tasks
+from .local import KILLS
+from .tasks import Reply, Task
+
+SCHEMES = ("tcp://", "tls://", "ucx://")
+PATIENCE, AGAIN = 10.0, 60.0  # s without a reply, after which it is told that there is no worker, and told again
+CONFIGURED = "distributed.comm.timeouts.connect"  # Dask's own setting of how long to wait for others, 30 s by itself
+
+
+class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A TOML file that starts a cluster. jobs : to ask the queue for; options : of dask_jobqueue's cluster."""
+
+    queue: Literal["slurm", "pbs", "sge", "lsf", "htcondor"]
+    jobs: int
+    options: dict[str, Any]
+
+
+class Cluster:
+    """A Dask scheduler's workers. address : of the scheduler, or of a file as `QueueFile`.
+
+    say : told when all tasks wait because no worker has come yet, as in a full queue
+    """
+
+    def __init__(self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None) -> None:
+        """Raises TactileError for an address or a file that is neither."""
+        self._say = say
+        self._folder = str(folder.resolve())
+        self._address = address
+        self._queue = None if address.startswith(SCHEMES) else _read(address)
+        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._tasks: dict[str, tuple[Task, Any]] = {}  # a future that nobody holds is given up
+
+    def submit(self, task: Task) -> None:
+        """Have a task done."""
+        plain = msgspec.to_builtins(task)
+        future = self._client.submit(tasks.run, self._folder, plain, pure=False)
+        self._tasks[future.key] = task, future
+        future.add_done_callback(self._done.put)
+
+    def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
+        """Replies as they come, as long as `count` says that some are awaited."""
+        while count():
+            future = self._next()
+            yield self._tasks.pop(future.key)[0], self._reply(future)
+
+    def _next(self) -> Any:
+        """The next future that is done."""
+        patience = PATIENCE
+        while True:
+            try:
+                return self._done.get(timeout=patience)
+            except queue.Empty:
+                patience = AGAIN
+                if not self._client.scheduler_info()["workers"]:
+                    self._say(f"{self._address}: no worker has come yet; {len(self._tasks)} tasks wait for one")
+
+    def _reply(self, future: Any) -> Reply:
+        from distributed import KilledWorker
+
+        error = future.exception() if future.status in ("error", "lost", "cancelled") else None
+        if isinstance(error, KilledWorker):
+            return Reply(error=f"killed its worker {KILLS} times ({error.last_worker.address}); set aside")
+        if future.status != "finished":
+            raise TactileError(self._address, f"a task was lost ({error or future.status})", "a working scheduler")
+        return msgspec.convert(future.result(), Reply)
+
+    def __enter__(self) -> Cluster:
+        with ExitStack() as stack:
+            place = self._address if self._queue is None else stack.enter_context(_closing(_start(self._queue)))
+            self._client = stack.enter_context(self._connected(place))
+            self._open = stack.pop_all()
+        return self
+
+    def _connected(self, place: Any) -> Any:
+        """A client of the scheduler. Raises TactileError where none answers."""
+        from distributed import Client, Security
+
+        security = Security(require_encryption=True) if self._address.startswith("tls://") else None
+        try:
+            return Client(place, security=security, timeout=wait(), set_as_default=False, loop=loop())
+        except (OSError, ValueError, TypeError, RuntimeError, MemoryError) as error:  # the last: of other servers
+            found = f"no scheduler answers ({error})"
+        gc.collect()  # ends that client here: within the next one's start it would wait for ever, for a lock held there
+        raise TactileError(self._address, found, "a Dask scheduler", "Start one: dask scheduler")
+
+    def __exit__(self, *error: object) -> None:
+        self._tasks.clear()
+        self._open.close()
+
+
+def _read(address: str) -> QueueFile:
+    try:
+        return msgspec.toml.decode(read_toml_text(address), type=QueueFile)
+    except OSError as error:
+        expected = "tcp://HOST:PORT, tls://HOST:PORT or a TOML file"
+        raise TactileError("--cluster", f"{address!r} ({error.strerror})", expected) from error
+    except (ValueError, RecursionError) as error:
+        raise TactileError(address, str(error), "queue, jobs and [options], as in docs/batch.md") from error
+
+
+@contextmanager
+def _closing(cluster: Any) -> Iterator[Any]:
+    """Close it at the end. Its library asserts that each job has been closed; on a busy machine some are late."""
+    try:
+        yield cluster
+    finally:
+        with suppress(AssertionError):  # the last of what closing does
+            cluster.close()
+
+
+def _start(wanted: QueueFile) -> Any:
+    """A cluster whose workers are jobs of a queue. Raises TactileError for options it does not know."""
+    import dask
+    import dask_jobqueue
+
+    dask.config.set({"distributed.scheduler.allowed-failures": KILLS - 1})
+    names = {"slurm": "SLURM", "pbs": "PBS", "sge": "SGE", "lsf": "LSF", "htcondor": "HTCondor"}
+    try:
+        cluster = getattr(dask_jobqueue, f"{names[wanted.queue]}Cluster")(loop=loop(), **wanted.options)
+    except (TypeError, ValueError) as error:
+        raise TactileError("--cluster, options", str(error), f"options of dask_jobqueue's {wanted.queue}") from error
+    cluster.scale(jobs=wanted.jobs)
+    return cluster
+
+
+def wait() -> float:
+    """s to wait for a loop or a scheduler; DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s asks for more."""
+    import dask
+    import distributed  # noqa: F401 - brings its settings
+    from dask.utils import parse_timedelta
+
+    return parse_timedelta(dask.config.get(CONFIGURED))
+
+
+@functools.cache
+def loop() -> Any:
+    """A tornado loop that runs in a thread as long as this process.
+
+    Dask starts one by itself, but gives up after 10 s whatever its settings are: too little on a machine that is very
+    busy (seen). Raises TactileError where it does not start.
+    """
+    from tornado.ioloop import IOLoop
+
+    began, found = threading.Event(), []
+
+    async def run() -> None:
+        """Tell the loop, then keep it running for good."""
+        found.append(IOLoop.current())
+        began.set()
+        await asyncio.Event().wait()
+
+    threading.Thread(target=asyncio.run, args=(run(),), daemon=True, name="dask loop").start()
+    if not began.wait(wait()):
+        advice = "Ease the machine, or set DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s"
+        raise TactileError("dask", f"its loop has not started after {wait():g} s", "a running thread", advice)
+    return found[0]

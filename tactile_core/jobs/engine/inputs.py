@@ -1,0 +1,171 @@
+"""From what the user names (files, folders, globs, ``@list``) to recordings with names and hashes."""
+
+from __future__ import annotations
+
+import functools
+import glob
+import hashlib
+import logging
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import msgspec
+
+from ...errors import TactileError
+from ...files import provenance
+from ...files.text_file import read_small
+from ...recordings.bag import MARK
+from ...recordings.fingers import name_of, split
+from ...recordings.readers import each_finger
+from ...sensors.calibration_file import load_calibration
+
+log = logging.getLogger(__name__)
+SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3", ".mat")  # what is taken from a folder
+MOST_STARS, MOST_PARTS = 2, 100  # of a glob: '**', whose work multiplies; parts, each a call deeper in Python's glob
+MOST_QUOTED = 200  # characters of a glob in an error: a line of a list may have millions
+SLIDE, BESIDE = "_bio.csv", ("_cw.csv", "_cp.csv")  # of the slide set; its wrenches and poses are no recordings
+
+
+class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One recording of a job.
+
+    name : of its files in the job folder, different for each; path : absolute; sha256, bytes : of its content
+    """
+
+    name: str
+    path: str
+    sha256: str
+    bytes: int
+
+
+def find(words: Sequence[str], out: Path) -> list[Path]:
+    """The recordings that `words` name, in their order, each once; what lies in the folder `out` is left out.
+
+    Raises TactileError for a word that names nothing, and for a glob that would go through a folder again and again.
+    """
+    own = out.resolve()
+    within = functools.cache(lambda folder: list(_of_folder(folder)))  # a list may name a folder on each line
+    found: dict[Path, None] = {}
+    for word, place in _words(words):
+        paths = [path for path in _named(word, within) if not path.is_relative_to(own)]
+        if not paths:
+            expected, advice = f"files ({', '.join(SUFFIXES)}), folders or globs", "Check the path"
+            advice += "; quote a glob, so that the shell leaves it alone" if not place else ""
+            raise TactileError(f"{place}{word[:MOST_QUOTED]}", "names no recording", expected, advice)
+        found |= dict.fromkeys(paths)
+    return list(found)
+
+
+def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Each path or glob, those of lists among them, and where it stands: "list.txt, line 3, " or nothing."""
+    for word in words:
+        if word.startswith("@"):
+            for number, line in _lines(Path(word[1:])):
+                yield os.path.join(os.path.dirname(word[1:]), line), f"{word[1:]}, line {number}, "
+        else:
+            yield word, ""
+
+
+def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
+    """The recordings of a path or glob. within : those in a folder."""
+    there = os.path.lexists(word) or not glob.has_magic(word)
+    for path in [word] if there else _globbed(word):
+        real = os.path.realpath(path)
+        if os.path.isdir(real):
+            yield from within(Path(real))
+        else:
+            yield Path(real)
+
+
+def _globbed(word: str) -> list[str]:
+    """What a glob names, by name; one that may look into the same folders again and again is refused."""
+    parts = word.replace(os.sep, "/").split("/")
+    wild = next(place for place, part in enumerate(parts) if glob.has_magic(part))
+    if ".." in parts[wild:] or parts.count("**") > MOST_STARS or len(parts) > MOST_PARTS:
+        expected = f"no '..' after a wildcard, at most {MOST_STARS} '**' and {MOST_PARTS} parts"
+        raise TactileError(word[:MOST_QUOTED], "a glob that goes through folders again and again", expected)
+    return sorted(glob.glob(word, recursive=True))
+
+
+def _lines(file: Path) -> list[tuple[int, str]]:
+    """Paths of a list file, one a line, and their lines; blank lines and those that begin with # are passed over."""
+    try:
+        text = read_small(file)
+        if "\0" in text:
+            raise ValueError("it holds a zero byte")
+    except (OSError, ValueError) as error:
+        raise TactileError(file, f"cannot be read ({error})", "a text file with one path a line") from error
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
+    for number, line in lines:
+        if line.startswith("@"):
+            advice = f"Give both lists to the command, or write ./{line[:MOST_QUOTED]} for a file"
+            raise TactileError(f"{file}, line {number}", line[:MOST_QUOTED], "a path: lists name no lists", advice)
+    return [(number, line) for number, line in lines if line and not line.startswith("#")]
+
+
+def _of_folder(folder: Path) -> Iterator[Path]:
+    """Recordings in a folder and below it, by name; links to folders are not followed.
+
+    One that cannot be looked into, such as a disk's lost+found, is passed over with a warning.
+    """
+
+    def refused(error: OSError) -> None:
+        """What `os.walk` passes over without a word."""
+        log.warning("%s: cannot be looked into (%s), passed over", error.filename, error.strerror)
+
+    if _is_bag(folder):
+        yield folder
+        return
+    for place, folders, names in os.walk(folder, onerror=refused):
+        bags = [name for name in folders if _is_bag(Path(place, name))]
+        folders[:] = sorted(name for name in folders if name not in bags and not name.startswith("."))
+        beside = BESIDE if any(name.endswith(SLIDE) for name in names) else ()
+        files = [name for name in names if name.lower().endswith(SUFFIXES) and not name.startswith(".")]
+        for name in sorted([*bags, *(name for name in files if not name.endswith(beside))]):
+            yield Path(place) / name
+
+
+def _is_bag(folder: Path) -> bool:
+    """Whether a folder is a ROS 2 bag; one that may not be read is none."""
+    return os.path.isfile(folder / MARK)
+
+
+def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[Input]:
+    """Read every file once. Raises TactileError for one that cannot be read; progress : (files done, in all)."""
+    found = []
+    for done, path in enumerate(paths, 1):
+        digest, size = content_hash(path)
+        for finger in _fingers(path):
+            name = f"{len(found):05d}_{re.sub(r'[^A-Za-z0-9._-]', '_', name_of(finger))[:80]}"
+            found.append(Input(name, finger, digest, size))
+        progress(done, len(paths))
+    return found
+
+
+def _fingers(path: Path) -> list[str]:
+    """Each finger of a file of several; what cannot be read as a recording is told of when its turn comes."""
+    try:
+        return each_finger(path)
+    except TactileError:
+        return [str(path)]
+
+
+def unit_hash(calibration: Path) -> str:
+    """Of a DIGIT's calibration file and the photograph that it names. Raises TactileError for a bad one."""
+    photograph = load_calibration(calibration).background.photograph
+    digests = [content_hash(Path(file))[0] for file in (calibration, photograph) if file]
+    return hashlib.sha256(" ".join(digests).encode()).hexdigest() if photograph else digests[0]
+
+
+def content_hash(path: Path) -> tuple[str, int]:
+    """Hash and bytes of a file, or of all files of a bag's folder with their names. Raises TactileError."""
+    path = Path(split(str(path))[0])
+    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
+        raise TactileError(path, "no regular file", "a recording", "Copy what it gives into a file")
+    try:
+        files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
+        return provenance.sha256(path), sum(file.stat().st_size for file in files)
+    except OSError as error:
+        raise TactileError(path, f"cannot be read ({error.strerror or error})", "a recording") from error

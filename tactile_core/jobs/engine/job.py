@@ -1,0 +1,127 @@
+"""``job.json``: what a job is to make. It never changes after it is written; all else follows from it."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ... import __version__
+from ...errors import TactileError
+from ...files import atomic, provenance
+from ...files.text_file import read_small
+from ...recordings import electrode_gains
+from .. import results
+from .inputs import Input
+from .recipes import Recipe, Simulate, Translate
+
+FORMAT = "tactile-job-1"
+FILE, PREPARED, SHARDS, ASIDE, MANIFEST = "job.json", "prepared", "shards", "aside", "manifest.json"
+ADVICE = "Use an empty --out folder"
+MOST = 2**30  # bytes of a job file; one of 10,000 inputs has 2.5 MB
+
+
+class Job(msgspec.Struct, forbid_unknown_fields=True, frozen=True, dict=True):
+    """A job: `inputs` by `recipe`.
+
+    weights, calibration : folder of the networks, file of the unit, None for the shipped ones; versions : a note
+    """
+
+    format: str
+    inputs: list[Input]
+    recipe: Recipe
+    weights: str | None
+    calibration: str | None
+    versions: dict[str, str]
+
+    @functools.cached_property  # every shard names it, and with 10,000 inputs it takes 10 ms
+    def id(self) -> str:
+        """Hash of all that decides the shards; the same inputs elsewhere have the same."""
+        named = [[one.name, one.sha256] for one in self.inputs]
+        return _hash([named, msgspec.to_builtins(self.recipe)])
+
+
+def _hash(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def make(inputs: list[Input], recipe: Recipe, weights: str | None, calibration: str | None = None) -> Job:
+    """A new job."""
+    paths = [None if path is None else os.path.abspath(path) for path in (weights, calibration)]
+    return Job(FORMAT, inputs, recipe, *paths, provenance.versions())
+
+
+def write(folder: Path, job: Job) -> None:
+    """Make the job folder, its job file first: all else is made again. Raises TactileError where it cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        atomic.write_json(folder / FILE, msgspec.to_builtins(job))
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise TactileError(folder, found, "a writable folder", "Name another --out folder") from error
+
+
+def check_empty(folder: Path, advice: str) -> None:
+    """Raises TactileError for a folder, without a job, that holds something of others; hidden files do not count."""
+    others = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+    if others:
+        raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", advice)
+
+
+def exists(folder: Path) -> bool:
+    """Whether the folder holds a job."""
+    return (folder / FILE).exists()
+
+
+def read(folder: Path) -> Job:
+    """The job of a folder. Raises TactileError for none, for one that is damaged or of another version."""
+    file = folder / FILE
+    try:
+        job = msgspec.convert(json.loads(read_small(file, MOST)), Job)
+    except OSError as error:
+        found, advice = f"cannot be read ({error.strerror or error})", "Begin one: tactile batch RECORDINGS --out DIR"
+        raise TactileError(file, found, "the folder of a job", advice) from error
+    except (ValueError, RecursionError) as error:  # of JSON and of msgspec
+        raise TactileError(file, f"damaged ({error})", f"a job file ({FORMAT})", ADVICE) from error
+    if job.format != FORMAT:
+        raise TactileError(f"{file}, format", repr(job.format), repr(FORMAT), ADVICE)
+    if job.recipe.version != __version__:
+        found = f"made by version {job.recipe.version}"
+        raise TactileError(file, found, f"version {__version__}, which is running", ADVICE)
+    for index, one in enumerate(job.inputs):
+        odd = os.path.basename(one.name) != one.name or "\0" in one.name + one.path
+        if odd or not one.name.startswith(f"{index:05d}_") or not _encodes(one.name + one.path):
+            raise TactileError(f"{file}, inputs", f"the name {one.name!r:.80}", f"{index:05d}_<file name>", ADVICE)
+    if isinstance(job.recipe, Translate):
+        results.parse_keep(",".join(job.recipe.keep))
+        job.recipe.prepare.options().check()
+        if job.recipe.sensor is not None:
+            electrode_gains.check(job.recipe.sensor, f"{file}, recipe, sensor")
+    if isinstance(job.recipe, Simulate) and len(job.recipe.values) != len(job.inputs):
+        found = f"{len(job.recipe.values)} sets of values"
+        raise TactileError(f"{file}, recipe", found, f"{len(job.inputs)}, one for each input", ADVICE)
+    return job
+
+
+def _encodes(name: str) -> bool:
+    """Whether it can be a path of this machine's."""
+    try:
+        os.fsencode(name)
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def prepared_file(folder: Path, name: str) -> Path:
+    """Of the recording of that name."""
+    return folder / PREPARED / f"{name}.h5"
+
+
+def shard_file(folder: Path, name: str, number: int) -> Path:
+    """Of the shard of that number in the recording, from 0."""
+    return folder / SHARDS / f"{name}-{number:06d}.h5"

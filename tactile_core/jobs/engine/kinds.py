@@ -1,0 +1,41 @@
+"""The kinds of job, a module of ``jobs`` each. Each has
+
+``first(folder, job, index)``  does what an input needs before its shards; returns how many shards it has, as far as is
+    known, and whether anything was made
+``make(folder, job, index, number)``  makes a shard unless it is there and whole; returns whether it was made
+``seen(folder, job, index)``  what the files tell of an input, None before its first task was done
+``GROWS``  whether `first` is to be asked again when all its shards are there
+
+Both doing functions raise TactileError for what cannot be done, OSError where the disk cannot be written.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from . import recipes
+
+if TYPE_CHECKING:
+    from .job import Job
+
+MODULES = {
+    recipes.Translate: "translate", recipes.Pairs: "pairs",
+    recipes.Simulate: "simulate", recipes.Render: "render_shards",
+}  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class Seen:
+    """What is known of an input. shards : how many it has; frames : of a recording; warnings : to tell of it"""
+
+    shards: int
+    frames: int = 0
+    warnings: tuple[str, ...] = ()
+
+
+def of(job: Job) -> ModuleType:
+    """The module that does a job."""
+    return importlib.import_module(f"...{MODULES[type(job.recipe)]}", __name__)

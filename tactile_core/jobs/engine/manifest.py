@@ -1,0 +1,128 @@
+"""What a job folder holds, told from its files alone."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ...errors import TactileError
+from ...files import atomic, checksummed
+from ...files.text_file import read_small
+from . import job as jobs
+from . import kinds
+from .job import Job
+
+FORMAT = "tactile-batch-1"
+
+
+@dataclasses.dataclass
+class Status:
+    """recordings, prepared : numbers of them; shards : of the prepared recordings, of which `there` exist
+
+    frames : of the prepared recordings; aside : task -> why it could not be done
+    """
+
+    recordings: int
+    prepared: int = 0
+    shards: int = 0
+    there: int = 0
+    frames: int = 0
+    aside: dict[str, str] = dataclasses.field(default_factory=dict)
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is missing."""
+        return self.prepared == self.recordings and self.there == self.shards
+
+
+def status(folder: Path, job: Job) -> Status:
+    """How far a job is. Reads names and lengths, no content: `damaged` checks that."""
+    found = Status(len(job.inputs), aside=_aside(folder))
+    there = {path.name for path in (folder / jobs.SHARDS).glob("*.h5")}
+    for index, one in enumerate(job.inputs):
+        seen = kinds.of(job).seen(folder, job, index)
+        if seen is None:
+            continue
+        names = [jobs.shard_file(folder, one.name, number).name for number in range(seen.shards)]
+        found.prepared += 1
+        found.frames += seen.frames
+        found.shards += len(names)
+        found.there += sum(name in there for name in names)
+    return found
+
+
+def _aside(folder: Path) -> dict[str, str]:
+    found = {}
+    for file in sorted((folder / jobs.ASIDE).glob("*.json")):
+        try:
+            found[file.stem] = str(json.loads(read_small(file))["why"])
+        except (OSError, ValueError, KeyError, TypeError, RecursionError, TactileError):
+            found[file.stem] = "its reason cannot be read"
+    return found
+
+
+def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
+    """Files of a job that are not as they were written; each is read once. progress : (files done, in all)
+
+    Where the job was done once, by its manifest: shards that are gone, and whole ones of another place or job, too.
+    """
+    told = _told(folder)
+    there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]
+    files = sorted({*there, *told})
+    bad = []
+    for index, file in enumerate(files):
+        digest = checksummed.verified_checksum(file)
+        if digest is None or told.get(file, digest) != digest:
+            bad.append(file)
+        progress(index + 1, len(files))
+    return bad
+
+
+def _told(folder: Path) -> dict[Path, str]:
+    """Shards of a manifest and their hashes; none where there is no manifest, or one that cannot be read."""
+    try:
+        found = msgspec.json.decode(read_small(folder / jobs.MANIFEST, jobs.MOST), type=_Manifest)
+    except (OSError, ValueError, RecursionError, TactileError):
+        return {}
+    shards = [shard for recording in found.recordings for shard in recording.shards]
+    return {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
+
+
+class _Shard(msgspec.Struct):
+    file: str
+    sha256: str
+
+
+class _Recording(msgspec.Struct):
+    shards: list[_Shard]
+
+
+class _Manifest(msgspec.Struct):
+    recordings: list[_Recording]
+
+
+def write(folder: Path, job: Job) -> None:
+    """``manifest.json``: recordings in order, their shards and hashes; the same job gives the same bytes."""
+    content = {
+        "format": FORMAT,
+        "job": job.id,
+        "recordings": [_recording(folder, job, i) for i in range(len(job.inputs))],
+    }
+    atomic.write_json(folder / jobs.MANIFEST, content | {"aside": _aside(folder)})
+
+
+def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
+    one = job.inputs[index]
+    seen = kinds.of(job).seen(folder, job, index) or kinds.Seen(0)
+    told: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
+    for number in range(seen.shards):
+        path = jobs.shard_file(folder, one.name, number)
+        digest = checksummed.stated_checksum(path)
+        if digest is not None:
+            told["shards"].append({"file": path.name, "sha256": digest})
+    return told | {"warnings": list(seen.warnings)}

@@ -1,0 +1,91 @@
+"""What is made of each input: all that decides a shard's bytes beside the input itself. One struct a kind of job."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from ... import __version__
+from ...recordings import PrepareOptions
+from ...recordings.electrode_gains import SensorFile
+
+SHARD_FRAMES = 1000
+MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
+PICTURE_FRAMES = 50  # rendered frames a shard: some seconds of work, and 80 MB with OpenEXR
+
+
+class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """As recordings.PrepareOptions, whose meanings these are."""
+
+    kind: str | None = None
+    tare: str | None = None
+    drift: bool = True
+    counts_per_unit: float | None = None
+    smooth: int | None = None
+    polarity: str = "auto"
+
+    def options(self) -> PrepareOptions:
+        """For ``recordings.prepare``."""
+        return PrepareOptions(**msgspec.structs.asdict(self))
+
+
+class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fields=True, frozen=True):
+    """Recordings to shards of translated frames.
+
+    keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames a shard
+    calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
+    preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
+    """
+
+    keep: list[str]
+    weights: str
+    shard_frames: Annotated[int, Meta(ge=1, le=MAX_SHARD_FRAMES)] = SHARD_FRAMES
+    prepare: Prepare = Prepare()
+    sensor: SensorFile | None = None
+    calibration: str = ""
+    preset: str = "fast"
+    variant: str = ""
+    version: str = __version__
+
+
+class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
+    """A scene to paired contacts. surfaces : sha256 of the BioTac's and the DIGIT's nodes; files : of the meshes."""
+
+    count: Annotated[int, Meta(ge=1)]
+    seed: int
+    surfaces: list[str]
+    files: list[str]
+    version: str = __version__
+
+
+class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
+    """A scene to one recording for each input, which has its own values; see ``scene_grid``.
+
+    seed : of the first; each has one more than that before it; values : name -> value, an input each
+    keep : words of ``mechanics.recording.OUTPUTS``
+    """
+
+    seed: int
+    values: list[dict[str, float | str]]
+    files: list[str]
+    keep: list[str]
+    version: str = __version__
+
+
+class Render(msgspec.Struct, tag="render", tag_field="verb", forbid_unknown_fields=True, frozen=True):
+    """Deformed gels to pictures; fields as of ``render.Options``, calibration as of ``Translate``."""
+
+    preset: str
+    variant: str
+    frames: str
+    size: tuple[int, int] | None
+    exr: bool
+    noise: bool
+    calibration: str = ""
+    shard_frames: Annotated[int, Meta(ge=1, le=MAX_SHARD_FRAMES)] = PICTURE_FRAMES
+    version: str = __version__
+
+
+Recipe = Translate | Pairs | Simulate | Render

@@ -1,0 +1,169 @@
+"""A job from beginning to end, wherever its tasks are done."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Protocol
+
+from ...errors import TactileError
+from ...files import atomic, lock
+from . import job as jobs
+from . import kinds, manifest, tasks
+from .job import Job
+from .tasks import Reply, Task
+
+Progress = Callable[[int, int], None]
+
+
+class Place(Protocol):
+    """Where tasks are done; a context manager."""
+
+    def submit(self, task: Task) -> None:
+        """Have a task done, some time."""
+
+    def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
+        """Replies as they come, as long as `count` says that some are awaited."""
+
+    def __enter__(self) -> Place: ...
+
+    def __exit__(self, *error: object) -> None: ...
+
+
+@dataclasses.dataclass
+class Done:
+    """What a run did. made, kept : shards; aside : sentence on each task that could not be done."""
+
+    made: int = 0
+    kept: int = 0
+    aside: dict[str, str] = dataclasses.field(default_factory=dict)
+
+
+@contextlib.contextmanager
+def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
+    """Hold the job's folder, made if need be, and clear what killed runs left in it.
+
+    Raises TactileError where another job runs in it, or where it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        stack = contextlib.ExitStack()
+        stack.enter_context(lock.held(folder, part))
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise TactileError(folder, found, "a writable folder", "Name another --out folder") from error
+    with stack:
+        _sweep(folder, part)
+        try:
+            yield
+        finally:
+            _sweep(folder, part)
+
+
+def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
+    """Clear what killed workers left; not in an array, whose other parts may be writing, nor where no job is."""
+    if part is None and jobs.exists(folder):
+        for place in (".", jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
+            atomic.sweep_files(folder / place)
+
+
+def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:
+    """Do all that the job still lacks, or a part (i, n) of it; call inside `opened`.
+
+    progress : called with (tasks done, tasks known so far)
+    Raises TactileError when the disk cannot be written.
+    """
+    try:
+        return _run(folder, job, place, part, progress)
+    except OSError as error:
+        where, found = error.filename2 or error.filename or folder, f"cannot be written ({error.strerror or error})"
+        raise TactileError(where, found, "a job folder of ours that can be written") from error
+
+
+def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:
+    """As `run`; raises OSError."""
+    work = _Work(folder, job, part)
+    for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
+        (folder / name).mkdir(exist_ok=True)
+    with place:
+        for task in work.first():
+            place.submit(task)
+        for task, reply in place.results(work.awaited):
+            for follow in work.take(task, reply):
+                place.submit(follow)
+            progress(work.finished, work.known)
+    if part is None:
+        manifest.write(folder, job)
+    return work.done
+
+
+class _Work:
+    """Which tasks there are, and what became of them."""
+
+    def __init__(self, folder: Path, job: Job, part: tuple[int, int] | None) -> None:
+        self._folder, self._job = folder, job
+        self._part, self._parts = part or (0, 1)
+        self.done, self.known, self.finished = Done(), 0, 0
+        self._grows = kinds.of(job).GROWS
+        self._asked, self._open = Counter[int](), Counter[int]()  # shards of each input: so far, and not done of them
+
+    def awaited(self) -> int:
+        """Tasks whose reply has not come."""
+        return self.known - self.finished
+
+    def first(self) -> list[Task]:
+        """The recordings to prepare. A part of an array begins with its own: they are then there for the others."""
+        count = len(self._job.inputs)
+        own = [index for index in range(count) if index % self._parts == self._part]
+        others = [index for index in range(count) if index % self._parts != self._part]
+        self.known = count
+        return [Task(index) for index in own + others]
+
+    def take(self, task: Task, reply: Reply) -> list[Task]:
+        """Note a reply; returns what can be done now."""
+        self.finished += 1
+        if reply.stop:
+            raise TactileError(*_parts_of(reply.error))
+        if reply.error:
+            self._set_aside(task, reply.error)
+            return []
+        self._clear(task)
+        if task.shard is None:
+            follow = self._shards(task.recording, reply.shards)
+        else:
+            self.done.made += reply.made
+            self.done.kept += not reply.made
+            self._open[task.recording] -= 1
+            follow = [Task(task.recording)] if self._grows and not self._open[task.recording] else []
+        self.known += len(follow)
+        return follow
+
+    def _shards(self, recording: int, count: int) -> list[Task]:
+        """Those of the first `count` shards of a recording that are this part's and were not asked for yet."""
+        if self._grows:
+            count = max(count, self._parts)  # each part makes one, from which it learns how many there are
+        numbers = range(self._asked[recording], count)
+        self._asked[recording] = max(count, self._asked[recording])
+        # Shifted by the recording, so that many short ones are spread over the parts too.
+        mine = [number for number in numbers if (number + recording) % self._parts == self._part]
+        self._open[recording] += len(mine)
+        return [Task(recording, number) for number in mine]
+
+    def _file(self, task: Task) -> Path:
+        return self._folder / jobs.ASIDE / f"{tasks.name(self._job, task)}.json"
+
+    def _set_aside(self, task: Task, why: str) -> None:
+        name = tasks.name(self._job, task)
+        self.done.aside[name] = why
+        atomic.write_json(self._file(task), {"task": name, "why": why}, shared=True)
+
+    def _clear(self, task: Task) -> None:
+        self._file(task).unlink(missing_ok=True)
+
+
+def _parts_of(sentence: str) -> tuple[str, str]:
+    where, _, found = sentence.partition(": ")
+    return where, found

@@ -1,0 +1,80 @@
+"""The two kinds of work in a job, as small values that any process can be handed."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ...errors import TactileError
+from . import job as jobs
+from . import kinds
+
+
+class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """What input `recording` of the job needs first (shard None), or one of its shards; see ``kinds``."""
+
+    recording: int
+    shard: int | None = None
+
+
+class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """What became of a task.
+
+    made : False where it was there already; shards : that follow, of an input's first task
+    error : why it cannot be done, as the user reads it; stop : no other task can be done either
+    """
+
+    made: bool = False
+    shards: int = 0
+    error: str = ""
+    stop: bool = False
+
+
+def name(job: jobs.Job, task: Task) -> str:
+    """Of the task in files and messages."""
+    recording = job.inputs[task.recording].name
+    return recording if task.shard is None else f"{recording}-{task.shard:06d}"
+
+
+def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
+    """Do a task of the job in `folder`; both sides plain data, so that JSON and Dask carry them alike.
+
+    Never raises what the task's input or the disk brings about: the reply says it.
+    """
+    reply = _run(Path(folder), msgspec.convert(task, Task))
+    return msgspec.to_builtins(reply)
+
+
+def _run(folder: Path, task: Task) -> Reply:
+    try:
+        job = _job(str(folder), _stamp(folder))
+        kind = kinds.of(job)
+        if task.shard is None:
+            shards, made = kind.first(folder, job, task.recording)
+            return Reply(made=made, shards=shards)
+        return Reply(made=kind.make(folder, job, task.recording, task.shard))
+    except TactileError as error:
+        return Reply(error=str(error))
+    except (OSError, MemoryError) as error:
+        where = getattr(error, "filename", None) or folder
+        told = getattr(error, "strerror", None) or str(error) or "no memory left"
+        sentence = f"{where}: cannot be written ({told}). Make room and give the same command again"
+        return Reply(error=sentence, stop=isinstance(error, OSError))
+
+
+def _stamp(folder: Path) -> tuple[int, int]:
+    """What tells one job file from another in the same place, for a worker that serves several jobs."""
+    try:
+        found = (folder / jobs.FILE).stat()
+    except OSError as error:
+        advice = "Give every machine the same path to it"
+        raise TactileError(folder, "no job here", "the job's folder", advice) from error
+    return found.st_ino, found.st_size
+
+
+@functools.lru_cache(maxsize=4)
+def _job(folder: str, stamp: tuple[int, int]) -> jobs.Job:
+    return jobs.read(Path(folder))

@@ -1,0 +1,39 @@
+"""A process that does tasks of one job: JSON lines in, JSON lines out, and an end of input ends it.
+
+Started by ``local``. It ends by itself when its client is killed, and leaves no half file.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import sys
+from typing import TextIO
+
+
+def serve(folder: str, requests: TextIO, replies: TextIO) -> None:
+    """Answer tasks until the requests end."""
+    from . import tasks
+
+    for line in requests:
+        replies.write(json.dumps(tasks.run(folder, json.loads(line))) + "\n")
+        replies.flush()
+
+
+def main() -> None:
+    """``python -m tactile_core.jobs.engine.worker FOLDER``."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group: the client decides
+    replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    # What the library warns of frame by frame is in the shards as flags and confidence; thousands of lines help nobody.
+    logging.getLogger(__package__.removesuffix(".jobs.engine")).setLevel(logging.ERROR)
+    os.dup2(2, 1)  # whatever a library prints must not be taken for a reply
+    try:
+        serve(sys.argv[1], sys.stdin, replies)
+    except BrokenPipeError:
+        os._exit(0)  # the client has gone
+
+
+if __name__ == "__main__":
+    main()

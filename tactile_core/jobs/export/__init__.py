@@ -1,0 +1,9 @@
+"""From a finished job to the layouts that others read.
+
+A new layout is one new file in ``formats/``, with ``BRIEF`` and ``write``; see there.
+"""
+
+from .finished_job import Finished, Recorded
+from .writers import export, layouts
+
+__all__ = ["Finished", "Recorded", "export", "layouts"]

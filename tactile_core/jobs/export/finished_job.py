@@ -1,0 +1,123 @@
+"""The shards of a finished job as recordings, some frames in memory at a time."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import TactileError
+from ...files import checksummed
+from ...files.hdf5_checked import declared, open_checked
+from ...recordings.array_store import damage_told
+from .. import frame_shard
+from ..engine import job as jobs
+from ..engine import manifest
+from ..engine.recipes import Translate
+from ..frames_file import arrays_of
+from ..prepared_signals import Prepared
+
+if TYPE_CHECKING:
+    from ..engine.job import Job
+
+ADVICE = "Make it anew: remove the file, then tactile batch --out DIR"
+BLOCK = 32  # frames in memory at a time: 7 MB of pictures, 10 MB of heights
+
+
+def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
+    """Name -> shape of one frame, and type."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return {name: (tuple(data.shape[1:]), data.dtype) for name, data in file.items()}
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded:
+    """One recording. name : of it in the job; frames : of it; shards : its files, in order."""
+
+    name: str
+    frames: int
+    shards: tuple[Path, ...]
+
+    def blocks(self) -> Iterator[dict[str, np.ndarray]]:
+        """All arrays of some frames after another, by the names of ``frames_file``."""
+        import h5py
+
+        for path in self.shards:
+            with h5py.File(path, "r") as file:
+                for start in range(0, len(file["frame"]), BLOCK):
+                    yield {name: data[start : start + BLOCK] for name, data in file.items()}
+
+    def arrays(self) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
+        """Name -> shape of one frame, and type."""
+        return _kinds(self.shards[0])
+
+
+@dataclasses.dataclass(frozen=True)
+class Finished:
+    """A job whose shards are all there. id : of the job; aside : recording or shard -> why it is not among them"""
+
+    id: str
+    recordings: tuple[Recorded, ...]
+    aside: dict[str, str]
+
+    @property
+    def frames(self) -> int:
+        """Of all recordings."""
+        return sum(one.frames for one in self.recordings)
+
+
+def load(folder: Path) -> Finished:
+    """The job of a folder. Raises TactileError where a shard is missing or not as a job of ours has it."""
+    job = jobs.read(folder)
+    if not isinstance(job.recipe, Translate):
+        raise TactileError(folder, "a job of another verb", "one of `tactile batch`", "Give the verb's command again")
+    status = manifest.status(folder, job)
+    unread = [one for one in job.inputs if one.name in status.aside]
+    if status.there < status.shards or status.prepared + len(unread) < status.recordings or not status.there:
+        found, advice = f"{status.there} of {status.shards} shards", "Finish it: tactile batch --out DIR"
+        raise TactileError(folder, found, "a finished job", advice)
+    recordings = []
+    for index, one in enumerate(job.inputs):
+        file = jobs.prepared_file(folder, one.name)
+        if not file.exists():
+            continue
+        frames = len(Prepared(file))
+        paths = tuple(jobs.shard_file(folder, one.name, number) for number in range(frame_shard.count(frames, job)))
+        for number, path in enumerate(paths):
+            _check(path, job, index, number, frames)
+        recordings.append(Recorded(one.name, frames, paths))
+    _check_alike([path for one in recordings for path in one.shards])
+    return Finished(job.id, tuple(recordings), status.aside)
+
+
+def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
+    """Raises TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
+    if checksummed.verified_checksum(path) is None:
+        raise TactileError(path, "damaged", "a whole shard", ADVICE)
+    if not frame_shard.is_of(path, job, index, number, frames):
+        raise TactileError(path, "another shard under this name", f"shard {number} of {job.inputs[index].name}", ADVICE)
+    rows = min(job.recipe.shard_frames, frames - number * job.recipe.shard_frames)
+    expected = set(arrays_of(job.recipe.keep, shard=True))
+    with damage_told(str(path), "shard"), open_checked(path) as file:
+        if set(file) != expected:
+            raise TactileError(path, f"arrays {', '.join(sorted(file))}", ", ".join(sorted(expected)), ADVICE)
+        for name, data in file.items():
+            declared(data, f"{path}, {name}")
+            if data.shape[:1] != (rows,) or data.dtype.kind not in "fiub":
+                found = f"shape {data.shape} of {data.dtype}"
+                raise TactileError(f"{path}, {name}", found, f"numbers of {rows} frames", ADVICE)
+
+
+def _check_alike(paths: list[Path]) -> None:
+    """Raises TactileError where an array's frames are not of one shape and type in all shards."""
+    first: dict[str, str] = {}
+    for path in paths:
+        for name, found in _kinds(path).items():
+            told = f"{found[1].name} of shape {found[0]}"
+            if first.setdefault(name, told) != told:
+                raise TactileError(f"{path}, {name}", f"frames are {told}", f"{first[name]}, as in {paths[0]}", ADVICE)

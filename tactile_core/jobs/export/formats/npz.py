@@ -1,0 +1,38 @@
+"""``<recording>.npz``: all arrays of a recording, as NumPy reads them; frames are written as they come."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ..finished_job import Finished, Recorded
+
+BRIEF = "one NPZ file a recording, all arrays"
+TIME = (1980, 1, 1, 0, 0, 0)  # of the files inside: the same job gives the same bytes
+
+
+def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
+    """One file a recording."""
+    done = 0
+    for one in source.recordings:
+        with zipfile.ZipFile(folder / f"{one.name}.npz", "w", zipfile.ZIP_STORED) as archive:
+            for name, (shape, kind) in one.arrays().items():
+                _write(archive, one, name, (one.frames, *shape), kind)
+        done += one.frames
+        progress(done, source.frames)
+
+
+def _write(archive: zipfile.ZipFile, one: Recorded, name: str, shape: tuple[int, ...], kind: np.dtype) -> None:
+    """An array of any length: its header first, then its rows, shard by shard."""
+    import h5py
+
+    header = {"descr": np.lib.format.dtype_to_descr(kind), "fortran_order": False, "shape": shape}
+    with archive.open(zipfile.ZipInfo(f"{name}.npy", TIME), "w", force_zip64=True) as out:
+        np.lib.format.write_array_header_2_0(out, header)
+        for path in one.shards:
+            with h5py.File(path, "r") as file:
+                for start in range(0, len(file[name]), 32):
+                    out.write(np.ascontiguousarray(file[name][start : start + 32]).tobytes())

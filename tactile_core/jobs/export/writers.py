@@ -1,0 +1,53 @@
+"""The registry of layouts, and the one way in: ``export``."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pkgutil
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+from ...errors import TactileError
+from ...files import atomic, provenance
+from . import finished_job, formats
+
+NOTE = "note.json"
+
+
+@cache
+def layouts() -> dict[str, ModuleType]:
+    """Name -> module of ``formats/``."""
+    names = sorted(info.name for info in pkgutil.iter_modules(formats.__path__))
+    return {name: importlib.import_module(f"{formats.__name__}.{name}") for name in names}
+
+
+def export(
+    job: str | os.PathLike, layout: str, out: str | os.PathLike, progress: Callable[[int, int], None]
+) -> finished_job.Finished:
+    """Write the finished job in a folder as `layout` into the new folder `out`, whole or not at all.
+
+    progress : called with (frames done, frames in all)
+    Raises TactileError: a job that is not finished, an unknown layout, an existing folder, a full disk.
+    """
+    if layout not in layouts():
+        raise TactileError("--to", repr(layout), " or ".join(layouts()))
+    source = finished_job.load(Path(job))
+    try:
+        with atomic.new_folder(out) as partial:
+            layouts()[layout].write(source, partial, progress)
+            note = {"layout": layout, "job": source.id, "left_out": source.aside, "versions": provenance.versions()}
+            atomic.write_json(partial / NOTE, note)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise TactileError(out, found, "a writable folder", "Make room, or name another --out folder") from error
+    return source
+
+
+def needed(source: finished_job.Finished, array: str, word: str) -> None:
+    """Raises TactileError where the job did not keep an array."""
+    if array not in source.recordings[0].arrays():
+        advice = f"Make the job with --keep {word}"
+        raise TactileError("the job", f"holds no {array}", f"one that kept {word}", advice)

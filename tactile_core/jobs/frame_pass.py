@@ -1,0 +1,198 @@
+"""One pass over the frames of a recording: translate, shade, write, a chunk at a time."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..files.png import write_png
+from ..files.stopwatch import Stopwatch
+from ..pictures.height_map import folds_counted
+from ..recordings import flags
+from ..recordings.signals import FRAMEWISE
+from ..sensors import PRESSURE_PER_COUNT
+from ..sensors.camera import Camera
+from . import results
+from .contact_sheet import Contents, choose_frames, contact_sheet
+from .frames_file import FramesFile
+from .sampling_error import depth_share
+
+if TYPE_CHECKING:
+    from ..recordings import Recording, Signals
+    from ..translation.translate import Translation
+
+CHUNK = 64  # frames in memory at a time: about 5 MB of displacements and 20 MB of heights
+SHEET_ARRAYS = (
+    "displacement_biotac", "displacement_digit", "force", "confidence", "expected_error_digit", "contact_center"
+)  # fmt: skip
+LEFT = ("expected_error_digit", "error_bound_digit")
+# Flags that the translation sets, so that no warning of the recording tells of them.
+REMARKABLE = {
+    "out_of_range": "signals unlike those the networks were trained on",
+    "beyond_digit": "the contact has no counterpart on the DIGIT's gel",
+    "beyond_picture": "the contact lies on the gel beside its picture",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Tools:
+    """What a conversion works with; the same for every recording.
+
+    translate : Signals -> Translation; card, sha256 : of its weights
+    height_map : (T, M, 3) m -> (T, H, W) m; shade : (H, W) m -> (H, W, 3) uint8, by a preset of ``pictures.presets``
+    camera : of the DIGIT that is drawn, by which contacts beside its picture are flagged; None: none are
+    """
+
+    translate: Callable[[Signals], Translation]
+    card: dict[str, Any]
+    sha256: str
+    height_map: Callable[[np.ndarray], np.ndarray]
+    shade: Callable[[np.ndarray], np.ndarray]
+    preset: str = "fast"
+    camera: Camera | None = None
+
+
+def translated(signals: Signals, tools: Tools) -> dict[str, np.ndarray]:
+    """What a translation makes of all frames of `signals`, T first, by the names of frames.h5."""
+    translation = tools.translate(signals)
+    arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
+    arrays |= {"electrodes": signals.electrodes, "pressure_measured": PRESSURE_PER_COUNT * signals.pdc}
+    return arrays | {"flags": arrays["flags"] | signals.flags | _beyond_picture(arrays["contact_center"], tools.camera)}
+
+
+def _beyond_picture(center: np.ndarray, camera: Camera | None) -> np.ndarray:
+    """Flags (T,) of contacts (T, 2) m on the gel that the camera does not see."""
+    if camera is None:
+        return np.zeros(len(center), np.uint16)
+    beside = np.isfinite(center[:, 0]) & ~camera.sees(*center.T)
+    return np.where(beside, flags.Flag.BEYOND_PICTURE, 0).astype(np.uint16)
+
+
+class FramePass:
+    """Takes the selected frames once through all stages, and keeps of them only what the contact sheet shows."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        signals: Signals,
+        frames: np.ndarray,
+        keep: tuple[str, ...],
+        tools: Tools,
+        clock: Stopwatch,
+    ) -> None:
+        """frames : (T,) indices into the recording, in order; keep : words of results.KEEPABLE."""
+        self.recording, self.signals, self.frames, self.keep = recording, signals, frames, keep
+        self.tools, self.clock = tools, clock
+        self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
+        self._errors: list[np.ndarray] = []
+        self.folded = 0  # height maps of a gel that folds over itself
+        self.share = 0.0  # the deepest move of a node so far, over the gel's thickness
+        chosen = choose_frames(np.abs(signals.change[frames]).mean(axis=1))
+        self.shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
+
+    def write(self, folder: Path, progress: Callable[[int, int], None]) -> None:
+        """Write ``frames.h5`` and the pictures; `progress` is called with (frames done, frames in all)."""
+        if "image" in self.keep:
+            (folder / results.IMAGES).mkdir()
+        name = self.recording.name.encode(errors="replace").decode()  # HDF5 text is UTF-8, file names need not be
+        about = {"recording": name, "simulated": self.recording.simulated}
+        with FramesFile(folder / results.FRAMES, len(self.frames), self.keep, about) as file:
+            for start in range(0, len(self.frames), CHUNK):
+                frames = self.frames[start : start + CHUNK]
+                arrays = self._translate(frames)
+                arrays |= self._draw(folder, frames, arrays["displacement_digit"])
+                with self.clock.stage("hdf5"):
+                    file.write(start, arrays)
+                self._count_flags(arrays["flags"])
+                self._keep_measures(arrays)
+                self._remember(frames, arrays)
+                progress(start + len(frames), len(self.frames))
+            file.annotate("time", start_time=self.recording.start_time)
+            file.annotate("electrodes", rest=self.signals.rest, kind=self.signals.kind)
+
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know: of the recording, and of what became of its frames."""
+        found = list(self.signals.warnings)
+        for name, meaning in REMARKABLE.items():
+            if self.flagged[name]:
+                found.append(f"{self.flagged[name]} of {len(self.frames)} frames: {meaning} (flag {name})")
+        if self.folded:
+            found.append(f"{self.folded} frames: the translated gel folds over itself; heights there are guesses")
+        return tuple(found)
+
+    def left(self) -> str:
+        """What the translation itself leaves on the DIGIT, in words: the median of the frames in contact."""
+        errors = np.concatenate(self._errors, axis=1)
+        if not errors.shape[1]:
+            return "no frame is in contact, so the translation expects no error"
+        expected, bound = 1e3 * np.median(errors, axis=1)
+        return (
+            f"the translation itself, beside this: the worst node of its gel is off by {expected:.2f} mm in half of "
+            f"such contacts, by less than {bound:.2f} mm in 95 of 100"
+        )
+
+    def _keep_measures(self, arrays: dict[str, np.ndarray]) -> None:
+        touching = np.isfinite(arrays["contact_center"][:, 0])
+        self._errors.append(np.stack([arrays[name][touching] for name in LEFT]))
+        self.share = max(self.share, depth_share(arrays["displacement_digit"]))
+
+    def _translate(self, frames: np.ndarray) -> dict[str, np.ndarray]:
+        """All arrays of some frames, T first, by the names of frames.h5."""
+        part = {name: getattr(self.signals, name)[frames] for name in FRAMEWISE}
+        with self.clock.stage("translate"):
+            arrays = translated(dataclasses.replace(self.signals, **part), self.tools)
+        return arrays | {"frame": frames.astype(np.int32), "time": self.recording.time[frames]}
+
+    def _draw(self, folder: Path, frames: np.ndarray, displacement: np.ndarray) -> dict[str, np.ndarray]:
+        """Heights, as far as they are kept; pictures go to their files. Frames that nobody looks at are passed over."""
+        whole = "height" in self.keep or "image" in self.keep
+        seen = np.flatnonzero([whole or int(frame) in self.shown for frame in frames])
+        if not len(seen):
+            return {}
+        with self.clock.stage("height_map"), folds_counted() as folds:
+            heights = self.tools.height_map(displacement[seen])
+        self.folded += len(folds)
+        for frame, height in zip(frames[seen], heights, strict=True):
+            shown = self.shown.get(int(frame))
+            if "image" in self.keep or shown is not None:
+                with self.clock.stage("shade"):
+                    picture = self.tools.shade(height)
+                if shown is not None:
+                    shown["pictures"] = picture
+                if "image" in self.keep:
+                    with self.clock.stage("png"):
+                        write_png(folder / results.IMAGES / results.IMAGE_NAME.format(frame), picture)
+        return {"height_map": heights} if "height" in self.keep else {}
+
+    def _count_flags(self, bits: np.ndarray) -> None:
+        for name, bit in flags.names().items():
+            self.flagged[name] += int(np.count_nonzero(bits & bit))
+
+    def _remember(self, frames: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
+        """Copies, so that the chunk can be forgotten."""
+        for index in np.flatnonzero(np.isin(frames, list(self.shown))):
+            shown = self.shown[int(frames[index])]
+            for name in SHEET_ARRAYS:
+                shown[name] = np.array(arrays[name][index])
+
+    def draw_sheet(self, path: Path) -> None:
+        """The contact sheet of the frames kept for it; call after `write`."""
+        shown = np.array(list(self.shown))
+        columns = {name: np.stack([at[name] for at in self.shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
+        truth = self.recording.truth
+        skin = None if truth is None else truth.displacement_biotac
+        contents = Contents(
+            name=self.recording.name,
+            time=self.recording.time[self.frames],
+            electrodes=self.signals.change[self.frames],
+            frames=np.searchsorted(self.frames, shown),
+            true_displacement_biotac=None if skin is None else skin[shown],
+            simulated=self.recording.simulated,
+            warnings=self.warnings(),
+            **columns,
+        )
+        contact_sheet(path, contents)

@@ -1,0 +1,94 @@
+"""A shard: some frames of a recording, translated, in a sealed HDF5 file of the layout of ``frames_file``.
+
+Its attributes name the recording and its hash, the recipe's hash, and which shard of how many it is; the rows are
+frames `number * shard_frames` to that of the next. Pictures are the dataset ``image``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..files import atomic, checksummed
+from ..files.hdf5_checked import check_before_opening
+from ..recordings.signals import FRAMEWISE
+from .engine import job as jobs
+from .frame_pass import CHUNK, Tools, translated
+from .frames_file import FramesFile
+from .prepared_signals import Prepared
+
+if TYPE_CHECKING:
+    from ..recordings import Signals
+    from .engine.job import Job
+
+
+def count(frames: int, job: Job) -> int:
+    """Shards of a recording of so many frames."""
+    return -(-frames // job.recipe.shard_frames)
+
+
+def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
+    """Make shard `number` of recording `index` unless it is there and whole; returns whether it was made.
+
+    Raises TactileError for a damaged prepared file, OSError where the disk cannot be written.
+    """
+    name = job.inputs[index].name
+    file = jobs.shard_file(folder, name, number)
+    prepared = Prepared(jobs.prepared_file(folder, name))
+    about, frames = prepared.about(), len(prepared)
+    if checksummed.verified_checksum(file) is not None and is_of(file, job, index, number, frames):
+        return False
+    start = number * job.recipe.shard_frames
+    stop = min(start + job.recipe.shard_frames, frames)
+    time, signals = prepared.rows(start, stop)
+    attributes = {
+        "recording": about["recording"].encode(errors="replace").decode(),
+        "simulated": about["simulated"], **_identity(job, index, number, frames),
+    }  # fmt: skip
+    with atomic.new_file(file, shared=True) as partial:
+        keep = tuple(job.recipe.keep)
+        with FramesFile(partial, stop - start, keep, attributes, room=checksummed.ROOM) as out:
+            for first in range(0, stop - start, CHUNK):
+                rows = slice(first, first + CHUNK)
+                out.write(first, _arrays(signals, time, rows, start, keep, tools))
+            out.annotate("time", start_time=about["start_time"])
+            out.annotate("electrodes", rest=signals.rest, kind=signals.kind)
+        checksummed.write_checksum(partial)
+    return True
+
+
+def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
+    """Whether a whole shard is shard `number` of recording `index`, of so many frames, and no other under its name."""
+    import h5py
+
+    try:
+        check_before_opening(file)
+        with h5py.File(file, "r") as found:
+            return all(found.attrs[name] == value for name, value in _identity(job, index, number, frames).items())
+    except Exception:  # the library raises a dozen types on what is no shard
+        return False
+
+
+def _identity(job: Job, index: int, number: int, frames: int) -> dict[str, str | int]:
+    """The attributes that tell a shard from others."""
+    return {
+        "recording_sha256": job.inputs[index].sha256, "recipe": job.id, "shard": number, "shards": count(frames, job)
+    }  # fmt: skip
+
+
+def _arrays(
+    signals: Signals, time: np.ndarray, rows: slice, start: int, keep: tuple[str, ...], tools: Tools
+) -> dict[str, np.ndarray]:
+    """All arrays of some rows of a shard that begins at frame `start`."""
+    part = {name: getattr(signals, name)[rows] for name in FRAMEWISE}
+    arrays = translated(dataclasses.replace(signals, **part), tools)
+    frames = np.arange(len(time), dtype=np.int32)[rows] + np.int32(start)
+    arrays |= {"frame": frames, "time": time[rows]}
+    if "height" in keep or "image" in keep:
+        arrays["height_map"] = tools.height_map(arrays["displacement_digit"])
+    if "image" in keep:
+        arrays["image"] = np.stack([tools.shade(height) for height in arrays["height_map"]])
+    return arrays

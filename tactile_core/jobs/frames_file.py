@@ -1,0 +1,131 @@
+"""``frames.h5``: the numbers of a converted recording, one row a frame, T first, SI units, float32 (time: float64)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .. import __version__
+from ..files.hdf5_writer import Disk
+from ..recordings import flags
+
+if TYPE_CHECKING:
+    import h5py
+    import numpy as np
+
+FORMAT = "tactile-frames-1"
+
+# dataset -> (unit, meaning); T is the number of frames converted
+ALWAYS = {
+    "frame": ("1", "index of the frame in the recording, from 0; names its picture"),
+    "time": ("s", "from the recording's first frame; attribute start_time: unix time of that frame, 0 if unknown"),
+    "electrodes": ("count", "(T, 19) E1..E19 as read, bad samples repaired; attribute rest: reading without contact"),
+    "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame; 0 without contact (not where rectified)"),
+    "contact_center": ("m", "(T, 2) = (x, z) on the DIGIT after unrolling; NaN without contact"),
+    "confidence": ("1", "0 (a guess) to 1"),
+    "expected_error_biotac": ("m", "expected largest node error: half of such frames have less"),
+    "expected_error_digit": ("m", "as much of the DIGIT's gel"),
+    "error_bound_biotac": ("m", "largest node error that 95 of 100 such frames stay below"),
+    "error_bound_digit": ("m", "as much of the DIGIT's gel"),
+    "pressure_measured": ("Pa", "the fluid's, by PDC, over its level at rest; NaN where the recording has no PDC"),
+    "flags": ("bits", "what is remarkable about a frame; attribute names: JSON, name -> bit"),
+}
+KEPT = {
+    "latent": {
+        "latent_signal": ("1", "(T, 8) code of the electrodes (SVB)"),
+        "latent_biotac": ("1", "(T, L) code of the BioTac's deformation (MVB)"),
+        "latent_digit": ("1", "(T, L) code of the DIGIT's deformation (MVD)"),
+    },
+    "displacement": {
+        "displacement_biotac": ("m", "(T, N, 3) of the nodes of sensors.biotac_surface()"),
+        "displacement_digit": ("m", "(T, M, 3) of the nodes of sensors.digit_surface()"),
+    },
+    "height": {"height_map": ("m", "(T, 320, 240) of the gel seen by the camera; see pictures.height_map")},
+    "image": {},
+}
+PICTURES = {"image": ("1", "(T, 320, 240, 3) sRGB pictures of the DIGIT")}  # in shards; elsewhere they are PNG files
+# Displacements and codes are stored plain: measured on smooth dents, gzip saves 21 % of the bytes for 1.5 ms a frame
+# (plain: 0.15 ms). Height maps, the largest and smoothest, are worth it.
+PACKED = {
+    "height_map": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
+    "image": {"compression": "gzip", "compression_opts": 4},
+}
+LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk of its own
+
+
+def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:
+    """Datasets of a file that keeps these words, with unit and meaning; a shard has the pictures, too."""
+    kept = [PICTURES if shard and word == "image" else KEPT[word] for word in keep]
+    return {name: told for about in (ALWAYS, *kept) for name, told in about.items()}
+
+
+class FramesFile:
+    """``frames.h5`` while it is written, some frames at a time. Nothing that was not kept is in it.
+
+    All methods raise OSError, naming the file, where the disk cannot be written.
+    """
+
+    def __init__(
+        self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0
+    ) -> None:
+        """path : new file; count : T; attributes : of the file itself, beside format and version.
+
+        room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's seal; pictures are then in the file,
+            and a large array has one chunk a frame
+        """
+        import h5py
+
+        self._about = arrays_of(keep, shard=bool(room))
+        self._count, self._framed = count, bool(room)
+        self._disk = Disk(path)
+        self._file = h5py.File(self._disk, "w", userblock_size=room)
+        self._file.attrs.update({"format": FORMAT, "tactile_core": __version__, **attributes})
+
+    def __enter__(self) -> FramesFile:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *more: object) -> None:
+        try:
+            with self._checked() if kind is None else suppress(Exception):  # the error on its way out tells more
+                self._file.close()
+        finally:
+            self._disk.close()
+
+    @contextmanager
+    def _checked(self) -> Iterator[None]:
+        """Raise what the disk refused, also where HDF5 stumbles over it first."""
+        try:
+            yield
+        except Exception:
+            self._disk.check()
+            raise
+        self._disk.check()
+
+    def write(self, start: int, arrays: dict[str, np.ndarray]) -> None:
+        """Write frames from `start` on; arrays that are not kept are passed over. Floats become float32."""
+        with self._checked():
+            for name, array in arrays.items():
+                if name in self._about:
+                    data = self._file[name] if name in self._file else self._create(name, array)
+                    data[start : start + len(array)] = array
+
+    def annotate(self, name: str, **attributes: Any) -> None:
+        """Add attributes to a dataset that exists."""
+        with self._checked():
+            self._file[name].attrs.update(attributes)
+
+    def _create(self, name: str, array: np.ndarray) -> h5py.Dataset:
+        kind = "float32" if array.dtype.kind == "f" and name != "time" else array.dtype  # an hour has 4e8 us
+        packing = PACKED.get(name, {})
+        large = self._framed and array[0].size >= LARGE
+        chunks = (1, *array.shape[1:]) if packing or large else None
+        shape = (self._count, *array.shape[1:])
+        data = self._file.create_dataset(name, shape, kind, chunks=chunks, track_times=False, **packing)
+        unit, meaning = self._about[name]
+        data.attrs.update({"unit": unit, "description": meaning})
+        if name == "flags":
+            data.attrs["names"] = json.dumps(flags.names())
+        return data

@@ -1,0 +1,188 @@
+"""What can be rendered: frames of a recording, height maps, a scene; each becomes height maps under a camera."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import sensors
+from ..errors import TactileError
+from ..files.hdf5_checked import SIGNATURE
+from ..recordings.array_store import open_hdf5, open_npz
+from ..recordings.simulated import FORMAT as SIMULATED
+from .frames_file import FORMAT as CONVERTED
+
+if TYPE_CHECKING:
+    from ..recordings.array_store import Store
+
+CONVERT = "Of a recording: `tactile convert` it first, and render its frames.h5"
+EXPECTED = "frames.h5, a simulated recording (.h5), a height map (.npz, .exr), or a scene's folder"
+HEIGHT_ARRAY = "height_map"
+
+Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Frames:
+    """What is in an input: displacements of the DIGIT's nodes or height maps, one of the two.
+
+    kind : in words; numbers : (T,) by which frames are known
+    displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m
+    """
+
+    kind: str
+    numbers: np.ndarray
+    displacement: np.ndarray | None = None
+    scale: float = 1.0
+    heights: np.ndarray | None = None
+
+    def some(self, rows: np.ndarray) -> Iterator[np.ndarray]:
+        """Displacement (M, 3) m or heights (H, W) m of each of some frames."""
+        for row in rows:
+            if self.heights is not None:
+                yield self.heights[row]
+            else:
+                yield self.displacement[row] * self.scale
+
+
+def is_scene(path: Path) -> bool:
+    """Whether an input is a scene, which is simulated first."""
+    return path.is_dir() or path.suffix == ".toml"
+
+
+def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier: str = "fast") -> Frames:
+    """What is in a file or folder; a scene is simulated, under `progress`, which yields a callback (done, in all).
+
+    tier : of a scene's contacts
+
+    Raises TactileError for anything else, or what cannot be read.
+    """
+    path = Path(path)
+    if is_scene(path):
+        return _of_scene(path, progress, tier)
+    if not path.is_file():
+        raise TactileError(path, "there is no such file", EXPECTED)
+    if path.suffix == ".npz":
+        return _of_npz(path)
+    if path.suffix == ".exr":
+        from ..files.exr import read_height
+
+        return Frames("height map", np.zeros(1, int), heights=read_height(path)[None])
+    if not _is_hdf5(path):
+        raise TactileError(path, "no HDF5 file", EXPECTED, CONVERT)
+    return _of_hdf5(path)
+
+
+def _is_hdf5(path: Path) -> bool:
+    """Whether a file begins as HDF5 does; our own have no room before that."""
+    with open(path, "rb") as file:
+        return file.read(len(SIGNATURE)) == SIGNATURE
+
+
+def _of_hdf5(path: Path) -> Frames:
+    with open_hdf5(os.fspath(path)) as store:
+        kind = store.attributes.get("format")
+        if kind == CONVERTED:
+            name, numbers = "displacement_digit", store.array("frame", (None,))
+            check_numbers(path, numbers)
+            numbers = numbers.astype(int)
+        elif kind == SIMULATED:
+            name, numbers = "truth/displacement_digit", None
+        else:
+            raise TactileError(path, f"format {kind!r}" if kind else "no frames of ours", EXPECTED, CONVERT)
+        _check_displacement(store, name)
+        scale = float(store.attributes_of(name).get("scale", 1.0))
+        displacement = store.array(name, (None, len(sensors.digit_surface().rest), 3), np.float32)
+    numbers = np.arange(len(displacement)) if numbers is None else numbers
+    if len(numbers) != len(displacement) or not len(numbers):
+        raise TactileError(path, f"{len(displacement)} frames of {len(numbers)} numbers", "as many, one or more")
+    return Frames("converted" if kind == CONVERTED else "simulated", numbers, displacement, scale)
+
+
+def _check_displacement(store: Store, name: str) -> None:
+    if name not in store.shapes:
+        raise TactileError(f"{store.path}, {name}", "missing", "the gel's deformation of each frame",
+                           "Convert with --keep displacement")  # fmt: skip
+    shape, count = store.shapes[name][0], len(sensors.digit_surface().rest)
+    if shape[1:] != (count, 3):
+        raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {count}, 3)",
+                           "It was made with another version of the surface: make it anew")  # fmt: skip
+
+
+def _of_npz(path: Path) -> Frames:
+    with open_npz(os.fspath(path)) as store:
+        names = list(store.shapes)
+        if "electrodes" in names:
+            raise TactileError(path, "a recording's electrodes", EXPECTED, CONVERT)
+        if HEIGHT_ARRAY not in names and len(names) != 1:
+            expected = f"one called {HEIGHT_ARRAY}, or one in all"
+            raise TactileError(path, f"arrays {', '.join(names) or 'none'}", expected)
+        name = HEIGHT_ARRAY if HEIGHT_ARRAY in names else names[0]
+        shape = store.shapes[name][0]
+        if len(shape) not in (2, 3) or 0 in shape:
+            raise TactileError(f"{path}, {name}", f"shape {shape}", "heights (H, W) or (T, H, W), m")
+        heights = store.array(name, (None,) * len(shape), np.float32).reshape(-1, *shape[-2:])
+    return Frames("height map", np.arange(len(heights)), heights=heights)
+
+
+def _of_scene(path: Path, progress: Progress, tier: str) -> Frames:
+    from ..simulation.recording import simulate_recording
+
+    with tempfile.TemporaryDirectory() as folder, progress() as shown:
+        simulated = Path(folder) / "scene.h5"
+        tiers = {"digit": tier}
+        simulate_recording(path, simulated, progress=shown, keep=("displacement_digit",), tiers=tiers)
+        return dataclasses.replace(_of_hdf5(simulated), kind="scene")
+
+
+def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.ndarray:
+    """Displacement (n, 3) m of a sensor's surface nodes in a frame, by its number in the recording.
+
+    Raises TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was
+    not kept or lies on another surface, and a frame that it does not hold.
+    """
+    path = os.fspath(path)
+    if not os.path.isfile(path):
+        raise TactileError(path, "there is no such file", "frames.h5 of `tactile convert`, or a simulated recording")
+    with open_hdf5(path) as store:
+        kind = store.attributes.get("format")
+        if kind == CONVERTED:
+            values, numbers, scale = _array(store, f"displacement_{sensor}", sensor), store.array("frame", (None,)), 1.0
+        elif kind == SIMULATED:
+            name = f"truth/displacement_{sensor}"
+            values, scale = _array(store, name, sensor), store.attributes_of(name).get("scale", 1.0)
+            numbers = np.arange(len(values))
+        else:
+            raise TactileError(path, f"format {kind!r}", f"{CONVERTED!r} or {SIMULATED!r}", "Name a file of `tactile`")
+    check_numbers(path, numbers)
+    row = np.flatnonzero(numbers == frame)
+    if len(row) != 1 or len(numbers) != len(values):
+        held = f"{numbers.min():g} to {numbers.max():g}" if len(numbers) else "none"
+        raise TactileError(f"{path}, frame {frame}", "not in the file", f"a frame it holds ({held})")
+    return values[row[0]].astype(np.float64) * scale
+
+
+def check_numbers(path: str | os.PathLike, numbers: np.ndarray) -> None:
+    """Raises TactileError for frame numbers (T,) that are no whole numbers from 0 on, each greater than the last."""
+    whole = np.isfinite(numbers).all() and (numbers == np.floor(numbers)).all() and (numbers >= 0).all()
+    if not (whole and (np.diff(numbers) > 0).all() and (numbers < 2**31).all()):
+        found = f"frame numbers {np.array2string(numbers, threshold=6, edgeitems=3)}"
+        raise TactileError(f"{os.fspath(path)}, frame", found, "whole ones from 0 on, each greater than the last")
+
+
+def _array(store: Store, name: str, sensor: str) -> np.ndarray:
+    if name not in store.shapes:
+        advice = "Convert with --keep displacement" if name.startswith("displacement") else ""
+        raise TactileError(f"{store.path}, {name}", "missing", "the deformation of each frame", advice)
+    shape, count = store.shapes[name][0], len(sensors.sensor_surface(sensor).rest)
+    if shape[1:] != (count, 3):
+        raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {count}, 3)",
+                           "It was made with another version of the surface: make it anew")  # fmt: skip
+    return store.array(name, (None, count, 3), np.float32)

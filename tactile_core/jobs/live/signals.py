@@ -1,0 +1,94 @@
+"""Signals of a recording of which only the past is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...recordings.flags import Flag
+from ...recordings.polarity import AUTO, FALLS, POLARITIES, TOUCHING, Polarity, polarity_of
+from ...recordings.recording import NOMINAL_RATE
+from ...recordings.rest_level import find_quiet, level, window_frames
+from ...recordings.signal_kind import detect
+from ...recordings.signals import Signals
+
+LONGEST = 10.0  # s that are looked through for rest and polarity; then the calmest so far is taken (assumed)
+AGAIN = 25  # new frames after which the polarity is looked at again
+
+
+class LiveSignals:
+    """The change against rest, frame by frame. Rest is the first quiet part; drift is not removed.
+
+    rate : Hz; polarity : "falls", "rises" or "auto", which is decided by the first contacts, and "falls" until then
+    """
+
+    def __init__(self, rate: float = NOMINAL_RATE, polarity: str = AUTO) -> None:
+        self._rate = rate
+        self._seen, self._pdc, self._looked_at = np.empty((0, 19)), np.empty(0), 0
+        self.polarity = _told(polarity, "as told")
+        self.rest: np.ndarray | None = None
+        self.kind, self.found = "raw", ""
+
+    def learn(self, electrodes: np.ndarray, pdc: np.ndarray | None = None, polarity: str = AUTO) -> bool:
+        """Look at frames (T, 19) counts for rest, and for their polarity; whether rest is known.
+
+        pdc : (T,) counts, where there are; polarity : what the file says of its counts, where it does
+        """
+        if not self.polarity.sure and polarity in POLARITIES:
+            self.polarity = _told(polarity, "as the file says")
+        if self.rest is not None and self.polarity.sure:
+            return True
+        whole = np.isfinite(electrodes).all(axis=1)
+        pdc = np.full(len(electrodes), np.nan) if pdc is None else pdc
+        most = round(LONGEST * self._rate)
+        self._seen = np.concatenate([self._seen, electrodes[whole]])[:most]
+        self._pdc = np.concatenate([self._pdc, pdc[whole]])[:most]
+        if self.rest is None:
+            self._find_rest()
+        if self.rest is not None:
+            self._decide()
+        return self.rest is not None
+
+    def _find_rest(self) -> None:
+        """Take the first quiet part for rest, or the calmest one when LONGEST has passed."""
+        if len(self._seen) < window_frames(self._rate):
+            return
+        self.kind, _ = detect(self._seen)
+        quiet = find_quiet(self._seen, None, self._rate, self.kind)
+        if quiet.parts:
+            first, last = quiet.parts[0]
+            self.rest, self.found = level(self._seen[first:last]), f"frames {first}:{last}"
+        elif len(self._seen) >= LONGEST * self._rate:
+            n = window_frames(self._rate)
+            spread = [self._seen[i : i + n].std(axis=0).max() for i in range(0, len(self._seen) - n, n)]
+            first = n * int(np.argmin(spread))
+            self.rest, self.found = level(self._seen[first : first + n]), f"no quiet part: a guess, {first}:{first + n}"
+
+    def _decide(self) -> None:
+        """The polarity, by the frames so far, looked at again now and then; once it is sure it stays."""
+        if self.kind == "rectified":
+            self.polarity = Polarity(FALLS, "the sign is lost", True)
+        if self.polarity.sure or len(self._seen) < self._looked_at + AGAIN:
+            return
+        self._looked_at = len(self._seen)
+        change = self._seen - self.rest
+        still = np.sqrt(np.square(change).sum(axis=1)) < TOUCHING
+        pdc = self._pdc if np.isfinite(self._pdc).all() else None
+        self.polarity = polarity_of(change, still, self._seen, pdc)
+
+    def signals(self, electrodes: np.ndarray) -> Signals:
+        """Signals of frames (T, 19) counts; call when rest is known."""
+        flags = Flag.RECTIFIED if self.kind == "rectified" else 0
+        count = len(electrodes)
+        return Signals(
+            change=self.polarity.sign * (electrodes - self.rest), rest=self.rest, drift=np.zeros(19),
+            electrodes=electrodes, kind=self.kind,
+            quiet=np.zeros(count, bool), flags=np.full(count, flags, np.uint16), pdc=np.full(count, np.nan),
+            warnings=(), report={},
+        )  # fmt: skip
+
+
+def _told(polarity: str, who: str) -> Polarity:
+    """What somebody says of the counts; an assumption where nobody does."""
+    if polarity in POLARITIES:
+        return Polarity(polarity, who, True)
+    return Polarity(FALLS, "assumed: no contact has shown it yet", False)

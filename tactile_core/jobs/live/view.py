@@ -1,0 +1,76 @@
+"""The newest frame as a picture, and how long that took."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...pictures.height_map import folds_counted
+from ...recordings.polarity import AUTO, Polarity
+from ...recordings.recording import Recording
+from ..frame_pass import Tools
+from .growing_file import newest
+from .signals import LiveSignals
+
+REMEMBERED = 1000  # latencies that figures are taken over
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """frame : its index; picture : (H, W, 3) uint8; force : N; latency : s from rows to picture; work : s of them"""
+
+    frame: int
+    picture: np.ndarray
+    force: float
+    latency: float
+    work: float
+
+
+class View:
+    """Rows in, pictures out: always the newest, older ones that came meanwhile are passed over."""
+
+    def __init__(self, tools: Tools, rate: float, polarity: str = AUTO) -> None:
+        """rate : Hz of the recording; polarity : as of ``PrepareOptions``."""
+        self._tools, self._signals = tools, LiveSignals(rate, polarity)
+        self.frames, self.passed = 0, 0
+        self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
+
+    @property
+    def polarity(self) -> Polarity:
+        """What counts do where a film thins, as far as the frames have shown."""
+        return self._signals.polarity
+
+    @property
+    def rest_found(self) -> str:
+        """Where rest was taken from; empty while it is not known."""
+        return self._signals.found
+
+    def show(self, rows: Recording, came: float) -> Shown | None:
+        """The picture of the last of some rows that came at `came` (time.perf_counter); None before rest is known."""
+        began = time.thread_time()
+        self.frames += len(rows)
+        if not self._signals.learn(rows.electrodes, rows.pdc, rows.about.get("polarity", AUTO)):
+            return None
+        self.passed += len(rows) - 1
+        translation = self._tools.translate(self._signals.signals(newest(rows)[None]))
+        with folds_counted():  # a line for each such picture would hide the latencies
+            heights = self._tools.height_map(translation.displacement_digit)
+        picture = self._tools.shade(heights[0])
+        force = float(np.linalg.norm(translation.force[0]))
+        latency, work = time.perf_counter() - came, time.thread_time() - began
+        shown = Shown(self.frames - 1, picture, force, latency, work)
+        self.latencies.append((latency, work))
+        return shown
+
+    def told(self) -> str:
+        """The latencies of the last pictures in words."""
+        if not self.latencies:
+            return "no picture yet: waiting for a quiet part"
+        (middle, work), (late, _) = 1e3 * np.percentile(np.array(self.latencies), [50, 99], axis=0)
+        return (
+            f"{middle:.1f} ms from frame to picture (99 of 100 below {late:.1f} ms; {work:.1f} ms of them computing),"
+            f" {self.passed} frames passed over"
+        )

@@ -1,0 +1,159 @@
+"""Paired contacts: the same force, angle and unrolled place on BioTac and DIGIT, as training data.
+
+Presses are numbered; press i draws all it needs from (seed, i), so any number of workers makes the same file, and
+an interrupted run goes on from the blocks of presses that are already on disk.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import pathlib
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from .. import sensors
+from ..errors import TactileError
+from ..files import array_pack, atomic, checksummed
+from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
+from ..simulation.pairs_card import card, card_path
+from ..simulation.pairs_file import merge
+from ..simulation.scene import Scene
+from .engine import job as jobs
+from .engine import result_parts, scene_input
+from .engine import run as runs
+from .engine.job import Job
+from .engine.kinds import Seen
+from .engine.local import Here, Local
+from .engine.recipes import Pairs
+from .engine.run import Place
+from .engine.scene_input import load
+
+GROWS = True
+BLOCK = 4  # presses a block: a few seconds of work
+COUNT = "count"  # the array of a block that says how many contacts it holds
+GROWTH = 8  # times as many blocks as there are, at most, are asked for at once: the estimate is better then
+IN_VAIN = 20  # blocks without a contact after which a scene is given up (assumed)
+
+
+def make_pairs(
+    scene_path: str | os.PathLike,
+    count: int,
+    seed: int,
+    out: str | os.PathLike,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+    place: Callable[[pathlib.Path], Place] | None = None,
+) -> None:
+    """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
+
+    progress : called with (blocks of presses done, known so far). Blocks wait in ``<out>.parts``, a folder as of
+        ``tactile batch``, which is removed at the end; the file's card (``pairs_card``) is written beside it.
+    workers : processes, this one alone for 1; place : where blocks are made instead, from the job's folder
+    Raises TactileError for a bad scene, count, or for parts of another scene or seed.
+    """
+    out = pathlib.Path(out)
+    job, names, text = plan(scene_path, count, seed, out)
+    digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
+    with result_parts.begun(out, job) as folder:
+        where = (place or (lambda folder: Here(folder) if workers == 1 else Local(folder.resolve(), workers)))(folder)
+        result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
+        merge(blocks(folder, job), count, out, text, seed, names)
+        atomic.write_json(card_path(out), card(out))
+        result_parts.finished(folder)
+
+
+def plan(scene_path: str | os.PathLike, count: int, seed: int, out: pathlib.Path) -> tuple[jobs.Job, list[str], str]:
+    """The job, the names of the indenters and the scene's text; raises what ``make_pairs`` raises before it begins."""
+    scene, text, inputs, files = scene_input.found(scene_path, ["presses"])
+    if scene.pairs is None:
+        raise TactileError(f"{scene_path}, pairs", "missing", "a [pairs] table", "See scenes/press_sphere/scene.toml")
+    if count < 1:
+        raise TactileError("--count", str(count), "at least 1")
+    for spec in scene.indenters:
+        spec.build()  # an impossible one is refused before anything is written
+    atomic.claim(out)
+    surfaces = [sensors.biotac_surface().sha256, sensors.digit_surface().sha256]
+    job = jobs.make(inputs, Pairs(count, seed, surfaces, files), None)
+    return job, [spec.name for spec in scene.indenters], text
+
+
+def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+    """Count what is there, and say how many blocks that asks for."""
+    _scene(job.inputs[index], tuple(job.recipe.files))
+    return wanted(_counts(folder, job, index), job.recipe.count, job.inputs[index].path), False
+
+
+def make(folder: Path, job: Job, index: int, number: int) -> bool:
+    """The contacts of some presses."""
+    from ..simulation.pair_sampling import press_rows
+
+    one = job.inputs[index]
+    file = jobs.shard_file(folder, one.name, number)
+    if checksummed.verified_checksum(file) is not None:
+        return False
+    scene = _scene(one, tuple(job.recipe.files))
+    rows = [row for i in range(BLOCK) for row in press_rows(scene, job.recipe.seed, number * BLOCK + i)]
+    columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
+    array_pack.write(file, columns | {COUNT: np.int64(len(rows))})
+    return True
+
+
+def seen(folder: Path, job: Job, index: int) -> Seen | None:
+    """As many blocks as are wanted by those that are there."""
+    counts = _counts(folder, job, index)
+    if not counts:
+        return None
+    return Seen(wanted(counts, job.recipe.count, job.inputs[index].path))
+
+
+def blocks(folder: Path, job: Job) -> list[Path]:
+    """Files of the blocks that hold the contacts of a finished job, in order."""
+    count = wanted(_counts(folder, job, 0), job.recipe.count, job.inputs[0].path)
+    return [jobs.shard_file(folder, job.inputs[0].name, number) for number in range(count)]
+
+
+def wanted(counts: dict[int, int], count: int, where: str) -> int:
+    """Blocks for `count` contacts, by the contacts of those that are there: exact where they suffice.
+
+    Raises TactileError for a scene whose presses touch nothing.
+    """
+    have, number = 0, 0
+    while have < count and number in counts:
+        have += counts[number]
+        number += 1
+    if have >= count:
+        return number
+    total = sum(counts.values())
+    if not total and len(counts) > IN_VAIN:
+        found = f"{len(counts) * BLOCK} presses made no contact"
+        raise TactileError(where, found, "a scene whose indenter can press the pad")
+    most = GROWTH * len(counts) + 1
+    estimate = -(-count * len(counts) // total) if total else most
+    return max(number + 1, min(estimate, most))
+
+
+def _counts(folder: Path, job: Job, index: int) -> dict[int, int]:
+    """Contacts of each block that is there."""
+    name, found = job.inputs[index].name, {}
+    for file in (folder / jobs.SHARDS).glob(f"{name}-*.h5"):
+        number = file.stem.rpartition("-")[2]
+        if re.fullmatch(r"[0-9]{6,9}", number):  # not what a cloud's folder calls a conflicted copy
+            found[int(number)] = _count(file)
+    return found
+
+
+def _count(file: Path) -> int:
+    """Of a block; one that is damaged counts as empty until it is made anew."""
+    try:
+        return int(array_pack.read(file, names=(COUNT,))[COUNT])
+    except (TactileError, KeyError):
+        return 0
+
+
+@functools.lru_cache(maxsize=2)
+def _scene(one: jobs.Input, files: tuple[str, ...]) -> Scene:
+    return load(one, files)[0]

@@ -1,0 +1,247 @@
+"""What a scene or a recording will build, and what that will cost, before it is run; from measured tables.
+
+A plan is rows: what is built, by which verb, how much of it, and its expected time, memory and disk. Times are of one
+thread of the machine that the tables were measured on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib.util
+import json
+import os
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from ..accuracy import Budget
+from ..errors import TactileError
+from ..files.shipped import shipped
+from ..translation import network_sizes
+from . import results
+
+COSTS = shipped("costs.json")
+TIERS = shipped("mechanics_tiers.json")
+OF_SCENE = ("electrodes", "displacement_biotac", "displacement_digit", "translation", "image")
+OF_RECORDING = results.KEEPABLE
+NAMES = {"biotac": "BioTac", "digit": "DIGIT"}
+# Once, where matrices are not cached: time as docs/simulate.md has it, memory as ``compliance.build`` asks for, and the
+# size of the files.
+BUILD_S, BUILD_MB, MATRICES_MB = 60.0, 2000.0, {"biotac": 283.0, "digit": 151.0}
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """One thing that is built.
+
+    verb : which builds it; told : how much of it; seconds; memory, disk : MB it adds
+    building : MB taken meanwhile, and given back
+    """
+
+    what: str
+    verb: str
+    told: str
+    seconds: float = 0.0
+    memory: float = 0.0
+    disk: float = 0.0
+    building: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """parts in the order they are built; left_out : what no output asked for needs."""
+
+    of: str
+    parts: tuple[Part, ...]
+    left_out: tuple[str, ...]
+
+    @property
+    def seconds(self) -> float:
+        """In all."""
+        return sum(part.seconds for part in self.parts)
+
+    @property
+    def memory(self) -> float:
+        """MB of the hungriest verb, as they run one after another; matrices are built one after another, too."""
+        verbs = {part.verb: [one for one in self.parts if one.verb == part.verb] for part in self.parts}
+        return max(sum(p.memory for p in parts) + max(p.building for p in parts) for parts in verbs.values())
+
+    @property
+    def disk(self) -> float:
+        """MB in all."""
+        return sum(part.disk for part in self.parts)
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it, fit for JSON."""
+        whole = {"of": self.of, "parts": [dataclasses.asdict(part) for part in self.parts]}
+        totals = {"seconds": self.seconds, "memory_mb": self.memory, "disk_mb": self.disk}
+        return whole | {"left_out": list(self.left_out)} | {key: round(value, 3) for key, value in totals.items()}
+
+    def lines(self) -> list[str]:
+        """All of it, to read."""
+        found = [self.of, f"{'verb':9}{'what':22}{'s':>9}{'MB':>7}{'disk MB':>9}  of"]
+        for part in self.parts:
+            numbers = f"{part.seconds:9.2f}{part.memory or part.building:7.0f}{part.disk:9.1f}"
+            found.append(f"{part.verb:9}{part.what:22}{numbers}  {part.told}")
+        found.append(f"in all about {self.seconds:.3g} s, {self.memory:.0f} MB of memory, {self.disk:.3g} MB on disk")
+        return [*found, f"not built: {', '.join(self.left_out) or 'nothing'}"]
+
+
+@functools.cache
+def costs() -> dict[str, Any]:
+    """What ``scripts/benchmarks/measure_costs.py`` found."""
+    return json.loads(COSTS.read_text(encoding="utf-8"))
+
+
+def plan(path: str | os.PathLike, keep: str | None, budget: Budget, preset: str | None) -> Plan:
+    """Of a scene (a folder or a .toml) or a recording.
+
+    keep : its outputs as text; None for all that a scene can have, and for what `tactile convert` keeps by itself
+
+    Raises TactileError for what cannot be read, another word, or a bound that nothing meets.
+    """
+    path = Path(path)
+    if path.is_dir() or path.suffix == ".toml":
+        return of_scene(path, results.parse_words(keep, OF_SCENE), budget, preset)
+    usual = ",".join(results.DEFAULT_KEEP)
+    return of_recording(path, results.parse_words(usual if keep is None else keep, OF_RECORDING), budget, preset)
+
+
+def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:
+    """`tactile simulate`, then `tactile convert` for a translation and `tactile render` for pictures."""
+    from ..simulation import recording, tier_choice
+    from ..simulation.scene import load_scene
+
+    scene, _ = load_scene(path)
+    spec = recording.recording_of(scene, path)
+    time, _, force = recording.motion(spec)
+    frames, contacts = len(time), int((force > 0).sum())
+    needed = set(keep) & set(recording.OUTPUTS)
+    needed |= {"electrodes"} if "translation" in keep else set()
+    needed |= {"displacement_digit"} if "image" in keep else set()
+    used = recording.sensors_of(needed)
+    choices = tier_choice.choose_for_scene(path, used, budget.um)
+    start, told = _part("simulate_nothing"), f"{frames} frames, {contacts} in contact; indenter {spec.indenter}"
+    parts = [Part("start", "simulate", told, start["start"], start["mb"])]
+    for sensor in used:
+        kept = f"displacement_{sensor}" in needed
+        parts += [*_matrices(sensor), _contacts(sensor, choices[sensor], contacts, kept)]
+    if "electrodes" in needed:
+        disk = _part("simulate_electrodes")["kb"] * frames / 1e3
+        parts.append(Part("electrodes", "simulate", "19, from the film over each; noise and drift", disk=disk))
+    parts += _translation(frames, "latent", "convert") if "translation" in keep else []
+    parts += _rendered(frames, budget, preset) if "image" in keep else []
+    left = [f"{NAMES[sensor]} and its matrices" for sensor in NAMES if sensor not in used]
+    left += [] if "translation" in keep else ["networks"]
+    left += [] if "image" in keep else ["height maps, LEDs and pictures"]
+    return Plan(f"scene {scene.name}: {', '.join(keep)}", tuple(parts), tuple(left))
+
+
+def of_recording(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:
+    """`tactile convert --keep`."""
+    from .. import recordings
+    from ..recordings.readers import each_finger
+
+    frames = sum(len(recordings.read(finger)) for finger in each_finger(path))
+    whole = _translation(frames, "displacement" if "displacement" in keep else "latent", "convert")
+    if "height" in keep:
+        whole.append(_each("height maps", "convert", "240 x 320, packed", frames, "convert_height", "convert_latent"))
+    if "image" in keep:
+        name = _preset(budget, preset or "fast")
+        extra = _preset_ms(name) - _preset_ms("fast")
+        drawn = _each("pictures", "convert", _lit(name), frames, "convert_image", "convert_latent")
+        whole.append(dataclasses.replace(drawn, seconds=drawn.seconds + extra * frames / 1e3))
+    left = [] if {"height", "image"} & set(keep) else ["height maps and pictures but those of the contact sheet"]
+    return Plan(f"recording {path.name}: {', '.join(keep)}", tuple(whole), (*left, "contact mechanics"))
+
+
+def _part(name: str) -> dict[str, float]:
+    return costs()["parts"][name]
+
+
+def _each(what: str, verb: str, told: str, frames: int, name: str, beside: str) -> Part:
+    """What one output costs a frame beyond what is done beside it anyway."""
+    own, other = _part(name), _part(beside)
+    seconds, disk = (max(own[key] - other[key], 0) * frames / 1e3 for key in ("ms", "kb"))
+    return Part(what, verb, told, seconds, max(own["mb"] - other["mb"], 0), disk)
+
+
+def _matrices(sensor: str) -> list[Part]:
+    """Surface compliance, and its building where it is not cached."""
+    from ..mechanics.fast.compliance import stored
+
+    found = stored(sensor)
+    nodes = f"{found.surface} surface nodes, {found.touchable} of them touchable; solid of {found.volume} nodes"
+    if found.bytes:
+        return [Part(f"{NAMES[sensor]} matrices", "simulate", f"{found.bytes / 1e6:.0f} MB, cached; {nodes}")]
+    told = f"to be built once in {found.folder}; {nodes}"
+    what = f"{NAMES[sensor]} matrices"
+    return [Part(what, "simulate", told, BUILD_S, disk=MATRICES_MB[sensor], building=BUILD_MB)]
+
+
+def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
+    """The solves of one sensor, in its tier."""
+    part, start = _part(f"simulate_{sensor}"), _part("simulate_nothing")
+    ms = part["ms"]
+    if choice.tier != "fast":
+        tiers = json.loads(TIERS.read_text(encoding="utf-8"))["tiers"]
+        full = costs()["full_ms"][sensor]
+        ms += full * tiers[choice.tier][sensor]["ms"] / tiers["full"][sensor]["ms"]
+    once = max(part["start"] - start["start"], 0)
+    told = f"{contacts} contacts; {choice.told(sensor)}"
+    disk = part["kb"] * contacts / 1e3 if kept else 0.0
+    seconds, memory = once + ms * contacts / 1e3, max(part["mb"] - start["mb"], 0)
+    return Part(f"{NAMES[sensor]} contacts", "simulate", told, seconds, memory, disk)
+
+
+def _translation(frames: int, keep: str, verb: str) -> list[Part]:
+    part = _part(f"convert_{keep}")
+    nets = ", ".join(("SVB", "S2MPN", "MVB", "M2MPN", "MVD", "force", "error"))
+    told = f"{frames} frames; {nets}; surfaces {' and '.join(network_sizes.SURFACES)}; contact sheet"
+    seconds = part["start"] + part["ms"] * frames / 1e3
+    return [Part("networks", verb, told, seconds, part["mb"], part["kb"] * frames / 1e3)]
+
+
+def _rendered(frames: int, budget: Budget, preset: str | None) -> list[Part]:
+    """Height maps and pictures by `tactile render`."""
+    from ..pictures.presets import DEFAULT
+
+    name = _preset(budget, preset or DEFAULT)
+    part = _part("render_fast")
+    seconds = part["start"] + (part["ms"] + _preset_ms(name) - _preset_ms("fast")) * frames / 1e3
+    return [Part("pictures", "render", f"{frames}; {_lit(name)}", seconds, part["mb"], part["kb"] * frames / 1e3)]
+
+
+def _preset(budget: Budget, preset: str) -> str:
+    from ..pictures.presets import NAMES as PRESET_NAMES
+    from ..pictures.presets import fitting
+
+    if preset not in PRESET_NAMES:
+        raise TactileError("--preset", repr(preset), f"one of {', '.join(PRESET_NAMES)}")
+    return preset if budget.levels is None else fitting(budget.levels)
+
+
+def _preset_ms(name: str) -> float:
+    """ms a picture, by the variant that runs here where it was measured."""
+    from ..pictures.presets import measured
+
+    ms = measured()["presets"][name]["ms"]
+    return ms.get(_variant(name) or "numpy", max(ms.values()))
+
+
+def _variant(preset: str) -> str:
+    """Of Mitsuba, that runs here; "" where none is needed, or none is there. Mitsuba itself is not loaded."""
+    from ..pictures.mitsuba.variant import LLVM, SCALAR, llvm_trouble
+
+    if preset == "fast" or importlib.util.find_spec("mitsuba") is None:
+        return ""
+    return SCALAR if llvm_trouble(os.environ.get("DRJIT_LIBLLVM_PATH", "")) else LLVM
+
+
+def _lit(name: str) -> str:
+    from ..pictures.presets import measured
+
+    found = measured()["presets"][name]
+    needs = "numpy alone" if name == "fast" else f"Mitsuba, {_variant(name) or 'which is missing here'}"
+    return f"3 LEDs, preset {name}: {found['says']}; {found['error']:.2g} levels; {needs}; PNG by Huffman coding"

@@ -1,0 +1,277 @@
+"""A recording's signals, ready for the networks, in a sealed file that shards read a few rows of.
+
+Datasets, T first: ``time`` float64 s; ``change`` float64 and ``electrodes`` float32 (T, 19) counts; ``quiet`` bool;
+``flags`` uint16; ``pdc`` float64 counts. ``part`` (P,) first frame of each part of the recording, ``rest`` (P, 19)
+counts. ``about``: JSON of what is told of the recording. Chunks carry checksums, so a shard reads no damaged ones.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict
+
+import msgspec
+import numpy as np
+
+from ..errors import TactileError
+from ..files import atomic, checksummed
+from ..files.hdf5_checked import check_before_opening, check_plain, declared
+from ..files.hdf5_writer import Disk
+from ..recordings import PrepareOptions, Recording, Signals, electrode_gains, prepare
+from ..recordings.chunks import read_parts
+from ..recordings.fingers import split
+from ..recordings.flags import Flag
+from ..recordings.polarity import AUTO, FALLS
+from ..recordings.recording import ELECTRODES
+from ..recordings.signals import Rest
+from .engine import job as jobs
+from .engine.inputs import content_hash
+
+if TYPE_CHECKING:
+    import h5py
+
+    from .engine.job import Job
+
+CHUNK = 1024  # rows a chunk: 160 kB of changes
+COLUMNS = {
+    "time": np.float64, "change": np.float64, "electrodes": np.float32, "quiet": bool, "flags": np.uint16,
+    "pdc": np.float64,
+}  # fmt: skip
+CARRIED = "no quiet part: the rest of the part before is taken"
+DOUBTS = np.uint16(Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED)
+MAX_WARNINGS = 100  # kept of one recording, the rest are counted
+
+
+class About(TypedDict):
+    """What is told of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all."""
+
+    recording: str
+    layout: str
+    simulated: bool
+    start_time: float
+    kind: str
+    warnings: list[str]
+    prepared: list[dict[str, Any]]
+    sha256: str
+    frames: int
+
+
+def make(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+    """Prepare recording `index` of the job, unless it is; returns its frames, and whether anything was made.
+
+    Raises TactileError for a recording that cannot be read or has changed since the job was made.
+    """
+    one = job.inputs[index]
+    file = jobs.prepared_file(folder, one.name)
+    if checksummed.verified_checksum(file) is not None:
+        return len(Prepared(file)), False
+    digest, size = content_hash(Path(one.path))
+    if (digest, size) != (one.sha256, one.bytes):
+        found = "another content than when the job was made"
+        raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
+    with atomic.new_file(file, shared=True) as partial:
+        count = _write(partial, job, one.path, digest)
+        checksummed.write_checksum(partial)
+    return count, True
+
+
+def _write(file: Path, job: Job, path: str, digest: str) -> int:
+    import h5py
+
+    disk = Disk(file)
+    try:
+        with h5py.File(disk, "w", userblock_size=checksummed.ROOM) as out:
+            writer = _Writer(out)
+            for recording, signals, repeated in _signals(path, job):
+                writer.append(recording, signals, repeated)
+            writer.close(digest)
+    except Exception:
+        disk.check()  # HDF5 stumbles over what the disk refused: that is the error to tell
+        raise
+    finally:
+        disk.close()
+    disk.check()
+    return writer.count
+
+
+def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
+    """Each part of a recording prepared, and how many of its frames the part before had."""
+    options, rest, rest_pdc = job.recipe.prepare.options(), None, np.nan
+    sensor = job.recipe.sensor
+    unit = None if sensor is None else sensor.of(path, split(path)[1], "--sensor")
+    if unit is not None:
+        options = dataclasses.replace(options, rest=unit.rest())
+    evidence, doubts = "", np.uint16(0)
+    for part in read_parts(path):
+        recording = part.recording
+        if rest is not None and options.tare not in (None, "none"):  # told frames lie in the first part
+            options = dataclasses.replace(options, tare=slice(0, len(recording)))
+        signals = prepare(recording, options)
+        if rest is None:
+            if options.polarity == AUTO and signals.flags[0] & DOUBTS:
+                options, evidence = _one_polarity(path, options)
+                signals = prepare(recording, options)
+            factor, polarity = (signals.report[name] for name in ("counts_per_unit", "polarity"))
+            doubts = np.uint16(0) if evidence else signals.flags[0] & DOUBTS
+            options = dataclasses.replace(options, kind=signals.kind, counts_per_unit=factor, polarity=polarity)
+        elif options.tare is not None or (not signals.quiet.any() and signals.kind != "raw"):
+            signals = _carried(recording, signals, rest, rest_pdc, told=options.tare is not None)
+        signals = _decided_once(signals, doubts, evidence, first=rest is None)
+        rest, rest_pdc = signals.rest + signals.drift * recording.duration, _rest_pdc(recording, signals)
+        # What is calm in the next part is rest where it lies near this one's: a long grip is calm, too.
+        known = Rest(tuple(rest), (0.0,) * len(rest), rest_pdc if np.isfinite(rest_pdc) else None)
+        options = dataclasses.replace(options, rest=known)
+        if unit is not None:
+            signals = electrode_gains.apply(signals, unit)
+        yield recording, signals, part.repeated
+
+
+def _one_polarity(path: str, options: PrepareOptions) -> tuple[PrepareOptions, str]:
+    """Options that name the polarity of the first part that shows it, and the evidence; as they are where none does."""
+    for part in read_parts(path):
+        signals = prepare(part.recording, options)
+        if not signals.flags[0] & DOUBTS:
+            name, evidence = (signals.report[each] for each in ("polarity", "polarity_evidence"))
+            return dataclasses.replace(options, polarity=name), evidence
+    return options, ""
+
+
+def _decided_once(signals: Signals, doubts: np.uint16, evidence: str, *, first: bool) -> Signals:
+    """A part's signals under what was decided of the whole recording's polarity, which is told once."""
+    flags = (signals.flags & ~DOUBTS) | doubts
+    report = signals.report | ({"polarity_evidence": evidence} if evidence else {})
+    keep = first and not evidence
+    warnings = tuple(text for text in signals.warnings if keep or not text.startswith("polarity "))
+    if not first:
+        own = "rest is the unit's own"
+        warnings = tuple(CARRIED if text.startswith(own) else text for text in warnings)
+    return dataclasses.replace(signals, flags=flags, report=report, warnings=warnings)
+
+
+def _rest_pdc(recording: Recording, signals: Signals) -> float:
+    """PDC, counts, that a part's pressure was measured from; NaN where there is none."""
+    return float(recording.pdc[0] - signals.pdc[0]) if recording.pdc is not None else np.nan
+
+
+def _carried(recording: Recording, signals: Signals, rest: np.ndarray, rest_pdc: float, told: bool) -> Signals:
+    """A part without rest of its own, from the rest (19,) and PDC at the end of the part before."""
+    drift = np.zeros_like(signals.drift)
+    warnings = tuple(text for text in signals.warnings if not text.startswith(("no quiet part", "rest is the unit's")))
+    if not told:
+        warnings += (CARRIED,)
+    sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
+    change = signals.change + sign * (signals.rest - rest)
+    pdc = signals.pdc + _rest_pdc(recording, signals) - rest_pdc
+    return dataclasses.replace(signals, change=change, rest=rest, pdc=pdc, drift=drift, warnings=warnings)
+
+
+class _Writer:
+    """The datasets of a prepared file, part by part."""
+
+    def __init__(self, file: h5py.File) -> None:
+        self.count, self._file = 0, file
+        self._parts: list[tuple[int, np.ndarray]] = []
+        self._about: dict[str, Any] = {"warnings": [], "prepared": []}
+
+    def append(self, recording: Recording, signals: Signals, repeated: int) -> None:
+        """Add the frames of a part that are new."""
+        arrays = {"time": recording.time, **{name: getattr(signals, name) for name in tuple(COLUMNS)[1:]}}
+        end = self.count + len(recording) - repeated
+        for name, kind in COLUMNS.items():
+            values = np.asarray(arrays[name])[repeated:].astype(kind)
+            if name not in self._file:
+                options = {"chunks": (CHUNK, *values.shape[1:]), "fletcher32": True, "track_times": False}
+                shape = (0, *values.shape[1:])
+                self._file.create_dataset(name, shape, kind, maxshape=(None, *shape[1:]), **options)
+            data = self._file[name]
+            data.resize(end, axis=0)
+            data[self.count :] = values
+            data.flush()  # where its chunks lie in the file is settled now, not by when Python lets go of it
+        if not self._parts:
+            self._about |= {
+                "recording": recording.name, "layout": recording.layout, "simulated": recording.simulated,
+                "start_time": recording.start_time, "kind": signals.kind,
+            }  # fmt: skip
+        self._parts.append((self.count, signals.rest))
+        self._about["warnings"] += [text for text in signals.warnings if text not in self._about["warnings"]]
+        self._about["prepared"].append(signals.report)
+        self.count = end
+
+    def close(self, digest: str) -> None:
+        """Write what is known at the end. digest : of the recording."""
+        warnings = self._about["warnings"]
+        if len(warnings) > MAX_WARNINGS:
+            warnings[MAX_WARNINGS:] = [f"{len(warnings) - MAX_WARNINGS} more warnings"]
+        self._file["part"] = np.array([first for first, _ in self._parts], np.int64)
+        self._file["rest"] = np.array([rest for _, rest in self._parts])
+        # A name that is no UTF-8 holds lone surrogates, which ASCII escapes; frames.h5 replaces them as well.
+        text = json.dumps(self._about | {"sha256": digest, "frames": self.count}, sort_keys=True)
+        self._file.create_dataset("about", data=np.frombuffer(text.encode("ascii"), np.uint8), track_times=False)
+
+
+class Prepared:
+    """An open look into a prepared file; every call opens it anew, so that nothing stays open in a worker.
+
+    Each raises TactileError for a damaged file.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._path = file
+
+    def __len__(self) -> int:
+        return self._read(lambda file: len(file["time"]))
+
+    def about(self) -> About:
+        """What is told of the recording."""
+        return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
+
+    def rows(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
+        """Times (T,) s and signals of the frames from `start` up to `stop`; `rest` is that of the first of them."""
+
+        def read(file: h5py.File) -> tuple[np.ndarray, Signals]:
+            """The same of an open file."""
+            arrays = {name: file[name][start:stop] for name in COLUMNS}
+            part = int(np.searchsorted(file["part"][()], start, side="right")) - 1
+            rest = file["rest"][part]
+            time = arrays.pop("time")
+            return time, Signals(
+                rest=rest, drift=np.zeros_like(rest), kind=about["kind"], warnings=(), report={}, **arrays
+            )
+
+        about = self.about()
+        return self._read(read)
+
+    def _read(self, what: Any) -> Any:
+        import h5py
+
+        try:
+            check_before_opening(self._path)
+            with h5py.File(self._path, "r") as file:
+                _check(self._path, file)
+                return what(file)
+        except TactileError:
+            raise
+        except Exception as error:  # the library raises a dozen types on damaged bytes
+            found, advice = f"damaged ({error})", "Run the job again: it is made anew"
+            raise TactileError(self._path, found, "a prepared recording", advice) from error
+
+
+def _check(path: Path, file: h5py.File) -> None:
+    """Raises ValueError or TactileError for other arrays than ours, whose rows would take more memory."""
+    import h5py
+
+    count = len(file["time"])
+    wide = {"change", "electrodes"}
+    shapes = {name: (count, ELECTRODES) if name in wide else (count,) for name in COLUMNS}
+    for name in (*COLUMNS, "part", "rest", "about"):
+        if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+            raise ValueError(f"{name} is a link")
+        data = file[name]
+        check_plain(path, data)
+        if name in shapes and data.shape != shapes[name]:
+            raise ValueError(f"{name} of shape {data.shape}, not {shapes[name]}")
+        if name not in shapes:
+            declared(data, f"{path}, {name}")

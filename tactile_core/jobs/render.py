@@ -1,0 +1,271 @@
+"""The job of ``tactile render``: an input becomes a folder of pictures, as PNG and OpenEXR, with a note.
+
+DIR/images/%05d.png  pictures, numbered as the input's frames are
+DIR/exr/%05d.exr     radiance in float32, where asked for: R, G, B as the camera's channels count it (grey levels,
+                     C times L), basis.red, basis.green, basis.blue as each LED gives it (L, the calibration's unit)
+DIR/rest.exr         the same of the undeformed gel: a picture is background + RGB - RGB at rest
+DIR/note.json        input, calibration, preset, versions; same input, same bytes
+DIR/timings.json     ms a frame of each stage on this machine; differs from run to run
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..accuracy import Budget
+from ..errors import TactileError
+from ..files import atomic, provenance
+from ..files.png import write_png
+from ..files.stopwatch import Stopwatch
+from ..pictures.height_map import digit_mapper
+from ..pictures.presets import DEFAULT, FAST, PRESETS, fitting, measured, told
+from ..pictures.renderer import Renderer
+from ..sensors.calibration import Calibration
+from ..sensors.calibration_file import SHIPPED, load_calibration
+from ..sensors.camera import COLOURS
+from . import results, sampling_error
+from .frame_range import frames_text, select
+from .gel_frames import is_scene, read_frames
+
+EXR, EXR_NAME, REST = "exr", "{:05d}.exr", "rest.exr"
+UNITS = (
+    "R G B: grey levels of 8 bits, C times L, without background. basis.*: L, in units of what the LED gives to a "
+    "coating that faces it, as far from it as the picture's centre at height zero."
+)
+
+Progress = Callable[[int, int], None]
+
+
+def _silent(text: str) -> None:
+    """For callers that do not ask what was picked."""
+
+MAKER = "tactile render"  # in the note
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """How to render.
+
+    preset : its name, None to choose by error; error : what will do, None for the default preset and the fast tier
+    calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
+    frames : part of the input; exr : whether to write OpenEXR too; variant : None for the faster one
+    noise : whether PNG pictures have the camera's noise, the same in every run
+    """
+
+    preset: str | None = None
+    error: Budget | None = None
+    calibration: str | os.PathLike | None = None
+    size: tuple[int, int] | None = None
+    frames: slice = dataclasses.field(default_factory=lambda: slice(None))
+    exr: bool = False
+    variant: str | None = None
+    noise: bool = False
+    overwrite: bool = False
+
+
+def render(
+    path: str | os.PathLike,
+    out: str | os.PathLike,
+    options: Options,
+    progress: Callable[[str], Any],
+    say: Callable[[str], None] = _silent,
+) -> Path:
+    """Render an input into the folder `out`, which appears whole or not at all; returns it.
+
+    progress : given a word, a context that yields a callback (done, in all); say : told what was picked, and why
+    Raises TactileError for a bad input, calibration or option, and a disk that cannot be written.
+    """
+    clock = Stopwatch()
+    out = Path(out)
+    load_calibration(options.calibration)
+    preset = claimed(out, options)
+    bound = options.error or Budget()
+    if bound.levels is not None:
+        say(told(preset, bound.levels))
+    scene = is_scene(Path(path))
+    tier = _tier(Path(path), bound.um, say) if scene and bound.um is not None else "fast"
+    with clock.stage("read"):
+        frames = read_frames(path, lambda: progress("simulate"), tier)
+    if bound.um is not None and frames.displacement is not None and not scene:
+        share = sampling_error.depth_share(frames.displacement) * frames.scale
+        say(sampling_error.check(bound.um, share))
+    shape = None if frames.heights is None else frames.heights.shape[1:]
+    rows = select(options.frames, len(frames.numbers))
+    with clock.stage("prepare"):
+        made = pictures(
+            options.calibration, preset, options.variant, shape, options.size, options.noise, options.exr, clock
+        )
+    try:
+        with atomic.new_folder(out, overwrite=options.overwrite) as folder, progress(preset) as shown:
+            made.begin(folder)
+            made.write_rest(folder)
+            for done, (row, values) in enumerate(zip(rows, frames.some(rows), strict=True), 1):
+                made.write_frame(folder, int(frames.numbers[row]), values)
+                shown(done, len(rows))
+            note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
+            if bound.um is not None and scene:
+                note["input"]["tier"] = tier
+            atomic.write_json(folder / results.NOTE, note)
+            timings = {"ms_a_frame": clock.per_frame(len(rows)), "frames": len(rows), "machine": provenance.machine()}
+            atomic.write_json(folder / results.TIMINGS, timings)
+    except OSError as error:
+        found, advice = f"cannot be written ({error.strerror or error})", "Make room, or name another --out folder"
+        raise TactileError(out, found, "a writable folder", advice) from error
+    return out
+
+
+def claimed(out: Path, options: Options) -> str:
+    """The preset, when `out` may be written; raises TactileError where not, and what `choose_preset` raises."""
+    results.check_free(out, options.overwrite, MAKER)
+    results.check_writable(out.parent)
+    atomic.sweep(out.parent)
+    return choose_preset(options)
+
+
+def choose_preset(options: Options) -> str:
+    """The preset asked for, the cheapest that is exact enough, or the default.
+
+    Raises TactileError for both, or an error that no preset has.
+    """
+    levels = None if options.error is None else options.error.levels
+    if options.preset is not None and levels is not None:
+        raise TactileError("--error", "given with --preset", "one of the two")
+    return options.preset or DEFAULT if levels is None else fitting(levels, options.variant)
+
+
+def _tier(path: Path, um: float, say: Callable[[str], None]) -> str:
+    """Of contact, for a scene: within the bound less what its height map adds. Raises TactileError where none is."""
+    from ..simulation import tier_choice
+
+    share = tier_choice.choose_for_scene(path, ("digit",), None)["digit"].share
+    sampled = sampling_error.height_error(share)
+    if um <= sampled:
+        expected = f"more than {sampled:.3g}, which heights between nodes add alone"
+        raise TactileError("--error", f"{um:g} um", expected, "Allow more")
+    choice = tier_choice.choose("digit", share, um - sampled)
+    say(f"{choice.told('digit')}; heights between nodes add {sampled:.2g} um")
+    return choice.tier
+
+
+def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
+    """The calibration in pixels of height maps (H, W), or of the size (width, height) asked for.
+
+    Raises TactileError where both are there and differ.
+    """
+    if heights is not None:
+        height, width = heights
+        if size not in (None, (width, height)):
+            found = f"{size[0]} x {size[1]}, the height map {width} x {height}"
+            raise TactileError("--size", found, "the height map's size", "Leave it out")
+        size = (width, height)
+    return calibration if size is None else calibration.at_size(*size)
+
+
+@dataclasses.dataclass(frozen=True)
+class Pictures:
+    """Writes frames as files.
+
+    about : attributes of EXR files; heights : whether frames are height maps, not displacements
+    noise : whether PNG pictures have some; exr : whether to write OpenEXR too
+    """
+
+    renderer: Renderer
+    clock: Stopwatch
+    about: dict[str, str]
+    heights: bool
+    noise: bool
+    exr: bool
+
+    def begin(self, folder: Path) -> None:
+        """Make the folders of the files."""
+        (folder / results.IMAGES).mkdir()
+        if self.exr:
+            (folder / EXR).mkdir()
+
+    def write_rest(self, folder: Path) -> None:
+        """The undeformed gel, where OpenEXR is asked for."""
+        if self.exr:
+            self._write_exr(folder / REST, self.renderer.rest_radiance, self.about)
+
+    def write_frame(self, folder: Path, number: int, values: np.ndarray) -> None:
+        """values : displacement (M, 3) m or heights (H, W) m."""
+        with self.clock.stage("height_map"):
+            height = values if self.heights else digit_mapper(self.renderer.camera)(values)
+        with self.clock.stage("radiance"):
+            radiance = self.renderer.radiance(height)
+        with self.clock.stage("picture"):
+            noise = np.random.default_rng(number) if self.noise else None
+            picture = self.renderer.picture(radiance, noise)
+        with self.clock.stage("png"):
+            write_png(folder / results.IMAGES / results.IMAGE_NAME.format(number), picture)
+        if self.exr:
+            with self.clock.stage("exr"):
+                about = {**self.about, "frame": str(number)}
+                self._write_exr(folder / EXR / EXR_NAME.format(number), radiance, about)
+
+    def _write_exr(self, path: Path, radiance: np.ndarray, about: dict[str, str]) -> None:
+        from ..files.exr import write_exr
+
+        levels = self.renderer.in_levels(radiance)
+        channels = {name: levels[..., k] for k, name in enumerate("RGB")}
+        channels |= {f"basis.{colour}": radiance[..., k] for k, colour in enumerate(COLOURS)}
+        write_exr(path, channels, about)
+
+
+def pictures(
+    calibration: str | os.PathLike | None,
+    preset: str,
+    variant: str | None,
+    heights: tuple[int, int] | None,
+    size: tuple[int, int] | None,
+    noise: bool,
+    exr: bool,
+    clock: Stopwatch | None = None,
+) -> Pictures:
+    """What writes frames; heights : (H, W) of height maps, None for displacements; the rest as of `Options`.
+
+    Raises TactileError for a bad calibration or size, and what ``Renderer`` raises.
+    """  # fmt: skip
+    unit = at_size(load_calibration(calibration), heights, size)
+    about = {"calibration": unit.unit, "preset": preset, "units": UNITS}
+    renderer = Renderer(unit, preset, variant)
+    return Pictures(renderer, clock or Stopwatch(), about, heights is not None, noise, exr)
+
+
+def note_of(
+    path: str | os.PathLike, kind: str, count: int, renderer: Renderer, preset: str, options: Options
+) -> dict[str, Any]:
+    """Where a result came from, fit for JSON: only what the same input makes again."""
+    path = Path(path)
+    file = path / "scene.toml" if path.is_dir() else path
+    unit, calibration = renderer.calibration.unit, Path(options.calibration or SHIPPED)
+    about = PRESETS[preset] if preset != FAST else None
+    return {
+        "format": results.FORMAT,
+        "made_by": MAKER,
+        "input": {"file": file.name, "sha256": provenance.sha256(file), "kind": kind},
+        "frames": {"selected": frames_text(options.frames), "rendered": count},
+        "calibration": {"file": calibration.name, "sha256": provenance.sha256(calibration), "unit": unit},
+        "noise": options.noise,
+        "size": {"width": renderer.camera.width, "height": renderer.camera.height},
+        "preset": {
+            "name": preset, "settings": None if about is None else dataclasses.asdict(about),
+            "measured": measured()["presets"][preset],
+        },
+        "versions": provenance.versions("PIL") | _mitsuba_versions(renderer.variant),
+    }  # fmt: skip
+
+
+def _mitsuba_versions(variant: str | None) -> dict[str, str]:
+    if variant is None:
+        return {}
+    import drjit
+    import mitsuba
+
+    return {"mitsuba": mitsuba.__version__, "drjit": drjit.__version__, "mitsuba_variant": variant}

@@ -1,0 +1,160 @@
+"""`tactile render` by many processes: the same folder as by one, but for timings.json, which only one can tell."""
+
+from __future__ import annotations
+
+import functools
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import TactileError
+from ..files import array_pack, atomic, checksummed
+from ..pictures.mitsuba.variant import variant_for
+from . import results
+from .engine import inputs, result_parts
+from .engine import job as jobs
+from .engine import run as runs
+from .engine.inputs import content_hash
+from .engine.job import Job
+from .engine.kinds import Seen
+from .engine.recipes import Render
+from .engine.run import Place
+from .frame_range import frames_text
+from .render import Options, Pictures, claimed, note_of, pictures
+from .translate import check_unit
+
+GROWS = False
+NUMBERS, VALUES, KIND, HEIGHTS = "numbers", "values", "kind", "heights"  # arrays of a prepared file
+
+
+def render_in_parts(
+    path: str | os.PathLike,
+    out: str | os.PathLike,
+    options: Options,
+    place: Callable[[Path], Place],
+    progress: Callable[[int, int], None],
+) -> Path:
+    """As ``render.render``; the job is in ``<out>.parts`` until all is there, and the same call goes on with it.
+
+    place : where frames are rendered, from the job's folder; progress : (tasks done, known so far)
+    Raises what ``render.render`` raises.
+    """
+    out = Path(out)
+    job = plan(path, out, options)
+    with result_parts.begun(out, job) as folder:
+        result_parts.check(runs.run(folder, job, place(folder), None, progress))
+        try:
+            _put_together(folder, job, out, options)
+        except OSError as error:
+            found, advice = f"cannot be written ({error.strerror or error})", "Make room, then give the command again"
+            raise TactileError(out, found, "a writable folder", advice) from error
+        result_parts.finished(folder)
+    return out
+
+
+def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> Job:
+    """The job. Raises TactileError for what can be refused before any work."""
+    preset = claimed(Path(out), options)
+    file = Path(path).resolve()
+    file = file / "scene.toml" if file.is_dir() else file
+    unit = "" if options.calibration is None else inputs.unit_hash(Path(options.calibration))
+    frames = "" if frames_text(options.frames) == "all" else frames_text(options.frames)
+    recipe = Render(
+        preset, variant_for(preset, options.variant), frames or ":", options.size, options.exr, options.noise, unit
+    )
+    calibration = None if options.calibration is None else os.fspath(options.calibration)
+    return jobs.make(inputs.hashed([file], lambda done, total: None), recipe, None, calibration)
+
+
+def _put_together(folder: Path, job: Job, out: Path, options: Options) -> None:
+    words, heights, frames = told(folder, job, 0)
+    name, recipe = job.inputs[0].name, job.recipe
+    shape = None
+    if heights:
+        shape = array_pack.read(jobs.prepared_file(folder, name), slice(0, 1), (VALUES,))[VALUES].shape[1:]
+    made = pictures(
+        job.calibration, recipe.preset, recipe.variant or None, shape, recipe.size, recipe.noise, recipe.exr
+    )
+    with atomic.new_folder(out, overwrite=options.overwrite) as partial:
+        made.begin(partial)
+        made.write_rest(partial)
+        for number in range(count(folder, job, 0)):
+            array_pack.unpack(jobs.shard_file(folder, name, number), partial)
+        note = note_of(job.inputs[0].path, words, frames, made.renderer, recipe.preset, options)
+        atomic.write_json(partial / results.NOTE, note)
+
+
+def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+    """Read the input, simulating a scene; keep what is to be rendered of it."""
+    from .frame_range import parse_frames, select
+    from .gel_frames import read_frames
+
+    one = job.inputs[index]
+    file = jobs.prepared_file(folder, one.name)
+    made = checksummed.verified_checksum(file) is None
+    if made:
+        if content_hash(Path(one.path))[0] != one.sha256:
+            found = "another content than when the job was made"
+            raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
+        frames = read_frames(one.path)
+        rows = select(parse_frames(job.recipe.frames), len(frames.numbers))
+        told = {NUMBERS: frames.numbers[rows], VALUES: np.stack(list(frames.some(rows)))}
+        kind = np.frombuffer(frames.kind.encode(), np.uint8)
+        array_pack.write(file, told | {KIND: kind, HEIGHTS: np.bool_(frames.heights is not None)})
+    return count(folder, job, index), made
+
+
+def make(folder: Path, job: Job, index: int, number: int) -> bool:
+    """Render some frames."""
+    one, recipe = job.inputs[index], job.recipe
+    file = jobs.shard_file(folder, one.name, number)
+    if checksummed.verified_checksum(file) is not None:
+        return False
+    start = number * recipe.shard_frames
+    found = array_pack.read(
+        jobs.prepared_file(folder, one.name), slice(start, start + recipe.shard_frames), (NUMBERS, VALUES)
+    )
+    shape = found[VALUES].shape[1:] if told(folder, job, index)[1] else None
+    pictures = _pictures(job.calibration, recipe, shape)
+    with tempfile.TemporaryDirectory() as name:
+        pictures.begin(Path(name))
+        for frame, values in zip(found[NUMBERS], found[VALUES], strict=True):
+            pictures.write_frame(Path(name), int(frame), values)
+        array_pack.write_files(file, Path(name))
+    return True
+
+
+def seen(folder: Path, job: Job, index: int) -> Seen | None:
+    """Frames of an input that was read."""
+    if not jobs.prepared_file(folder, job.inputs[index].name).exists():
+        return None
+    frames = _frames(folder, job, index)
+    return Seen(count(folder, job, index), frames)
+
+
+def count(folder: Path, job: Job, index: int) -> int:
+    """Shards of an input that was read."""
+    return -(-_frames(folder, job, index) // job.recipe.shard_frames)
+
+
+def told(folder: Path, job: Job, index: int) -> tuple[str, bool, int]:
+    """Of an input that was read: its kind in words, whether it holds height maps, its frames."""
+    found = array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(KIND, HEIGHTS))
+    return found[KIND].tobytes().decode(), bool(found[HEIGHTS]), _frames(folder, job, index)
+
+
+def _frames(folder: Path, job: Job, index: int) -> int:
+    return len(array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(NUMBERS,))[NUMBERS])
+
+
+@functools.lru_cache(maxsize=2)
+def _pictures(calibration: str | None, recipe: Render, heights: tuple[int, int] | None) -> Pictures:
+    """The renderer, once a process; heights : (H, W) of height maps, None for displacements."""
+    from .render import pictures
+
+    check_unit(calibration, recipe.calibration)
+    preset, variant = recipe.preset, recipe.variant or None
+    return pictures(calibration, preset, variant, heights, recipe.size, recipe.noise, recipe.exr)

@@ -1,0 +1,116 @@
+"""What a converted recording leaves behind: the layout of a result folder, and where it may stand.
+
+<recording>/frames.h5           numbers, T first, SI units; see ``frames_file``
+<recording>/images/%05d.png     DIGIT pictures, 240 wide, 320 high, numbered by the frame's index in the recording
+<recording>/contact_sheet.png   a few frames to look at
+<recording>/note.json           where it came from: versions, weights, options, warnings; same input, same bytes
+<recording>/timings.json        ms a frame of each stage on this machine; differs from run to run
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import TactileError
+from ..files import atomic
+from ..recordings.fingers import name_of
+
+FORMAT = "tactile-result-1"
+FRAMES, IMAGES, SHEET, NOTE, TIMINGS = "frames.h5", "images", "contact_sheet.png", "note.json", "timings.json"
+OURS = {FRAMES, IMAGES, SHEET, NOTE, TIMINGS, "exr", "rest.exr"}  # the last two of `tactile render --exr`
+IMAGE_NAME = "{:05d}.png"
+
+KEEPABLE = ("latent", "displacement", "height", "image")
+DEFAULT_KEEP = ("latent", "displacement", "image")
+
+
+def parse_keep(text: str) -> tuple[str, ...]:
+    """``"latent,image"`` -> ("latent", "image") in the order of KEEPABLE; ``""`` keeps only what is always written.
+
+    Raises TactileError for an unknown word.
+    """
+    return parse_words(text, KEEPABLE, least=0)
+
+
+def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:
+    """The result folder of each recording; all that can be refused before any work is refused here.
+
+    Makes `out` where it is missing, and clears what killed runs left in it. Raises TactileError: an empty `out`,
+    two recordings of the same name, a result that exists (unless `overwrite`), something that is no result in its
+    place, a folder that cannot be written.
+    """
+    if not os.fspath(out):
+        raise TactileError("--out", "an empty name", "a folder to write", "Name one")
+    out = Path(out)
+    seen: dict[str, str | os.PathLike] = {}
+    for recording in recordings:
+        name = name_of(recording).casefold()  # macOS and Windows fold case in file names
+        if name in seen:
+            advice = "Convert them into different --out folders"
+            raise TactileError(
+                recording, f"has the same name as {seen[name]}", "one name for each result folder", advice
+            )
+        seen[name] = recording
+    check_writable(out)
+    atomic.sweep(out)
+    folders = [out / name_of(recording) for recording in recordings]
+    for folder in folders:
+        check_free(folder, overwrite)
+    return folders
+
+
+def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
+    """Raises TactileError where a result may not stand: one is there (unless `overwrite`), or something else is.
+
+    maker : what its note says of who made it; another verb's result is something else, and so is one among whose files
+        there are others
+    """
+    if not os.path.lexists(folder):
+        return
+    if not is_result(folder, maker):
+        raise TactileError(folder, "exists and is no result of this verb", "a free place", "Name another --out folder")
+    names = sorted(path.name for path in folder.iterdir())
+    others = [name for name in names if name not in OURS and not name.startswith(".")]  # as .DS_Store
+    if others:
+        found, advice = f"holds {others[0]:.80}, which is not of the result", "Name another --out, or move it away"
+        raise TactileError(folder, found, "a result alone", advice)
+    if not overwrite:
+        raise TactileError(folder, "already holds a result", "a free place", "Add --overwrite, or another --out")
+
+
+def check_writable(out: Path) -> None:
+    """Make the folder and try a file in it; raises TactileError."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as error:
+        found, advice = f"cannot be written ({error.strerror or error})", "Name another --out, or allow writing"
+        raise TactileError(out, found, "a writable folder", advice) from error
+
+
+def is_result(folder: Path, maker: str = "") -> bool:
+    """Whether a folder holds a result of ours, made by `maker`, so that --overwrite may replace it."""
+    try:
+        note = json.loads((folder / NOTE).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(note, dict) and note.get("format") == FORMAT and note.get("made_by", "") == maker
+
+
+def parse_words(text: str | None, known: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
+    """``"image,electrodes"`` as known words, in their order; None: all.
+
+    Raises TactileError for other words, or fewer than ``least``.
+    """
+    words = known if text is None else [word.strip() for word in text.split(",") if word.strip()]
+    for word in words:
+        if word not in known:
+            raise TactileError("--keep", repr(word), f"words out of {', '.join(known)}", "Separate them by commas")
+    if len(words) < least:
+        raise TactileError("--keep", "nothing", f"one or more of {', '.join(known)}")
+    return tuple(word for word in known if word in words)

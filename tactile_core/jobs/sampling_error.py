@@ -1,0 +1,56 @@
+"""What the toolkit adds to a translation or a solved contact by itself: rounding, and heights between the nodes."""
+
+from __future__ import annotations
+
+import functools
+import json
+from typing import Any
+
+import numpy as np
+
+from ..errors import TactileError
+from ..files.shipped import shipped
+from ..sensors.digit import THICKNESS
+
+TABLE = shipped("sampling.json")
+
+
+@functools.cache
+def measured() -> dict[str, Any]:
+    """What ``scripts/benchmarks/measure_sampling.py`` found; bins of depth over thickness, m."""
+    return json.loads(TABLE.read_text(encoding="utf-8"))
+
+
+def height_error(share: float) -> float:
+    """um rms of a height map between nodes that 95 of 100 contacts stay below, up to a depth over the thickness."""
+    bins = measured()["bins"]
+    reached = [each for each in bins if each["depth_share_to"] < share] + [_bin_of(share)]
+    return 1e6 * max(each["rms_95_m"] for each in reached)
+
+
+def _bin_of(share: float) -> dict[str, float]:
+    """The bin of a depth; the deepest beyond it."""
+    bins = measured()["bins"]
+    return next((each for each in bins if share <= each["depth_share_to"]), bins[-1])
+
+
+def rounding() -> float:
+    """um, largest that float32 changes in a translated gel."""
+    return 1e6 * measured()["float32_m"]
+
+
+def check(bound: float, share: float | None) -> str:
+    """What is added to a gel, in words; share : the depth over the thickness of its heights, None without heights.
+
+    Raises TactileError where that is more than the bound, um: there is nothing more exact to choose.
+    """
+    added = rounding() if share is None else height_error(share)
+    what = "rounding to float32 adds" if share is None else f"heights between nodes add, {share:.0%} of the gel deep"
+    if added > bound:
+        raise TactileError("--error", f"{bound:g} um", f"{added:.3g} or more, which {what}", "Allow more")
+    return f"{what}: {added:.2g} um, at most {bound:g}; there is nothing to choose"
+
+
+def depth_share(displacement: np.ndarray) -> float:
+    """The largest move of a gel's node in displacements (..., M, 3) m, over the gel's thickness."""
+    return float(np.sqrt(np.square(displacement, dtype=np.float32).sum(-1).max(initial=0))) / THICKNESS

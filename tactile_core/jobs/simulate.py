@@ -1,0 +1,114 @@
+"""Simulated recordings of a scene over a grid of parameters, in a folder that appears whole or not at all.
+
+<out>/<number>_<values>.h5   each as `tactile simulate` makes it
+<out>/grid.json              the seed and values of each
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import msgspec
+
+from ..errors import TactileError
+from ..files import array_pack, atomic, checksummed
+from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
+from ..simulation.recording import ALL, check_places, recording_of
+from ..simulation.scene import Scene
+from ..simulation.scene_grid import combinations, name_of, with_values
+from ..simulation.scene_text import to_toml
+from .engine import job as jobs
+from .engine import result_parts, scene_input
+from .engine import run as runs
+from .engine.job import Job
+from .engine.kinds import Seen
+from .engine.local import Here
+from .engine.recipes import Simulate
+from .engine.run import Place
+from .engine.scene_input import load
+
+GRID = "grid.json"
+FORMAT = "tactile-grid-1"
+GROWS = False
+
+
+def simulate_grid(
+    job: Job,
+    out: str | os.PathLike,
+    progress: Callable[[int, int], None] | None = None,
+    place: Callable[[Path], Place] | None = None,
+) -> None:
+    """Simulate all recordings of a `plan` into the folder ``out``.
+
+    progress : (tasks done, known so far); place : where the work is done, from the job's folder; None for this process
+    The job is in ``<out>.parts`` until all is there. Raises TactileError for what cannot be done.
+    """
+    digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
+    with result_parts.begun(Path(out), job) as folder:
+        result_parts.check(runs.run(folder, job, (place or Here)(folder), None, progress or (lambda done, known: None)))
+        _put_together(folder, job, Path(out))
+        result_parts.finished(folder)
+
+
+def plan(
+    scene_path: str | os.PathLike, grid: Sequence[str], out: str | os.PathLike, seed: int = 0, keep: Sequence[str] = ALL
+) -> Job:
+    """The job: the [recording] of a scene for each combination of the values in ``grid`` (``scene_grid``).
+
+    seed : of the first recording, each has one more than that before it; keep : words of ``recording.OUTPUTS``
+    Raises TactileError for a bad scene, grid or place, before any work.
+    """
+    values = combinations(grid)
+    scene, _, inputs, files = scene_input.found(scene_path, [name_of(one) for one in values])
+    for one in values:
+        check_places(scene_path, recording_of(with_values(scene, one, str(scene_path)), scene_path))
+    atomic.claim(out)
+    return jobs.make(inputs, Simulate(seed, values, files, list(keep)), None)
+
+
+def _put_together(folder: Path, job: Job, out: Path) -> None:
+    told = []
+    try:
+        with atomic.new_folder(out) as partial:
+            for index, one in enumerate(job.inputs):
+                array_pack.unpack(jobs.shard_file(folder, one.name, 0), partial)
+                told.append({
+                    "file": f"{one.name}.h5", "seed": job.recipe.seed + index, "values": job.recipe.values[index]
+                })  # fmt: skip
+            content = {"format": FORMAT, "scene_sha256": job.inputs[0].sha256, "recordings": told}
+            atomic.write_json(partial / GRID, content)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise TactileError(out, found, "room for it", "Make room, then give the command again") from error
+
+
+def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+    """Nothing: a recording is one shard."""
+    return 1, False
+
+
+def make(folder: Path, job: Job, index: int, number: int) -> bool:
+    """Simulate a recording."""
+    from ..simulation.recording import simulate_recording
+
+    one = job.inputs[index]
+    file = jobs.shard_file(folder, one.name, number)
+    if checksummed.verified_checksum(file) is not None:
+        return False
+    scene, text = load(one, tuple(job.recipe.files))
+    values = job.recipe.values[index]
+    told = with_values(msgspec.toml.decode(text, type=Scene), values, one.path)  # its files named as the scene does
+    scene = with_values(scene, values, one.path)
+    with tempfile.TemporaryDirectory() as name:
+        out, seed = Path(name) / f"{one.name}.h5", job.recipe.seed + index
+        simulate_recording(one.path, out, seed, keep=job.recipe.keep, loaded=(scene, to_toml(told)))
+        array_pack.write_files(file, Path(name))
+    return True
+
+
+def seen(folder: Path, job: Job, index: int) -> Seen | None:
+    """One shard."""
+    return Seen(1)

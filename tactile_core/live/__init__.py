@@ -1,7 +1,0 @@
-"""A recording while it is made: its newest frame as a picture, as soon as it is there."""
-
-from .growing import Growing
-from .live_signals import LiveSignals
-from .view import Shown, View
-
-__all__ = ["Growing", "LiveSignals", "Shown", "View"]

@@ -1,0 +1,1 @@
+"""From the fluid film to the counts of the electrodes."""

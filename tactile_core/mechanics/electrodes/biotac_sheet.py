@@ -1,0 +1,149 @@
+"""The BioTac's fluid as a thin conducting sheet: what its 19 electrodes read for a deformed inner skin.
+
+Assumed: the conductivity, the size of the electrodes, that the four excitation electrodes are joined and that the
+electrodes that are not being read float. The sheet lies half way between core and resting inner skin, which is exact to
+second order in thickness over radius for a film between concentric cylinders; the current's spreading through the
+thickness near an electrode is left out.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ... import sensors
+from ...geometry.lattice import Lattice, cap_faces
+from ...sensors import biotac
+from ...sensors.unrolling import closest_on_triangles
+from ..solids.hex_mesh import skin_mesh
+from .gap_law import FILM_FLOOR
+from .thin_sheet import ThinSheet, resistances
+
+CONDUCTIVITY = 0.3  # S/m: assumed, a dilute salt solution; it scales all resistances alike
+ELECTRODE_RADIUS = 0.3e-3  # m: assumed (mechanics.md, 0.6 mm patches)
+
+# Excitation electrodes X1..X4, mm, SynTouch's frame as in ``sensors``. From the drawing in the visualiser of Shadow
+# Robot and SynTouch (sr_gui_biotac, biotac.py, "physical electrode locations on the sensor", 2013), where the sensing
+# electrodes stand at 8.58 mm - x along the finger and, across, at 0.942 times their arc from the pad's lowest line.
+_EXCITATION_SYNTOUCH_MM = np.array(
+    [[-3.9, -4.956, -1.116], [-15.9, -3.588, -3.595], [-15.9, 3.588, -3.595], [-3.9, 4.956, -1.116]]
+)
+_CORE_STEP = (0.05e-3, np.radians(1.0))  # m and rad between the points that stand for the core: at most 0.09 mm apart
+_FINE = 2  # times the triangles are halved to find what the grid leaves unresolved near an electrode: 0.12 mm
+
+
+@dataclasses.dataclass(frozen=True)
+class BiotacSheet:
+    """The fluid film between core and inner skin.
+
+    sheet : on the nodes that bound fluid, with the 19 electrodes and the 4 of the excitation
+    wet : (k,) the sheet's nodes in ``biotac.skin_surface("inner")``
+    film : (k,) m, thickness at rest; outward : (k, 3), from the core to the skin
+    unresolved : (23,) what the grid is too coarse for: resistance of each electrode in a film of 1 m and 1 S/m
+    """
+
+    sheet: ThinSheet
+    wet: np.ndarray
+    film: np.ndarray
+    outward: np.ndarray
+    unresolved: np.ndarray
+
+    def films(self, displacement: np.ndarray) -> np.ndarray:
+        """Thickness (k,) m for a displacement (n_inner, 3) m of the whole inner skin; at least ``FILM_FLOOR``."""
+        return np.maximum(self.film + np.einsum("ki,ki->k", displacement[self.wet], self.outward), FILM_FLOOR)
+
+    def resistances(self, displacement: np.ndarray) -> np.ndarray:
+        """Resistance (19,) ohm of each electrode to the excitation, for a displacement (n_inner, 3) m."""
+        films = self.films(displacement)
+        potentials = self.sheet.potentials(films, CONDUCTIVITY)
+        near = self.unresolved / (CONDUCTIVITY * self.sheet.mean_over_electrodes(films))
+        return resistances(potentials + np.diag(near), 19)
+
+
+def divider_counts(resistance: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """12-bit counts (..., 19), not rounded, of electrodes (..., 19) ohm that each share a voltage with one load.
+
+    Read is the voltage over the load, so that counts fall as films thin (SynTouch, BioTac SP manual). The load is the
+    same for all and such that the median of ``rest`` (19,) ohm gives ``sensors.REST_COUNT`` (assumed).
+    """
+    load = np.median(rest) / (sensors.COUNT_MAX / sensors.REST_COUNT - 1)
+    return sensors.COUNT_MAX * load / (resistance + load)
+
+
+def excitation_electrodes() -> np.ndarray:
+    """Positions (4, 3) m of the excitation electrodes X1..X4 in the shared frame, read from a drawing (see above)."""
+    x, y, z = _EXCITATION_SYNTOUCH_MM.T
+    return np.column_stack([-x - 13.97, z, y]) * 1e-3
+
+
+@functools.cache
+def biotac_sheet(*, core_of_mesh: bool = False) -> BiotacSheet:
+    """The sheet of the resting BioTac; a solve takes 10 ms.
+
+    core_of_mesh : whether the film ends on the public mesh's core. By default it ends on a core that carries the
+    electrodes, so that films over electrodes are the published gaps: the mesh's core stands 0.25 mm over the electrodes
+    of the trunk and 0.6 mm under those of the tip.
+    """
+    inner = biotac.skin_surface("inner")
+    outward, film = _from_core()
+    free = ~skin_mesh().clamped[skin_mesh().inner]
+    faces = _mirrored_faces(inner)
+    faces = faces[free[faces].all(1)]
+    positions = np.concatenate([sensors.electrodes(), excitation_electrodes()])
+    face, weights, feet = closest_on_triangles(Lattice(inner.rest.copy(), faces, inner.shape), positions)
+    corners = faces[face]
+    if not core_of_mesh:
+        gap = np.linalg.norm(feet - positions, axis=1)[:19]
+        film = film + _spread(feet[:19], gap - (weights * film[corners]).sum(1)[:19], inner.rest)
+    middle = inner.rest - outward * film[:, None] / 2
+    centers = np.einsum("ek,ekd->ed", weights, middle[corners])
+    wet, faces = np.unique(_connected(faces[(film > FILM_FLOOR)[faces].all(1)]), return_inverse=True)
+    sheet = ThinSheet(middle[wet], faces.reshape(-1, 3), centers, ELECTRODE_RADIUS)
+    return BiotacSheet(sheet, wet, film[wet], outward[wet], sheet.unresolved(_FINE))
+
+
+@functools.cache
+def _from_core() -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (n, 3) from the public mesh's core to the nodes of the resting inner skin; distances (n,) m."""
+    import scipy.spatial
+
+    points = biotac.skin_surface("inner").rest
+    step, turn = _CORE_STEP
+    x, theta = np.meshgrid(np.arange(-20e-3, 5.3e-3, step), np.arange(-np.pi, np.pi - turn / 2, turn), indexing="ij")
+    x, theta = x.ravel(), theta.ravel()
+    radius = biotac.core_radius(x, theta)
+    core = np.column_stack([x, biotac.AXIS_Y - radius * np.cos(theta), radius * np.sin(theta)])
+    core = core[np.isfinite(radius)]
+    distance, nearest = scipy.spatial.cKDTree(core).query(points)
+    return (points - core[nearest]) / np.maximum(distance, 1e-9)[:, None], distance
+
+
+def _spread(places: np.ndarray, values: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Values (n,) at points (n, 3) from those at places (k, 3), weighted by 1 / distance^3 (Shepard)."""
+    weights = 1 / (np.linalg.norm(points[:, None] - places, axis=2) ** 3 + 1e-15)
+    return weights @ values / weights.sum(1)
+
+
+def _mirrored_faces(inner: Lattice) -> np.ndarray:
+    """Triangles of the grid and its tip cap whose diagonals are each other's images in z, unlike the lattice's own."""
+    rows, columns = inner.shape
+    row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    right = (column + 1) % columns
+    a, b = row * columns + column, (row + 1) * columns + column
+    c, d = (row + 1) * columns + right, row * columns + right
+    one = np.stack([a, b, c, a, c, d], -1).reshape(rows - 1, columns, 2, 3)
+    other = np.stack([a, b, d, b, c, d], -1).reshape(rows - 1, columns, 2, 3)
+    left = (np.arange(columns) < columns // 2)[:, None, None]  # columns run from -180 degrees up
+    return np.concatenate([np.where(left, one, other).reshape(-1, 3), cap_faces(rows * columns, np.arange(columns))])
+
+
+def _connected(faces: np.ndarray) -> np.ndarray:
+    """The largest connected piece of a surface."""
+    import scipy.sparse.csgraph
+
+    size = faces.max() + 1
+    joined = scipy.sparse.coo_matrix((np.ones(faces.size), (faces.ravel(), np.roll(faces, 1, 1).ravel())), (size, size))
+    piece = scipy.sparse.csgraph.connected_components(joined, directed=False)[1][faces[:, 0]]
+    return faces[piece == np.bincount(piece).argmax()]

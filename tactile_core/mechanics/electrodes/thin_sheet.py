@@ -1,0 +1,143 @@
+"""A thin sheet of conducting fluid with round electrodes: resistances from div(sigma h grad phi) = 0 on a surface.
+
+Linear triangles. An electrode injects its current evenly over its disc and reads the mean potential there, which stays
+exact as the grid gets finer and needs no nodes on the disc's rim. All other electrodes float.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+_DISC_SAMPLES = 16  # a triangle's edge is cut so often to find what part of it an electrode covers: 0.03 mm
+
+
+class ThinSheet:
+    """A conducting sheet on a triangulated surface, of a thickness that changes from solve to solve.
+
+    nodes : (n, 3) m; faces : (m, 3) int, one connected piece; centers : (k, 3) m, the electrodes; radius : m, theirs
+    refine : how often each triangle is cut into four; films stay given at ``nodes``
+    """
+
+    def __init__(
+        self, nodes: np.ndarray, faces: np.ndarray, centers: np.ndarray, radius: float, refine: int = 0
+    ) -> None:
+        import scipy.sparse
+
+        self.given = nodes, faces, centers, radius
+        self.prolong = scipy.sparse.identity(len(nodes), format="csr")
+        for _ in range(refine):
+            nodes, faces, finer = _halved(nodes, faces)
+            self.prolong = finer @ self.prolong
+        self.nodes, self.faces = nodes, faces
+        self.patches = np.stack([_disc(nodes, faces, center, radius) for center in centers], 1)
+        self._prepare_matrix()
+
+    def potentials(self, film: np.ndarray, conductivity: float = 1.0) -> np.ndarray:
+        """Mean potential (k, k) V of electrode i for 1 A into electrode j, up to a constant a column.
+
+        film : (n,) m, thickness at the nodes; conductivity : S/m. Raises ValueError where the film is not positive.
+        Only combinations of currents that sum to zero have a meaning: the current leaves at the first node.
+        """
+        from ..solids.sparse_cholesky import factor
+
+        answer = factor(self.matrix(film, conductivity)[1:, 1:].tocsc())(self.patches[1:])
+        return self.patches[1:].T @ answer
+
+    def matrix(self, film: np.ndarray, conductivity: float = 1.0):  # noqa: ANN201 (scipy is imported where it is needed)
+        """Currents out of the nodes per potential, S, sparse (n_fine, n_fine): sum of sigma h grad N_i . grad N_j."""
+        if not (film > 0).all():  # false for NaN too
+            raise ValueError("a film without thickness does not conduct")
+        thickness = (self.prolong @ film)[self.faces].mean(1)  # exact for a film that is linear in each triangle
+        matrix = self._pattern.copy()
+        matrix.data = conductivity * (self._scatter @ thickness)
+        return matrix
+
+    def mean_over_electrodes(self, film: np.ndarray) -> np.ndarray:
+        """Mean (k,) over each electrode of values (n,) at the nodes."""
+        return (self.prolong @ film) @ self.patches
+
+    def unresolved(self, refine: int) -> np.ndarray:
+        """What this grid misses of each electrode's own resistance against one refined, (k,) ohm for 1 m and 1 S/m.
+
+        Near an electrode the current spreads in a film of nearly one thickness h, so the miss is this over sigma h.
+        """
+        film = np.ones(len(self.given[0]))
+        miss = ThinSheet(*self.given, refine).potentials(film) - self.potentials(film)
+        elsewhere = miss[~np.eye(len(miss), dtype=bool)]  # one constant, from the node where the current leaves
+        return np.diag(miss) - np.median(elsewhere)
+
+    def _prepare_matrix(self) -> None:
+        """The pattern of the matrix, and the weights that fill it from the thicknesses of the triangles."""
+        import scipy.sparse
+
+        local = _gradient_products(self.nodes[self.faces])
+        rows, columns = np.repeat(self.faces, 3, 1).ravel(), np.tile(self.faces, 3).ravel()
+        size = len(self.nodes)
+        self._pattern = scipy.sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(size, size))
+        self._pattern.sort_indices()
+        keys = np.repeat(np.arange(size), np.diff(self._pattern.indptr)) * size + self._pattern.indices
+        place = np.searchsorted(keys, rows.astype(np.int64) * size + columns)
+        face = np.repeat(np.arange(len(self.faces)), 9)
+        self._scatter = scipy.sparse.csr_matrix((local.ravel(), (place, face)), shape=(len(keys), len(self.faces)))
+
+
+def resistances(potentials: np.ndarray, sensing: int) -> np.ndarray:
+    """Resistance (sensing,) ohm between each of the first ``sensing`` electrodes and all others, joined by a wire.
+
+    potentials : (k, k), of ``ThinSheet.potentials``. The currents of the joined ones share out so that they are at one
+    potential: a bordered system with one unknown a joined electrode and their potential.
+    """
+    joined = len(potentials) - sensing
+    system = np.zeros((joined + 1, joined + 1))
+    system[:joined, :joined], system[:joined, joined], system[joined, :joined] = potentials[sensing:, sensing:], -1, 1
+    into = np.vstack([-potentials[sensing:, :sensing], -np.ones((1, sensing))])
+    answer = np.linalg.solve(system, into)
+    own = np.diag(potentials)[:sensing]
+    return own + np.einsum("ej,je->e", potentials[:sensing, sensing:], answer[:joined]) - answer[joined]
+
+
+def _gradient_products(corners: np.ndarray) -> np.ndarray:
+    """Area times grad N_i . grad N_j, (m, 3, 3), of triangles (m, 3, 3) m."""
+    edges = np.roll(corners, -2, 1) - np.roll(corners, -1, 1)  # the edge across from each corner
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
+    return np.einsum("fik,fjk->fij", edges, edges) / (4 * area[:, None, None])
+
+
+def _halved(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, object]:
+    """Nodes and faces with a node on every edge, and the sparse matrix that interpolates linearly onto them."""
+    import scipy.sparse
+
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, 1)], -1).reshape(-1, 2), 1)
+    edges, which = np.unique(ends, axis=0, return_inverse=True)
+    middle = len(nodes) + which.reshape(-1, 3)  # of the edges 01, 12, 20
+    a, b, c = faces.T
+    ab, bc, ca = middle.T
+    cut = np.concatenate([np.stack(t, 1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    rows = len(nodes) + np.repeat(np.arange(len(edges)), 2)
+    values = np.full(len(rows), 0.5)
+    half = scipy.sparse.csr_matrix((values, (rows - len(nodes), edges.ravel())), shape=(len(edges), len(nodes)))
+    finer = scipy.sparse.vstack([scipy.sparse.identity(len(nodes)), half]).tocsr()
+    return finer @ nodes, cut, finer
+
+
+def _disc(nodes: np.ndarray, faces: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
+    """Mean over a disc as weights (n,) of the nodes; they sum to 1."""
+    corners = nodes[faces]
+    size = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
+    near = np.flatnonzero(np.linalg.norm(corners - center, axis=2).min(1) < radius + size)
+    corners = corners[near]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    at = _sub_centroids(_DISC_SAMPLES)
+    inside = np.linalg.norm(np.einsum("sk,fkd->fsd", at, corners) - center, axis=2) < radius
+    weights = np.bincount(faces[near].ravel(), (area[:, None] * (inside @ at)).ravel(), minlength=len(nodes))
+    if not weights.any():
+        raise ValueError(f"an electrode at {center} m does not lie on the sheet")
+    return weights / weights.sum()
+
+
+def _sub_centroids(cuts: int) -> np.ndarray:
+    """Barycentric centroids (cuts^2, 3) of the equal triangles that a triangle is cut into."""
+    place = np.stack(np.meshgrid(np.arange(cuts), np.arange(cuts)), -1).reshape(-1, 2)
+    upright, turned = place[place.sum(1) < cuts], place[place.sum(1) < cuts - 1]
+    uv = np.concatenate([upright + 1 / 3, turned + 2 / 3]) / cuts
+    return np.column_stack([1 - uv.sum(1), uv])

@@ -1,0 +1,78 @@
+"""What a contact states of its own error: that of its depth, or more where it is sharper or smaller than was measured.
+
+The table by depth (``expected_error``) was measured on indenters that the meshes resolve.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from typing import Any
+
+from ..files.shipped import shipped
+from .sharpness import LEARNED_RADIUS
+
+Errors = tuple[float, float]  # shape, m rms, and relative, of the force
+
+_ROUNDING = 1e-9  # m, of first touch
+# A contact of a few nodes is known to about one of them: a 7 mm ball 1, 2, 4, 8, 16, 32 um deep in the gel was 78, 12,
+# 2, 8, 2, 2 % off Hertz's force.
+_FEW = 20
+# Nodes across a contact, 2 sqrt(radius of curvature x depth) over their spacing: 8.4 to 10.6 under a 7 mm ball in the
+# gel, whose shape was 1.5 um off the reference tier and its force up to 1 %. Errors grow with the spacing's square: a
+# ring of 2.8 nodes was 8.7 um and 1.6 % off, two balls of 3.9 nodes 5.0 um and 3.0 %, a wedge of 1.5
+# nodes 56 um and 4.5 %; 2 um covers them all.
+_ACROSS, _SHAPE, _FORCE = 8.0, 2e-6, 0.01
+# Where a surface lies more than so deep, m, in the indenter between nodes: of 44 such contacts of six indenters, with
+# friction and without, forces of 41 were off half the spacing's by less than that over the depth, and shapes of all by
+# less than 0.35 of it, rms. What stands above covered 16 of the forces.
+_HIDDEN, _HIDDEN_SHAPE, _HIDDEN_FORCE = 100e-6, 0.35, 1.0
+TABLE = shipped("mechanics_tiers.json")
+REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of order 2 leaves a quarter; a margin on it)
+
+
+def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
+    """Of a contact ``depth`` m from first touch, of touching nodes, under an indenter as sharp as ``radius`` m."""
+    if not nodes:
+        return _of_nothing(depth)
+    sharper = max(LEARNED_RADIUS / radius, 1.0)
+    return sharper * table[0], min(sharper * table[1], 1.0)
+
+
+def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hidden: float) -> Errors:
+    """The same in the full and the reference tier.
+
+    across : nodes across the contact, by the full tier's spacing; hidden : m, how deep the surface lies in the indenter
+    between nodes
+    """
+    if not nodes:
+        return _of_nothing(depth)
+    coarser = max(_ACROSS / max(across, 1e-3), 1.0) ** 2
+    few = 1 / nodes if nodes < _FEW else 0.0
+    shape, force = (coarser * least if coarser > 1 else 0.0 for least in (_SHAPE, _FORCE))
+    if hidden > _HIDDEN:
+        shape, force = max(shape, _HIDDEN_SHAPE * hidden), max(force, _HIDDEN_FORCE * hidden / depth)
+    return max(table[0], shape), min(max(table[1], force, few), 1.0)
+
+
+def _of_nothing(depth: float) -> Errors:
+    """Nothing is known of the force of a body that stands deeper than first touch, between nodes that it misses."""
+    return (depth, 1.0) if depth > _ROUNDING else (0.0, 0.0)
+
+
+@functools.cache
+def measured() -> dict[str, Any]:
+    """The table: how, and by tier and sensor ms a contact and errors in bins of depth over thickness."""
+    return json.loads(TABLE.read_text(encoding="utf-8"))
+
+
+def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
+    """Shape error, m rms, and relative force error that 95 of 100 contacts at a depth over thickness stay below.
+
+    The fast tier's are from the full tier, whose own come on top; deeper than measured: those of the deepest bin.
+    """
+    if share <= 0:
+        return 0.0, 0.0
+    bins = measured()["tiers"][tier][sensor]["bins"]
+    found = next((each for each in bins if share <= each["depth_share_to"]), bins[-1])
+    return 1e-6 * found["shape_95_um"], found["force_95"]

@@ -1,0 +1,255 @@
+"""Surface compliance of a sensor: what every surface node does under a unit force on each node that can be touched.
+
+Linear elasticity of the whole solid, condensed to its surface once and cached on disk; a contact then needs
+only dense sub-blocks. The BioTac's incompressible fluid enters exactly, as a rank-one change.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import logging
+import pathlib
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import sensors
+from ...errors import TactileError
+from ...files import atomic
+from ...files.cache import cache_folder
+from ...geometry.lattice import Lattice
+from ...sensors import Material, digit
+from ...sensors import unrolling as surface
+from ..solids.fluid_cavity import FluidCavity
+from ..solids.hex_mesh import HexMesh, gel_mesh, inner_faces, skin_mesh
+from .condense import condense, mirror_nodes
+from .mirror_symmetry import MirrorSymmetry, axes_of
+from .sensing_points import ON_PLANE, electrode_feet, images, sensing_points_of
+
+log = logging.getLogger(__name__)
+_FORMAT = 5  # raise when the meaning of the cached arrays changes
+
+# Skin nodes that can be touched: those that unroll onto the gel or up to this far beside it, m.
+_BESIDE_GEL = 2.0e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class Compliance:
+    """Answers of a sensor's surface to forces, SI units.
+
+    name : ``"biotac"`` or ``"digit"``
+    surface : the sensor's surface lattice, n nodes
+    touchable : (m,) int, surface nodes that can carry contact force
+    move : (3 r, 3 n) float32, m/N; row 3 i + k is the surface displacement under 1 N along axis k at the i-th of the r
+        touchable nodes with z >= 0, and mirrored that under the same force on its image (``answers``)
+    watch : (3 m, w) float32, m/N; motion of the watched inner points along their watch directions (BioTac only:
+        first the electrode feet, then the inner skin under the pad; toward the core is negative)
+    watch_gap : (w,) float64, m, their distance to electrode or core at rest
+    pressure : (3 m,) float64, Pa/N, fluid pressure under the same forces (zero for the gel)
+    inner_move : (w, 3 n) float32, m/N, surface displacement under 1 N at a watched point along its direction
+    inner_watch : (w, w) float32, m/N, motion of the watched points under the same forces
+    inner_pressure : (w,) float64, Pa/N, fluid pressure under them
+    feet : how many of the watched points, the first ones, are electrode feet; the core presses on the others
+    """
+
+    name: str
+    surface: Lattice
+    touchable: np.ndarray
+    move: np.ndarray
+    watch: np.ndarray
+    watch_gap: np.ndarray
+    pressure: np.ndarray
+    inner_move: np.ndarray
+    inner_watch: np.ndarray
+    inner_pressure: np.ndarray
+    feet: int = 0
+
+    @functools.cached_property
+    def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Row of ``move`` (m,) for each touchable node, whether it is the image's (m,) bool, and all images (n,)."""
+        image = mirror_nodes(self.surface.rest)
+        answered = answered_nodes(self.surface, self.touchable, image)
+        mirrored = self.surface.rest[self.touchable, 2] < -ON_PLANE
+        return np.searchsorted(answered, np.where(mirrored, image[self.touchable], self.touchable)), mirrored, image
+
+
+class Arrays(NamedTuple):
+    """What is computed and cached of a ``Compliance``."""
+
+    move: np.ndarray
+    watch: np.ndarray
+    watch_gap: np.ndarray
+    pressure: np.ndarray
+    inner_move: np.ndarray
+    inner_watch: np.ndarray
+    inner_pressure: np.ndarray
+
+
+@functools.cache
+def biotac_compliance() -> Compliance:
+    """The BioTac's skin over incompressible fluid; built in about a minute, then read from the cache."""
+    return _cached(_solid("biotac"))
+
+
+@functools.cache
+def digit_compliance() -> Compliance:
+    """The DIGIT's gel; built in about a minute, then read from the cache."""
+    return _cached(_solid("digit"))
+
+
+def compliance_of(sensor: str) -> Compliance:
+    """That of ``"biotac"`` or ``"digit"``."""
+    return biotac_compliance() if sensor == "biotac" else digit_compliance()
+
+
+class _Solid(NamedTuple):
+    """What a compliance is made of; touchable : (m,) surface nodes."""
+
+    name: str
+    lattice: Lattice
+    touchable: np.ndarray
+    mesh: HexMesh
+    material: Material
+
+
+def _solid(sensor: str) -> _Solid:
+    if sensor == "biotac":
+        return _Solid(sensor, sensors.biotac_surface(), _touchable_skin(), skin_mesh(), sensors.BIOTAC_SKIN)
+    lattice = sensors.digit_surface()
+    return _Solid(sensor, lattice, np.arange(len(lattice.rest)), gel_mesh(), sensors.DIGIT_GEL)
+
+
+class Stored(NamedTuple):
+    """Where a sensor's matrices are kept, or will be: bytes on disk, 0 before they are built.
+
+    surface, touchable, volume : how many nodes the surface has, can be touched, and the solid has
+    """
+
+    folder: pathlib.Path
+    bytes: int
+    surface: int
+    touchable: int
+    volume: int
+
+
+def stored(sensor: str) -> Stored:
+    """Of ``"biotac"`` or ``"digit"``; builds and loads nothing."""
+    solid = _solid(sensor)
+    folder = _folder(solid)
+    files = [folder / f"{array}.npy" for array in Arrays._fields]
+    size = sum(file.stat().st_size for file in files) if all(file.is_file() for file in files) else 0
+    return Stored(folder, size, len(solid.lattice.rest), len(solid.touchable), len(solid.mesh.nodes))
+
+
+def _touchable_skin() -> np.ndarray:
+    rolled = surface.unrolled_nodes()
+    x, z = rolled.T
+    near = (x > digit.X_TIP - _BESIDE_GEL) & (x < digit.X_BASE + _BESIDE_GEL)
+    return np.flatnonzero(near & (np.abs(z) < digit.HALF_WIDTH + _BESIDE_GEL))
+
+
+def _folder(solid: _Solid) -> pathlib.Path:
+    """Named by all that decides the arrays."""
+    name, lattice, touchable, mesh, material = solid
+    digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
+    watched = sensing_points_of(mesh)
+    # Rounded, and without a minus before zero, which differ between versions of numpy and scipy.
+    places = watched.rows, watched.columns, *(np.round(each * 1e9) + 0.0 for each in (watched.weights, watched.gap))
+    for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, *places):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return cache_folder() / f"compliance-{name}-{digest.hexdigest()[:16]}"
+
+
+def _cached(solid: _Solid) -> Compliance:
+    name, lattice, touchable, mesh, material = solid
+    folder = _folder(solid)
+    try:
+        loaded = _load(folder)
+    except (OSError, ValueError):  # not built yet, or cut short
+        log.info("building the compliance of the %s in %s (about a minute, once)", name, folder)
+        _claim(folder)
+        _store(folder, build(mesh, material, touchable, lattice)._asdict())
+        loaded = _load(folder)
+    return Compliance(name, lattice, touchable, *loaded, len(electrode_feet().gap) if len(mesh.inner) else 0)
+
+
+def _load(folder: pathlib.Path) -> Arrays:
+    read = (np.load(folder / f"{array}.npy", mmap_mode="r", allow_pickle=False) for array in Arrays._fields)
+    # A plain view: numpy's memory map class costs a microsecond at every slice.
+    return Arrays(*(array.view(np.ndarray) for array in read))
+
+
+def _claim(folder: pathlib.Path) -> None:
+    """Find out before the long build whether its result can be kept."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "probe").touch()
+        (folder / "probe").unlink()
+    except OSError as error:
+        found = f"cannot be written ({error.strerror})"
+        raise TactileError(folder, found, "a folder for 300 MB", "Name one in TACTILE_CACHE") from error
+
+
+def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write arrays whole or not at all; two processes that build at once write the same bytes."""
+    try:
+        for name, values in arrays.items():
+            with atomic.new_file(folder / f"{name}.npy") as partial, open(partial, "wb") as file:
+                np.save(file, values)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror})"
+        raise TactileError(folder, found, "room for 300 MB", "Make room, or name a folder in TACTILE_CACHE") from error
+
+
+def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lattice) -> Arrays:
+    """The arrays of a ``Compliance``, from a solid that is even in z.
+
+    touchable : (m,) surface nodes that may carry force. Raises ValueError for a solid without mirror symmetry or held
+    nowhere, TactileError where the memory does not suffice.
+    """
+    watched = sensing_points_of(mesh)
+    watch, watch_gap = watched.dense(3 * len(mesh.nodes)), watched.gap
+    source, mirrored = images(mesh, watch.shape[1])
+    kept = np.unique(source)
+    loads, column, sign = watch[:, kept], np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
+    if len(mesh.inner):
+        loads = np.column_stack([loads, _volume_gradient(mesh)])
+        column, sign = np.r_[column, len(kept)], np.r_[sign, 1.0]
+    half = np.flatnonzero(lattice.rest[:, 2] >= -ON_PLANE)
+    try:
+        even, odd = (condense(mesh, material, mesh.surface[half], loads, parity) for parity in (1, -1))
+        image = mirror_nodes(lattice.rest)
+        place, answered = MirrorSymmetry(half, image), answered_nodes(lattice, touchable, image)
+        move = place.forces(even.answer, odd.answer, answered)
+        inner_move = place.loads(even.under_loads, odd.under_loads, column, sign)
+        every = np.ix_(column, column)
+        among = even.among[every] + odd.among[every] * np.outer(sign, sign)
+        inner_pressure, pressure = np.zeros(watch.shape[1]), np.zeros(3 * len(touchable))
+        touch_dofs = axes_of(touchable)
+        if len(mesh.inner):  # the fluid keeps its volume: its pressure is one more force, and takes one more row away
+            swell, stiffness = inner_move[-1], 1 / among[-1, -1]
+            inner_pressure, pressure = -stiffness * among[-1, :-1], -stiffness * swell[touch_dofs]
+            on_answered = -stiffness * swell[axes_of(answered)]
+            for start in range(0, len(move), 512):  # in blocks: the whole outer product would double the memory
+                part = slice(start, start + 512)
+                move[part] += np.outer(on_answered[part], swell).astype(np.float32)
+            inner_move = inner_move[:-1] + np.outer(inner_pressure, swell)
+            among = among[:-1, :-1] + np.outer(inner_pressure, among[-1, :-1])
+        watch = np.ascontiguousarray(inner_move[:, touch_dofs].T, np.float32)
+    except MemoryError as error:
+        raise TactileError("compliance", "out of memory", "2 GB of free memory", "Close other programs") from error
+    inner = inner_move.astype(np.float32), among.astype(np.float32), inner_pressure
+    return Arrays(move, watch, watch_gap, pressure, *inner)
+
+
+def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
+    """Surface nodes (r,) with z >= 0 whose answers also serve their mirror images: of every touchable node one."""
+    return np.unique(np.where(lattice.rest[touchable, 2] >= -ON_PLANE, touchable, image[touchable]))
+
+
+def _volume_gradient(mesh: HexMesh) -> np.ndarray:
+    """d(fluid volume) / d(node) (3 n_nodes,), m2, at rest."""
+    return FluidCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)

@@ -1,0 +1,65 @@
+"""Entries of a sensor's large compliance among the nodes near an indenter, each gathered when it is first asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compliance import Compliance
+from .mirror_symmetry import axes_of
+from .surface_response import runs
+
+
+class ComplianceRows:
+    """What nodes near an indenter do under forces on some of them. ``near`` (n,) are sorted touchable indices."""
+
+    def __init__(self, compliance: Compliance, near: np.ndarray) -> None:
+        self.compliance, self.near = compliance, near
+        row, self._mirrored, image = compliance.answers
+        self._row, self._mirrored = row[near], self._mirrored[near]
+        at = compliance.touchable[near]
+        self._columns, self._mirrored_columns = axes_of(at), axes_of(image[at])
+        self._entries = np.empty((3 * len(near), 3 * len(near)), np.float32)
+        self._known = np.zeros(len(near), bool)
+
+    def block(self, nodes: np.ndarray) -> np.ndarray:
+        """Compliance (3 k, 3 k) float32 m/N among sorted touchable nodes (k,), all of them near ones."""
+        return self._rows(nodes).take(axes_of(np.searchsorted(self.near, nodes)), axis=1)
+
+    def watched(self, nodes: np.ndarray, inner: np.ndarray) -> np.ndarray:
+        """Motion (3 k, c) float32 m/N of watched points (c,) under forces on touchable nodes (k,)."""
+        return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
+
+    def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
+        """Displacement (n, 3) m of the near nodes under forces (k, 3) N at sorted, single near ones and (c,) N at
+        watched points."""
+        moved = np.zeros(3 * len(self.near), np.float32)
+        if len(nodes):
+            moved += force.ravel().astype(np.float32) @ self._rows(nodes)
+        if len(inner):
+            moved += inner_force.astype(np.float32) @ self.compliance.inner_move[inner[:, None], self._columns]
+        return moved.reshape(-1, 3).astype(float)
+
+    def _rows(self, nodes: np.ndarray) -> np.ndarray:
+        """Rows (3 k, 3 n) of nodes (k,)."""
+        at = np.searchsorted(self.near, nodes)
+        new = at[~self._known[at]]
+        if len(new):
+            new = np.unique(new)  # a node may stand twice
+            self._known[new] = True
+            mirrored = self._mirrored[new]
+            direct, turned = new[~mirrored], new[mirrored]
+            self._entries[axes_of(direct)] = self._gathered(self._row[direct], self._columns)
+            turned = turned[np.argsort(self._row[turned], kind="stable")]
+            answer = self._gathered(self._row[turned], self._mirrored_columns)
+            answer[:, 2::3] *= -1
+            answer[2::3] *= -1
+            self._entries[axes_of(turned)] = answer
+        return self._entries.take(axes_of(at), axis=0)
+
+    def _gathered(self, row: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Entries (3 k, j) of three rows of the large matrix for each of sorted ``row`` (k,), in ``columns`` (j,)."""
+        answer = np.empty((3 * len(row), len(columns)), np.float32)
+        for start, stop, first, last in runs(row) if len(row) else ():
+            rows = self.compliance.move[3 * first : 3 * last]
+            rows.take(columns, axis=1, out=answer[3 * start : 3 * stop], mode="clip")
+        return answer

@@ -1,0 +1,156 @@
+"""A solid condensed to its surface: dense elimination of everything else, cell group by cell group.
+
+The solid is even in z, so it falls apart into two halves of half the unknowns, moving evenly and oddly; the groups of
+cells form a tree, and each unknown inside goes where the last cell that holds it joins: the multifrontal method
+(I. Duff, J. Reid, ACM Trans. Math. Software 9, 1983, 302-325). Nearly all work is products of large dense matrices.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...sensors import Material
+from ..solids.elasticity import cell_stiffness
+from ..solids.hex_mesh import HexMesh
+
+_LEAF = 8  # cells a group: smaller groups cost calls, larger ones dense work on zeros
+_SAME_PLACE = 1e-8  # m, between a node and the mirror image of its partner
+_MIRROR = np.array([1.0, 1.0, -1.0])
+
+
+@dataclasses.dataclass(frozen=True)
+class Half:
+    """The even (or odd) motion of a solid, by the nodes ``keep`` (k,) with z >= 0.
+
+    answer : (3 k, 3 k) m/N, motion of the kept nodes under unit forces on them; zero where nothing can move
+    under_loads : (3 k, w), their motion under the given loads; among : (w, w), work of the loads on one another's
+    motion"""
+
+    keep: np.ndarray
+    answer: np.ndarray
+    under_loads: np.ndarray
+    among: np.ndarray
+
+
+def mirror_nodes(nodes: np.ndarray) -> np.ndarray:
+    """The node (n,) that is each node's image under z -> -z. Raises ValueError where one has none."""
+    from scipy.spatial import cKDTree
+
+    away, image = cKDTree(nodes).query(nodes * _MIRROR)
+    if away.max() > _SAME_PLACE:
+        raise ValueError("the solid is not mirror symmetric: some nodes have no image")
+    return image
+
+
+def condense(mesh: HexMesh, material: Material, keep: np.ndarray, loads: np.ndarray, parity: int) -> Half:
+    """The even (``parity`` 1) or odd (-1) half of a solid, condensed to the nodes ``keep`` (k,) with z >= 0.
+
+    loads : (3 n_nodes, w), unit loads anywhere. Raises ValueError for a solid that is not even in z.
+    """
+    tree = _Elimination(mesh, material, keep, loads, parity)
+    dofs, stiffness = tree.group(np.arange(len(tree.cells)))
+    from scipy.linalg import lapack
+
+    factor, failed = lapack.dpotrf(stiffness, lower=1, overwrite_a=1)
+    if failed:
+        raise ValueError("the stiffness is singular: is the solid held anywhere?")
+    inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    place = np.full(tree.free, -1)
+    place[dofs] = np.arange(len(dofs))
+    held = tree.number[(3 * keep[:, None] + np.arange(3)).ravel()]
+    known = held >= 0
+    rows = place[held[known]]
+    answer = np.zeros((len(held), len(held)), np.float32)
+    answer[np.ix_(known, known)] = inverse[np.ix_(rows, rows)]
+    load = tree.loads[dofs]
+    moved = inverse @ load
+    under_loads = np.zeros((len(held), loads.shape[1]))
+    under_loads[known] = moved[rows]
+    return Half(keep, answer, under_loads, tree.among + load.T @ moved)
+
+
+class _Elimination:
+    """One half of the solid on its way to the kept nodes."""
+
+    def __init__(self, mesh: HexMesh, material: Material, keep: np.ndarray, loads: np.ndarray, parity: int) -> None:
+        image = mirror_nodes(mesh.nodes)
+        z = mesh.nodes[:, 2]
+        plane = image == np.arange(len(z))
+        speaks = (z >= 0) | plane
+        stands = np.where(speaks, np.arange(len(z)), image)
+        sign = np.where(speaks[:, None], 1.0, parity * _MIRROR)
+        moves = (speaks & ~mesh.clamped)[:, None] & ~(plane[:, None] & (parity * _MIRROR < 0))
+        self.number = np.where(moves, np.cumsum(moves.ravel()).reshape(moves.shape) - 1, -1).ravel()
+        self.free = int(moves.sum())
+        own = (3 * stands[:, None] + np.arange(3)).ravel()
+        self.dof, self.sign = self.number[own], sign.ravel()
+        self.loads = np.zeros((self.free, loads.shape[1]))
+        known = self.dof >= 0
+        if loads.shape[1]:
+            np.add.at(self.loads, self.dof[known], self.sign[known, None] * loads[known])
+        self.among = np.zeros((loads.shape[1],) * 2)
+        middle = mesh.nodes[mesh.cells].mean(axis=1)
+        chosen = middle[:, 2] > -1e-9
+        self.cells, self.middle = mesh.cells[chosen], middle[chosen]
+        twice = np.where(self.middle[:, 2] > 1e-9, 2.0, 1.0)  # a cell and its image, or one that is its own
+        self.stiffness = cell_stiffness(mesh.nodes[self.cells], material) * twice[:, None, None]
+        self.kept = np.zeros(self.free, bool)
+        held = self.number[(3 * keep[:, None] + np.arange(3)).ravel()]
+        self.kept[held[held >= 0]] = True
+        self.uses = np.zeros(self.free, int)
+        for cell in self.cells:
+            self.uses[np.unique(self._cell_dofs(cell)[0])] += 1
+
+    def _cell_dofs(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        full = (3 * cell[:, None] + np.arange(3)).ravel()
+        local = np.flatnonzero(self.dof[full] >= 0)
+        return self.dof[full[local]], self.sign[full[local]], local
+
+    def group(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Unknowns (n,) that a group of cells shares with others, or keeps, and its stiffness among them (n, n)."""
+        if len(cells) <= _LEAF:
+            parts = []
+            for c in cells:
+                dofs, sign, local = self._cell_dofs(self.cells[c])
+                single, inverse = np.unique(dofs, return_inverse=True)
+                fold = np.zeros((len(dofs), len(single)))
+                fold[np.arange(len(dofs)), inverse] = sign
+                parts.append((single, fold.T @ self.stiffness[c][np.ix_(local, local)] @ fold))
+        else:
+            middle = self.middle[cells]
+            order = cells[np.argsort(middle[:, np.argmax(np.ptp(middle, axis=0))], kind="stable")]
+            parts = [self.group(order[: len(order) // 2]), self.group(order[len(order) // 2 :])]
+        return self._eliminate(cells, parts)
+
+    def _eliminate(self, cells: np.ndarray, parts: list) -> tuple[np.ndarray, np.ndarray]:
+        from scipy.linalg import lapack, solve_triangular
+
+        uses = np.zeros(self.free, int)
+        for c in cells:
+            uses[np.unique(self._cell_dofs(self.cells[c])[0])] += 1
+        dofs = np.unique(np.concatenate([part[0] for part in parts]))
+        inside = (uses[dofs] == self.uses[dofs]) & ~self.kept[dofs]
+        dofs = np.concatenate([dofs[inside], dofs[~inside]])
+        place = np.empty(self.free, int)
+        place[dofs] = np.arange(len(dofs))
+        front = np.zeros((len(dofs), len(dofs)))
+        while parts:
+            own, stiffness = parts.pop(0)
+            at = place[own]
+            front[np.ix_(at, at)] += stiffness
+        n = int(inside.sum())
+        if n == 0:
+            return dofs, front
+        factor, failed = lapack.dpotrf(front[:n, :n], lower=1)
+        if failed:
+            raise ValueError("a cell's stiffness is not positive definite")
+        carried = solve_triangular(factor, front[:n, n:], lower=True, check_finite=False)
+        rest = front[n:, n:] - carried.T @ carried
+        if self.loads.shape[1]:
+            load = solve_triangular(factor, self.loads[dofs[:n]], lower=True, check_finite=False)
+            self.loads[dofs[n:]] -= carried.T @ load
+            self.among += load.T @ load
+        return dofs[n:], rest

@@ -1,0 +1,300 @@
+"""Contact of a rigid indenter with a sensor's surface, solved on its compliance; every result is checked.
+
+Only nodes that the indenter may touch enter a solve; all nodes near it are then displaced and looked at, and those that
+would go through it, or inner skin that would go through the core, are taken in and the solve goes on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from ...geometry.indenters import Indenter, Pose
+from ..penetration import check_follows
+from ..pose_path import between, same_place
+from . import surface_response
+from .active_set import UnsolvedError
+from .candidates import Candidates
+from .compliance import Compliance
+from .compliance_block import ComplianceBlock
+from .compliance_rows import ComplianceRows
+from .contact_state import Contact, sideways_share
+from .friction import Friction
+from .frictionless import Frictionless, Try
+from .projection import first_contact, project
+
+PENETRATION = 1e-6  # m, what MECHANICS allows at any node
+_REACH = 0.8e-3  # m, nodes this far outside the indenter at the end of a solve may come to touch it
+_SPARE = 0.15e-3  # m, by which more nodes are followed than that, so that a deeper contact needs no others (assumed)
+_LARGE = 2.5  # times what is wanted: so many nodes followed cost more than a fresh start (assumed)
+_TAKE_IN = 20e-6  # m: where some nodes go through the indenter, those this close to it are taken in with them
+_CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps vary more
+_CLOSED = 0.3e-6  # m: gaps closed to this need no further look
+_MOST_ROUNDS = 12  # of taking in nodes
+_DETOURS = (4, 9, 20)  # steps from the start to the goal, where one does not settle: other steps pass other edges
+_LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest overlap are first taken to touch
+
+
+class _Around(NamedTuple):
+    """What a contact does to the nodes near it: displacement (n, 3) m, gaps (n,) m; gaps (g,) m of skin and core."""
+
+    moved: np.ndarray
+    gap: np.ndarray
+    core_gap: np.ndarray
+
+
+class ContactProblem:
+    """An indenter in front of one sensor; solves for depths, for forces along the motion, and for other poses.
+
+    Nodes are followed only where the indenter can reach them, ``reach`` m in from the pose at depth 0.
+    friction : Coulomb's coefficient; with it a contact depends on the one it goes on from, and on the steps between.
+    """
+
+    def __init__(
+        self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, friction: float = 0.0
+    ) -> None:
+        self.compliance, self.indenter, self.pose, self.friction = compliance, indenter, pose, friction
+        self._rest = self._resting()
+        self._block: ComplianceBlock | None = None
+        self._rows = ComplianceRows(compliance, np.empty(0, int))
+        self._look_near(pose.moved(reach))
+
+    def _resting(self) -> np.ndarray:
+        """Where what may touch rests: the touchable nodes (m, 3) m."""
+        return self.compliance.surface.rest[self.compliance.touchable]
+
+    def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
+        """The contact at a given depth, m, going on from ``start`` where there is one."""
+        return self._walk(self.pose.moved(depth), None, start)
+
+    def at_force(self, axial_force: float, start: Contact) -> Contact:
+        """The contact whose force along the motion is ``axial_force`` N, in or out from where ``start`` stands."""
+        return self._walk(start.pose, axial_force, start)
+
+    def at_pose(self, pose: Pose, start: Contact | None = None, axial_force: float | None = None) -> Contact:
+        """The contact of the indenter at another pose, moved there from ``start`` in one step.
+
+        axial_force : N; with it the indenter then moves along its own direction until it bears that force
+        """
+        self._look_near(pose, start)
+        return self._walk(pose, axial_force, start)
+
+    def check_follows(self, contact: Contact) -> None:
+        """Raise SunkError where the indenter has sunk in between the surface's nodes."""
+        surface, deformed = self.compliance.surface, contact.deformed
+        _, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable[contact.nodes]])
+        where, grid = f"fast tier, {self.compliance.name}", surface.grid(deformed)
+        check_follows(where, grid, self.indenter, contact.pose, contact.depth, normals, closed=surface.closed)
+
+    def _look_near(self, pose: Pose, start: Contact | None = None) -> None:
+        """Follow the nodes that the indenter may reach at a pose, and those that ``start`` touched."""
+        wanted = self._within(pose, _REACH)
+        touched = np.empty(0, int) if start is None else start.nodes
+        if len(self.near) > _LARGE * len(wanted) or not (
+            _among(wanted, self.near).all() and _among(touched, self.near).all()
+        ):
+            near = wanted if start is None else np.union1d(self._within(pose, _REACH + _SPARE), touched)
+            self._rows = self._rows_of(near)
+
+    def _rows_of(self, near: np.ndarray) -> ComplianceRows:
+        return ComplianceRows(self.compliance, near)
+
+    def _within(self, pose: Pose, reach: float) -> np.ndarray:
+        """Sorted touchable indices (k,) of the resting nodes that lie less than ``reach`` m outside the indenter."""
+        nodes, _ = self.compliance.surface.blocks.near(self.indenter, pose, reach)
+        touchable = self.compliance.touchable
+        return np.searchsorted(touchable, nodes[_among(nodes, touchable)])
+
+    @property
+    def near(self) -> np.ndarray:
+        """(n,) sorted touchable indices of the nodes that are followed."""
+        return self._rows.near
+
+    @property
+    def nodes_near(self) -> np.ndarray:
+        """The nodes among them."""
+        return self.near
+
+    def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
+        """Solve in one step, or where that does not settle by a detour."""
+        contact = self._solve(pose, axial_force, start)
+        for steps in _DETOURS:
+            if contact.converged:
+                break
+            contact = self._steps(pose, axial_force, start, steps)
+        return contact
+
+    def _steps(self, pose: Pose, axial_force: float | None, start: Contact | None, steps: int) -> Contact:
+        """Go from the start to the goal in several steps."""
+        first = contact = start or self._nothing(self.pose)
+        for share in np.arange(1, steps + 1) / steps:
+            goal = None if axial_force is None else first.axial_force + share * (axial_force - first.axial_force)
+            there = between(first.pose, pose, share)
+            if axial_force is not None and same_place(first.pose, pose):
+                there = contact.pose  # only the force grows: each step starts as deep as the last one ended
+            contact = self._solve(there, goal, contact)
+        return contact
+
+    def _solve(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
+        before = start or self._nothing(self.pose)
+        moved = self._moved(before)
+        gap, _ = self._distance(pose, self.near, moved)
+        touched = np.zeros(len(gap), bool)
+        touched[np.searchsorted(self.near, before.nodes)] = True
+        touched &= gap < _REACH
+        take = (gap < _way_in(before, axial_force)) | touched
+        if not take.any():
+            return self._nothing(pose, converged=axial_force is None)
+        active = touched[take] | (gap[take] < min(_LIKELY * gap.min(), 0))
+        far = 0.1e-3 + float(np.linalg.norm(pose.apex - before.pose.apex))
+        landed, inside = moved[take], gap[take] < -_CLOSED
+        if inside.any():
+            landed[inside] += project(self.indenter, pose, self._rest[self.near[take][inside]] + landed[inside], far)
+        candidates = Candidates(
+            self.near[take], landed, np.zeros_like(landed), active, before.core_nodes, np.zeros(len(active), int)
+        )
+        return self._rounds(pose, axial_force, before, moved, candidates)
+
+    def _distance(self, pose: Pose, nodes: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps (k,) m and normals (k, 3) of the indenter at nodes (k,) displaced by (k, 3) m."""
+        return pose.distance(self.indenter, self._rest[nodes] + moved)
+
+    def _moved(self, contact: Contact) -> np.ndarray:
+        """Displacement (n, 3) m of the near nodes in a contact."""
+        return self._rows.moved(contact.nodes, contact.nodal_force, contact.core_nodes, contact.core_force)
+
+    def _rounds(self, pose: Pose, axial_force: float | None, before: Contact, moved, candidates: Candidates) -> Contact:  # noqa: ANN001
+        """Solve, look at the whole surface, take in what it shows, until nothing more is found."""
+        iterations, shift, contact = 0, 0.0, None
+        for _ in range(_MOST_ROUNDS):
+            state = self._iterate(pose, axial_force, before, moved, candidates, shift)
+            if state is None:
+                return self._nothing(pose, iterations=iterations + 1, converged=False)
+            iterations, shift = iterations + state.iterations, state.shift
+            candidates.go_on(state.displacement, state.active)
+            there, rest = pose.moved(shift), self._rest[candidates.nodes]
+            if state.creases is not None:
+                candidates.split(*state.creases, self.indenter, there, rest)
+                continue
+            contact, around = self._result(there, state, candidates, iterations)
+            if not state.settled or not self._take_in(candidates, around):
+                return contact
+        return dataclasses.replace(contact, converged=False)
+
+    def _iterate(self, pose, axial_force, before, moved, candidates, shift) -> Try | None:  # noqa: ANN001
+        block = self._block
+        if block is None or not (
+            np.array_equal(block.nodes, candidates.nodes) and np.array_equal(block.inner, candidates.inner)
+        ):
+            block = self._block = ComplianceBlock(self.compliance, candidates.nodes, candidates.inner, self._rows)
+        rest = self._rest[candidates.nodes]
+        active = np.r_[candidates.active, np.ones(block.c, bool)]
+        begin = Try(candidates.displacement, np.zeros_like(rest), np.zeros(block.c), shift, active)
+        core_gap = self.compliance.watch_gap[candidates.inner].astype(float)
+        if self.friction == 0:
+            solver = self._frictionless(block, rest, core_gap, pose, candidates)
+        else:
+            begin.force, begin.slipping = _borne(before, candidates.nodes)
+            spots = self._spots(before, moved, pose, candidates.nodes)
+            solver = Friction(block, rest, core_gap, self.indenter, pose, spots, self.friction)
+        try:
+            return solver.solve(begin, axial_force)
+        except UnsolvedError:
+            return None
+
+    def _frictionless(
+        self, block: ComplianceBlock, rest: np.ndarray, core_gap: np.ndarray, pose: Pose, candidates: Candidates
+    ) -> Frictionless:
+        return Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
+
+    def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
+        """Where nodes (k,) stick on the indenter, (k, 3) m in its frame: where they were, or where they meet it."""
+        points = self._rest[nodes] + moved[np.searchsorted(self.near, nodes)]
+        spots, new = before.pose.to_own(points), ~_among(nodes, before.nodes)
+        if pose is not before.pose:
+            spots[new] = first_contact(self.indenter, spots[new], pose.to_own(points[new]))
+        return spots
+
+    def _take_in(self, candidates: Candidates, around: _Around) -> bool:
+        """Let the nodes enter that the solved contact lets through the indenter or the core; whether there are any."""
+        outside = np.ones(len(self.near), bool)
+        outside[np.searchsorted(self.near, candidates.nodes)] = False
+        found = bool(around.gap[outside].min(initial=0.0) < -_CLOSED)
+        if found:
+            new = outside & (around.gap < _TAKE_IN)
+            candidates.add(self.near[new], around.moved[new], np.zeros((int(new.sum()), 3)))
+        if around.core_gap.min(initial=0.0) < -_CLOSED:
+            close = self.compliance.feet + np.flatnonzero(around.core_gap < _CORE_TAKE_IN)
+            inner = np.union1d(candidates.inner, close)
+            found |= len(inner) > len(candidates.inner)
+            candidates.inner = inner
+        return found
+
+    def _nothing(self, pose: Pose, *, converged: bool = True, iterations: int = 0) -> Contact:
+        """No contact, or one that was not found."""
+        none, depth = np.empty(0, int), float((pose.apex - self.pose.apex) @ pose.direction)
+        return Contact(
+            self.compliance, pose, depth, np.zeros(3), 0.0, none, np.zeros((0, 3)), np.zeros(0, bool), converged,
+            iterations, none, np.zeros(0), 0.0, 0.0,
+        )  # fmt: skip
+
+    def _result(self, pose: Pose, state: Try, candidates: Candidates, iterations: int) -> tuple[Contact, _Around]:
+        touching, pressed, slips = _single(candidates.nodes, state)
+        nodes, force, slipping = self._on_nodes(touching, pressed, slips)
+        presses = state.core_force > 0
+        inner, inner_force = candidates.inner[presses], state.core_force[presses]
+        moved = self._place(touching, pressed, self._rows.moved(nodes, force, inner, inner_force))
+        gap, normal = self._distance(pose, self.near, moved)
+        sideways = sideways_share(pressed, normal[np.searchsorted(self.near, touching)])
+        core = surface_response.sensing_gaps(self.compliance, nodes, force, inner, inner_force)[self.compliance.feet :]
+        penetration = max(-float(gap.min(initial=0.0)), -float(core.min(initial=0.0)))
+        total = force.sum(axis=0)
+        contact = Contact(
+            self.compliance, pose, float((pose.apex - self.pose.apex) @ pose.direction), total,
+            float(total @ pose.direction), nodes, force, slipping, state.settled and penetration <= PENETRATION,
+            iterations, inner, inner_force, penetration, sideways,
+        )  # fmt: skip
+        return contact, _Around(moved, gap, core)
+
+    def _on_nodes(self, touching: np.ndarray, force: np.ndarray, slipping: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The nodes (k,) that carry what touches, (k, 3) N, and whether they slip (k,)."""
+        return touching, force, slipping
+
+    def _place(self, touching: np.ndarray, force: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """Displacement (n, 3) m of what may touch, from that of the surface there."""
+        return moved
+
+
+def _single(nodes: np.ndarray, state: Try) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes (k,) that carry force, each once, their forces (k, 3) N, and whether they slip (k,)."""
+    force, slipping = state.force, state.slipping
+    if (nodes[1:] == nodes[:-1]).any():
+        first = np.flatnonzero(np.diff(nodes, prepend=-1))
+        nodes, force, slipping = nodes[first], np.add.reduceat(force, first), slipping[first]
+    carries = force.any(axis=1)
+    return nodes[carries], force[carries], slipping[carries]
+
+
+def _way_in(before: Contact, axial_force: float | None) -> float:
+    """About how much deeper, m, an indenter will stand when its force grows from that of ``before``: Hertz's law."""
+    if axial_force is None or before.axial_force <= 0 or before.depth <= 0:
+        return 0.0
+    return min(before.depth * max((axial_force / before.axial_force) ** (2 / 3) - 1, 0.0), _REACH / 2)
+
+
+def _borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (k, 3) N that nodes (k,) bore in a contact, and which of them slipped (k,)."""
+    force, slipping = np.zeros((len(nodes), 3)), np.zeros(len(nodes), bool)
+    same = _among(nodes, before.nodes)
+    at = np.searchsorted(before.nodes, nodes[same])
+    force[same], slipping[same] = before.nodal_force[at], before.slipping[at]
+    return force, slipping
+
+
+def _among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Which of the nodes (k,) are among sorted others (j,): (k,) bool; a few times quicker than ``np.isin``."""
+    if not len(others):
+        return np.zeros(len(nodes), bool)
+    return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes

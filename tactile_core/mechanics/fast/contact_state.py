@@ -1,0 +1,76 @@
+"""One solved contact of an indenter with a sensor's surface."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ...geometry.indenters import Pose
+from . import surface_response
+from .compliance import Compliance
+
+
+@dataclasses.dataclass(frozen=True)
+class Contact:
+    """One solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
+
+    pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
+    force : (3,); axial_force : its part along the motion
+    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3), with what is pushed between nodes as loads on
+        those whose cubic interpolation it is, some of them small and outward
+    slipping : (k,) bool, nodes whose friction is spent; without friction all
+    converged : whether it may be used; iterations : linearised problems solved for it
+    core_nodes : (c,) watched inner points that press on the core; core_force : (c,), on the skin, away from the core
+    penetration : m, deepest place of a node in the indenter or of the inner skin in the core
+    sideways : nodal forces across the indenter's normals over the whole force: 0 without friction
+    """
+
+    compliance: Compliance = dataclasses.field(repr=False)
+    pose: Pose
+    depth: float
+    force: np.ndarray
+    axial_force: float
+    nodes: np.ndarray
+    nodal_force: np.ndarray
+    slipping: np.ndarray
+    converged: bool
+    iterations: int
+    core_nodes: np.ndarray
+    core_force: np.ndarray
+    penetration: float
+    sideways: float
+
+    @functools.cached_property
+    def displacement(self) -> np.ndarray:
+        """(n, 3) float32, of the whole surface; computed where it is first asked for."""
+        return surface_response.displacement(
+            self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
+        )
+
+    @property
+    def deformed(self) -> np.ndarray:
+        """(n, 3) m, where the surface's nodes are."""
+        return self.compliance.surface.rest + self.displacement
+
+    @property
+    def watched_gaps(self) -> np.ndarray:
+        """(w,) m, of the watched points: 19 electrodes, then inner skin over the core."""
+        return surface_response.sensing_gaps(
+            self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
+        )
+
+    @property
+    def fluid_pressure(self) -> float:
+        """Pa, by which the fluid's has risen."""
+        at_nodes = self.compliance.pressure.reshape(-1, 3)[self.nodes]
+        at_core = self.compliance.inner_pressure[self.core_nodes]
+        return float((self.nodal_force * at_nodes).sum() + self.core_force @ at_core)
+
+
+def sideways_share(force: np.ndarray, normal: np.ndarray) -> float:
+    """Forces (k, 3) N across the normals (k, 3) there, over the whole force."""
+    size = np.linalg.norm(force.sum(axis=0))
+    across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
+    return float(np.linalg.norm(across) / size) if size else 0.0

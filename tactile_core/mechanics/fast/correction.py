@@ -1,0 +1,272 @@
+"""What the fast tier's linear model leaves out, learned from the full tier: a factor of force and a field of shape.
+
+Both are smooth functions of what a fast contact looks like (depth, patch, place, lean, fluid), found by kernel ridge
+regression; nothing depends on which indenter it was. The field is a sum of a few learned fields in a frame that moves
+with the contact and is scaled by its size. See ``learn_correction`` for how they are made.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import sensors
+from ...files.shipped import shipped
+from ...sensors import biotac, unrolling
+from ...sensors import digit as digit_shape
+from .compliance import Compliance
+from .contact_state import Contact
+
+REACH = 12.0  # patch radii, how far the learned fields go; they fade over the last of their cells
+LINES = 33  # of their grid, even in asinh(distance / radius): fine at the patch, coarse far from it
+_SMALLEST_RADIUS = 0.3e-3  # m, added to a patch's: one touching node has a size, too
+# Nodal forces across the normals, over the whole force: 0.0001 without friction (0.04 at most); 0.027 at
+# least with 0.78, of 1,187 contacts of nine indenters.
+_SIDEWAYS, _STILL, _RUBS = 19, 0.005, 0.025
+_ALIKE = 1.0  # on presses kept apart 0.5 and 3 did as well; with 0 forces with friction were a fifth farther off
+# Features that a force is told from, twice: the mean of both was nearer on presses kept apart than either.
+ALL, ESSENTIAL = slice(None), np.array([0, 2, 4, 15, 16, 18, 19])  # depth, force, radius, core, ..., friction
+FILE = "mechanics_correction.npz"
+
+
+@dataclasses.dataclass(frozen=True)
+class Frame:
+    """A frame that moves with a contact: centre (2,) m in unrolled coordinates, radius m of its patch."""
+
+    centre: np.ndarray
+    radius: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Learned:
+    """A sensor's correction, with friction or without. f features, n supports, k fields on a grid of g = LINES x LINES.
+
+    shift, scale : (f,) of the features; supports : (n, f) scaled features; support_rubs : (n,), see ``rubs``
+    widths : (3,), of the kernels of force on all features, on the ``ESSENTIAL`` ones, and of fields
+    force_weights : (2, n), of the logarithm of the force's factor, whose mean it is; field_weights : (n, k)
+    fields : (k, g, 3), per metre of depth, in the surface's own frames
+    trust : (bins, 3), depth over thickness, and how much of the predicted logarithm and field is applied there, 0 to 1
+    """
+
+    shift: np.ndarray
+    scale: np.ndarray
+    supports: np.ndarray
+    support_rubs: np.ndarray
+    widths: np.ndarray
+    force_weights: np.ndarray
+    field_weights: np.ndarray
+    fields: np.ndarray
+    trust: np.ndarray
+
+    def log_factor(self, features: np.ndarray) -> float:
+        """Logarithm of the force's factor."""
+        every = self._near(features, ALL, self._all, self.widths[0]) @ self.force_weights[0]
+        few = self._near(features, ESSENTIAL, self._few, self.widths[1]) @ self.force_weights[1]
+        return self._trusted(features, 1) * float(every + few) / 2
+
+    def field(self, features: np.ndarray) -> np.ndarray:
+        """The correction on the grid (g, 3), per metre of depth."""
+        near = self._near(features, ALL, self._all, self.widths[2])
+        return self._trusted(features, 2) * np.tensordot(near @ self.field_weights, self.fields, 1)
+
+    def _near(self, features: np.ndarray, parts: slice | np.ndarray, supports: _Supports, width: float) -> np.ndarray:
+        scaled = ((features - self.shift) / self.scale)[None, parts]
+        return kernel(scaled, *supports, width)[0] * alike(rubs(features), self.support_rubs)
+
+    @functools.cached_property
+    def _all(self) -> _Supports:
+        return _Supports(self.supports, squares(self.supports))
+
+    @functools.cached_property
+    def _few(self) -> _Supports:
+        few = np.ascontiguousarray(self.supports[:, ESSENTIAL])
+        return _Supports(few, squares(few))
+
+    def _trusted(self, features: np.ndarray, column: int) -> float:
+        return float(np.interp(features[0], self.trust[:, 0], self.trust[:, column]))
+
+
+@dataclasses.dataclass(frozen=True)
+class Correction:
+    """One sensor's: ``still`` without friction, ``rubbing`` with the coefficient of 0.78, between them in between."""
+
+    still: Learned
+    rubbing: Learned
+
+    def factor(self, features: np.ndarray) -> float:
+        """Factor of the force."""
+        return float(np.exp(self._blend(features, Learned.log_factor)))
+
+    def field(self, features: np.ndarray) -> np.ndarray:
+        """See ``Learned``."""
+        return self._blend(features, Learned.field)
+
+    def _blend(self, features: np.ndarray, of: Callable) -> np.ndarray | float:
+        share = float(rubs(features))
+        of_still = of(self.still, features) if share < 1 else 0.0
+        return of_still if share == 0 else (1 - share) * of_still + share * of(self.rubbing, features)
+
+
+class _Supports(NamedTuple):
+    """Scaled features (n, j) and their ``squares``."""
+
+    features: np.ndarray
+    squares: np.ndarray
+
+
+def squares(features: np.ndarray) -> np.ndarray:
+    """Sums (n,) of the squares of scaled features (n, f)."""
+    return (features**2).sum(axis=1)
+
+
+def kernel(a: np.ndarray, b: np.ndarray, b_squares: np.ndarray, width: float) -> np.ndarray:
+    """Inverse multiquadric and linear kernel (n, m) of scaled features (n, f) and (m, f): smooth, and tame far out."""
+    products = a @ b.T
+    apart = squares(a)[:, None] + b_squares - 2 * products
+    return 1 / np.sqrt(1 + np.maximum(apart, 0) / width**2) + 0.1 * (products / a.shape[1] + 1)
+
+
+def rubs(features: np.ndarray) -> np.ndarray:
+    """Whether contacts of features (..., f) have friction: 0 without it, 1 with as much as was learned from."""
+    return np.clip((features[..., _SIDEWAYS] - _STILL) / (_RUBS - _STILL), 0.0, 1.0)
+
+
+def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Factor of the kernel between contacts that ``rubs`` so: contacts with friction tell most about each other."""
+    return 1 + _ALIKE * (a * b + (1 - a) * (1 - b))
+
+
+@functools.cache
+def plane(sensor: str) -> np.ndarray:
+    """Unrolled places (n, 2) = (x, z) m of a sensor's surface nodes; the BioTac's back goes on round its axis."""
+    if sensor == "digit":
+        return digit_shape.gel_surface().rest[:, [0, 2]]
+    x, z = np.broadcast_arrays(unrolling._rolled_x()[1:-1, None], unrolling.PAD_RADIUS * biotac.angles())
+    ends = [[unrolling._rolled_x()[0], 0.0], [unrolling._rolled_x()[-1], 0.0]]
+    return np.concatenate([np.stack([x, z], -1).reshape(-1, 2), ends])
+
+
+@functools.cache
+def node_frames(sensor: str) -> np.ndarray:
+    """Axes (n, 3, 3) of each surface node as columns: along the finger, outward, across."""
+    if sensor == "digit":
+        axes = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
+        return np.broadcast_to(axes, (len(digit_shape.gel_surface().rest), 3, 3))
+    lattice = biotac.skin_surface()
+    outward = unrolling.node_normals(lattice.rest, lattice.faces)
+    along = np.array([1.0, 0, 0]) - outward[:, :1] * outward
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    along = np.where(length > 1e-3, along / np.maximum(length, 1e-3), [0.0, 1.0, 0.0])
+    return np.stack([along, outward, np.cross(along, outward)], -1)
+
+
+def frame(compliance: Compliance, contact: Contact) -> Frame:
+    """Where a contact's fields lie: about the centre of its forces, with its patch's radius."""
+    places = plane(compliance.name)[compliance.touchable[contact.nodes]]
+    load = np.linalg.norm(contact.nodal_force, axis=1)
+    share = load / load.sum()
+    centre = share @ places
+    # Hertz's pressure has 2/5 of the radius squared as its mean square distance; a count of nodes would jump.
+    return Frame(centre, float(np.sqrt(2.5 * (share @ ((places - centre) ** 2).sum(axis=1)))) + _SMALLEST_RADIUS)
+
+
+def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
+    """What a fast contact looks like: (f,) numbers without a unit, lengths over the thickness, stresses over E.
+
+    All are continuous in the nodal forces, so that a force can be searched for.
+    """
+    digit = compliance.name == "digit"
+    material = sensors.DIGIT_GEL if digit else sensors.BIOTAC_SKIN
+    thickness = digit_shape.THICKNESS if digit else biotac.SKIN_THICKNESS
+    nodes = compliance.touchable[contact.nodes]
+    load = np.linalg.norm(contact.nodal_force, axis=1)
+    share = load / load.sum()
+    offset = (plane(compliance.name)[nodes] - at.centre) / thickness
+    spread = np.einsum("k,ki,kj->ij", share, offset, offset)
+    local = np.einsum("kji,kj->i", node_frames(compliance.name)[nodes], contact.nodal_force) / load.sum()
+    towards = np.einsum("k,kji,j->i", share, node_frames(compliance.name)[nodes], contact.pose.direction)
+    alike = 1 / float(share @ share)  # how many nodes would carry as evenly
+    depth = contact.depth / thickness
+    force = np.log(load.sum() / (material.youngs * thickness**2) + 1e-6)
+    core = contact.core_force.sum() / load.sum() if len(contact.core_force) else 0.0
+    return np.array([
+        depth, np.sqrt(depth), force, at.radius / thickness, np.log(at.radius / thickness),
+        spread[0, 0], spread[1, 1], spread[0, 1], at.centre[0] / 5e-3, at.centre[1] / 5e-3, (at.centre[1] / 5e-3) ** 2,
+        local[0], local[2], towards[0], towards[2], core, np.log(depth / (at.radius / thickness)),
+        share.max() * alike, 1 / alike, contact.sideways,
+    ])  # fmt: skip
+
+
+MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1, 1.0])  # features under z -> -z
+
+
+def grid_places() -> np.ndarray:
+    """Places (LINES, LINES, 2) of the fields' grid, in patch radii."""
+    line = np.sinh(np.linspace(-np.arcsinh(REACH), np.arcsinh(REACH), LINES))
+    return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
+
+
+def spread_field(sensor: str, at: Frame, field: np.ndarray) -> np.ndarray:
+    """A field on the grid (g, 3), at all nodes of a sensor (n, 3), in the sensor's axes: bilinear, 0 beyond."""
+    place = (plane(sensor).T - at.centre[:, None]) / at.radius
+    inside = np.flatnonzero(np.maximum(np.abs(place[0]), np.abs(place[1])) < REACH)
+    position = (np.arcsinh(place.take(inside, axis=1)) / np.arcsinh(REACH) + 1) * ((LINES - 1) / 2)
+    cell = np.minimum(position.astype(int), LINES - 2)
+    u, v = position - cell
+    corner = cell[0] * LINES + cell[1]
+    grid = np.ascontiguousarray(field.reshape(-1, 3).T)  # axis by axis: sums over many nodes at a time are faster
+    local = (1 - v) * ((1 - u) * grid.take(corner, axis=1) + u * grid.take(corner + LINES, axis=1))
+    local += v * ((1 - u) * grid.take(corner + 1, axis=1) + u * grid.take(corner + LINES + 1, axis=1))
+    moved = np.zeros((place.shape[1], 3))
+    moved[inside] = np.einsum("ijk,jk->ki", _frames_by_axis(sensor).take(inside, axis=2), local)
+    return moved
+
+
+@functools.cache
+def _frames_by_axis(sensor: str) -> np.ndarray:
+    """``node_frames`` as (3, 3, n)."""
+    return np.ascontiguousarray(np.moveaxis(node_frames(sensor), 0, 2))
+
+
+@functools.cache
+def learned() -> dict[str, Correction]:
+    """The shipped correction of each sensor."""
+    names = [field.name for field in dataclasses.fields(Learned)]
+    with shipped(FILE).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+        return {
+            sensor: Correction(*(
+                Learned(**{name: arrays[f"{sensor}_{kind}_{name}"].astype(np.float64) for name in names})
+                for kind in ("still", "rubbing")
+            ))
+            for sensor in ("biotac", "digit")
+        }  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class Corrected:
+    """A fast contact with its correction. displacement : (n, 3) m; factor : of all forces."""
+
+    displacement: np.ndarray
+    factor: float
+
+
+def force_factor(compliance: Compliance, contact: Contact) -> float:
+    """By how much a fast contact's forces are too small."""
+    if not len(contact.nodes):
+        return 1.0
+    return learned()[compliance.name].factor(features(compliance, contact, frame(compliance, contact)))
+
+
+def correct(compliance: Compliance, contact: Contact, parts: Correction | None = None) -> Corrected:
+    """A fast contact as the full tier would have it, at the same depth."""
+    parts = parts or learned()[compliance.name]
+    if not len(contact.nodes):
+        return Corrected(contact.displacement, 1.0)
+    at = frame(compliance, contact)
+    seen = features(compliance, contact, at)
+    moved = contact.displacement + contact.depth * spread_field(compliance.name, at, parts.field(seen))
+    return Corrected(moved, parts.factor(seen))

@@ -1,0 +1,267 @@
+"""Frictionless contact on a compliance: forces along the indenter's normals at the deformed surface.
+
+Each iteration linearises the indenter's distance at the deformed nodes and solves the complementarity problem exactly.
+Along edges and small balls the normals turn with the nodes, which the linearised problem does not see; the nodes that
+feel it most take a Newton step in the tangent planes with the indenter's curvature.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from ...geometry.indenters import Indenter, Pose
+from ...geometry.indenters.indenter import lengths
+from .active_set import Pressing, complement
+from .compliance_block import ComplianceBlock
+from .node_vectors import weighted
+
+GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that MECHANICS allows
+SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up
+FORCE_TOLERANCE = 1e-7  # relative, of the force along the motion where one is asked for
+MAX_ITERATIONS = 60
+_FEELS_CURVATURE = 0.1  # least curvature x force x compliance of such a direction
+_FEELS_AT_ONCE, _LATER = 0.4, 5  # from the second iteration on only for more than this: plain iterations are cheaper
+# Assumed, tried on random contacts: what Newton's step divides by at least, and at most where a mode runs away.
+_LEAST_STIFFNESS, _SLOPE_STIFFNESS = 0.02, 0.1
+_LARGEST_TURN = 0.3  # rad, of a normal in one Newton step
+_LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
+_CREASE_ANGLE = np.cos(np.radians(20.0))
+_CREASE_ITERATION = 6  # from which nodes that flip between two faces are taken to sit in the crease between them
+_STALE = 0.1  # rad: the compliance along the normals is made anew when one has turned by more
+_FEW = 0.3  # of the nodes: their part of the compliance costs less to make than the whole
+_FREE_ITERATIONS = 4  # in which steps are taken whole, whatever they bring
+_HOPE, _WINDOW, _NEARER = 4, 6, 0.5  # iterations at least, those looked at, what they bring (assumed; random contacts)
+_PROGRESS, _SHRINK, _GROW, _LEAST_TRUST = 0.8, 0.6, 1.3, 0.1
+
+
+@dataclasses.dataclass
+class Try:
+    """One iterate: displacement (k, 3) m, nodal force (k, 3) N, core force (c,) N, shift m along the motion.
+
+    active : (k + c,) bool; settled : whether it fulfils the tolerances; iterations : so far
+    slipping : (k,) bool, nodes whose friction is spent
+    creases : nodes (j,) of the block that flip between two faces, points (j, 3) m of the face they left, normals there
+    """
+
+    displacement: np.ndarray
+    force: np.ndarray
+    core_force: np.ndarray
+    shift: float
+    active: np.ndarray
+    settled: bool = False
+    iterations: int = 0
+    slipping: np.ndarray | None = None
+    creases: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+
+    def __post_init__(self) -> None:
+        if self.slipping is None:
+            self.slipping = np.ones(len(self.displacement), bool)
+
+
+class _Model(NamedTuple):
+    """Compliance (k + c, k + c) m/N of the gaps along normals (k, 3), and its Cholesky factors by active set."""
+
+    normal: np.ndarray
+    matrix: np.ndarray
+    factors: dict[bytes, np.ndarray]
+
+
+class Pace:
+    """How far to go along each step: nodes at edges and in creases may swing from one side to the other."""
+
+    def __init__(self) -> None:
+        self._trust, self._last, self._calls = 1.0, np.inf, 0
+        self._best: list[float] = []  # m, least that was wrong in the first 1, 2, ... iterations
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the last iterations have hardly come nearer to the contact than those before them."""
+        best = self._best
+        return len(best) >= _HOPE + _WINDOW and best[-1] > _NEARER * best[-1 - _WINDOW]
+
+    def after(self, gap: np.ndarray, active: np.ndarray) -> float:
+        """The share of the next step to take, for gaps (k,) m that should be closed where ``active`` (k,)."""
+        wrong = max(-gap.min(), np.abs(gap[active]).max(initial=0.0))
+        self._calls += 1
+        if wrong > max(_PROGRESS * self._last, GAP_TOLERANCE) and self._calls > _FREE_ITERATIONS:
+            self._trust = max(_SHRINK * self._trust, _LEAST_TRUST)
+        else:
+            self._trust = min(_GROW * self._trust, 1.0)
+        self._last = wrong
+        self._best.append(min([wrong, *self._best[-1:]]))
+        return self._trust
+
+
+class Frictionless:
+    """Solves for the nodes of one block.
+
+    rest : (k, 3) m; core_gap : (c,) m; probe : (k, 3) m, toward the second face of nodes in a crease
+    faced : (k,) bool, nodes whose faces are known: they are not looked at for creases
+    most_curved : tangent directions in the Newton step: more cost more than the iterations they save
+    """
+
+    most_curved = 20
+
+    def __init__(
+        self, block: ComplianceBlock, rest: np.ndarray, core_gap: np.ndarray, indenter: Indenter, pose: Pose,
+        probe: np.ndarray, faced: np.ndarray,
+    ) -> None:  # fmt: skip
+        self.block, self.rest, self.core_gap = block, rest, core_gap
+        self.indenter, self.pose, self.probe, self.faced = indenter, pose, probe, faced
+        self._probes = bool(probe.any())
+
+    def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps (k,) m and normals (k, 3); at a crease's second face measured a little toward it."""
+        points = self.rest + displacement
+        there = self.pose.moved(shift) if shift else self.pose
+        if not self._probes:
+            return there.distance(self.indenter, points)
+        gap, normal = there.distance(self.indenter, points + self.probe)
+        return gap - np.einsum("ai,ai->a", self.probe, normal), normal
+
+    def solve(self, begin: Try, axial_force: float | None) -> Try:
+        """From a first guess to the contact at its depth, or at a force along the motion, N. Raises UnsolvedError."""
+        state, place, pace, model, solved = begin, begin.displacement, Pace(), None, None
+        gap, normal = self.distance(place, state.shift)
+        flips = np.zeros(len(gap), int)
+        for iteration in range(1, MAX_ITERATIONS + 1):
+            model = self._model(normal, model)
+            offset = self._offset(gap, normal, place, model, solved)
+            solved = self._complement(model, offset, normal, state.active, axial_force)
+            state = self._step(state, place, model.matrix, normal, solved, iteration)
+            left = gap
+            gap, turned = self.distance(state.displacement, state.shift)
+            state.iterations = iteration
+            state.settled = self._settled(state, gap, turned, solved.step, axial_force)
+            if state.settled:
+                return state
+            flipped = solved.active[: len(gap)] & (np.einsum("ai,ai->a", turned, normal) < _CREASE_ANGLE)
+            if iteration >= _CREASE_ITERATION:
+                flips += flipped & ~self.faced
+                if (flips >= 2).any():
+                    nodes = np.flatnonzero(flips >= 2)
+                    points = (self.rest + place)[nodes] - left[nodes, None] * normal[nodes]
+                    state.creases = nodes, points, normal[nodes]
+                    return state
+            trust = pace.after(gap, solved.active[: len(gap)])
+            place = place + trust * (state.displacement - place)
+            gap, normal = (gap, turned) if trust == 1 else self.distance(place, state.shift)
+        return state
+
+    def _model(self, normal: np.ndarray, older: _Model | None) -> _Model:
+        """The model at new normals (k, 3), or the older one while they have hardly turned."""
+        if older is None:
+            return _Model(normal, self.block.normal(normal), {})
+        stale = np.flatnonzero(np.abs(normal - older.normal).max(axis=1) > _STALE)
+        if not len(stale):
+            return older
+        if len(stale) > _FEW * len(normal):
+            return _Model(normal, self.block.normal(normal), {})
+        mixed = older.normal.copy()
+        mixed[stale] = normal[stale]
+        return _Model(mixed, self.block.turned(older.matrix, mixed, stale), {})
+
+    def _offset(self, gap, normal, place, model, solved) -> np.ndarray:  # noqa: ANN001
+        """Gaps without any forces; with a model of older normals only the change of the forces is left to it."""
+        if solved is None or model.normal is normal:
+            return np.concatenate([gap - np.einsum("ai,ai->a", normal, place), self.core_gap])
+        k = self.block.k
+        moved, core = self.block.respond(solved.pressing[:k, None] * normal, solved.pressing[k:])
+        now = np.concatenate([gap + np.einsum("ai,ai->a", normal, moved - place), self.core_gap + core])
+        return now - model.matrix @ solved.pressing
+
+    def _complement(self, model, offset, normal, active, axial_force) -> Pressing:  # noqa: ANN001
+        matrix = model.matrix
+        if axial_force is None:
+            return complement(matrix, offset, active, factors=model.factors)
+        along = np.concatenate([normal @ self.pose.direction, np.zeros(self.block.c)])
+        solved = complement(matrix, offset, active, along, along, axial_force, factors=model.factors)
+        if abs(solved.step) <= _LARGEST_STEP:
+            return solved
+        step = float(np.clip(solved.step, -_LARGEST_STEP, _LARGEST_STEP))
+        return dataclasses.replace(
+            complement(matrix, offset - step * along, solved.active, factors=model.factors), step=step
+        )
+
+    def _step(self, state: Try, place, matrix, normal, solved: Pressing, iteration: int) -> Try:  # noqa: ANN001
+        k = self.block.k
+        force, core_force = solved.pressing[:k, None] * normal, solved.pressing[k:]
+        displacement, _ = self.block.respond(force, core_force)
+        if iteration > 1:
+            threshold = _FEELS_AT_ONCE if iteration < _LATER else _FEELS_CURVATURE
+            travel = displacement - place - solved.step * self.pose.direction
+            more = self._turn(matrix, normal, solved, travel, self.rest + place + self.probe, state.shift, threshold)
+            if more is not None:
+                force, core_force = force + more[0], core_force + more[1]
+                displacement, _ = self.block.respond(force, core_force)
+        return Try(displacement, force, core_force, state.shift + solved.step, solved.active)
+
+    def _turn(self, matrix, normal, solved: Pressing, travel, place, shift, threshold):  # noqa: ANN001, ANN202
+        """Change of force (k, 3), (c,) N when normals follow their nodes; None where no node feels it.
+
+        With t a principal direction of the indenter's surface at a node, weighted by sqrt(force x curvature), the
+        turned force is p n + t y, y = t . travel: (1 - S) y = t . travel, S the compliance among the t with the gaps
+        held shut.
+        """
+        from scipy.linalg import lapack
+
+        active = np.flatnonzero(solved.active)
+        touching = active[active < self.block.k]
+        bend = self.pose.moved(shift).curvature(self.indenter, place[touching])
+        feels = solved.pressing[touching] * matrix.diagonal()[touching]
+        most = feels * lengths(bend.reshape(-1, 9))
+        if most.max(initial=0.0) < threshold:
+            return None
+        felt = np.sort(np.argsort(-most, kind="stable")[: self.most_curved])
+        curvature, axes = np.linalg.eigh(bend[felt])
+        weight = (np.maximum(curvature, 0) * solved.pressing[touching[felt], None]).ravel()
+        share = (np.maximum(curvature, 0) * feels[felt, None]).ravel()
+        chosen = np.argsort(-share, kind="stable")[: self.most_curved]
+        chosen = chosen[share[chosen] > _FEELS_CURVATURE]
+        if not len(chosen):
+            return None
+        nodes, root = touching[felt[chosen // 3]], np.sqrt(weight[chosen])
+        tangent = axes[chosen // 3, :, chosen % 3] * root[:, None]
+        three = 3 * nodes + np.arange(3)[:, None]
+        moved = weighted(self.block.matrix.take(three, axis=0), tangent.T[:, :, None])
+        on_surface = moved[:, : 3 * self.block.k].reshape(len(nodes), self.block.k, 3)
+        onto_gaps = np.einsum("qbi,bi->qb", on_surface, normal).take(touching, axis=1)
+        if self.block.c:
+            onto_gaps = np.concatenate([onto_gaps, moved[:, active[len(touching) :] + 2 * self.block.k]], axis=1)
+        relief, _ = lapack.dpotrs(solved.factor, onto_gaps.T, lower=1)
+        among = np.einsum("qri,ri->qr", on_surface[:, nodes], tangent) - onto_gaps @ relief
+        mode, shape = np.linalg.eigh((among + among.T) / 2)
+        driven = shape.T @ np.einsum("qi,qi->q", tangent, travel[nodes])
+        amount = shape @ (driven / _stiffness(mode))
+        turn = np.abs(amount / root * curvature.ravel()[chosen]).max()
+        amount *= min(1.0, _LARGEST_TURN / max(turn, 1e-30))
+        change = np.zeros(len(solved.pressing))
+        change[active] = -(relief @ amount)
+        force = change[: self.block.k, None] * normal
+        np.add.at(force, nodes, amount[:, None] * tangent)
+        return force, change[self.block.k :]
+
+    def _settled(self, state: Try, gap, normal, step, axial_force) -> bool:  # noqa: ANN001
+        active = state.active[: len(gap)]
+        if not active.any():
+            return bool((gap > -GAP_TOLERANCE).all()) and axial_force is None
+        if gap.min() < -GAP_TOLERANCE or np.abs(gap[active]).max() > GAP_TOLERANCE:
+            return False
+        pressing = np.einsum("ai,ai->a", state.force, normal)
+        whole = np.linalg.norm(state.force.sum(0))
+        if np.linalg.norm(state.force - pressing[:, None] * normal) > SIDEWAYS_TOLERANCE * whole:
+            return False
+        if pressing.min() < 0 or state.core_force.min(initial=0.0) < 0:
+            return False
+        axial = float(state.force.sum(0) @ self.pose.direction)
+        return axial_force is None or abs(axial - axial_force) <= FORCE_TOLERANCE * abs(axial_force)
+
+
+def _stiffness(mode: np.ndarray) -> np.ndarray:
+    """1 - mode, by which Newton's step divides; beyond 1 a mode runs away from its equilibrium, and the step goes
+    that way."""
+    away = np.minimum(mode - 1, _SLOPE_STIFFNESS)
+    return np.maximum(np.where(mode < 1, 1 - mode, away), _LEAST_STIFFNESS)

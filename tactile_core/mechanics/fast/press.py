@@ -1,0 +1,189 @@
+"""A press in the fast tier whose forces and shapes are the corrected ones."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from ...errors import TactileError
+from ...geometry.indenters import Indenter, Pose
+from ..first_touch import fall
+from ..force_search import touch_at_force
+from ..penetration import PenetrationError
+from ..pose_path import same_line
+from ..sharpness import BENDS, sharpest
+from .active_set import UnsolvedError
+from .compliance import Compliance
+from .contact import ContactProblem
+from .contact_state import Contact
+from .correction import Corrected, correct, force_factor
+from .edge_contact import EdgeContactProblem
+
+FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
+_FIRST_DEPTH = 30e-6  # m, where a search for a force starts
+_GROWTH = 1.6  # largest change of force in one step of a search, which a warm start follows safely
+_LEAST_DEPTH = 1e-6  # m, of a contact that has slid: friction may hold it where the resting surface is not reached
+_SEARCH_STEPS = 24
+_POWER_FROM, _POWERS = 1e-2, (0.7, 1.5)  # least growth that tells the power; what it may be (assumed)
+
+
+@dataclasses.dataclass(frozen=True)
+class FastContact:
+    """A contact of the linear model, and what its correction makes of it. Forces N, by the indenter on the sensor.
+
+    linear : as solved; corrected : shape and factor; force : (3,); axial_force : along the motion
+    pressure : Pa, rise of the fluid's; depth : m, from first touch where the indenter has slid to
+    """
+
+    linear: Contact
+    corrected: Corrected
+    force: np.ndarray
+    axial_force: float
+    pressure: float
+    depth: float
+
+
+class CorrectedPress:
+    """An indenter in front of one sensor; contacts follow each other, at depths or at corrected forces.
+
+    pose : at first touch; limit : m, the greatest depth; friction : Coulomb's coefficient
+    """
+
+    def __init__(
+        self, compliance: Compliance, indenter: Indenter, pose: Pose, limit: float, friction: float = 0.0
+    ) -> None:
+        self.compliance, self.pose, self.limit = compliance, pose, limit
+        self.problem = ContactProblem(compliance, indenter, pose, limit, friction)
+        self.last: Contact | None = None
+        self._last_power = 1.0
+
+    def at_depth(self, depth: float, pose: Pose | None = None) -> FastContact:
+        """The contact at a depth, m, of the press's pose or of another one; it may not have converged.
+
+        Raises SunkError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
+        """
+        return self._guarded_if_needed(lambda: self._at_depth(depth, pose or self.pose))
+
+    def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
+        """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found."""
+        try:
+            return self._guarded_if_needed(lambda: self._at_force(force, pose or self.pose))
+        except UnsolvedError:
+            return None
+
+    def _guarded_if_needed(self, solve: Callable[[], FastContact | None]) -> FastContact | None:
+        """What ``solve`` finds; where frictionless nodes do not hold the indenter, with points between them, from the
+        start and from then on."""
+        try:
+            found = solve()
+            if found is None or found.linear.converged or not self._may_be_guarded():
+                return found
+        except (PenetrationError, UnsolvedError):
+            if not self._may_be_guarded():
+                raise
+        self.problem = EdgeContactProblem(self.compliance, self.problem.indenter, self.pose, self.limit)
+        self.last = None
+        return solve()
+
+    def _may_be_guarded(self) -> bool:
+        """Whether nodes may slide off the indenter, and the surface between them can bend round it."""
+        if self.problem.friction or isinstance(self.problem, EdgeContactProblem):
+            return False
+        rest = self.compliance.surface.rest[self.compliance.touchable[self.problem.nodes_near]]
+        return sharpest(self.problem.indenter, self.pose, rest) >= BENDS
+
+    def _at_depth(self, depth: float, pose: Pose) -> FastContact:
+        contact = self.problem.at_pose(pose.moved(depth), self.last)
+        if contact.converged:
+            self.last = contact
+        return self._with_correction(contact, self._fall_to(pose))
+
+    def _at_force(self, force: float, pose: Pose) -> FastContact | None:
+        """A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
+
+        None beyond the limit; raises UnsolvedError where none is found.
+        """
+        if isinstance(self.problem, EdgeContactProblem):
+            return self._by_depths(force, pose)
+        contact, fall = self.last or self._first(pose), self._fall_to(pose)
+        if contact is not None and not same_line(contact.pose, pose):
+            contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
+        before: tuple[float, float] | None = None  # linear and corrected force, N
+        for _ in range(_SEARCH_STEPS):
+            if contact is None or not contact.converged:
+                raise UnsolvedError(f"no contact at {force:g} N")
+            linear, seen = contact.axial_force, _from_touch(contact, fall)
+            found = linear, linear * force_factor(self.compliance, seen)
+            close = found[1] > 0 and abs(found[1] / force - 1) < FORCE_TOLERANCE
+            if seen.depth > self.limit and (close or found[1] < force):
+                if not self.problem.friction:  # what has sunk in bears less than it would
+                    self.problem.check_follows(contact)
+                return None
+            if close:
+                self.last = contact
+                return self._with_correction(contact, fall)
+            growth = (force / max(found[1], 1e-12)) ** (1 / self._power(before, found))
+            before, goal = found, linear * float(np.clip(growth, 1 / _GROWTH, _GROWTH))
+            contact = self.problem.at_pose(pose.moved(contact.depth), contact, goal)
+        raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
+
+    def _by_depths(self, force: float, pose: Pose) -> FastContact | None:
+        """The same among contacts at depths: where all points feel the turn of their normals those are found quicker.
+
+        Raises SunkError and UnsolvedError.
+        """
+        fall = self._fall_to(pose)
+
+        def move(depth: float, before: FastContact) -> FastContact:
+            contact = self.problem.at_pose(pose.moved(depth + fall), before.linear)
+            if not contact.converged:
+                raise UnsolvedError(f"no contact at {depth * 1e3:g} mm")
+            return self._with_correction(contact, fall)
+
+        start = self.last or self.problem.at_pose(pose.moved(fall))
+        begin = self._with_correction(start, fall)
+        try:
+            found = touch_at_force(move, begin, pose.direction, force, self.limit, "", FORCE_TOLERANCE)
+        except PenetrationError:
+            raise
+        except TactileError:  # beyond the limit
+            return None
+        self.last = found.linear
+        return found
+
+    def _power(self, before: tuple[float, float] | None, found: tuple[float, float]) -> float:
+        """By which power the corrected force grows with the linear one, between two contacts; kept for the next."""
+        if before is not None and min(*before, *found) > 0:
+            linear, corrected = np.log(found) - np.log(before)
+            if abs(linear) > _POWER_FROM:
+                self._last_power = float(np.clip(corrected / linear, *_POWERS))
+        return self._last_power
+
+    def _first(self, pose: Pose) -> Contact | None:
+        """The first contact that carries force; a coarse lattice may be missed by the shallowest depths."""
+        depth = _FIRST_DEPTH
+        while depth <= self.limit:
+            contact = self.problem.at_pose(pose.moved(depth))
+            if contact.converged and contact.axial_force > 0:
+                return contact
+            depth *= 1.5
+        return None
+
+    def _fall_to(self, pose: Pose) -> float:
+        return fall(self.compliance.surface, self.problem.indenter, self.pose, pose)
+
+    def _with_correction(self, contact: Contact, fall: float) -> FastContact:
+        made = correct(self.compliance, _from_touch(contact, fall))
+        if contact.converged:
+            self.problem.check_follows(contact)
+        pressure = made.factor * contact.fluid_pressure
+        force, axial = made.factor * contact.force, made.factor * contact.axial_force
+        return FastContact(contact, made, force, axial, pressure, contact.depth - fall)
+
+
+def _from_touch(contact: Contact, fall: float) -> Contact:
+    """A contact with its depth measured from first touch where the indenter has slid to, as the correction knows it."""
+    depth = max(contact.depth - fall, _LEAST_DEPTH)
+    return contact if depth == contact.depth else dataclasses.replace(contact, depth=depth)

@@ -1,0 +1,99 @@
+"""What is watched inside a solid while its surface is pressed: the electrodes' feet, and inner nodes over the core."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import sensors
+from ...sensors import biotac, unrolling
+from ..solids.biotac_core import BiotacCore, facing_core
+from ..solids.hex_mesh import HexMesh
+from .condense import mirror_nodes
+from .mirror_symmetry import axes_of
+
+ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
+
+
+class SensingPoints(NamedTuple):
+    """What turns a displacement into the change of w watched gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
+
+    rows, columns : (k,) int; weights : (k,); gap : (w,) m
+    """
+
+    rows: np.ndarray
+    columns: np.ndarray
+    weights: np.ndarray
+    gap: np.ndarray
+
+    def dense(self, size: int) -> np.ndarray:
+        """The matrix (size, w): 700 MB of the skin's, which only a build needs."""
+        matrix = np.zeros((size, len(self.gap)))
+        matrix[self.rows, self.columns] = self.weights
+        return matrix
+
+
+def sensing_points_of(mesh: HexMesh) -> SensingPoints:
+    """The electrodes' feet, three nodes each, then the inner nodes over the core."""
+    if not len(mesh.inner):
+        return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
+    feet = electrode_feet()
+    corners = biotac.skin_surface("inner").faces[feet.face]
+    core_nodes, core_out, core_gap = _over_core(mesh)
+    nodes = mesh.inner[np.r_[corners.ravel(), core_nodes]]
+    columns = np.r_[np.repeat(np.arange(len(feet.gap)), 3), len(feet.gap) + np.arange(len(core_nodes))]
+    out = np.concatenate([(feet.weights[..., None] * feet.outward[:, None]).reshape(-1, 3), core_out])
+    return SensingPoints(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap])
+
+
+@dataclasses.dataclass(frozen=True)
+class ElectrodeFeet:
+    """Where the film over each electrode ends on the inner skin: face, weights, direction (19, 3), gap (19,) m."""
+
+    face: np.ndarray
+    weights: np.ndarray
+    outward: np.ndarray
+    gap: np.ndarray
+
+
+@functools.cache
+def electrode_feet() -> ElectrodeFeet:
+    """The nearest point of the resting inner skin to each electrode; gaps 0.49 to 1.76 mm (published: 0.51 to 1.76)."""
+    positions = sensors.electrodes()
+    face, weights, place = unrolling.closest_on_triangles(biotac.skin_surface("inner"), positions)
+    gap = np.linalg.norm(place - positions, axis=1)
+    return ElectrodeFeet(face, weights, (place - positions) / gap[:, None], gap)
+
+
+def _over_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m; even in
+    z."""
+    inner = biotac.skin_surface("inner")
+    nodes = _facing(mesh)
+    image = mirror_nodes(inner.rest)
+    mirrored = inner.rest[nodes, 2] < -ON_PLANE
+    gap, outward = BiotacCore().distance(inner.rest[np.where(mirrored, image[nodes], nodes)])
+    return nodes, np.where(mirrored[:, None], outward * [1.0, 1.0, -1.0], outward), gap
+
+
+def _facing(mesh: HexMesh) -> np.ndarray:
+    """Inner nodes that may come to press on the core, each with its mirror image."""
+    inner = biotac.skin_surface("inner")
+    faces = facing_core(inner.rest) & ~mesh.clamped[mesh.inner]
+    return np.flatnonzero(faces & faces[mirror_nodes(inner.rest)])
+
+
+def images(mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """For each of ``count`` watched points the one whose mirror image it is, else itself; and whether it is an
+    image."""
+    source, mirrored = np.arange(count), np.zeros(count, bool)
+    if count:
+        nodes, rest = _facing(mesh), biotac.skin_surface("inner").rest
+        first = count - len(nodes)
+        image = mirror_nodes(rest)[nodes]
+        mirrored[first:] = rest[nodes, 2] < -ON_PLANE
+        source[first:] = first + np.where(mirrored[first:], np.searchsorted(nodes, image), np.arange(len(nodes)))
+    return source, mirrored

@@ -1,0 +1,57 @@
+"""What the whole surface, the watched points and the fluid do under the forces of a contact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compliance import Compliance
+
+_MIRROR = np.array([1.0, 1.0, -1.0])
+
+
+def runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
+    """Stretches of consecutive numbers in sorted ``indices``: (start, stop) there, and first and last + 1 number."""
+    cuts = np.flatnonzero(np.diff(indices) != 1) + 1
+    starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
+    return list(
+        zip(starts.tolist(), stops.tolist(), indices[starts].tolist(), (indices[stops - 1] + 1).tolist(), strict=True)
+    )
+
+
+def displacement(
+    compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
+) -> np.ndarray:
+    """Displacement (n, 3) float32, m, of the surface under forces (k, 3) N at sorted, single touchable ``nodes`` and
+    (c,) N at watched points."""
+    rows, mirror, image = compliance.answers
+    row, mirrored = rows[nodes], mirror[nodes]
+    moved = _under(compliance, row[~mirrored], force[~mirrored])
+    if mirrored.any():
+        order = np.argsort(row[mirrored], kind="stable")
+        there = _under(compliance, row[mirrored][order], force[mirrored][order] * _MIRROR)
+        moved += (there.reshape(-1, 3)[image] * _MIRROR.astype(np.float32)).ravel()
+    if len(inner):
+        moved += inner_force.astype(np.float32) @ compliance.inner_move[inner]
+    return moved.reshape(-1, 3)
+
+
+def _under(compliance: Compliance, row: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Motion (3 n,) of the surface under forces (k, 3) N at the nodes of sorted rows (k,) of the compliance."""
+    moved, force = np.zeros(compliance.move.shape[1], np.float32), force.astype(np.float32)
+    for start, stop, first, last in runs(row) if len(row) else ():
+        moved += force[start:stop].ravel() @ compliance.move[3 * first : 3 * last]
+    return moved
+
+
+def sensing_gaps(
+    compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
+) -> np.ndarray:
+    """Gaps (w,) m of the watched points under the same forces."""
+    gaps = compliance.watch_gap.astype(float)
+    if not len(gaps):
+        return gaps
+    for start, stop, first, last in runs(nodes) if len(nodes) else ():
+        gaps = gaps + force[start:stop].ravel().astype(np.float32) @ compliance.watch[3 * first : 3 * last]
+    if len(inner):
+        gaps = gaps + inner_force.astype(np.float32) @ compliance.inner_watch[inner]
+    return gaps

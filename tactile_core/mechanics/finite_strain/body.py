@@ -1,0 +1,131 @@
+"""The full and the reference tier: one finite-strain contact, on a mesh graded round it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+
+from ... import sensors
+from ...geometry.indenters import Indenter, Pose
+from ...sensors import biotac, digit
+from ..penetration import BLUNT, check_follows, penetration_between
+from ..sharpness import BENDS, sharpest
+from ..solids.biotac_core import BiotacCore, facing_core
+from ..solids.finite_strain import FiniteStrainSolid
+from ..solids.fluid_cavity import FluidCavity
+from ..solids.graded_mesh import Footprint, GradedMesh, graded_gel, graded_skin
+from ..solids.hex_mesh import inner_faces, outer_faces
+from ..solids.neo_hookean import NeoHookean
+from ..solids.split_bulk_modulus import SplitBulkModulus
+from .contact_state import ContactState
+from .newton import FiniteStrainContact
+from .tolerance import EXACT, Tolerance
+
+Sensor = Literal["biotac", "digit"]
+
+# m of a load step: without friction one is enough from rest, unless it fails and is halved; friction follows a path.
+ONE_STEP, FRICTION_STEP = 5e-3, 0.25e-3
+# Gaps to 1/100 of the penetration that MECHANICS allows. A last step of 0.15 um left forces in balance to 1e-6.
+_FULL = Tolerance(10e-9, 1e-7, 0.15e-6)
+_FIRST_SHARE = {"biotac": 0.7, "digit": 0.5}  # a ball on a half-space touches where it overlaps by half of the depth
+_REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth may come to touch it
+# Nodes wanted across the fine part of a graded mesh. Normals under a 7 mm ball 1.2 mm deep in the gel were 1.4 to 1.5
+# degrees off with 10, 1.2 with 11, 1.0 with 12 at a fifth more time.
+_ACROSS = 11
+_SPACING = 0.3, 1.5  # lattice lines, least and most between nodes there
+_MARGIN = 0.6  # of its size that the fine part reaches beyond the touching nodes
+_LEAST_HALF = 1.2  # lattice lines, half of the smallest fine part
+
+
+@dataclasses.dataclass(frozen=True)
+class Body:
+    """A sensor's solid with all that a contact on it needs; ``graded`` knows the way to the lattice's nodes."""
+
+    sensor: Sensor
+    tier: Literal["full", "reference"]
+    solid: FiniteStrainSolid
+    cavity: FluidCavity | None
+    core_nodes: np.ndarray
+    graded: GradedMesh
+
+    def contact(self, indenter: Indenter, pose: Pose, depth: float, friction: float) -> FiniteStrainContact:
+        """An indenter in front of this body, which will come ``depth`` m in at most."""
+        mesh = self.solid.mesh
+        distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])
+        near = mesh.surface[distance < _REACH]
+        return FiniteStrainContact(
+            self.solid, near[~mesh.clamped[near]], indenter, pose, self.cavity, friction=friction,
+            core=BiotacCore() if len(self.core_nodes) else None, inner=self.core_nodes,
+            factor=self.graded.factor, tolerance=_FULL if self.tier == "full" else EXACT,
+            first_share=_FIRST_SHARE[self.sensor],
+            faces=None if friction else self._faces(indenter, pose.moved(depth), near),  # friction holds nodes at edges
+        )  # fmt: skip
+
+    def _faces(self, indenter: Indenter, pose: Pose, near: np.ndarray) -> np.ndarray | None:
+        """The faces (f, 9) between nodes ``near`` an indenter, where those slide off it and faces can bend round it."""
+        mesh = self.solid.mesh
+        if not BENDS <= sharpest(indenter, pose, mesh.nodes[near]) < BLUNT:
+            return None
+        faces = outer_faces(mesh)
+        return faces[np.isin(faces, near).all(axis=1)]
+
+    def hidden(self, touch: ContactState, indenter: Indenter) -> float:
+        """How deep, m, the surface lies in the indenter between nodes; raises SunkError where it does not follow it."""
+        mesh = self.solid.mesh
+        surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
+        where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"
+        normals = touch.normals[touch.pressing > 0]
+        check_follows(where, surface, indenter, touch.pose, touch.depth, normals, closed=closed)
+        return penetration_between(where, surface, indenter, touch.pose, touch.depth, closed=closed)
+
+    def displacement(self, touch: ContactState) -> np.ndarray:
+        """Displacement (n, 3) m of the sensor's surface lattice."""
+        moved = touch.state.displacement[self.solid.mesh.surface]
+        return self.graded.on_lattice(moved)
+
+    def contact_patch(self, touch: ContactState) -> np.ndarray:
+        """(n,) bool, lattice nodes that carry force."""
+        flags = np.isin(self.solid.mesh.surface, touch.nodes[touch.pressing > 0])
+        return self.graded.nearest_on_lattice(flags)
+
+
+def graded_body(
+    sensor: Sensor,
+    indenter: Indenter,
+    pose: Pose,
+    depth: float,
+    tier: Literal["full", "reference"] = "full",
+    spacing: float = 1.0,
+) -> Body:
+    """A sensor's body, fine where the indenter, ``depth`` m in, overlaps the resting surface.
+
+    spacing : of the fine part's nodes, over the tier's own. The reference tier's cells are half as large as the full
+    tier's.
+    """
+    place = _footprint(sensor, indenter, pose, depth)
+    footprint = dataclasses.replace(place, spacing=spacing * place.spacing, refine=1 if tier == "full" else 2)
+    graded = graded_gel(footprint) if sensor == "digit" else graded_skin(footprint)
+    mesh = graded.mesh
+    if sensor == "digit":
+        solid = FiniteStrainSolid(mesh, SplitBulkModulus.of(NeoHookean.of(sensors.DIGIT_GEL)), graded.pattern)
+        return Body(sensor, tier, solid, None, np.empty(0, int), graded)
+    solid = FiniteStrainSolid(mesh, sensors.BIOTAC_SKIN, graded.pattern)
+    free = mesh.inner[~mesh.clamped[mesh.inner]]
+    cavity = FluidCavity(inner_faces(mesh), len(mesh.nodes))
+    return Body(sensor, tier, solid, cavity, np.sort(free[facing_core(mesh.nodes[free])]), graded)
+
+
+def _footprint(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float) -> Footprint:
+    """Row and column range of the lattice where the indenter, ``depth`` m in, overlaps the resting surface."""
+    lattice = digit.gel_surface() if sensor == "digit" else biotac.skin_surface()
+    rows, columns = lattice.shape
+    distance, _ = pose.moved(depth).distance(indenter, lattice.rest[: rows * columns])
+    deepest = distance.min()
+    inside = np.flatnonzero(distance <= (_FIRST_SHARE[sensor] * deepest if deepest < 0 else deepest))
+    at = np.column_stack([inside // columns + (sensor == "biotac"), inside % columns])
+    low, high = at.min(axis=0).astype(float), at.max(axis=0).astype(float)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, _LEAST_HALF) * (1 + _MARGIN)
+    spacing = float(np.clip(2 * half.max() / _ACROSS, *_SPACING))
+    return Footprint(tuple(middle - half), tuple(middle + half), spacing)

@@ -1,0 +1,255 @@
+"""The nodes that touch an obstacle: which, how hard, and how they rub.
+
+Friction is Coulomb's with a stiff spring at each touching node, as elastoplasticity is solved: the spring pulls toward
+the node's anchor on the indenter until it is as strong as mu times the normal force, and then drags the anchor along
+(J. Simo, T. Laursen, Computers and Structures 42, 1992, 97-116). A node that sticks thus gives way by what its spring
+yields, at most mu times its normal force over ``grip``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...geometry.indenters import Pose
+from ..fast.projection import first_contact
+from .obstacle import Obstacle
+
+_NO_WAY = np.zeros((0, 3))
+
+
+@dataclasses.dataclass
+class ContactSet:
+    """Contact of candidate nodes with one obstacle; changes in place during a load step.
+
+    candidates : (m,) mesh nodes that may touch; active, slipping : (m,) bool
+    anchor : (m, 3) m, in the indenter's frame, the place to which a touching node is tied
+    pressing : (k,) N, normal forces of the active nodes; rubbing : (k, 3) N, their friction, in the sensor's frame
+    normals : (k, 3) of the obstacle there; imbalance : of friction, relative to the largest normal force
+    friction : Coulomb's coefficient; grip : N/m, stiffness of the springs
+    """
+
+    candidates: np.ndarray
+    active: np.ndarray
+    slipping: np.ndarray
+    anchor: np.ndarray
+    pressing: np.ndarray
+    rubbing: np.ndarray
+    normals: np.ndarray
+    obstacle: Obstacle | None = None
+    friction: float = 0.0
+    grip: float = 0.0
+    imbalance: float = 0.0
+    # Of the active nodes, as ``begin`` saw them: distance (k,) m, frames (k, 3, 3), pull (k, 3) N of springs that would
+    # never slip, stiffness (k, 3, 3) N/m of friction.
+    # Of all candidates: where (m, 3) m they stood in the indenter's frame when the load step began.
+    _distance: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0), repr=False)
+    _frames: np.ndarray = dataclasses.field(default_factory=lambda: np.empty((0, 3, 3)), repr=False)
+    _trial: np.ndarray = dataclasses.field(default_factory=lambda: np.empty((0, 3)), repr=False)
+    _gripping: np.ndarray = dataclasses.field(default_factory=lambda: np.empty((0, 3, 3)), repr=False)
+    _stood: np.ndarray = dataclasses.field(default_factory=lambda: np.empty((0, 3)), repr=False)
+
+    @classmethod
+    def none(cls) -> ContactSet:
+        """Nothing touches."""
+        flags = np.zeros(0, bool)
+        return cls(np.empty(0, int), flags, flags, _NO_WAY, np.empty(0), _NO_WAY, _NO_WAY)
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """(k,) mesh nodes that touch."""
+        return self.candidates[self.active]
+
+    @property
+    def forces(self) -> np.ndarray:
+        """(k, 3) N, of the obstacle on ``nodes``."""
+        return self.pressing[:, None] * self.normals + self.rubbing
+
+    @property
+    def slips(self) -> bool:
+        """Whether any touching node slips against friction."""
+        return self.friction > 0 and bool((self.active & self.slipping).any())
+
+    def gaps(self, at: np.ndarray) -> np.ndarray:
+        """Gaps (m,) m of all candidates, negative in the obstacle; at (n, 3) m: the mesh's nodes."""
+        return self.obstacle.distance(at[self.candidates])[0] if len(self.candidates) else np.empty(0)
+
+    def carried(
+        self,
+        obstacle: Obstacle | None,
+        candidates: np.ndarray,
+        at: np.ndarray,
+        before: Pose | None = None,
+        friction: float = 0.0,
+        grip: float = 0.0,
+        first_share: float = 0.0,
+    ) -> ContactSet:
+        """The start of the next load step: what touched goes on, what the moved obstacle has reached begins.
+
+        at : (n, 3) m, the mesh's nodes now; before : where the obstacle stood until now.
+        Anchors of slipping nodes have been dragged to where their friction holds.
+        first_share : where nothing touched, only nodes begin that overlap by this share of the largest overlap.
+        """
+        m = len(candidates)
+        if obstacle is None or not m:
+            return ContactSet.none()
+        distance, normal = obstacle.distance(at[candidates])
+        went, place = np.isin(candidates, self.nodes), np.searchsorted(self.nodes, candidates)
+        share = 0.0 if went.any() else first_share
+        active = went | (distance < min(share * distance.min(), 0.0))
+        slipping, anchor, pressing, rubbing = np.zeros(m, bool), np.zeros((m, 3)), np.zeros(m), np.zeros((m, 3))
+        pressing[went], rubbing[went] = self.pressing[place[went]], self.rubbing[place[went]]
+        if friction and went.any():
+            slipping[went] = self.slipping[self.active][place[went]]
+            anchor[went] = before.to_own(at[candidates[went]] + rubbing[went] / grip)
+        forces = pressing[active], rubbing[active]
+        carried = ContactSet(candidates, active, slipping, anchor, *forces, normal[active], obstacle, friction, grip)
+        if friction:
+            carried._stood = before.to_own(at[candidates])
+            carried._tie(active & ~went, at)
+        return carried
+
+    def _tie(self, fresh: np.ndarray, at: np.ndarray) -> None:
+        """Anchor nodes where they meet the obstacle, which moves onto them in this load step."""
+        last = self.obstacle.pose.to_own(at[self.candidates[fresh]])
+        self.anchor[fresh] = first_contact(self.obstacle.indenter, self._stood[fresh], last)
+
+    def begin(self, at: np.ndarray) -> np.ndarray:
+        """Look at the obstacle from where the nodes are; frames (k, 3, 3) with the normal as first axis.
+
+        One tangent lies across the axis that the normal has least of: on a plane of symmetry that is its own.
+        """
+        if not len(self.candidates):
+            self._distance, self._frames = np.empty(0), np.empty((0, 3, 3))
+            return self._frames
+        self._distance, self.normals = self.obstacle.distance(at[self.nodes])
+        helper = np.eye(3)[np.argmin(np.abs(self.normals), axis=1)]
+        first = np.cross(self.normals, helper)
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        self._frames = np.stack([self.normals, first, np.cross(self.normals, first)], -1)
+        if self.friction:
+            self._look(at)
+            self._rub()
+        return self._frames
+
+    def _look(self, at: np.ndarray) -> None:
+        """Measure how far nodes are from their anchors, along the obstacle."""
+        away = at[self.nodes] - self.obstacle.pose.from_own(self.anchor[self.active])
+        self._trial = -self.grip * (away - np.einsum("ki,ki->k", away, self.normals)[:, None] * self.normals)
+
+    def _rub(self) -> None:
+        """Friction from the normal forces and the springs."""
+        self.rubbing, self.slipping[self.active] = self._capped(self._trial)
+
+    def _capped(self, trial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What is left (k, 3) of pulls (k, 3) N, and which (k,) slip."""
+        bound, size = self.friction * np.maximum(self.pressing, 0), np.linalg.norm(trial, axis=1)
+        slips = size > bound
+        return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips
+
+    def slide_share(self, move: np.ndarray, force: float, stiffness: float) -> float:
+        """The share of a step at which friction balances the rest along it; 1 where the whole step is good enough.
+
+        move : (k, 3) m, of the nodes, in the frames of ``begin``; force : N m, of all other forces times the step, at
+        its start; stiffness : N m, what the whole step adds to them and to friction as linearised by ``gripping``.
+        Newton's steps overshoot where many nodes begin to slip.
+        """
+        if not self.friction:
+            return 1.0
+        along = np.einsum("kij,kj->ki", self._frames[:, :, 1:], move[:, 1:])
+
+        stiffness -= float(np.einsum("ki,kij,kj->", along, self._gripping, along))
+
+        def left(share: float) -> float:
+            rubbing, _ = self._capped(self._trial - share * self.grip * along)
+            return force + share * stiffness - float((along * rubbing).sum())
+
+        begin, end = left(0.0), left(1.0)
+        if begin >= 0 or end <= _OVERSHOT * -begin:
+            return 1.0
+        low, high = 0.0, 1.0
+        while high - low > _SHARE_STEP:
+            middle = (low + high) / 2
+            low, high = (middle, high) if left(middle) < 0 else (low, middle)
+        return high
+
+    def bending(self, at: np.ndarray) -> np.ndarray:
+        """Change (k, 3, 3) N/m of the contact forces with the normals' turn: pressing times the Hessian.
+
+        Taken where the nodes will come to lie, on the obstacle: near a centre of curvature, deep in it, it is no guide.
+        """
+        if not self.active.any():
+            return np.empty((0, 3, 3))
+        return self.pressing[:, None, None] * self.obstacle.curvature(
+            at[self.nodes] - self._distance[:, None] * self.normals
+        )
+
+    def gripping(self, along: float) -> np.ndarray:
+        """Stiffness (k, 3, 3) N/m of friction: all of the springs that hold, across their pull of those that slip.
+
+        along : 0 for Newton's method; more of the secant's stiffness along the pull keeps nodes from swinging to and
+        fro between stick and slip.
+        """
+        self._gripping = np.zeros((int(self.active.sum()), 3, 3))
+        if not self.friction:
+            return self._gripping
+        size = np.maximum(np.linalg.norm(self._trial, axis=1), 1e-30)
+        slips = self.slipping[self.active]
+        pull = np.where(slips[:, None], self._trial / size[:, None], 0.0)
+        share = np.where(slips, np.linalg.norm(self.rubbing, axis=1) / size, 1.0)
+        flat = np.eye(3) - self.normals[:, :, None] * self.normals[:, None, :]
+        flat -= (1 - along) * pull[:, :, None] * pull[:, None, :]
+        self._gripping = (self.grip * share)[:, None, None] * flat
+        return self._gripping
+
+    def prescribe(self, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Held degrees of freedom and their steps, both (k, 3) in the frames of ``begin``; fixed ones do not move."""
+        held, step = fixed.copy(), np.zeros(fixed.shape)
+        if len(fixed):
+            held[:, 0] = True
+            step[:, 0] = -self._distance
+            step[fixed] = 0.0
+        return held, step
+
+    def rubbing_in_frames(self) -> np.ndarray:
+        """(k, 3) N, friction in the frames of ``begin``."""
+        if not self.friction:
+            return np.zeros((int(self.active.sum()), 3))
+        return np.einsum("kji,kj->ki", self._frames, self.rubbing)
+
+    def follow(self, reaction: np.ndarray) -> None:
+        """Let friction follow normal forces that have just been found; reaction (k, 3) N in frames."""
+        if self.slips:
+            self.pressing = reaction[:, 0].copy()
+            before = self.rubbing
+            self._rub()
+            self.imbalance = float(np.abs(self.rubbing - before).max() / max(self.pressing.max(initial=0), 1e-12))
+
+    def press(self, reaction: np.ndarray) -> None:
+        """Keep the normal forces in reactions (k, 3) N in frames."""
+        self.pressing = reaction[:, 0].copy()
+
+    def update(self, at: np.ndarray, tolerance: float) -> bool:
+        """Release what is pulled and take in what is passed; whether nothing had to. tolerance : m, of the gaps."""
+        if not len(self.candidates):
+            return True
+        distance, normal = self.obstacle.distance(at[self.candidates])
+        pressing = np.zeros(len(distance))
+        pressing[self.active] = self.pressing
+        release, enter = self.active & (pressing < 0), ~self.active & (distance < -tolerance)
+        settled = not release.any() and not enter.any() and np.abs(distance[self.active]).max(initial=0) < tolerance
+        if self.friction:
+            self._tie(enter, at)
+            self.slipping[enter | release] = False
+        self.active = (self.active & ~release) | enter
+        self.normals, self.pressing = normal[self.active], pressing[self.active]
+        self.rubbing = np.zeros_like(self.normals)
+        if self.friction:
+            self._look(at)
+            self._rub()
+        return bool(settled)
+
+
+_OVERSHOT = 0.3  # of a step's driving force: what may be left against it (assumed)
+_SHARE_STEP = 1 / 64

@@ -1,0 +1,299 @@
+"""Contact of a rigid indenter with a finite-strain solid: Newton's method with an exact active set.
+
+A touching node may slide on the indenter but not leave along its normal: its degrees of freedom are turned into the
+indenter's frame and the normal one is prescribed, so the matrix stays symmetric positive definite. Friction holds it by
+a spring that slips at mu times the normal force (``contact_set``). The BioTac's fluid adds one unknown, its pressure,
+by a bordered solve; its core is a second obstacle, for the inner skin.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from ...errors import TactileError
+from ...geometry.indenters import Indenter, Pose
+from ..penetration import BEHIND
+from ..pose_path import between
+from ..solids.damped_factor import DampedFactor, held_back
+from ..solids.finite_strain import FiniteStrainSolid, State
+from ..solids.fluid_cavity import FluidCavity
+from ..solids.sparse_cholesky import NotPositiveDefiniteError, PatternFactor
+from .contact_set import ContactSet
+from .contact_state import ContactState, guarded
+from .obstacle import Obstacle, PlacedIndenter
+from .penalty_points import LET_THROUGH, NO_PUSH, PenaltyPoints, Push
+from .tolerance import EXACT, Tolerance
+
+SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
+MAX_ITERATIONS, MAX_GUARDED = 40, 60  # the second where springs between nodes push: they slow the end (assumed)
+MOST_FAILURES = 8  # of load steps on one path: bounds its time (assumed; the longest path that was found had 8)
+_EASY = 8  # iterations, of a load step after which the next may be longer again (assumed)
+SMALLEST_STEP = 1 / 16  # of a load step, or of the way where that is less; halved below that, the path has ended
+# Of a node's own stiffness, of springs between nodes: stiff ones find their contact only from that of softer ones.
+_SPRING, _STIFF = 10.0, 40.0
+_FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the normal forces
+
+
+class NoEquilibriumError(TactileError):
+    """A path has ended: no contact was found beyond it."""
+
+
+class _NotConvergedError(Exception):
+    """A load step is too large."""
+
+
+_FAILURES = _NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError  # of a load step
+
+
+class FiniteStrainContact:
+    """An indenter at a pose in front of a solid; follows a path of growing depth, or of poses.
+
+    touchable : (m,) mesh nodes that the indenter may touch
+    fixed : (3 n,) bool, degrees of freedom that do not move; None: those of the clamped nodes
+    cavity : incompressible fluid in the solid; ``pre_inflation`` m3 is added to its volume at rest
+    core : a rigid body inside, that ``inner`` (k,) mesh nodes may come to touch
+    friction : Coulomb's coefficient, between indenter and sensor
+    factor : where it is known already, the solver of the solid's pattern; tolerance : when iterations end
+    first_share : a press from rest begins with the nodes that overlap by more than this share of the most: a guess,
+        which the active set corrects
+    faces : (f, 9) quadratic faces of the surface that keep the indenter out between their nodes, see ``PenaltyPoints``
+    """
+
+    def __init__(
+        self,
+        solid: FiniteStrainSolid,
+        touchable: np.ndarray,
+        indenter: Indenter,
+        pose: Pose,
+        cavity: FluidCavity | None = None,
+        pre_inflation: float = 0.0,
+        fixed: np.ndarray | None = None,
+        core: Obstacle | None = None,
+        inner: np.ndarray | None = None,
+        friction: float = 0.0,
+        factor: PatternFactor | None = None,
+        tolerance: Tolerance = EXACT,
+        first_share: float = 0.0,
+        faces: np.ndarray | None = None,
+    ) -> None:
+        self.solid, self.touchable, self.indenter, self.pose, self.cavity = solid, touchable, indenter, pose, cavity
+        self.fixed = (np.repeat(solid.mesh.clamped, 3) if fixed is None else fixed).reshape(-1, 3)
+        self.volume = pre_inflation + (cavity.volume(solid.mesh.nodes) if cavity else 0.0)
+        self.core, self.inner = core, np.empty(0, int) if inner is None or core is None else inner
+        self.friction, self.tolerance, self.first_share = friction, tolerance, first_share
+        self.most_failures = MOST_FAILURES
+        self._factor = DampedFactor(solid, factor or PatternFactor())
+        self._between = None if faces is None else PenaltyPoints(faces)
+        if cavity:
+            rows, columns, _ = cavity.hessian(solid.mesh.nodes)
+            self._cavity_places = solid.pattern.find(rows, columns)
+
+    def start(self) -> ContactState:
+        """Nothing is deformed; a pre-inflated skin finds its shape in the first step."""
+        return ContactState(0.0, self.pose, self.solid.rest(), ContactSet.none(), ContactSet.none(), NO_PUSH)
+
+    def press(self, depth: float, start: ContactState | None = None, step: float = 0.1e-3) -> ContactState:
+        """The contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
+
+        A step that fails is halved. Raises TactileError with the depth reached where a sixteenth of a step fails, or
+        where too many have failed.
+        """
+        touch = start or self.start()
+        if depth <= touch.depth + 1e-12:
+            return dataclasses.replace(touch, steps=0)
+        begin, reach = touch, depth - touch.depth
+
+        def along(part: float) -> Pose:
+            return between(begin.pose, self.pose.moved(depth), part)
+
+        try:
+            touch = self._follow(along, begin, step / reach)
+        except _PathEndsError as end:
+            reached = begin.depth + end.part * reach
+            found = f"no equilibrium beyond {reached * 1e3:.3f} mm"
+            raise NoEquilibriumError("finite-strain solver", found, "a smaller depth") from None
+        return dataclasses.replace(touch, depth=depth)
+
+    def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
+        """The contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel.
+
+        Raises TactileError with the part of the way that was reached.
+        """
+        way = float(np.linalg.norm(pose.apex - start.pose.apex))
+        turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
+        try:
+            touch = self._follow(lambda part: between(start.pose, pose, part), start, step / max(way, turned, 1e-12))
+        except _PathEndsError as end:
+            found = f"no equilibrium beyond {end.part:.0%} of the way"
+            raise NoEquilibriumError("finite-strain solver", found, "a shorter way, or less force") from None
+        return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
+
+    def _follow(self, along: Callable[[float], Pose], start: ContactState, step: float) -> ContactState:
+        """Load steps from ``along(0)``, where ``start`` is solved, to ``along(1)``; a step that fails is halved."""
+        touch, done, size, steps, failures = start, 0.0, step, 0, 0
+        while done < 1 - 1e-9:
+            goal = min(done + size, 1.0)
+            try:
+                touch = self._solve(along(goal), touch)
+                done, size = goal, min(step, 2 * size) if touch.iterations <= _EASY else size
+            except _FAILURES:
+                steps += 1
+                if self._between and not touch.guarded:
+                    touch = guarded(touch)
+                    continue
+                size, failures = min(size, goal - done) / 2, failures + 1
+                if size < min(step, 1.0) * SMALLEST_STEP or failures > self.most_failures:
+                    raise _PathEndsError(done) from None
+            else:
+                steps += 1
+        return dataclasses.replace(self._stiffened(touch), steps=steps)
+
+    def _solve(self, pose: Pose, start: ContactState, spring: float = _SPRING) -> ContactState:
+        """One load step, from a solved contact; spring : stiffness of those between nodes, over a node's own."""
+        state, fluid = start.state.copy(), start.fluid
+        at = self._at(state)
+        outer = start.outer.carried(
+            PlacedIndenter(self.indenter, pose), self.touchable, at, start.pose, self.friction,
+            _GRIP * self._factor.stiffness, self.first_share,
+        )  # fmt: skip
+        if (outer.normals @ pose.direction).min(initial=1.0) < BEHIND:
+            raise _NotConvergedError  # it would come to lie before the nodes that it should push
+        inner = start.inner.carried(self.core, self.inner, at)
+        self._factor.damping, imbalance, sizes = 0.0, 1.0, [0.0, 0.0]
+        for iteration in range(1, (MAX_GUARDED if start.guarded else MAX_ITERATIONS) + 1):
+            push = self._push(start, outer, at, spring)
+            step, rise, imbalance, pressure_step, slide = self._newton(state, outer, inner, fluid, push, imbalance)
+            share = self._share(state, step) * (slide if iteration > 1 else 1.0)
+            state.displacement += share * step
+            state.pressure += share * pressure_step
+            fluid += share * rise
+            at = self._at(state)
+            settled = [touching.update(at, self.tolerance.gap) for touching in (outer, inner)]
+            enough = max(self.tolerance.balance, SLIDING_TOLERANCE) if outer.slips else self.tolerance.balance
+            small = np.abs(step).max() < self.tolerance.step and not outer.slips and not self._factor.damping
+            if all(settled) and share == 1 and (small or max(outer.imbalance, imbalance) < enough):
+                push = self._push(start, outer, at, spring)
+                found = ContactState(start.depth, pose, state, outer, inner, push, start.guarded, fluid, iteration)
+                return self._solve(pose, guarded(found)) if self._lets_through(found) and not start.guarded else found
+            sizes.append(float(np.abs(step).max()))
+            if abs(sizes[-1] - sizes[-3]) < _SAME * sizes[-1]:
+                raise _NotConvergedError  # to and fro between two faces of the indenter
+            self._factor.relax()
+        raise _NotConvergedError
+
+    def _share(self, state: State, step: np.ndarray) -> float:
+        """How much of a step leaves every Gauss point a good part of its volume; FloatingPointError where none does."""
+        before = self.solid.deformation(state.displacement)[1]
+        for share in _SHARES:
+            if (self.solid.deformation(state.displacement + share * step)[1] > _KEPT_VOLUME * before).all():
+                return share
+        raise FloatingPointError("a cell would be turned inside out")
+
+    def _push(self, start: ContactState, outer: ContactSet, at: np.ndarray, spring: float) -> Push:
+        """Of the indenter on the surface between nodes, where that is guarded."""
+        if not (start.guarded and outer.obstacle):
+            return NO_PUSH
+        return self._between.push(outer.obstacle, at, spring * self._factor.stiffness)
+
+    def _lets_through(self, touch: ContactState) -> bool:
+        """Whether the indenter has come in between nodes."""
+        obstacle, at = touch.outer.obstacle, self._at(touch.state)
+        return bool(self._between and obstacle and self._between.deepest(obstacle, at) > LET_THROUGH)
+
+    def _stiffened(self, touch: ContactState) -> ContactState:
+        """A contact solved on with stiff springs between nodes; as it is where that fails, or where none are needed.
+
+        What stays hidden is seen afterwards (``penetration``).
+        """
+        if not touch.guarded or not self._lets_through(touch):
+            return touch
+        try:
+            return self._solve(touch.pose, touch, _STIFF)
+        except _FAILURES:
+            return touch
+
+    def _at(self, state: State) -> np.ndarray:
+        return self.solid.mesh.nodes + state.displacement
+
+    def _newton(
+        self, state: State, outer: ContactSet, inner: ContactSet, fluid: float, push: Push, unrest: float
+    ) -> tuple[np.ndarray, float, float, np.ndarray, float]:
+        """Steps of displacement (n, 3), the fluid's pressure and the cells' (n_cells, 4); the imbalance before them,
+        and the share of the step that friction allows."""
+        lines = self.solid.linearise(state)
+        largest = np.abs(lines.internal_force(condensed=False)).max()
+        pattern, at = self.solid.pattern, self._at(state)
+        blocks, residual = lines.blocks(), lines.internal_force().reshape(-1, 3)
+        swell, excess = np.zeros_like(residual), 0.0
+        if self.cavity:
+            swell, excess = self.cavity.gradient(at).reshape(-1, 3), self.cavity.volume(at) - self.volume
+            residual = residual - fluid * swell
+            np.add.at(blocks, self._cavity_places, -fluid * self.cavity.hessian(at)[2])
+        push.add_to(residual, blocks, pattern)
+        held, step = self.fixed.copy(), np.zeros_like(residual)
+        nodes = np.concatenate([outer.nodes, inner.nodes])
+        frames = np.concatenate([touching.begin(at) for touching in (outer, inner)])
+        blocks[pattern.diagonal[nodes]] -= held_back(
+            np.concatenate([outer.bending(at), inner.bending(at)]), blocks[pattern.diagonal[nodes]]
+        )
+        blocks[pattern.diagonal[outer.nodes]] += outer.gripping(min(unrest, _MOST_ALONG))
+        held[nodes] = np.einsum("nij,ni->nj", frames**2, self.fixed[nodes]) > 0.5
+        for touching in (outer, inner):
+            held[touching.nodes], step[touching.nodes] = touching.prescribe(held[touching.nodes])
+        pattern.turn(blocks, nodes, frames)
+        matrix = pattern.sparse(blocks)
+        for values in (residual, swell):
+            values[nodes] = np.einsum("nji,nj->ni", frames, values[nodes])
+        solve = self._factor.solver(blocks, held)
+        known = (matrix @ step.ravel()).reshape(-1, 3)
+        under_pressure = solve(swell) if self.cavity else swell
+        step, reaction, rise = self._pull(
+            solve, matrix, residual, step, known, held, swell, excess, under_pressure, outer
+        )
+        for touching in (outer, inner):
+            touching.press(reaction[touching.nodes])
+        loose = ~held
+        forces = (float((values[loose] * step[loose]).sum()) for values in (residual, reaction - residual))
+        slide = outer.slide_share(step[outer.nodes], *forces)
+        pulled = residual.copy()
+        pulled[outer.nodes] -= outer.rubbing_in_frames()
+        imbalance = np.abs(pulled[loose]).max(initial=0.0) / max(largest, 1e-12)
+        step[nodes] = np.einsum("nij,nj->ni", frames, step[nodes])
+        imbalance = float(max(imbalance, abs(excess) / max(self.volume, 1e-12)))
+        return step, rise, imbalance, lines.pressure_step(step), slide
+
+    def _pull(self, solve, matrix, residual, prescribed, known, held, swell, excess, under_pressure, outer):  # noqa: ANN001, ANN202
+        """Step, reactions and rise of the fluid's pressure, with friction that follows the normal forces."""
+        rise = 0.0
+        for _ in range(_FRICTION_SWEEPS if outer.slips else 1):
+            load = -residual - known
+            load[outer.nodes] += outer.rubbing_in_frames()
+            step = prescribed + solve(load)
+            if self.cavity:
+                loose = np.where(held, 0.0, swell)
+                rise = -(excess + float((swell * step).sum())) / float((loose * under_pressure).sum())
+                step = step + rise * under_pressure
+            reaction = residual + (matrix @ step.ravel()).reshape(-1, 3) - rise * swell
+            outer.follow(reaction[outer.nodes])
+        return step, reaction, rise
+
+
+_GRIP = 30.0  # of a node's own stiffness: springs of friction that yield some micrometres at most
+_SHARES = 1.0, 0.5, 0.25, 0.125  # of a step
+_SAME = 1e-6  # relative, of two steps that swing to and fro (assumed)
+_MOST_ALONG = 0.6  # of the secant's stiffness, for springs that slip while forces are far from balance (assumed)
+_KEPT_VOLUME = 0.3  # least share of its volume that a Gauss point keeps in one step
+
+
+class _PathEndsError(Exception):
+    """Even a small load step fails; part : of the way that was reached."""
+
+    def __init__(self, part: float) -> None:
+        super().__init__(part)
+        self.part = part
+
+
+_TURN_ARM = 5e-3  # m, lever arm at which a turn counts as travel: about a fingertip's radius

@@ -1,0 +1,1 @@
+"""Contacts as Isaac Gym simulates them: corotated linear tetrahedra."""

@@ -1,0 +1,1 @@
+"""Elastic bodies: meshes, materials, stress, the fluid, factorisations."""

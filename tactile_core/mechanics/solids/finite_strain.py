@@ -1,0 +1,153 @@
+"""Finite-strain, nearly incompressible solid: Q2 displacement with a discontinuous linear pressure a cell.
+
+Energy W(F) + p (J - 1) - p^2 / (2 kappa), p linear in each cell: the pressure is an independent Newton iterate,
+eliminated cell by cell (mechanics.md). Simo, Taylor, Pister, Comput. Methods Appl. Mech. Eng. 51, 1985.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ...sensors import Material
+from .block_pattern import BlockPattern
+from .determinants import cofactors, determinants
+from .elasticity import reference_gradients
+from .hex_mesh import HexMesh
+from .neo_hookean import Law, NeoHookean
+
+_BATCH = 32  # cells whose stiffness is made at once: what they need stays in the processor's cache
+
+
+@dataclasses.dataclass
+class State:
+    """displacement : (n, 3) m; pressure : (n_cells, 4) Pa, coefficients of 1, xi, eta, zeta (tension positive)."""
+
+    displacement: np.ndarray
+    pressure: np.ndarray
+
+    def copy(self) -> State:
+        """A state that can be changed alone."""
+        return State(self.displacement.copy(), self.pressure.copy())
+
+
+class FiniteStrainSolid:
+    """Residual and tangent of a mesh of one material; see the module for the energy.
+
+    material : linear constants, for a neo-Hookean solid, or a law of its own
+    pattern : of the mesh's cells, where it is known already
+    """
+
+    def __init__(self, mesh: HexMesh, material: Material | Law, pattern: BlockPattern | None = None) -> None:
+        self.mesh = mesh
+        self.law: Law = NeoHookean.of(material) if isinstance(material, Material) else material
+        if pattern is not None:
+            self.pattern = pattern
+        points, weights, reference = reference_gradients()
+        n = len(mesh.cells)
+        corners = np.ascontiguousarray(mesh.nodes[mesh.cells].swapaxes(1, 2))  # (e, d, a)
+        jacobian = (corners @ reference.transpose(1, 0, 2).reshape(27, 81)).reshape(n, 3, 27, 3).swapaxes(1, 2)
+        self.weight = weights * np.linalg.det(jacobian)
+        if not (self.weight > 0).all():
+            raise ValueError("the mesh holds cells that are turned inside out")
+        self.gradient = reference @ np.linalg.inv(jacobian)  # (e, q, a, d)
+        self._by_node = np.ascontiguousarray(self.gradient.transpose(0, 2, 1, 3)).reshape(n, 27, 81)
+        self._by_point = np.ascontiguousarray(self.gradient.swapaxes(2, 3))
+        self.linear = np.column_stack([np.ones(len(points)), points])
+        self.mass = np.einsum("eq,qp,qr->epr", self.weight, self.linear, self.linear, optimize=True) / self.law.bulk
+        self.dofs = (3 * mesh.cells[..., None] + np.arange(3)).reshape(n, 81)
+
+    @functools.cached_property
+    def pattern(self) -> BlockPattern:
+        """Where the stiffness matrix has entries."""
+        return BlockPattern(self.mesh.cells, self.mesh.clamped)
+
+    def rest(self) -> State:
+        """No displacement, no pressure."""
+        return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 4)))
+
+    def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Deformation gradient F (n_cells, 27, 3, 3) and its determinant J (n_cells, 27)."""
+        moved = displacement[self.mesh.cells].swapaxes(1, 2)
+        f = (moved @ self._by_node).reshape(-1, 3, 27, 3).swapaxes(1, 2) + np.eye(3)
+        return f, determinants(f)
+
+    def energy(self, state: State) -> float:
+        """Stored elastic energy, J."""
+        f, j = self.deformation(state.displacement)
+        p = state.pressure @ self.linear.T
+        density = self.law.energy(f, j) + p * (j - 1) - p**2 / (2 * self.law.bulk)
+        return float((density * self.weight).sum())
+
+    def linearise(self, state: State) -> Linearised:
+        """Residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
+        f, j = self.deformation(state.displacement)
+        if not (j > 0).all():  # NaN, too
+            raise FloatingPointError("a cell is turned inside out")
+        p = state.pressure @ self.linear.T
+        n = len(j)
+        residual, couple = np.empty((n, 27, 3)), np.empty((n, 27, 4, 3))
+        stiffness = np.empty((n, 27, 3, 3, 27))
+        for start in range(0, n, _BATCH):
+            part = slice(start, start + _BATCH)
+            self._cells(part, f[part], j[part], p[part], residual, couple, stiffness)
+        gap = (self.weight * (j - 1)) @ self.linear - np.einsum("epr,er->ep", self.mass, state.pressure)
+        couple = couple.swapaxes(1, 2)  # (e, p, a, i)
+        to_pressure = np.linalg.solve(self.mass, couple.reshape(n, 4, 81)).reshape(n, 4, 27, 3)
+        pressure_gap = np.linalg.solve(self.mass, gap[..., None])[..., 0]
+        by_dof = couple.reshape(n, 4, 81).swapaxes(1, 2)
+        stiffness += (by_dof @ to_pressure.swapaxes(2, 3).reshape(n, 4, 81)).reshape(n, 27, 3, 3, 27)
+        residual = residual.reshape(n, 81)
+        condensed = residual + (by_dof @ pressure_gap[..., None])[..., 0]
+        return Linearised(self, residual, condensed, stiffness, to_pressure.reshape(n, 4, 81), pressure_gap)
+
+    def _cells(self, part, f, j, p, residual, couple, stiffness) -> None:  # noqa: ANN001
+        """Fill in internal forces (e, 27, 3), pressure coupling (e, 27, 4, 3) and stiffness of some cells."""
+        stress, tangent = self.law.stress_tangent(f, j, p)
+        by_node, n = self._by_node[part], len(j)
+        weight = self.weight[part]
+        along = (weight[..., None, None] * stress).swapaxes(2, 3)  # (e, q, J, i)
+        residual[part] = by_node @ along.reshape(n, 81, 3)
+        cofactor = weight[..., None, None] * cofactors(f).swapaxes(-1, -2)  # (e, q, J, i)
+        spread = cofactor[:, :, :, None, :] * self.linear[:, None, :, None]
+        couple[part] = (by_node @ spread.reshape(n, 81, 12)).reshape(n, 27, 4, 3)
+        tangent = weight[..., None, None, None, None] * tangent.transpose(0, 1, 3, 2, 4, 5)  # (e, q, J, i, k, L)
+        half = np.ascontiguousarray(tangent).reshape(n, 27, 27, 3) @ self._by_point[part]
+        stiffness[part] = (by_node @ half.reshape(n, 81, 243)).reshape(n, 27, 3, 3, 27)
+
+
+@dataclasses.dataclass
+class Linearised:
+    """A solid's equations at one state, cell by cell, pressure eliminated.
+
+    residual, condensed : (n_cells, 81) N, the second with the pressure's own residual carried over
+    stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node)
+    """
+
+    solid: FiniteStrainSolid
+    residual: np.ndarray
+    condensed: np.ndarray
+    stiffness: np.ndarray
+    to_pressure: np.ndarray
+    pressure_gap: np.ndarray
+
+    def internal_force(self, *, condensed: bool = True) -> np.ndarray:
+        """(3 n,) N; ``condensed`` as the Newton step needs it."""
+        values = self.condensed if condensed else self.residual
+        size = 3 * len(self.solid.mesh.nodes)
+        return np.bincount(self.solid.dofs.ravel(), values.ravel(), minlength=size)
+
+    def blocks(self) -> np.ndarray:
+        """Tangent stiffness (n_blocks, 3, 3) N/m on the solid's pattern."""
+        return self.solid.pattern.gather(self.stiffness)
+
+    def matrix(self):  # noqa: ANN201 (scipy is imported only where it is needed)
+        """Tangent stiffness, scipy CSC (3 n, 3 n), N/m."""
+        return self.solid.pattern.sparse(self.blocks()).tocsc()
+
+    def pressure_step(self, step: np.ndarray) -> np.ndarray:
+        """Change of the pressures (n_cells, 4) Pa that goes with a displacement step (n, 3) m."""
+        local = step.reshape(-1)[self.solid.dofs]
+        return np.einsum("epi,ei->ep", self.to_pressure, local) + self.pressure_gap

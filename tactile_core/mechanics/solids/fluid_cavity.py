@@ -1,0 +1,64 @@
+"""The BioTac's fluid in finite strain: incompressible, one pressure in the whole cavity."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from .elasticity import _POINT_WEIGHTS, _POINTS, quadratic
+
+
+class FluidCavity:
+    """Volume under a skin of quadratic cells by their own curved faces, with its exact first and second derivatives.
+
+    V = 1/3 of the integral of x . (dx/dxi x dx/deta) over the faces: trilinear in the nodes, and summed with
+    coefficients that are antisymmetric in them, since x_a . (x_b x x_c) is.
+    """
+
+    def __init__(self, faces: np.ndarray, n_nodes: int) -> None:
+        """faces : (n, 9) mesh nodes, node 3 a + b at (xi, eta) = (a, b) - 1, xi, eta and outward right-handed."""
+        self.faces, self.n_nodes = faces, n_nodes
+
+    def volume(self, nodes: np.ndarray) -> float:
+        """m3, for node positions (n_nodes, 3) m."""
+        return float((nodes.ravel() @ self.gradient(nodes)) / 3)
+
+    def gradient(self, nodes: np.ndarray) -> np.ndarray:
+        """dV / d(node) (3 n_nodes,), m2."""
+        corners = nodes[self.faces]
+        parts = 3 * np.cross(corners[:, None], self._arms(corners)).sum(axis=2)
+        gradient = np.zeros((self.n_nodes, 3))
+        np.add.at(gradient, self.faces.ravel(), parts.reshape(-1, 3))
+        return gradient.ravel()
+
+    def hessian(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """d2V / d(node)2: node pairs (k,), (k,) and the sum's 3 x 3 blocks (k, 3, 3), m, of each; pairs come again."""
+        arms = self._arms(nodes[self.faces])
+        rows, columns = np.repeat(self.faces, 9, axis=1).ravel(), np.tile(self.faces, (1, 9)).ravel()
+        return rows, columns, -6 * _cross_matrix(arms.reshape(-1, 3))
+
+    def _arms(self, corners: np.ndarray) -> np.ndarray:
+        return np.einsum("abc,fci->fabi", _coefficients(), corners, optimize=True)
+
+
+@functools.cache
+def _coefficients() -> np.ndarray:
+    """Antisymmetric (9, 9, 9): a third of the integral of N_a dN_b/dxi dN_c/deta, exact by three Gauss points."""
+    value, slope = quadratic(_POINTS)
+    weights = np.einsum("p,q->pq", _POINT_WEIGHTS, _POINT_WEIGHTS)
+    shape, along, across = (
+        np.einsum("pa,qb->pqab", first, second).reshape(3, 3, 9)
+        for first, second in ((value, value), (slope, value), (value, slope))
+    )
+    product = np.einsum("pq,pqa,pqb,pqc->abc", weights, shape, along, across) / 3
+    even = sum(product.transpose(order) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
+    odd = sum(product.transpose(order) for order in ((1, 0, 2), (0, 2, 1), (2, 1, 0)))
+    return (even - odd) / 6
+
+
+def _cross_matrix(v: np.ndarray) -> np.ndarray:
+    """Matrices (n, 3, 3) with M w = v x w."""
+    zero = np.zeros(len(v))
+    x, y, z = v.T
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(-1, 3, 3)

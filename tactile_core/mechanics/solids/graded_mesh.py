@@ -1,0 +1,208 @@
+"""Solids refined where an indenter touches: the sensors' own lattices, with fewer lines away from the contact.
+
+The lines of a mesh are given by their places in the sensor's lattice (real-valued row and column numbers), so that its
+surface is the sensor's own. What is found on the lines is carried to the lattice by cubic splines along them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...geometry.catmull_rom import catmull_rom
+from ...sensors import biotac, digit
+from .block_pattern import BlockPattern
+from .hex_mesh import SKIN_LAYERS, HexMesh, gel_solid, glued_skin, skin_solid
+from .sparse_cholesky import PatternFactor
+
+_WIDEST = {"biotac": 6.0, "digit": 10.0}  # lattice lines, the widest cell; the skin bends everywhere
+_KEPT = 6  # patterns kept, each with the analysis and the last factor of its matrix: about 100 MB
+
+
+@dataclasses.dataclass(frozen=True)
+class Footprint:
+    """Where a lattice is to be fine, in row and column numbers of the lattice.
+
+    low, high : (row, column) of the fine part's corners
+    spacing : of the nodes there, in lattice lines; growth : of a cell with its distance from the fine part
+    refine : divides every cell, for a mesh that many times as fine
+    """
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    spacing: float = 1.0
+    growth: float = 1.5
+    refine: int = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class GradedMesh:
+    """A graded solid, the pattern of its matrix with the solver that knows it, and its lines.
+
+    rows (i,), columns (j,) : places of the mesh's lines in the lattice
+    to_rows (rows, i), to_columns (columns, j) : from values at the mesh's lines to values at the lattice's lines
+    """
+
+    mesh: HexMesh
+    pattern: BlockPattern
+    factor: PatternFactor
+    rows: np.ndarray
+    columns: np.ndarray
+    to_rows: np.ndarray
+    to_columns: np.ndarray
+
+    def grid(self, values: np.ndarray) -> np.ndarray:
+        """Values (n_surface, k) at the mesh's surface nodes as a grid (rows, columns, k); poles left out."""
+        columns = self.to_columns.shape[1]
+        return values[: len(values) // columns * columns].reshape(-1, columns, values.shape[1])
+
+    def on_lattice(self, values: np.ndarray) -> np.ndarray:
+        """Values (n_surface, k) at the mesh's surface nodes, at the lattice's nodes (n, k): twice differentiable."""
+        return self._carry(values, self.to_rows, self.to_columns)
+
+    def nearest_on_lattice(self, flags: np.ndarray) -> np.ndarray:
+        """Flags (n_surface,) at the mesh's surface nodes, at the lattice's nodes (n,): set where most around are."""
+        shares = self._carry(flags[:, None].astype(float), *self._linear())
+        return shares[:, 0] > 0.5
+
+    def _linear(self) -> tuple[np.ndarray, np.ndarray]:
+        periodic = len(self.columns) > self.to_columns.shape[1]
+        count = np.arange(len(self.to_rows)), np.arange(len(self.to_columns))
+        rows = np.stack([np.interp(count[0], self.rows, line) for line in np.eye(len(self.rows))], -1)
+        columns = np.stack([np.interp(count[1], self.columns, line) for line in np.eye(len(self.columns))], -1)
+        if periodic:
+            columns[:, 0] += columns[:, -1]
+            columns = columns[:, :-1]
+        return rows, columns
+
+    def _carry(self, values: np.ndarray, to_rows: np.ndarray, to_columns: np.ndarray) -> np.ndarray:
+        i, j = to_rows.shape[1], to_columns.shape[1]
+        k = values.shape[1]
+        if len(values) == i * j:
+            return np.einsum("ri,ijk,cj->rck", to_rows, values.reshape(i, j, k), to_columns, optimize=True).reshape(
+                -1, k
+            )
+        ring, poles = values[: (i - 2) * j].reshape(i - 2, j, k), values[(i - 2) * j :]
+        ends = [np.broadcast_to(pole, (1, j, k)) for pole in poles]
+        grid = np.concatenate([ends[0], ring, ends[1]])
+        body = np.einsum("ri,ijk,cj->rck", to_rows[1:-1], grid, to_columns, optimize=True)
+        return np.concatenate([body.reshape(-1, k), poles])
+
+
+def graded_gel(footprint: Footprint) -> GradedMesh:
+    """The DIGIT's gel, fine under ``footprint``."""
+    plan = digit.plan_grid()
+    window = digit.gel_surface().window
+    marks = [(0, part.start, part.stop - 1, size - 1) for part, size in zip(window, plan.shape[:2], strict=True)]
+    rows, columns = (_lines(marks[k], footprint, k, _WIDEST["digit"]) for k in range(2))
+    place = _bilinear(plan, rows, columns)
+    top = np.stack(
+        [place[..., 0], digit.BACK_Y - digit.dome_height(*np.moveaxis(place, -1, 0)), place[..., 1]], -1
+    )
+    mesh = gel_solid(top, _divided(_gel_layers(footprint.spacing), 2 * footprint.refine))
+    pattern, factor = _pattern(mesh, "digit", len(rows), len(columns))
+    to_rows, to_columns = _spline(rows, plan.shape[0]), _spline(columns, plan.shape[1])
+    return GradedMesh(mesh, pattern, factor, rows, columns, to_rows, to_columns)
+
+
+def graded_skin(footprint: Footprint) -> GradedMesh:
+    """The BioTac's skin, fine under ``footprint``."""
+    glued = glued_skin()
+    stations, around = glued.shape
+    rows = _lines((0, *_SKIN_ROW_MARKS, stations - 1), footprint, 0, _WIDEST["biotac"])
+    columns = _lines((0, *_SKIN_COLUMN_MARKS, around), footprint, 1, _WIDEST["biotac"])
+    outer, inner = (_skin_points(layer, rows, columns[:-1]) for layer in ("outer", "inner"))
+    nearest = glued[np.rint(rows).astype(int)][:, np.rint(columns[:-1]).astype(int) % around]
+    mesh = skin_solid(outer, inner, nearest, 2 * footprint.refine * (SKIN_LAYERS // 2) + 1)
+    pattern, factor = _pattern(mesh, "biotac", len(rows), len(columns))
+    to_columns = _spline(columns, around, periodic=True)
+    return GradedMesh(mesh, pattern, factor, rows, columns, _spline(rows, stations), to_columns)
+
+
+# Lines of the skin's grid that a mesh must keep: where the glued part begins and ends, and where the lines' spacing
+# changes (``biotac.angles``, TIP_ROWS, TRUNK_ROWS).
+_SKIN_ROW_MARKS = (10, 18, 45, 52)
+_SKIN_COLUMN_MARKS = (9, 12, 52, 55)
+
+
+def _gel_layers(spacing: float) -> np.ndarray:
+    """Places, 0 = back, 1 = surface, of the cells through the gel: the top one twice the spacing, growing downward."""
+    top = min(2 * spacing * digit.SPACING / digit.THICKNESS, 0.2)
+    growth = (0.5 / top) ** 0.5 if top > _THIN_TOP else (0.5 / top) ** (1 / 3)
+    cells = np.array([0.5, *top * growth ** np.arange(1 if top > _THIN_TOP else 2, -1, -1)])
+    return 1 - np.r_[np.cumsum((cells / cells.sum())[::-1])[::-1], 0.0]
+
+
+_THIN_TOP = 0.12  # of the thickness: below a top cell of this size a fourth cell keeps the growth small
+
+
+def _lines(marks: tuple[int, ...], footprint: Footprint, axis: int, widest: float) -> np.ndarray:
+    """Places of node lines, an odd number, through all marks: evenly spaced in the footprint, growing beyond."""
+    low, high = footprint.low[axis], footprint.high[axis]
+    at = np.linspace(marks[0], marks[-1], 20 * (marks[-1] - marks[0]) + 1)
+    beyond = np.maximum(np.maximum(low - at, at - high), 0)
+    width = np.minimum(2 * footprint.spacing + footprint.growth * beyond, widest)
+    middle = (1 / width[:-1] + 1 / width[1:]) / 2 * np.diff(at)
+    cells = np.r_[0, np.cumsum(middle)]  # cells wanted up to each place
+    wanted = np.diff(np.interp(marks, at, cells))
+    counts = np.maximum(np.rint(wanted).astype(int), 1)
+    if counts.sum() % 2:  # even totals: fewer patterns to keep
+        counts[np.argmax(wanted / counts)] += 1
+    edges = [np.array([float(marks[0])])]
+    for first, last, count in zip(marks, marks[1:], counts, strict=False):
+        start, stop = np.interp([first, last], at, cells)
+        edges.append(np.r_[np.interp(np.linspace(start, stop, count + 1)[1:-1], cells, at), last])
+    return _divided(np.concatenate(edges), 2 * footprint.refine)
+
+
+def _divided(values: np.ndarray, parts: int) -> np.ndarray:
+    """Values with ``parts`` even intervals for each of theirs."""
+    return np.interp(np.arange(parts * (len(values) - 1) + 1) / parts, np.arange(len(values)), values)
+
+
+def _bilinear(grid: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Values of a grid (r, c, k) at real-valued rows and columns."""
+    for axis, places in ((0, rows), (1, columns)):
+        cell = np.minimum(places.astype(int), grid.shape[axis] - 2)
+        shape = [1] * grid.ndim
+        shape[axis] = len(places)
+        part = (places - cell).reshape(shape)
+        grid = np.take(grid, cell, axis) * (1 - part) + np.take(grid, cell + 1, axis) * part
+    return grid
+
+
+def _skin_points(layer: str, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Points (i, j, 3) m of a skin's grid at real-valued stations and columns, by cubics along both."""
+    points = biotac.skin_points(layer, np.interp(columns, np.arange(65), np.r_[biotac.angles(), np.pi]))
+    cell = np.minimum(rows.astype(int), len(points) - 2)
+    weights = catmull_rom(rows - cell)
+    last = len(points) - 1
+    at = sum(weights[k][:, None, None] * points[np.clip(cell + k - 1, 0, last)] for k in range(4))
+    at[[0, -1]] = points[[0, -1]]
+    return at
+
+
+def _spline(lines: np.ndarray, count: int, *, periodic: bool = False) -> np.ndarray:
+    """Matrix (count, lines) from values on lines to values at 0 .. count - 1, by a cubic spline."""
+    import scipy.interpolate
+
+    values = np.eye(len(lines))
+    if periodic:
+        values[-1] = values[0]
+        values = values[:, :-1]
+    spline = scipy.interpolate.make_interp_spline(lines, values, k=3, bc_type="periodic" if periodic else "not-a-knot")
+    return spline(np.arange(count))
+
+
+_PATTERNS: dict[tuple, tuple[BlockPattern, PatternFactor]] = {}  # the latest used comes last
+
+
+def _pattern(mesh: HexMesh, *kind: str | int) -> tuple[BlockPattern, PatternFactor]:
+    """Kept for meshes of one ``kind`` (sensor, rows, columns) with the same clamped nodes: their cells are the same."""
+    key = (*kind, len(mesh.nodes), mesh.clamped.tobytes())
+    found = _PATTERNS.pop(key, None) or (BlockPattern(mesh.cells, mesh.clamped), PatternFactor())
+    _PATTERNS[key] = found
+    while len(_PATTERNS) > _KEPT:
+        del _PATTERNS[next(iter(_PATTERNS))]
+    return found

@@ -1,0 +1,131 @@
+"""Structured solids of 27-node hexahedra: the BioTac's skin and the DIGIT's gel."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ...sensors import biotac, digit
+
+SKIN_LAYERS = 5  # nodes through the skin: two quadratic elements
+# Through the gel, 0 = bonded back, 1 = surface: three quadratic elements, thinner toward the contact.
+GEL_LAYERS = np.array([0.0, 0.25, 0.5, 0.65, 0.8, 0.9, 1.0])
+
+
+@dataclasses.dataclass(frozen=True)
+class HexMesh:
+    """A solid of quadratic hexahedra.
+
+    nodes : (n, 3) float64, m
+    cells : (n_cells, 27) int, node a + 3 b + 9 c of a cell at (xi, eta, zeta) = (a, b, c) - 1
+    clamped : (n,) bool, nodes that do not move
+    surface : (n_surface,) int, the mesh node of each node of the sensor's surface lattice
+    inner : (n_inner,) int, likewise for the inner skin (empty for the gel)
+    """
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    clamped: np.ndarray
+    surface: np.ndarray
+    inner: np.ndarray
+
+
+def hex_cells(ids: np.ndarray) -> np.ndarray:
+    """Cells (n, 27) of 27-node hexahedra on a grid of node numbers (odd, odd, odd).
+
+    Repeated numbers collapse an edge or a face, as at the skin's poles.
+    """
+    if any(size % 2 == 0 for size in ids.shape):
+        raise ValueError(f"a grid of quadratic cells has odd sizes, got {ids.shape}")
+    a, b, c = (slice(0, size - 2, 2) for size in ids.shape)
+    corner = [ids[_shift(a, i), _shift(b, j), _shift(c, k)] for k in range(3) for j in range(3) for i in range(3)]
+    return np.stack(corner, -1).reshape(-1, 27)
+
+
+def _shift(part: slice, by: int) -> slice:
+    return slice(part.start + by, part.stop + by, part.step)
+
+
+def gel_solid(top: np.ndarray, layers: np.ndarray = GEL_LAYERS) -> HexMesh:
+    """The gel below a grid (rows, columns, 3) m of its surface, both odd, bonded at its flat back.
+
+    layers : places of the nodes through the gel, 0 = back, 1 = surface, an odd number
+    """
+    back = top.copy()
+    back[..., 1] = digit.BACK_Y
+    nodes = back[..., None, :] + layers[:, None] * (top - back)[..., None, :]
+    ids = np.arange(nodes[..., 0].size).reshape(nodes.shape[:-1])
+    clamped = np.zeros(ids.size, bool)
+    clamped[ids[..., 0]] = True
+    return HexMesh(nodes.reshape(-1, 3), hex_cells(ids), clamped, ids[..., -1].ravel(), np.empty(0, int))
+
+
+def skin_solid(outer: np.ndarray, inner: np.ndarray, glued: np.ndarray, layers: int = SKIN_LAYERS) -> HexMesh:
+    """The skin between two grids (stations, columns, 3) m, whose first and last stations are the poles.
+
+    glued : (stations, columns) bool, inner points that do not move; layers : nodes through the skin, odd
+    """
+    through = np.linspace(0, 1, layers)
+    grid = inner[..., None, :] + through[:, None] * (outer - inner)[..., None, :]
+    stations, columns = outer.shape[:2]
+    ring = np.arange((stations - 2) * columns * layers).reshape(stations - 2, columns, layers)
+    tip, base = ring.size + np.arange(layers), ring.size + layers + np.arange(layers)
+    poles = [np.broadcast_to(pole, (1, columns, layers)) for pole in (tip, base)]
+    ids = np.concatenate([poles[0], ring, poles[1]])
+    nodes = np.concatenate([grid[1:-1].reshape(-1, 3), grid[0, 0], grid[-1, 0]])
+    closed = np.concatenate([ids, ids[:, :1]], axis=1)
+
+    def surface_ids(layer: int) -> np.ndarray:
+        return np.concatenate([ring[..., layer].ravel(), tip[[layer]], base[[layer]]])
+
+    clamped = np.zeros(len(nodes), bool)
+    clamped[surface_ids(0)] = np.r_[glued[1:-1].ravel(), glued[0, 0], glued[-1, 0]]
+    return HexMesh(nodes, hex_cells(closed), clamped, surface_ids(-1), surface_ids(0))
+
+
+def inner_faces(mesh: HexMesh) -> np.ndarray:
+    """Quadratic faces (n, 9) of the inner skin, seen from outside the fluid: the undersides of the cells on it."""
+    inner = np.zeros(len(mesh.nodes), bool)
+    inner[mesh.inner] = True
+    faces = mesh.cells[:, :9][inner[mesh.cells[:, :9]].all(axis=1)]
+    return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)
+
+
+def outer_faces(mesh: HexMesh) -> np.ndarray:
+    """Quadratic faces (n, 9) of the surface that is touched, node 3 b + a at (xi, eta) = (a, b) - 1."""
+    outer = np.zeros(len(mesh.nodes), bool)
+    outer[mesh.surface] = True
+    return mesh.cells[:, 18:][outer[mesh.cells[:, 18:]].all(axis=1)]
+
+
+@functools.cache
+def gel_mesh() -> HexMesh:
+    """The DIGIT's gel on the lattice of its surface; about 20,000 nodes."""
+    surface = digit.gel_surface()
+    return gel_solid(surface.grid(surface.rest))
+
+
+@functools.cache
+def skin_mesh() -> HexMesh:
+    """The BioTac's skin on its lattice, clamped where its inner side lies on or in the rigid core; 18,200 nodes."""
+    return skin_solid(biotac.skin_grid("outer"), biotac.skin_grid("inner"), glued_skin())
+
+
+@functools.cache
+def glued_skin() -> np.ndarray:
+    """Which inner points of the skin's grid (stations, columns) lie on or in the core."""
+    inner = biotac.skin_grid("inner")
+    return _on_core(inner.reshape(-1, 3)).reshape(inner.shape[:2])
+
+
+_ATTACHED = 0.02e-3  # m, nodes this close to the core are glued to it: 532 nodes of the public mesh
+_BASE_CAP_X = 4.9e-3  # m, the inner base cap rests on the core (public mesh: 0.024 mm inside it)
+
+
+def _on_core(inner: np.ndarray) -> np.ndarray:
+    x, y, z = inner.T
+    radius = np.hypot(y - biotac.AXIS_Y, z)
+    core = biotac.core_radius(x, np.arctan2(z, biotac.AXIS_Y - y))
+    return (np.nan_to_num(core, nan=-1.0) >= radius - _ATTACHED) | (x > _BASE_CAP_X)

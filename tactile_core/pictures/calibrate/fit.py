@@ -1,0 +1,168 @@
+"""A unit's calibration from photographs of a ball pressed into it, by Gauss-Newton's method on the fast picture."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from ...errors import TactileError
+from ...sensors.calibration import Background, Calibration, Fit
+from ..background import fit_polynomial
+from .ball_pictures import BallPictures, working_factor
+from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_figures
+from .levenberg_marquardt import minimise
+from .parameters import FIRST_LED, NAMES, SPREAD, parameters_of
+from .photographs import Photographs
+from .press_fit import Sight
+from .residuals import GAIN_SPREAD, MODEL_ERROR, UnitResiduals
+
+FIRST_DEPTH = 1.0  # mm, from which presses start
+PLACING_STEPS, STEPS, TOLERANCE = 6, 14, 1e-3  # of the search; a step that gains less than 0.1 % of the cost is noise
+UNEXPLAINED = 0.5  # share of a photograph's squares that is left: more, and it does not show this ball
+IDENTIFIED = 0.5  # of the assumed spread of units; a number whose standard error is larger stays called unknown
+# What the fast picture has no light for, or what a press does not move: kept from the start.
+NEVER_IDENTIFIED = ("albedo", "centre_x_mm", "centre_z_mm")
+MM_LIMITS = (1.0, 16.0)  # mm, ball diameters that fit on the gel
+
+
+@dataclasses.dataclass(frozen=True)
+class Calibrated:
+    """calibration : of the unit; tried : the presses it was fitted on, with it; warnings : sentences"""
+
+    calibration: Calibration
+    tried: list[Evaluation]
+    warnings: tuple[str, ...]
+
+
+def check_diameter(ball_diameter: float) -> None:
+    """Raises TactileError for a ball, m, that does not fit on the gel."""
+    if not MM_LIMITS[0] <= 1e3 * ball_diameter <= MM_LIMITS[1]:
+        expected = f"{MM_LIMITS[0]:g} to {MM_LIMITS[1]:g}"
+        raise TactileError("ball diameter, mm", f"{1e3 * ball_diameter:g}", expected)
+
+
+def calibrate(
+    photographs: Photographs,
+    ball_diameter: float,
+    start: Calibration,
+    *,
+    unit: str,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Calibrated:
+    """Fit camera, dome, lights and gain of a unit from a start's; ball_diameter : m; unit : its name.
+
+    Raises TactileError for a ball that does not fit on the gel, and where no photograph shows such a ball.
+    """
+    check_diameter(ball_diameter)
+    whole = fitted_size(start, photographs)
+    factor = working_factor(whole.camera.width, whole.camera.height)
+    working = whole.at_size(whole.camera.width // factor, whole.camera.height // factor)
+    total = PLACING_STEPS + 2 * STEPS + 1
+    search = _Search(working, photographs, ball_diameter / 2, lambda done: progress(done, total))
+    search.place()
+    dropped = search.drop_unexplained()
+    search.fit(np.arange(len(NAMES)) >= FIRST_LED)
+    search.fit(np.ones(len(NAMES), bool))
+    fitted = search.calibration().at_size(whole.camera.width, whole.camera.height)
+    used = dataclasses.replace(photographs, presses=tuple(search.presses))
+    tried = evaluate_unit(fitted, used, ball_diameter / 2, search_radius=False)
+    progress(total, total)
+    errors, unknown = search.identified(factor)
+    figures = {name: value for name, value in mean_figures(tried)[0].items() if np.isfinite(value)}
+    names = tuple(press.name for press in search.presses)
+    note = f"fast picture; {len(names)} presses; background {'estimated' if photographs.estimated else 'photographed'}"
+    calibration = dataclasses.replace(
+        fitted,
+        unit=unit,
+        background=Background(fit_polynomial(photographs.background, fitted.camera)),
+        noise=photographs.noise,
+        fit=Fit(note, names, ball_diameter, figures, errors, (*unknown, *NEVER_IDENTIFIED)),
+    )
+    return Calibrated(calibration, tried, _warnings(photographs, tried, dropped))
+
+
+class _Search:
+    """The presses that are fitted and where the search stands."""
+
+    def __init__(
+        self, start: Calibration, photographs: Photographs, radius: float, progress: Callable[[int], None]
+    ) -> None:
+        self.start, self.radius = start, radius
+        self.presses = list(photographs.presses)
+        self._sights = [Sight(press) for press in self.presses]
+        self._progress, self._done = progress, 0
+        self._none = np.zeros(len(NAMES), bool)
+
+    def place(self) -> None:
+        """Presses and gain alone, the unit's numbers as in the start."""
+        bench = BallPictures(self.start)
+        balls = [(*(1e3 * np.array(sight.guess(bench))), FIRST_DEPTH) for sight in self._sights]
+        self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
+        self._minimise(np.concatenate(balls), PLACING_STEPS)
+
+    def drop_unexplained(self) -> list[str]:
+        """Leave out photographs that show no such ball; returns their names. Raises TactileError if none is left."""
+        left = self._problem.unexplained()
+        good = [k for k, share in enumerate(left) if share < UNEXPLAINED]
+        if not good:
+            found = f"no photograph looks like a ball of {2e3 * self.radius:g} mm"
+            advice = "Check --ball-diameter, --background and the way the pictures lie (fingertip up)"
+            raise TactileError("presses", found, "photographs of that ball", advice)
+        dropped = [press.name for k, press in enumerate(self.presses) if k not in good]
+        if dropped:
+            balls = self._problem.balls(self._x)[good]
+            self.presses, self._sights = ([values[k] for k in good] for values in (self.presses, self._sights))
+            self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
+            self._minimise(balls.ravel(), PLACING_STEPS)
+        return dropped
+
+    def fit(self, free: np.ndarray) -> None:
+        """Go on from where the search stands with some of the unit's numbers free."""
+        numbers, balls = parameters_of(self._problem.unit(self._x)), self._problem.balls(self._x)
+        self._problem = UnitResiduals(self.start, self._sights, self.radius, free)
+        self._minimise(np.concatenate([numbers[free], balls.ravel()]), STEPS)
+
+    def _minimise(self, x: np.ndarray, steps: int) -> None:
+        done = self._done
+        self._x, _ = minimise(
+            self._problem, x, most=steps, tolerance=TOLERANCE, progress=lambda step: self._progress(done + step)
+        )
+        self._problem.cost(self._x)
+        self._done += steps
+
+    def calibration(self) -> Calibration:
+        return self._problem.unit(self._x)
+
+    def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Standard errors by name, and the names of what the photographs tell too little of.
+
+        The errors count what is assumed of units as one more measurement; misfits of the model as MODEL_ERROR.
+        """
+        matrix, _ = self._problem.normal_equations(self._x)
+        errors = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: len(NAMES)]
+        unknown = [
+            name for name, error, spread in zip(NAMES, errors, SPREAD, strict=True) if error > IDENTIFIED * spread
+        ]
+        named = dict(zip(NAMES, errors.tolist(), strict=True))
+        for name in ("px_per_mm_x", "px_per_mm_y"):
+            named[name] *= factor
+        parts = zip(("gain_centre", "gain_along_right_per_mm", "gain_along_down_per_mm"),
+                    self._problem.gain_errors(), GAIN_SPREAD, strict=True)  # fmt: skip
+        for name, error, spread in parts:
+            named[name] = error
+            if error > IDENTIFIED * spread:
+                unknown.append(name)
+        return named, tuple(unknown)
+
+
+def _warnings(photographs: Photographs, tried: list[Evaluation], dropped: list[str]) -> tuple[str, ...]:
+    found = []
+    if photographs.estimated:
+        found.append("the background is the median of the photographs; a photograph of the untouched gel is better")
+    if photographs.untouched:
+        found.append(f"no press in {', '.join(photographs.untouched)}")
+    found += [f"{name}: does not look like the ball, left out" for name in dropped]
+    found += [f"{each.press.name}: {flag}" for each in tried for flag in each.flags]
+    return tuple(found)

@@ -1,0 +1,45 @@
+"""The numbers of a calibration that enter its pictures in a nonlinear way, as one vector in the units of its file."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...sensors.calibration import Calibration
+from ...sensors.camera import COLOURS
+
+# name, standard deviation of units round the calibration that a fit starts from (assumed, but for the scale: sensors.md
+# has 17 to 21 px/mm), step of the differences that make the Jacobian
+CAMERA = (("px_per_mm_x", 0.7, 0.02), ("px_per_mm_y", 0.7, 0.02), ("apparent_height_mm", 4.0, 0.2))
+GEL = (("dome_scale", 0.1, 0.02),)
+LED = (("right_mm", 2.0, 0.05), ("down_mm", 2.0, 0.05), ("up_mm", 1.0, 0.05), ("radius_mm", 1.0, 0.05))
+LEDS = tuple((f"{colour}_{name}", spread, step) for colour in COLOURS for name, spread, step in LED)
+
+PARAMETERS = (*CAMERA, *GEL, *LEDS)
+NAMES = tuple(name for name, _, _ in PARAMETERS)
+SPREAD = np.array([spread for _, spread, _ in PARAMETERS])
+STEP = np.array([step for _, _, step in PARAMETERS])
+FIRST_LED = len(CAMERA) + len(GEL)
+SMALLEST_RADIUS, LARGEST_RADIUS = 0.1, 8.0  # mm; the gel's window is 18 mm wide
+
+
+def parameters_of(calibration: Calibration) -> np.ndarray:
+    """The vector (16,) of a calibration, in the order of NAMES."""
+    camera = calibration.camera
+    leds = [1e3 * value for led in calibration.leds for value in (*led.position, led.radius)]
+    head = [camera.px_per_mm_x, camera.px_per_mm_y, 1e3 * camera.apparent_height, calibration.dome_scale]
+    return np.array([*head, *leds])
+
+
+def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
+    """A calibration with other numbers; raises TactileError for some that mean nothing."""
+    scale_x, scale_y, height, dome = (float(value) for value in numbers[:FIRST_LED])
+    camera = dataclasses.replace(
+        calibration.camera, px_per_mm_x=scale_x, px_per_mm_y=scale_y, apparent_height=1e-3 * height
+    )
+    leds = tuple(
+        dataclasses.replace(led, position=tuple(1e-3 * float(v) for v in row[:3]), radius=1e-3 * float(row[3]))
+        for led, row in zip(calibration.leds, numbers[FIRST_LED:].reshape(3, 4), strict=True)
+    )
+    return dataclasses.replace(calibration, camera=camera, leds=leds, dome_scale=dome)

@@ -1,0 +1,186 @@
+"""A folder of photographs of a ball pressed into a DIGIT: pictures, background, and where each press shows."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import TactileError
+from ..background import read_photograph
+from .photo_metrics import windowed
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+CHANGE = 18  # grey levels in some channel, of a pixel that the press has changed (issue: region of interest)
+DILATION = 9  # px, by which the region reaches beyond such pixels
+SMALLEST_PRESS = 300  # px at 240 x 320 changed by more than CHANGE; less is dust or drift, a light press has 2,000
+LARGEST_SHARE = 0.6  # of the picture changed: another lighting, not a press
+OVER_EXPOSED = 0.05  # share of the region with a channel at 255 from which on a press is flagged
+FEWEST_FOR_MEDIAN = 3  # photographs; of two, the median is their mean, which shows both presses
+NOISE_WINDOW = 41  # px at 240 wide, of the means that are no noise
+NOISE_LIMIT = 15  # grey levels; more is dust or the rim of a press
+
+
+@dataclasses.dataclass(frozen=True)
+class Press:
+    """One photograph of a press.
+
+    picture : (H, W, 3) uint8; change : (H, W, 3) float32, grey levels, picture less background
+    region : (H, W) bool, its region of interest
+    flags : what is wrong with it, in words; empty for nothing
+    """
+
+    name: str
+    picture: np.ndarray
+    change: np.ndarray
+    region: np.ndarray
+    flags: tuple[str, ...]
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """(row, column) of the change's centre of mass."""
+        weight = np.abs(self.change).max(-1) * self.region
+        rows, columns = np.indices(weight.shape)
+        return float((weight * rows).sum() / weight.sum()), float((weight * columns).sum() / weight.sum())
+
+
+@dataclasses.dataclass(frozen=True)
+class Photographs:
+    """background : (H, W, 3) float32, grey levels; estimated : whether it was made from the set
+    untouched : names of photographs that show no press; noise : (3,) grey levels, standard deviation of a pixel
+    """
+
+    folder: Path
+    presses: tuple[Press, ...]
+    background: np.ndarray
+    estimated: bool
+    untouched: tuple[str, ...]
+    noise: tuple[float, float, float]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(H, W) of each photograph, pixels."""
+        return self.background.shape[:2]
+
+
+def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | None = None) -> Photographs:
+    """All pictures of a folder, by name; without a background photograph it is estimated.
+
+    Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
+    pictures to tell the background.
+    """
+    files = _files(Path(folder))
+    pictures = {file.name: read_photograph(file) for file in files}
+    sizes = {name: picture.shape[:2] for name, picture in pictures.items()}
+    first = next(iter(sizes))
+    for name, size in sizes.items():
+        if size != sizes[first]:
+            found = f"{size[1]} x {size[0]} pixels"
+            raise TactileError(Path(folder) / name, found, f"{sizes[first][1]} x {sizes[first][0]}, as {first}")
+    if background is not None:
+        rest = read_photograph(background).astype(np.float32)
+        if rest.shape[:2] != sizes[first]:
+            found = f"{rest.shape[1]} x {rest.shape[0]} pixels"
+            raise TactileError(background, found, f"{sizes[first][1]} x {sizes[first][0]}, as the photographs")
+    elif len(pictures) < FEWEST_FOR_MEDIAN:
+        found = f"{len(pictures)} photographs, from which no untouched gel can be told"
+        advice = "Give a photograph of the untouched gel: --background FILE"
+        raise TactileError(folder, found, f"{FEWEST_FOR_MEDIAN} or more", advice)
+    else:
+        rest = estimated_background(np.stack(list(pictures.values())))
+    found = {name: _press(name, picture, rest) for name, picture in pictures.items()}
+    presses = tuple(press for press in found.values() if press is not None)
+    if not presses:
+        advice = "Give the background with --background, or press harder"
+        raise TactileError(folder, f"no press in {len(pictures)} photographs", "photographs of a pressed ball", advice)
+    untouched = tuple(name for name, press in found.items() if press is None)
+    return Photographs(Path(folder), presses, rest, background is None, untouched, measured_noise(presses, rest))
+
+
+def chosen(photographs: Photographs, names: list[str]) -> Photographs:
+    """Some presses of a set, with the whole set's background; raises TactileError for a name that is none."""
+    by_name = {press.name: press for press in photographs.presses}
+    for name in names:
+        if name not in by_name:
+            raise TactileError(
+                photographs.folder / name, "shows no press or is absent", f"some of {', '.join(by_name)}"
+            )
+    return dataclasses.replace(photographs, presses=tuple(by_name[name] for name in names))
+
+
+def estimated_background(pictures: np.ndarray) -> np.ndarray:
+    """Untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3), where presses cover less than half of them.
+
+    The median at each pixel of those that differ from the median of all by CHANGE at most: presses that cover a third
+    of the pictures pull the plain median by up to that much.
+    """
+    first = np.median(pictures, axis=0).astype(np.float32)
+    touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
+    found = np.nanmedian(np.where(touched, np.nan, pictures.astype(np.float32)), axis=0)
+    return np.where(np.isnan(found), first, found)
+
+
+def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
+    """Standard deviation (3,) of the camera's noise, grey levels: of what changes outside the presses, less its means.
+
+    Means over NOISE_WINDOW hold drift of the light. A photographed background adds noise of its own.
+    """
+    window = NOISE_WINDOW * background.shape[1] // 240 | 1
+    found = []
+    for press in presses:
+        quiet = ~dilated(press.region, window // 4)
+        if quiet.any():
+            rest = press.change - windowed(press.change.astype(float), window)
+            found.append([channel[np.abs(channel) < NOISE_LIMIT].std() for channel in rest[quiet].T])
+    levels = np.median(found, axis=0) if found else np.zeros(3)
+    return tuple(float(level) for level in levels)
+
+
+def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
+    """(H, W) bool: some channel differs by more than 18 levels within 9 px; from the photograph alone."""
+    changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
+    return dilated(changed, DILATION)
+
+
+def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
+    """mask (H, W) grown by a disc of a radius in px."""
+    height, width = mask.shape
+    padded = np.zeros((height + 2 * radius, width + 2 * radius + 1), np.int32)
+    padded[radius : radius + height, radius + 1 : radius + 1 + width] = mask
+    counted = padded.cumsum(1)
+    grown = np.zeros(mask.shape, bool)
+    for row in range(-radius, radius + 1):
+        half = int(np.sqrt(radius**2 - row**2))
+        rows = counted[radius + row : radius + row + height]
+        right = rows[:, radius + half + 1 : radius + half + 1 + width]
+        left = rows[:, radius - half : radius - half + width]
+        grown |= right > left
+    return grown
+
+
+def _files(folder: Path) -> list[Path]:
+    if not folder.is_dir():
+        raise TactileError(folder, "is no folder", "a folder of photographs of a pressed ball")
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
+    if not files:
+        raise TactileError(folder, "no photographs", f"files that end in {', '.join(SUFFIXES)}")
+    return files
+
+
+def _press(name: str, picture: np.ndarray, background: np.ndarray) -> Press | None:
+    """The press that a photograph shows; None where it shows none."""
+    change = picture.astype(np.float32) - background
+    changed = np.abs(change).max(-1) > CHANGE
+    scale = changed.size / (240 * 320)
+    # Dust and drift change single pixels here and there: only what is changed all around counts.
+    if (~dilated(~changed, 2)).sum() < SMALLEST_PRESS * scale:
+        return None
+    region = dilated(changed, DILATION)
+    flags = []
+    if (picture[region].max(-1) == 255).mean() > OVER_EXPOSED:
+        flags.append("over-exposed")
+    if changed.mean() > LARGEST_SHARE:
+        flags.append("changed nearly all over: another lighting than the background's")
+    return Press(name, picture, change, region, tuple(flags))

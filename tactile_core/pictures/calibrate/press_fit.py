@@ -1,0 +1,89 @@
+"""Where and how deep the ball of a photograph was pressed, under a known calibration."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from .ball_pictures import BallPictures, smaller, working_factor
+from .levenberg_marquardt import minimise
+from .photographs import Press, dilated
+
+DEPTHS = (0.5e-3, 1.2e-3)  # m, from which a fit starts; the better end is taken
+SHALLOWEST, DEEPEST = 0.03e-3, 2.2e-3  # m, of the table of prints
+SMALLEST_BALL, LARGEST_BALL = 1e-3, 8e-3  # m, radius
+MARGIN = 3  # working px round the region that count too: a print must not shade what the photograph shows untouched
+STEP = 10e-6  # m, of the differences that make the Jacobian
+STEPS, TOLERANCE = 25, 1e-5
+
+
+@dataclasses.dataclass(frozen=True)
+class Ball:
+    """A pressed ball: right, down (image frame), depth from first touch, radius, all m."""
+
+    right: float
+    down: float
+    depth: float
+    radius: float
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float]:
+        """right, down, depth, radius, all m."""
+        return self.right, self.down, self.depth, self.radius
+
+
+class Sight:
+    """What a fit looks at: a photograph's change (h, w, 3) in working pixels, and which of them count (h, w)."""
+
+    def __init__(self, press: Press) -> None:
+        factor = working_factor(press.picture.shape[1], press.picture.shape[0])
+        self.change = smaller(press.change, factor)
+        spoilt = smaller((press.picture.max(-1) == 255).astype(np.float32), factor) > 0
+        self.region = smaller(press.region.astype(np.float32), factor) > 0.25
+        self.counts = dilated(self.region, MARGIN) & ~spoilt
+
+    def guess(self, bench: BallPictures) -> tuple[float, float]:
+        """Right and down, m, of the change's middle."""
+        weight = np.abs(self.change).max(-1) * self.region
+        weight /= weight.sum()
+        return float((weight * bench.right).sum()), float((weight * bench.down).sum())
+
+
+def fit_ball(bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False) -> tuple[Ball, float]:
+    """The ball whose picture is nearest the photograph's, and the mean square of what is left, grey levels squared.
+
+    bench : in working pixels; radius : m, the ball's, or where its search starts
+    """
+    problem = _PressProblem(bench, sight, radius)
+    starts = [np.array([*sight.guess(bench), depth, radius][: 4 if free_radius else 3]) for depth in DEPTHS]
+    x, cost = min(
+        (minimise(problem, start, most=STEPS, tolerance=TOLERANCE) for start in starts), key=lambda end: end[1]
+    )
+    return Ball(*x, *[radius][len(x) - 3 :]), 2 * cost / (3 * sight.counts.sum())
+
+
+class _PressProblem:
+    """Squares of what a ball's picture misses; x = right, down, depth and, where it is free, radius."""
+
+    def __init__(self, bench: BallPictures, sight: Sight, radius: float) -> None:
+        self._bench, self._sight, self._radius = bench, sight, radius
+
+    def _missed(self, x: np.ndarray) -> np.ndarray:
+        ball = (*x[:3], x[3] if len(x) > 3 else self._radius)
+        return (self._bench.change(ball) - self._sight.change)[self._sight.counts].ravel()
+
+    def cost(self, x: np.ndarray) -> float:
+        """Half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off the picture and the table."""
+        radius = x[3] if len(x) > 3 else self._radius
+        inside = np.abs(x[0]) < -2 * self._bench.right[0, 0] and np.abs(x[1]) < -2 * self._bench.down[0, 0]
+        if not (inside and SHALLOWEST <= x[2] <= DEEPEST * radius / 3e-3 and SMALLEST_BALL <= radius <= LARGEST_BALL):
+            return np.inf
+        self._last = self._missed(x)
+        return float(np.square(self._last).sum() / 2)
+
+    def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """J^T J (n, n), levels squared / m2, and J^T r (n,), levels squared / m, of n unknowns, at x."""
+        last = self._missed(x)
+        jacobian = np.stack([(self._missed(x + step) - last) / STEP for step in STEP * np.eye(len(x))], -1)
+        return jacobian.T @ jacobian, jacobian.T @ last

@@ -1,0 +1,68 @@
+"""What a trial of a calibration leaves: rows with the null beside them, and a sheet to look at."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+
+import numpy as np
+
+from ...accuracy import Row, row
+from ...files import atomic
+from .evaluate import TARGETS, Evaluation, mean_figures
+
+LARGEST_SHEET = 20  # presses; more would make a picture that nobody opens
+GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round grey 128
+
+
+def rows_of(tried: list[Evaluation], name: str) -> list[Row]:
+    """One row a figure, means over presses; name : of the set of photographs."""
+    ours, null = mean_figures(tried)
+    rows = []
+    for figure, (unit, target, better) in TARGETS.items():
+        value, beside = (None if math.isnan(values[figure]) else values[figure] for values in (ours, null))
+        if value is None:
+            target = None
+        rows.append(row(figure, value, unit, target, null=beside, of=name, at_least=better > 0))
+    return rows
+
+
+def rows_by_press(tried: list[Evaluation]) -> list[Row]:
+    """One row a figure and press, and where the ball was found."""
+    rows = []
+    for each in tried:
+        name = each.press.name
+        places = {"right": each.ball.right, "down": each.ball.down, "depth": each.ball.depth}
+        rows += [row(f"press_{what}", 1e3 * value, "mm", of=name) for what, value in places.items()]
+        for figure, (unit, _, _) in TARGETS.items():
+            value, beside = each.figures.get(figure, math.nan), each.null.get(figure, math.nan)
+            if math.isfinite(value):
+                rows.append(row(figure, value, unit, null=beside if math.isfinite(beside) else None, of=name))
+    return rows
+
+
+def write_sheet(path: str | os.PathLike, tried: list[Evaluation]) -> None:
+    """Photograph, render and difference (twice, on grey) of each press as a PNG; equal input makes equal bytes."""
+    from PIL import Image, ImageDraw
+
+    shown = tried[:LARGEST_SHEET]
+    height, width = shown[0].picture.shape[:2]
+    columns = 1 if len(shown) < 3 else 2
+    lines = math.ceil(len(shown) / columns)
+    cell = (height + 18, 3 * (width + GAP) + GAP)
+    sheet = Image.new("RGB", (columns * cell[1], lines * cell[0] + 16), "white")
+    draw = ImageDraw.Draw(sheet)
+    draw.text((GAP, 2), f"photograph, render, difference x {MAGNIFIED}", fill="black")
+    for k, each in enumerate(shown):
+        top, left = 16 + k // columns * cell[0], k % columns * cell[1] + GAP
+        difference = 128 + MAGNIFIED * (each.picture.astype(float) - each.press.picture)
+        for j, picture in enumerate((each.press.picture, each.picture, difference.clip(0, 255).astype(np.uint8))):
+            sheet.paste(Image.fromarray(picture), (left + j * (width + GAP), top + 14))
+        figures, null = each.figures, each.null
+        text = f"{each.press.name}  {figures['roi_psnr']:.1f} dB (null {null['roi_psnr']:.1f})"
+        text += f"  {figures['roi_l1']:.1f} levels (null {null['roi_l1']:.1f})  {'; '.join(each.flags)}"
+        draw.text((left, top), text.encode("ascii", "replace").decode(), fill="black")
+    content = io.BytesIO()
+    sheet.save(content, "PNG")
+    atomic.write_bytes(path, content.getvalue())

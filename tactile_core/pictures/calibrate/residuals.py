@@ -1,0 +1,176 @@
+"""The sum of squares that a unit's calibration makes small: photographs of presses against their fast pictures.
+
+The unknowns are the unit's numbers and three numbers a press. The gain C is linear in the picture, so that it is solved
+for at each step and eliminated (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). What is
+assumed of units holds the numbers that few photographs do not tell: one more square each.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...errors import TactileError
+from ...sensors.calibration import Calibration, Gain
+from ..shading import SeenSurface
+from .ball_pictures import BallPictures
+from .parameters import FIRST_LED, LARGEST_RADIUS, SMALLEST_RADIUS, SPREAD, STEP, parameters_of, with_parameters
+from .press_fit import DEEPEST, SHALLOWEST, Sight
+
+# Grey levels: what a pixel's misfit weighs against the assumed spread of units. Misfits of 5 to 9 levels are those of
+# the model, alike over whole parts of a print: thousands of pixels count as some fifty.
+MODEL_ERROR = 80.0
+GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels a unit of radiance, of C; levels a mm, of its slopes; assumed
+PRESS_STEP = 10e-3  # mm
+
+
+@dataclasses.dataclass(frozen=True)
+class _Lights:
+    """Radiance of a press: by LED and counted pixel (3, p), times 1, right, down in mm (9, p); the gel behind it."""
+
+    surface: SeenSurface
+    changes: np.ndarray
+    terms: np.ndarray
+
+
+class UnitResiduals:
+    """Cost and normal equations of x = the unit's free numbers, then right, down, depth of each press in mm.
+
+    start : the calibration that the spread of units is centred on, in working pixels; radius : m, the ball's
+    free : (16,) bool, which of the unit's numbers may change
+    """
+
+    def __init__(self, start: Calibration, sights: list[Sight], radius: float, free: np.ndarray) -> None:
+        self._start, self._sights, self._radius, self._free = start, sights, radius, free
+        self._numbers = parameters_of(start)
+        self._seen = [sight.change[sight.counts].T.astype(float) for sight in sights]  # (3, p) each
+        gain = start.gain
+        terms = [np.asarray(gain.centre), 1e-3 * np.asarray(gain.along_right), 1e-3 * np.asarray(gain.along_down)]
+        self._start_gain = np.concatenate(terms, axis=1)  # (channel, term and LED)
+        self._gain_weight = np.repeat((MODEL_ERROR / np.array(GAIN_SPREAD)) ** 2, 3)
+        self._weight = (MODEL_ERROR / SPREAD) ** 2
+        self.gain = self._start_gain
+
+    def unit(self, x: np.ndarray) -> Calibration:
+        """The calibration of x, with the gain of the last cost that was taken."""
+        numbers = self._numbers.copy()
+        numbers[self._free] = x[: self._free.sum()]
+        centre, right, down = (tuple(map(tuple, part.tolist())) for part in np.split(self.gain, 3, axis=1))
+        slopes = [tuple(tuple(1e3 * value for value in row) for row in part) for part in (right, down)]
+        try:
+            gain = Gain(centre, *slopes)
+        except TactileError:  # on the way a colour may turn dark; at the end it may not
+            gain = self._start.gain
+        return with_parameters(dataclasses.replace(self._start, gain=gain), numbers)
+
+    def balls(self, x: np.ndarray) -> np.ndarray:
+        """Right, down, depth, mm, of each press (n, 3)."""
+        return x[self._free.sum() :].reshape(-1, 3)
+
+    def cost(self, x: np.ndarray) -> float:
+        """Half the sum of squares, the gain at its best; infinity where a number means nothing."""
+        if not self._sensible(x):
+            return np.inf
+        try:
+            bench = BallPictures(self.unit(x))
+        except TactileError:  # an LED over the picture or as high as the camera
+            return np.inf
+        lights = [self._lights(bench, ball, sight) for ball, sight in zip(self.balls(x), self._sights, strict=True)]
+        self._bench, self._last, self._balls_now = bench, lights, self.balls(x)
+        self._solve_gain()
+        numbers = parameters_of(bench.calibration)
+        cost = sum(np.square(missed).sum() for missed in self._missed())
+        cost += (self._weight * (numbers - self._numbers) ** 2).sum()
+        cost += (self._gain_weight * (self.gain - self._start_gain) ** 2).sum()
+        return float(cost / 2)
+
+    def unexplained(self) -> np.ndarray:
+        """Share (n,) of each photograph's squares that the pictures of the last cost leave."""
+        pairs = zip(self._missed(), self._seen, strict=True)
+        return np.array([np.square(missed).sum() / np.square(seen).sum() for missed, seen in pairs])
+
+    def gain_errors(self) -> tuple[float, float, float]:
+        """Standard errors of the gain and its two slopes, root mean squares over LEDs, at the last cost's presses."""
+        matrix = np.diag(self._gain_weight)
+        for lights in self._last:
+            matrix = matrix + lights.terms @ lights.terms.T
+        squares = MODEL_ERROR**2 * np.diag(np.linalg.inv(matrix)).reshape(3, 3).mean(1)
+        return tuple(np.sqrt(squares).tolist())
+
+    def _sensible(self, x: np.ndarray) -> bool:
+        balls, numbers = self.balls(x), self._numbers.copy()
+        numbers[self._free] = x[: self._free.sum()]
+        radii = numbers[FIRST_LED + 3 :: 4]
+        deepest = 1e3 * DEEPEST * self._radius / 3e-3
+        inside = (balls[:, 2] >= 1e3 * SHALLOWEST).all() and (balls[:, 2] <= deepest).all()
+        return bool(inside and (radii >= SMALLEST_RADIUS).all() and (radii <= LARGEST_RADIUS).all())
+
+    def _lights(self, bench: BallPictures, ball: np.ndarray, sight: Sight) -> _Lights:
+        surface = bench.surface((*(1e-3 * ball), self._radius))
+        changes = np.stack([bench.light(surface, lamp)[sight.counts] for lamp in bench.lamps])
+        return _Lights(surface, changes, self._terms(bench, changes, sight))
+
+    def _terms(self, bench: BallPictures, changes: np.ndarray, sight: Sight) -> np.ndarray:
+        right, down = (1e3 * values[sight.counts] for values in (bench.right, bench.down))
+        return np.concatenate([changes, right * changes, down * changes])
+
+    def _missed(self) -> list[np.ndarray]:
+        """What the pictures miss (3, p) of each press."""
+        return [self.gain @ lights.terms - seen for lights, seen in zip(self._last, self._seen, strict=True)]
+
+    def _solve_gain(self) -> None:
+        matrix = np.diag(self._gain_weight)
+        right_side = self._start_gain * self._gain_weight
+        for lights, seen in zip(self._last, self._seen, strict=True):
+            matrix = matrix + lights.terms @ lights.terms.T
+            right_side = right_side + seen @ lights.terms.T
+        self.gain = np.linalg.solve(matrix, right_side.T).T
+
+    def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Matrix and gradient over x, the gain eliminated."""
+        self.cost(x)
+        count, free = len(x), int(self._free.sum())
+        matrix, gradient = np.zeros((count, count)), np.zeros(count)
+        numbers = parameters_of(self._bench.calibration)
+        matrix[:free, :free] = np.diag(self._weight[self._free])
+        gradient[:free] = (self._weight * (numbers - self._numbers))[self._free]
+        own = np.diag(self._gain_weight)
+        mixed = np.zeros((3, count, 9))  # by channel
+        unit_steps = self._steps_of_unit(numbers)
+        for k, (lights, missed) in enumerate(zip(self._last, self._missed(), strict=True)):
+            columns = np.r_[:free, free + 3 * k : free + 3 * k + 3]
+            slopes = np.concatenate([unit_steps[k], self._steps_of_press(x, k)], axis=1)  # (3, free + 3, p)
+            matrix[np.ix_(columns, columns)] += np.einsum("cap,cbp->ab", slopes, slopes, optimize=True)
+            gradient[columns] += np.einsum("cap,cp->a", slopes, missed, optimize=True)
+            own = own + lights.terms @ lights.terms.T
+            mixed[:, columns] += slopes @ lights.terms.T
+        for channel in mixed:
+            matrix -= channel @ np.linalg.solve(own, channel.T)
+        return matrix, gradient
+
+    def _steps_of_unit(self, numbers: np.ndarray) -> list[np.ndarray]:
+        """Slopes (3, free, p) of each press's picture by the unit's numbers, forward differences."""
+        slopes = [np.zeros((3, int(self._free.sum()), lights.changes.shape[1])) for lights in self._last]
+        for column, number in enumerate(np.flatnonzero(self._free)):
+            moved = numbers.copy()
+            moved[number] += STEP[number]
+            unit = with_parameters(self._bench.calibration, moved)
+            led = (number - FIRST_LED) // 4
+            bench = BallPictures(unit) if number < FIRST_LED else self._bench
+            lamp = None if number < FIRST_LED else bench.lamp(unit.leds[led])
+            for k, (lights, sight) in enumerate(zip(self._last, self._sights, strict=True)):
+                if lamp is None:
+                    after = self._lights(bench, self._balls_now[k], sight).terms
+                else:
+                    changes = lights.changes.copy()
+                    changes[led] = bench.light(lights.surface, lamp)[sight.counts]
+                    after = self._terms(bench, changes, sight)
+                slopes[k][:, column] = self.gain @ (after - lights.terms) / STEP[number]
+        return slopes
+
+    def _steps_of_press(self, x: np.ndarray, k: int) -> np.ndarray:
+        """Slopes (3, 3, p) of a press's picture by its right, down and depth."""
+        ball, lights, sight = self.balls(x)[k], self._last[k], self._sights[k]
+        after = [self._lights(self._bench, ball + step, sight).terms for step in PRESS_STEP * np.eye(3)]
+        return np.stack([self.gain @ (terms - lights.terms) / PRESS_STEP for terms in after], axis=1)

@@ -1,0 +1,167 @@
+"""Soft shadows that the gel casts in the light of one small LED: a march toward the light in polar rows.
+
+The march works on what the camera sees. The map (right, down, h) -> (right, down, h) / (1 - h / apparent height) takes
+lines to lines and the pinhole to infinity, so that the seen gel becomes a height field over the pixels, and its
+shadows those of an LED that has moved by the same map.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..errors import TactileError
+from ..sensors.camera import Camera, Led
+from .perspective import bilinear
+
+GRID_STEP = 0.1e-3  # m, of the polar grid along a ray, and across rays in the picture's middle
+FREE = 1.0  # sight from which on the whole LED is seen
+HIGHEST = 0.9  # share of the camera's height that an LED may have: at 1 the map takes it to infinity
+SMALLEST_SLOPE = 0.02  # of the light; flatter shadows are cut at 50 times their height, beyond the picture
+
+_TABLE_STEPS = 256
+
+
+class ShadowCaster:
+    """How much of one LED each pixel sees over the gel.
+
+    The mapped field is sampled on rays that leave the LED's foot point, (angle, distance), where a march toward the
+    light is a shift along rows. Gel outside the picture is taken as flat, as high as the picture's edge.
+    Raises TactileError for an LED whose foot point lies in the picture, or that is as high as the camera.
+    """
+
+    def __init__(self, camera: Camera, led: Led) -> None:
+        self.led = led
+        if led.position[2] + led.radius > HIGHEST * camera.apparent_height:
+            found = f"{(led.position[2] + led.radius) * 1e3:.1f} mm high"
+            expected = f"well below the camera, {camera.apparent_height * 1e3:.1f} mm"
+            raise TactileError(f"led {led.colour}, position", found, expected)
+        near = 1 - led.position[2] / camera.apparent_height
+        foot = self._foot = tuple(value / near for value in led.position)
+        right, down = np.meshgrid(camera.right, camera.down)
+        if abs(foot[0]) <= right.max() and abs(foot[1]) <= down.max():
+            found = f"({led.position[0] * 1e3:.1f}, {led.position[1] * 1e3:.1f}) mm, inside the picture"
+            raise TactileError(f"led {led.colour}, position", found, "a place beside it, as round the gel's window")
+        right, down = right - foot[0], down - foot[1]
+        middle = np.arctan2(-foot[1], -foot[0])  # angle from the foot to the picture's centre
+        # Turned so that the picture lies around angle 0: no jump at +-pi inside it.
+        angle = np.angle((right + 1j * down) * np.exp(-1j * middle))
+        distance = np.hypot(right, down)
+        self._step_angle = GRID_STEP / float(np.hypot(*foot[:2]))
+        self._angle_0, self._distance_0 = angle.min(), distance.min()
+        self._row = ((angle - self._angle_0) / self._step_angle).astype(np.float32)
+        self._column = ((distance - self._distance_0) / GRID_STEP).astype(np.float32)
+        rows, columns = int(np.ceil(self._row.max())) + 1, int(np.ceil(self._column.max())) + 1
+        ray = (middle + self._angle_0 + self._step_angle * np.arange(rows))[:, None]
+        self.distance = (self._distance_0 + GRID_STEP * np.arange(columns)).astype(np.float32)
+        across, along = foot[0] + self.distance * np.cos(ray), foot[1] + self.distance * np.sin(ray)
+        step_right, step_down = camera.pixel_size
+        last_row, last_column = camera.height - 1, camera.width - 1
+        self._pixel_column = ((across - camera.right[0]) / step_right).clip(0, last_column).astype(np.float32)
+        self._pixel_row = ((along - camera.down[0]) / step_down).clip(0, last_row).astype(np.float32)
+        self._radii = self._radii_of_slope(camera, across, along).astype(np.float32)
+        self._shape, self._polar_shape = camera.shape, (rows, columns)
+
+    def _radii_of_slope(self, camera: Camera, across: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """LED radii that a unit of slope of the mapped line of sight is at the LED, across that line, (rows, columns).
+
+        A rise dw of the mapped line at the LED is a move of (1 - h / H)^2 (-right / H, -down / H, 1) dw in space, with
+        the mapped LED's right and down. Points lie at height zero here: that changes the angle by a few degrees.
+        """
+        led, inverse = np.asarray(self.led.position), 1 / camera.apparent_height
+        rise = (1 - led[2] * inverse) ** 2 * np.array([-self._foot[0] * inverse, -self._foot[1] * inverse, 1.0])
+        to_led = np.stack([led[0] - across, led[1] - along, np.full_like(across, led[2])], -1)
+        part = (to_led @ rise) ** 2 / (to_led**2).sum(-1)
+        return self.distance * np.sqrt(rise @ rise - part) / self.led.radius
+
+    def sight(self, height: np.ndarray, box: tuple[slice, slice]) -> tuple[np.ndarray, tuple[slice, slice]]:
+        """How far the LED's centre stands above the horizon, in LED radii, cut to -1 (hidden) .. 1 (all seen).
+
+        height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may throw shadows
+        Returns sight (h, w) and the box of pixels it is for; it is 1 everywhere else.
+        """
+        reach = self._reach(float(height[box].max()), float(height.min()))
+        rows = _span(self._row[box], self._polar_shape[0] - 1)
+        columns = _span(self._column[box], self._polar_shape[1] - 1, reach)
+        polar = (rows, columns)
+        field = bilinear(height, self._pixel_row[polar], self._pixel_column[polar])
+        sight = self._march(field, polar, reach)
+        shadow = bounding_box(sight < FREE, margin=1)
+        if shadow is None:
+            return sight[:0, :0], (slice(0, 0), slice(0, 0))
+        sight = sight[shadow]
+        first_row, first_column = rows.start + shadow[0].start, columns.start + shadow[1].start
+        polar = slice(first_row, first_row + sight.shape[0]), slice(first_column, first_column + sight.shape[1])
+        pixels = (
+            _span(self._pixel_row[polar], self._shape[0] - 1),
+            _span(self._pixel_column[polar], self._shape[1] - 1),
+        )
+        row = np.clip(self._row[pixels] - np.float32(first_row), 0, sight.shape[0] - 1)
+        column = np.clip(self._column[pixels] - np.float32(first_column), 0, sight.shape[1] - 1)
+        return bilinear(sight, row, column), pixels
+
+    def _reach(self, highest: float, lowest: float) -> int:
+        """Columns that the longest shadow of such heights covers."""
+        rise = self._foot[2] - highest
+        slope = max(rise / float(self.distance[-1]) - 1 / float(self._radii[:, -1].min()), SMALLEST_SLOPE)
+        return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1
+
+    def _march(self, field: np.ndarray, polar: tuple[slice, slice], reach: int) -> np.ndarray:
+        horizon = np.full_like(field, -np.inf)
+        for k in march_steps(min(reach, field.shape[1] - 1)):
+            rise = field[:, :-k] - field[:, k:]
+            rise *= np.float32(1 / (k * GRID_STEP))
+            np.maximum(horizon[:, k:], rise, out=horizon[:, k:])
+        sight = np.float32(self._foot[2]) - field
+        sight /= self.distance[polar[1]]
+        sight -= horizon
+        sight *= self._radii[polar]
+        return np.clip(sight, -1, FREE, out=sight)
+
+
+@functools.cache
+def march_steps(reach: int) -> tuple[int, ...]:
+    """Steps of a march: each one at first, then every tenth of the way; what throws a shadow far is wide."""
+    steps, k = [], 1
+    while k <= reach:
+        steps.append(k)
+        k += max(1, k // 10)
+    return tuple(steps)
+
+
+def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | None:
+    """Rows and columns that enclose what is true in mask (h, w), margin further within the mask; None for nothing."""
+    box = []
+    for axis in (1, 0):
+        found = np.flatnonzero(mask.any(axis))
+        if not len(found):
+            return None
+        box.append(slice(max(int(found[0]) - margin, 0), min(int(found[-1]) + 1 + margin, mask.shape[1 - axis])))
+    return box[0], box[1]
+
+
+def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
+    """Two whole numbers or more from 0 to ``highest`` that enclose the values wanted, `more` further up."""
+    first = min(max(int(np.floor(wanted.min())), 0), highest - 1)
+    last = min(int(np.ceil(wanted.max())) + more, highest)
+    return slice(first, max(last, first + 1) + 1)
+
+
+@functools.cache
+def _disc_tables() -> tuple[np.ndarray, np.ndarray]:
+    t = np.linspace(-1, 1, _TABLE_STEPS + 1)
+    share = 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
+    moment = 2 / (3 * np.pi) * (1 - t**2) ** 1.5
+    return share.astype(np.float32), moment.astype(np.float32)
+
+
+def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of a disc of radius 1 cut by a horizon `sight` below its centre: area seen and its first moment upward.
+
+    Both over the whole disc's area (circular segment): share 1/2 + (t sqrt(1 - t^2) + asin t) / pi,
+    moment 2 (1 - t^2)^(3/2) / (3 pi).
+    """
+    share, moment = _disc_tables()
+    place = ((sight + 1) * (_TABLE_STEPS / 2)).astype(np.intp)
+    return share.take(place), moment.take(place)

@@ -1,0 +1,211 @@
+"""Displaced gel -> its heights under the camera's pixels.
+
+A height is the position of the coating toward the camera, in metres. It grows with y of the shared frame: an
+indentation raises it. Zero is the plane ``camera.HEIGHT_ZERO_Y``, which touches the resting gel's lowest point, so
+the dome is part of the map: about 0 in the middle, up to 1.7 mm where the resting gel falls away. The map follows
+sideways movement too: it tells of the gel point that has come to lie there. It is a map of the gel, seen along its
+normal: pixels stand for the places on the plane of height zero where the camera sees them; perspective comes later.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+import functools
+import logging
+from collections.abc import Iterator
+
+import numpy as np
+
+from .. import sensors
+from ..errors import TactileError
+from ..geometry.cubic_spline import EvenSpline, bspline_weights
+from ..geometry.lattice import Lattice
+from ..sensors.calibration import Calibration
+from ..sensors.calibration_file import load_calibration
+from ..sensors.camera import HEIGHT_ZERO_Y, Camera
+
+_log = logging.getLogger(__name__)
+_folded: contextvars.ContextVar[list[int] | None] = contextvars.ContextVar("folded", default=None)
+
+REFINEMENT = 2  # grid for the sideways search, intervals a node interval; measured in tests/pictures/test_height_map.py
+MOVE_TOLERANCE = 1e-7  # m, of the sideways search: times a slope of 1, below a tenth of a grey level
+MOVE_ITERATIONS = 12  # 2 or 3 do for presses; where 12 do not, the surface folds over itself
+BEYOND_WINDOW = 1e-3  # m that a picture may reach past the window (17 px/mm: 0.7 mm); the edge is held there
+NEGLIGIBLE = 1e-12  # weight of a node in a pixel, of 1 in all: a hundred-thousandth of float32's rounding
+SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area is about to fold: steps stay finite
+
+
+@contextlib.contextmanager
+def folds_counted() -> Iterator[list[int]]:
+    """For each map made inside that folds over itself, at how many places; it is then not logged."""
+    folded: list[int] = []
+    token = _folded.set(folded)
+    try:
+        yield folded
+    finally:
+        _folded.reset(token)
+
+
+class HeightMapper:
+    """Height maps of one surface under one camera; matrices are made once.
+
+    surface : a lattice with an evenly spaced ``window`` that covers the camera's picture, but for 1 mm at its edges
+    camera : None for the shipped calibration's
+    Raises TactileError where the picture reaches further.
+    """
+
+    def __init__(self, surface: Lattice, camera: Camera | None = None) -> None:
+        if surface.window is None:
+            raise TactileError("surface", "no evenly spaced window", "one", "Use sensors.digit_surface()")
+        camera = camera or load_calibration().camera
+        self.surface, self.camera = surface, camera
+        rest = surface.grid(surface.rest)[surface.window]
+        self._along, self._across = _axis(rest[:, 0, 0]), _axis(rest[0, :, 2])
+        for name, spline, seen in (("x", self._along, camera.gel_x), ("z", self._across, camera.gel_z)):
+            low, high = spline.nodes[0], spline.nodes[-1]
+            if seen.min() < low - BEYOND_WINDOW or seen.max() > high + BEYOND_WINDOW:
+                raise TactileError(
+                    f"camera, {name}", f"picture {seen.min() * 1e3:.2f}..{seen.max() * 1e3:.2f} mm",
+                    f"inside the surface's even window {low * 1e3:.2f}..{high * 1e3:.2f} mm", "Raise its px/mm",
+                )  # fmt: skip
+        self._fine_along, self._fine_across = self._along.refined(REFINEMENT), self._across.refined(REFINEMENT)
+        fine = self._fine_along.nodes, self._fine_across.nodes
+        # [order of the derivative][along x, across z]
+        self._to_fine = [(self._along.matrix(fine[0], k), self._across.matrix(fine[1], k)) for k in (0, 1)]
+        self._to_pixels = [
+            _short(self._fine_along.matrix(camera.gel_x)), _short(self._fine_across.matrix(camera.gel_z)).T.copy()
+        ]  # fmt: skip
+        self._rest_y = rest[..., 1] - HEIGHT_ZERO_Y
+        down, right = self._along.matrix(camera.gel_x), self._across.matrix(camera.gel_z)
+        self.rest = (down @ self._rest_y @ right.T).astype(np.float32)
+        self.rest.flags.writeable = False
+
+    def __call__(self, displacement: np.ndarray) -> np.ndarray:
+        """Heights (H, W) float32, m, of displacement (n_nodes, 3) m; or (T, H, W) of (T, n_nodes, 3).
+
+        Twice differentiable where the surface does not fold; exactly ``rest`` where nothing moves.
+        A point from beyond the window counts as the window's edge.
+        Raises TactileError for another shape or a value that is not finite.
+        """
+        displacement = np.asarray(displacement)
+        expected = (len(self.surface.rest), 3)
+        if displacement.ndim not in (2, 3) or displacement.shape[-2:] != expected:
+            raise TactileError("displacement", f"shape {displacement.shape}", f"{expected} or (T, {expected[0]}, 3)")
+        if not np.isfinite(displacement).all():
+            raise TactileError("displacement", "values that are not finite", "metres", "Repair the frame first")
+        if displacement.ndim == 2:
+            return self._one(displacement)
+        maps = np.empty((len(displacement), *self.camera.shape), np.float32)
+        for k, frame in enumerate(displacement):
+            maps[k] = self._one(frame)
+        return maps
+
+    def _one(self, displacement: np.ndarray) -> np.ndarray:
+        move = self.surface.grid(displacement)[self.surface.window].astype(float)
+        if not move.any():
+            return self.rest.copy()
+        down, right = self._to_pixels
+        return self.rest + down @ self._raised(move).astype(np.float32) @ right
+
+    def _raised(self, move: np.ndarray) -> np.ndarray:
+        """Change of height (fine rows, fine columns) m at the nodes of the refined grid, which stay in place."""
+        down, right = self._to_fine[0]
+        if not move[..., [0, 2]].any():
+            return down @ move[..., 1] @ right.T
+        tables = np.stack([move[..., 0], move[..., 2], self._rest_y + move[..., 1]])
+        coefficients = self._along.to_coefficients @ tables @ self._across.to_coefficients.T
+        x, z = self._source(tables[:2], coefficients[:2])
+        height = self._look_up(coefficients[2:], x, z)[:, 0].reshape(len(down), len(right))
+        return height - down @ self._rest_y @ right.T
+
+    def _source(self, move: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rest places (n,) x, z m of the gel points that have moved to the nodes of the refined grid.
+
+        Newton's method for X + u(X) = x from X = x, with the Jacobian kept: u changes little over a displacement.
+        move : (2, rows, columns) sideways displacement x, z at the window's nodes; coefficients : of its splines
+        """
+        (down, right), (down_slope, right_slope) = self._to_fine
+        to_x, to_z = _inverse(down_slope @ move @ right.T, down @ move @ right_slope.T)
+        x, z = np.meshgrid(self._fine_along.nodes, self._fine_across.nodes, indexing="ij")
+        x, z = x.ravel(), z.ravel()
+        source_x, source_z = x.copy(), z.copy()
+        miss = (down @ move @ right.T).reshape(2, -1)
+        active = np.arange(len(x))
+        for _ in range(MOVE_ITERATIONS):
+            source_x[active] -= (to_x[:, active] * miss).sum(0)
+            source_z[active] -= (to_z[:, active] * miss).sum(0)
+            active = active[np.abs(miss).max(0) > MOVE_TOLERANCE]
+            if not len(active):
+                return source_x, source_z
+            at_x, at_z = source_x[active], source_z[active]
+            moved = self._look_up(coefficients, at_x, at_z).T
+            miss = np.stack([at_x - x[active], at_z - z[active]]) + moved
+        folded = _folded.get()
+        if folded is None:
+            found = len(active), len(x)
+            _log.warning("gel surface folds over itself at %d of %d places: height there is a guess", *found)
+        else:
+            folded.append(len(active))
+        return source_x, source_z
+
+    def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Splines with coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, good to 0.1 nm a mm."""
+        (row, t), (column, s) = self._along.cells(x), self._across.cells(z)
+        weights_x, weights_z = bspline_weights(t.astype(np.float32)), bspline_weights(s.astype(np.float32))
+        windows = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4), axis=(1, 2)).transpose(1, 2, 0, 3, 4)
+        patches = np.ascontiguousarray(windows, np.float32).reshape(-1, len(coefficients), 16)
+        patches = patches.take(row * windows.shape[1] + column, axis=0)
+        weights = (weights_x[:, None] * weights_z).reshape(16, -1).T
+        return np.einsum("nkp,np->nk", patches, weights)
+
+
+def _short(matrix: np.ndarray) -> np.ndarray:
+    """A spline's matrix in float32, without what rounding would drop.
+
+    Far from a node its weights fall below the smallest normal float32, and processors are ten times slower at those.
+    """
+    return np.where(np.abs(matrix) > NEGLIGIBLE, matrix, 0).astype(np.float32)
+
+
+def _inverse(by_x: np.ndarray, by_z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (2, n) each of the inverse of the 2 x 2 matrices I + du/dX, from du/dx and du/dz (2, rows, columns)."""
+    a, c = 1 + by_x[0].ravel(), by_x[1].ravel()
+    b, d = by_z[0].ravel(), 1 + by_z[1].ravel()
+    determinant = np.maximum(a * d - b * c, SMALLEST_AREA)
+    return np.stack([d, -b]) / determinant, np.stack([-c, a]) / determinant
+
+
+def _axis(nodes: np.ndarray) -> EvenSpline:
+    return EvenSpline(nodes[0], (nodes[-1] - nodes[0]) / (len(nodes) - 1), len(nodes))
+
+
+def digit_mapper(camera: Camera | None = None) -> HeightMapper:
+    """The mapper of ``sensors.digit_surface()``, made once a camera; None for the shipped calibration's."""
+    return _digit_mapper(camera or load_calibration().camera)
+
+
+@functools.cache
+def _digit_mapper(camera: Camera) -> HeightMapper:
+    return HeightMapper(sensors.digit_surface(), camera)
+
+
+def height_map(displacement: np.ndarray, camera: Camera | None = None) -> np.ndarray:
+    """Heights (H, W) or (T, H, W) float32, m, of the DIGIT's gel displaced by (n_nodes, 3) or (T, n_nodes, 3) m."""
+    return digit_mapper(camera)(displacement)
+
+
+def rest_height_map(camera: Camera | None = None) -> np.ndarray:
+    """Heights (H, W) float32, m, of the undeformed DIGIT: its dome."""
+    return digit_mapper(camera).rest.copy()
+
+
+def of_unit(heights: np.ndarray, calibration: Calibration) -> np.ndarray:
+    """Heights (H, W) or (T, H, W) m of the DIGIT's gel -> float32, of a unit whose dome is higher or flatter at rest.
+
+    What a contact raises stays; the resting dome is that of the public mesh times the calibration's ``dome_scale``.
+    """
+    heights = np.asarray(heights, np.float32)
+    if calibration.dome_scale == 1:
+        return heights
+    return heights - np.float32(1 - calibration.dome_scale) * digit_mapper(calibration.camera).rest

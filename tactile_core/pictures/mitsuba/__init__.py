@@ -1,0 +1,1 @@
+"""Pictures whose rays Mitsuba casts."""

@@ -1,0 +1,76 @@
+"""The gel as a triangle mesh for Mitsuba, made of a height map."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import TactileError
+from ...geometry.lattice import grid_faces
+from ...sensors.camera import Camera
+
+SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, about 20,000 vertices in the picture
+# m of gel round the picture, as high as the picture's edge (sensors.md: 18.4 x 25 mm, of which 13 x 17 are seen).
+MARGIN = 3e-3
+# Mitsuba's ray offsets are made for scenes of about unit size; in metres they would be 0.1 mm.
+MM = 1e3
+
+
+class GelMesh:
+    """Vertices and faces of height maps under one camera.
+
+    Mesh coordinates: right, up and toward the camera, mm, with up scaled so that pixels are square there. Straight
+    lines stay straight in them, so visibility is that of the real gel; lengths and angles along the picture are not.
+    """
+
+    def __init__(self, camera: Camera, spacing: float = SPACING) -> None:
+        """spacing : m between vertices, rounded to whole pixels."""
+        self.camera = camera
+        right, down = camera.pixel_size
+        self.up_scale = right / down
+        self._rows = _kept(camera.height, max(1, round(spacing / down)))
+        self._columns = _kept(camera.width, max(1, round(spacing / right)))
+        across, along = _extended(camera.right[self._columns]), _extended(camera.down[self._rows])
+        self._rows, self._columns = (np.r_[kept[0], kept, kept[-1]] for kept in (self._rows, self._columns))
+        plan = np.empty((len(along), len(across), 3), np.float32)
+        plan[..., 0] = across * MM
+        plan[..., 1] = -along[:, None] * (MM * self.up_scale)
+        self._plan = plan
+        # Rows grow downward, so that (row x column) points to the camera: outward for Mitsuba.
+        self.faces = grid_faces(len(along), len(across), closed=False).astype(np.uint32)
+        self.count = len(along) * len(across)
+
+    def vertices(self, height: np.ndarray) -> np.ndarray:
+        """Vertices (n, 3) float32 in mesh coordinates of a height map (H, W) m."""
+        self._plan[..., 2] = height[np.ix_(self._rows, self._columns)] * MM
+        return self._plan.reshape(-1, 3).copy()
+
+    def to_mesh(self, points: np.ndarray) -> np.ndarray:
+        """Points (n, 3) m, image frame (right, down, toward the camera), in mesh coordinates."""
+        return np.asarray(points) * [MM, -MM * self.up_scale, MM]
+
+
+def _kept(count: int, step: int) -> np.ndarray:
+    """Every step-th of count pixels, the last one too."""
+    kept = np.arange(0, count, step)
+    return kept if kept[-1] == count - 1 else np.r_[kept, count - 1]
+
+
+def _extended(values: np.ndarray) -> np.ndarray:
+    return np.r_[values[0] - MARGIN, values, values[-1] + MARGIN]
+
+
+def check_mesh(vertices: np.ndarray, faces: np.ndarray, count: int) -> None:
+    """What Mitsuba would crash on or leave holes for.
+
+    vertices (n, 3), faces (m, 3) ; count : how many vertices the scene was made with
+    Raises TactileError for another number of vertices, values that are not finite, or a face of a missing vertex.
+    """
+    if vertices.shape != (count, 3):
+        raise TactileError("gel mesh, vertices", f"shape {vertices.shape}", f"({count}, 3)")
+    if not np.isfinite(vertices).all():
+        raise TactileError("gel mesh, vertices", "values that are not finite", "finite numbers")
+    if faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
+        raise TactileError("gel mesh, faces", f"shape {faces.shape}", "(faces, 3)")
+    if faces.min() < 0 or faces.max() >= count:
+        found = f"vertex {faces.max() if faces.max() >= count else faces.min()}"
+        raise TactileError("gel mesh, faces", found, f"indices 0 to {count - 1}")

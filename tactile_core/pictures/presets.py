@@ -1,0 +1,97 @@
+"""Presets: how exactly a picture is made, and what that was measured to cost."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from typing import Any
+
+from .. import accuracy
+from ..accuracy import Candidate
+from ..errors import TactileError
+from ..files.shipped import shipped
+from .mitsuba.gel_mesh import SPACING
+from .mitsuba.interreflection import Gather
+from .mitsuba.variant import SCALAR, choose_variant
+
+TABLE = shipped("optics_presets.json")
+
+
+@dataclasses.dataclass(frozen=True)
+class Preset:
+    """What Mitsuba is asked for.
+
+    points : that stand for each LED, a pass; passes : pictures from other points and other places of each pixel, over
+    which a picture is the mean; 1 looks at each pixel's middle alone
+    spacing : m between vertices of the gel's mesh
+    gather : how finely the gel's own light is gathered; None leaves it out
+    window : whether rays bend as the window makes them
+    """
+
+    name: str
+    says: str
+    points: int
+    passes: int = 1
+    spacing: float = SPACING
+    gather: Gather | None = None
+    window: bool = False
+
+
+FAST = "fast"  # shading.Shader: numpy alone
+STANDARD = Preset("standard", "direct light, 4 points an LED", points=4)
+QUALITY = Preset(
+    "quality", "6 points an LED, one bounce", points=6, gather=Gather(step=4, azimuths=12, growth=0.3, bounces=1)
+)
+REFERENCE = Preset(
+    "reference", "512 points an LED and 64 places a pixel, four bounces, the window", points=8, passes=64,
+    spacing=SPACING / 2, gather=Gather(step=2, azimuths=32, growth=0.1, bounces=4), window=True,
+)  # fmt: skip
+PRESETS = {preset.name: preset for preset in (STANDARD, QUALITY, REFERENCE)}
+NAMES = (FAST, *PRESETS)
+DEFAULT = STANDARD.name
+
+
+def preset_named(name: str) -> Preset:
+    """One of Mitsuba's presets; raises TactileError for another name."""
+    if name not in PRESETS:
+        raise TactileError("--preset", repr(name), f"one of {', '.join(NAMES)}")
+    return PRESETS[name]
+
+
+@functools.cache
+def measured() -> dict[str, Any]:
+    """What ``measure_presets.py`` found: how, and by preset error in grey levels and ms by variant."""
+    return json.loads(TABLE.read_text(encoding="utf-8"))
+
+
+def cheapest(error: float, variant: str) -> str:
+    """The fastest preset whose measured error, grey levels rms from the full model, is at most that.
+
+    Raises TactileError where none is.
+    """
+    table = measured()["presets"]
+    rows = [Candidate(name, table[name]["error"], _ms(table[name]["ms"], variant)) for name in NAMES]
+    return accuracy.cheapest(rows, error, "levels").name
+
+
+def fitting(error: float, variant: str | None = None) -> str:
+    """`cheapest` by the variant asked for or the one that works here; where Mitsuba is missing, as without LLVM."""
+    if measured()["presets"][FAST]["error"] <= error:
+        return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
+    try:
+        chosen = choose_variant(variant).name
+    except ModuleNotFoundError:
+        chosen = SCALAR
+    return cheapest(error, chosen)
+
+
+def told(name: str, error: float) -> str:
+    """Why a preset was picked for a bound, in words."""
+    found = measured()["presets"][name]
+    return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"
+
+
+def _ms(ms: dict[str, float], variant: str) -> float:
+    """Of a preset that needs no Mitsuba, or by a variant; one that was not measured counts as slowest."""
+    return ms.get("numpy", ms.get(variant, float("inf")))

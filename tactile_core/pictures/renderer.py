@@ -1,0 +1,149 @@
+"""Pictures of height maps by a preset: the radiance that each LED gives, and the camera's picture of it."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from ..sensors.calibration import LARGEST_LEVEL, Calibration
+from ..sensors.calibration_file import load_calibration
+from .background import background_picture
+from .height_map import of_unit, rest_height_map
+from .mitsuba.direct_light import Hits, direct_light
+from .mitsuba.gel_mesh import GelMesh
+from .mitsuba.interreflection import interreflection
+from .mitsuba.light_samples import light_points, sphere_points
+from .mitsuba.tracer import make_tracer
+from .mitsuba.variant import choose_variant
+from .mitsuba.window import through_window
+from .perspective import slopes
+from .presets import DEFAULT, FAST, Preset, preset_named
+from .shading import Shader, camera_array, check_reach
+
+# Pixels off each pixel's middle, where else rays would meet vertices exactly and slip between triangles.
+_ASIDE = (0.013, 0.0071)
+# Steps of the additive recurrence that fills four dimensions evenly (M. Roberts, 2018: powers of 1 / g, g^5 = g + 1).
+_EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
+
+
+class Light(Protocol):
+    """Gives radiance (H, W, 3) of height maps (H, W) m."""
+
+    def radiance(self, height_map: np.ndarray) -> np.ndarray:
+        """(H, W, 3) of heights (H, W) m."""
+
+
+class Renderer:
+    """Pictures by one preset; the scene and what only the resting gel decides are made once.
+
+    calibration : None for the one that ships; preset : one of ``presets.NAMES``
+    variant : of Mitsuba, "llvm_ad_rgb" or "scalar_rgb"; None for the faster one that works here. Not asked by ``fast``
+    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the calibration's
+    rest : (H, W) heights of the undeformed gel, m; None for the calibration's, whose dome heights then get too
+    seed : of the reference's random places and points; the others have none
+    Raises TactileError for an unknown preset, arrays of another shape, values that are not finite, and a gel that
+    reaches an LED or the camera; ModuleNotFoundError where mitsuba is missing.
+    """
+
+    def __init__(
+        self,
+        calibration: Calibration | None = None,
+        preset: str = DEFAULT,
+        variant: str | None = None,
+        background: np.ndarray | None = None,
+        rest: np.ndarray | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.calibration = calibration = calibration or load_calibration()
+        self.camera = calibration.camera
+        self._domed = rest is None and calibration.dome_scale != 1
+        own = rest_height_map(self.camera) if rest is None else rest
+        resting = self._heights(own, "rest height map")
+        background = background_picture(calibration) if background is None else background
+        self.background = camera_array(background, (*self.camera.shape, 3), "background")
+        self._gain = np.ascontiguousarray(calibration.gain.matrices(self.camera).transpose(2, 3, 0, 1), np.float32)
+        if preset == FAST:
+            self.variant = None
+            self._light: Light = Shader(calibration, background, resting)
+        else:
+            self.variant = choose_variant(variant).name
+            self._light = MitsubaLight(calibration, preset_named(preset), self.variant, resting, seed)
+        self.rest_radiance = self._light.radiance(resting)
+
+    def __call__(self, height_map: np.ndarray) -> np.ndarray:
+        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
+        return self.picture(self.radiance(height_map))
+
+    def radiance(self, height_map: np.ndarray) -> np.ndarray:
+        """Radiance (H, W, 3) float32 that each LED gives to what pixels see, in the unit of ``calibration``."""
+        return self._light.radiance(self._heights(height_map, "height map"))
+
+    def picture(self, radiance: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
+        """Picture (H, W, 3) uint8: background + C (radiance - radiance at rest).
+
+        noise : makes the camera's noise, as measured on the unit; None for none
+        """
+        levels = self.in_levels(radiance - self.rest_radiance)
+        levels += self.background
+        if noise is not None:
+            levels += noise.standard_normal(levels.shape, np.float32) * np.asarray(self.calibration.noise, np.float32)
+        np.rint(levels, out=levels)
+        return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
+
+    def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
+        """The unit's heights (H, W) float32 m, checked."""
+        heights = camera_array(given, self.camera.shape, name)
+        heights = of_unit(heights, self.calibration) if self._domed else heights
+        check_reach(heights, self.calibration, name)
+        return heights
+
+    def in_levels(self, radiance: np.ndarray) -> np.ndarray:
+        """C times radiance (H, W, 3), grey levels float32: what the camera's channels make of it."""
+        levels = np.empty_like(radiance)
+        for channel, gains in enumerate(self._gain):
+            levels[..., channel] = sum(gain * radiance[..., led] for led, gain in enumerate(gains))
+        return levels
+
+
+class MitsubaLight:
+    """Radiance by one of Mitsuba's presets; arguments checked by the caller."""
+
+    def __init__(self, unit: Calibration, preset: Preset, variant: str, rest: np.ndarray, seed: int) -> None:
+        self.unit, self.preset = unit, preset
+        self._tracer = make_tracer(GelMesh(unit.camera, preset.spacing), rest, variant)
+        self._start = np.random.default_rng(seed).random(4)
+
+    def radiance(self, height_map: np.ndarray) -> np.ndarray:
+        """Radiance (H, W, 3) float32 of heights (H, W) m, in the unit of ``calibration``."""
+        height = np.asarray(height_map, np.float32)
+        return self.completed(height, *self.direct(height))
+
+    def direct(self, height: np.ndarray) -> tuple[np.ndarray, Hits]:
+        """Radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W) float32, and what the first pass saw."""
+        self._tracer.load(height)
+        tilt = slopes(height, self.unit.camera)
+        total, first = self._one_pass(0, tilt)
+        for number in range(1, self.preset.passes):
+            total += self._one_pass(number, tilt)[0]
+        return total / np.float32(self.preset.passes), first
+
+    def completed(self, height: np.ndarray, direct: np.ndarray, hits: Hits) -> np.ndarray:
+        """Direct light with what else the preset has: the gel's own light, and the window."""
+        radiance, preset = direct, self.preset
+        if preset.gather and self.unit.albedo:
+            radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)
+        return through_window(radiance, hits.height, self.unit.camera) if preset.window else radiance
+
+    def _one_pass(self, number: int, tilt: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Hits]:
+        """Direct light (H, W, 3) and what pixels saw."""
+        leds, count = self.unit.leds, self.preset.points
+        if self.preset.passes == 1:
+            shift, points = _ASIDE, [light_points(led, count) for led in leds]
+        else:
+            *shift, turn, depth = (self._start + number * _EVEN) % 1
+            shift = (shift[0] - 0.5, shift[1] - 0.5)
+            points = [sphere_points(led, count, turn, depth) for led in leds]
+        place, seen = self._tracer.trace(np.concatenate(points), shift)
+        hits = Hits.on_map(place, tilt, self.unit.camera)
+        return direct_light(hits, seen, points, leds, soften=self.preset.passes == 1), hits

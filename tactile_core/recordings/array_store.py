@@ -1,0 +1,179 @@
+"""Named arrays of an HDF5 or NPZ file, with their declared size checked before a byte of them is read."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import TactileError
+from ..files.hdf5_checked import declared, open_checked
+from .assemble import MAX_FRAMES
+
+MAX_BYTES = (
+    2 * 2**30
+)  # of one array in memory; a truth of 700 frames and 6,000 nodes takes 50 MB as float32 (assumed enough)
+MAX_HEADER = 10_000  # bytes of an array's header in NPZ, numpy's own limit
+_NPY_START = 12  # bytes: magic, version, length
+
+
+@dataclass(frozen=True)
+class Store:
+    """shapes : name -> (shape, dtype) as declared in the file; attributes : of the file's root."""
+
+    path: str
+    shapes: dict[str, tuple[tuple[int, ...], np.dtype]]
+    load: Callable[[str], np.ndarray]
+    attributes: dict[str, Any] = field(default_factory=dict)
+    attributes_of: Callable[[str], dict[str, Any]] = lambda name: {}
+    load_rows: Callable[[str, slice], np.ndarray] | None = None
+
+    def rows(self, rows: slice, count: int) -> Store:
+        """The same store with only these rows of all arrays that are `count` long; HDF5 alone reads in parts."""
+        long = {name for name, (shape, _) in self.shapes.items() if shape[:1] == (count,)}
+        cut = {name: ((rows.stop - rows.start, *self.shapes[name][0][1:]), self.shapes[name][1]) for name in long}
+
+        def load(name: str) -> np.ndarray:
+            return self.load_rows(name, rows) if name in long else self.load(name)
+
+        return replace(self, shapes=self.shapes | cut, load=load)
+
+    def array(self, name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> np.ndarray:
+        """The array as floats; shape has None where any length will do. Raises TactileError for all that is wrong."""
+        where = f"{self.path}, {name}"
+        if name not in self.shapes:
+            raise TactileError(where, "this array is missing", advice="Export the recording again with all arrays")
+        found, kind = self.shapes[name]
+        if kind.kind not in "iufb":
+            raise TactileError(where, f"values of type {kind}", "numbers")
+        wanted = "(" + ", ".join("frames" if n is None else str(n) for n in shape) + ")"
+        if len(found) != len(shape) or any(n is not None and n != m for n, m in zip(shape, found, strict=False)):
+            raise TactileError(where, f"shape {found}", wanted)
+        bytes_needed = int(np.prod([float(n) for n in found])) * max(kind.itemsize, np.dtype(dtype).itemsize)
+        if bytes_needed > MAX_BYTES or (found and found[0] > MAX_FRAMES):
+            raise TactileError(
+                where,
+                f"shape {found}, {bytes_needed / 2**30:.1f} GB in memory",
+                f"at most {MAX_FRAMES:,} frames and {MAX_BYTES / 2**30:.0f} GB",
+                "Split the recording",
+            )
+        return self._loaded(name).astype(dtype)
+
+    def optional(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
+        """The array, or None where the file does not hold it."""
+        return self.array(name, shape) if name in self.shapes else None
+
+    def _loaded(self, name: str) -> np.ndarray:
+        try:
+            return np.asarray(self.load(name))
+        except (TactileError, MemoryError):
+            raise
+        except Exception as error:  # the file libraries raise a dozen types on damaged bytes
+            raise TactileError(
+                f"{self.path}, {name}",
+                f"damaged data ({_short(error)})",
+                "a whole file",
+                "Copy or export the recording again",
+            ) from error
+
+
+def _short(error: BaseException) -> str:
+    text = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {text[0][:80]}" if text else type(error).__name__
+
+
+@contextmanager
+def open_hdf5(path: str) -> Iterator[Store]:
+    """Open for reading; arrays are named by their full path without the first slash."""
+    import h5py
+
+    shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
+
+    def note(name: str | bytes, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.shape is not None:
+            shapes[_plain(name)] = (tuple(item.shape), item.dtype)
+
+    with ExitStack() as stack:
+        with damage_told(path, "HDF5"):
+            file = stack.enter_context(open_checked(path))
+            file.visititems(note)
+            attributes = {key: _plain(value) for key, value in file.attrs.items()}
+
+        def attributes_of(name: str) -> dict[str, Any]:
+            with damage_told(f"{path}, {name}", "attributes"):
+                return {key: _plain(value) for key, value in file[name].attrs.items()}
+
+        def load(name: str, rows: Any = ()) -> np.ndarray:
+            declared(file[name], f"{path}, {name}")
+            return file[name][rows]
+
+        yield Store(path, shapes, load, attributes, attributes_of, load)
+
+
+@contextmanager
+def damage_told(where: str, what: str) -> Iterator[None]:
+    """Turn whatever a file library raises into a TactileError; see Store._loaded."""
+    try:
+        yield
+    except (TactileError, MemoryError):
+        raise
+    except Exception as error:
+        raise TactileError(
+            where, f"damaged {what} ({_short(error)})", "a whole file", "Copy or export the recording again"
+        ) from error
+
+
+def _plain(value: Any) -> Any:
+    """A name or attribute as plain Python: str, int, float, bool or list, fit for JSON."""
+    if isinstance(value, bytes):  # h5py gives text as bytes where it is not UTF-8
+        return value.decode("utf-8", "replace")
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value if isinstance(value, str | int | float | bool) else str(value)
+
+
+@contextmanager
+def open_npz(path: str) -> Iterator[Store]:
+    """Open for reading; never unpickles. Sizes come from the arrays' own headers, not from unpacking them."""
+    shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
+    with ExitStack() as stack:
+        with damage_told(path, "NPZ"):
+            archive = stack.enter_context(zipfile.ZipFile(path))
+            for member in archive.infolist():
+                if member.filename.endswith(".npy"):
+                    _check_packing(path, member)
+                    with archive.open(member) as stream:
+                        shapes[member.filename[:-4]] = _npy_header(stream)
+
+        def load(name: str) -> np.ndarray:
+            with archive.open(name + ".npy") as stream:
+                return np.lib.format.read_array(stream, allow_pickle=False)
+
+        yield Store(path, shapes, load)
+
+
+def _check_packing(path: str, member: zipfile.ZipInfo) -> None:
+    """Other kinds of packing than deflate unpack at once whatever the file says, or ask for gigabytes to begin with."""
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        found = f"packed by method {member.compress_type}"
+        raise TactileError(f"{path}, {member.filename}", found, "stored or deflated, as numpy does", "Save it again")
+
+
+def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype]:
+    """Shape and type; a header that says it is long is not read: numpy would take it into memory before it looks."""
+    start = stream.read(_NPY_START)
+    length = int.from_bytes(start[8 : 10 if start[6:7] == b"\1" else 12], "little")
+    if not start.startswith(b"\x93NUMPY") or length > MAX_HEADER:
+        raise ValueError(f"a header of {length} bytes")
+    whole = io.BytesIO(start + stream.read(length))
+    version = np.lib.format.read_magic(whole)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(whole)
+    return tuple(int(n) for n in shape), dtype

@@ -1,0 +1,89 @@
+"""A recording in parts that fit into memory, however long it is; short ones are a single part, as `read` gives them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from .array_store import Store, open_hdf5
+from .bag import open_bag, read_bag
+from .readers import container_of, layout_of, names, read, reading
+from .recording import Recording
+from .table import read_header_of_start, read_tables
+
+TEXT_BYTES = 32 * 2**20  # a part's text: about 150,000 frames, 25 minutes at 100 Hz
+ARRAY_BYTES = 256 * 2**20  # of a part's arrays, as the file declares them; a simulated one has 150 kB a frame
+PART_FRAMES = 100_000  # most frames of a part: 17 minutes at 100 Hz; preparing them takes 15 MB a copy
+CONTEXT = 200  # frames that a part shares with the one before: glitches are looked for over 50, smoothing over 101
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """recording : the frames of a part; repeated : how many of them, at its start, the part before had too."""
+
+    recording: Recording
+    repeated: int
+
+
+def read_parts(path: str | os.PathLike[str]) -> Iterator[Part]:
+    """The parts of a recording in order, their times counted from the first frame of all. NPZ files are read whole.
+
+    Raises TactileError as `readers.read`.
+    """
+    path = os.fspath(path)
+    shift, time = 0.0, None
+    for part in _parts(path):
+        if part.repeated:
+            shift = time[-part.repeated]
+        time = part.recording.time + shift
+        yield replace(part, recording=replace(part.recording, time=time))
+
+
+def _parts(path: str) -> Iterator[Part]:
+    with reading(path):
+        container = container_of(path)
+        if container == "csv" and os.path.getsize(path) > TEXT_BYTES:
+            layout = layout_of(path, container, read_header_of_start(path))
+            for table, repeated in read_tables(path, TEXT_BYTES, CONTEXT):
+                yield Part(layout.read(table), repeated)
+        elif container == "hdf5":
+            with open_hdf5(path) as store:
+                yield from _of_store(store)
+        elif container == "bag":
+            with open_bag(path) as bag:
+                layout = layout_of(path, container, bag.topics)
+                for recording, repeated in read_bag(bag, layout, PART_FRAMES, CONTEXT):
+                    yield Part(recording, repeated)
+        else:
+            yield Part(read(path), 0)
+
+
+def _of_store(store: Store) -> Iterator[Part]:
+    layout = layout_of(store.path, "hdf5", names(store))
+    count = _frames(store, layout.ELECTRODES_NAME)
+    frames = max(2 * CONTEXT, min(PART_FRAMES, ARRAY_BYTES // max(1, _bytes_a_frame(store, count))))
+    if count <= frames:
+        yield Part(layout.read(store), 0)
+        return
+    for start in range(0, count, frames):
+        repeated = min(CONTEXT, start)
+        rows = slice(start - repeated, min(start + frames, count))
+        yield Part(layout.read(store.rows(rows, count)), repeated)
+
+
+def _frames(store: Store, name: str) -> int:
+    """Length of the electrodes' array, 0 where it is missing or a single number: the layout says so."""
+    shape = store.shapes.get(name, ((), None))[0]
+    return shape[0] if shape else 0
+
+
+def _bytes_a_frame(store: Store, count: int) -> int:
+    total = 0
+    for shape, kind in store.shapes.values():
+        if count and shape[:1] == (count,):
+            numbers = 1
+            for length in shape[1:]:
+                numbers *= length
+            total += numbers * max(kind.itemsize, 8)  # read as float64
+    return total

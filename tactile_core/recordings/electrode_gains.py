@@ -1,0 +1,166 @@
+"""A unit's own rest, gains and offsets: the TOML file of `tactile adapt`, and what it does to signals."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from ..errors import TactileError
+from ..files import atomic
+from ..files.text_file import read_toml_text
+from .fingers import FINGERS
+from .recording import ELECTRODES, Recording
+from .signals import PrepareOptions, Rest, Signals, prepare
+
+FORMAT = "tactile-sensor-2"
+OLD_FORMAT = "tactile-sensor-1"  # its offsets were of counts that rise where a film thins
+LEAST, MOST = 0.2, 5.0  # a gain beyond is a broken channel or a match gone wrong, not a unit (assumed)
+LARGEST_OFFSET = 500.0  # counts; a raw reading's rest is never that near to a change (assumed)
+LARGEST_COUNT = 4095.0  # 12 bits
+ADVICE = "Make it again with `tactile adapt`"
+Row = Annotated[list[float], Meta(min_length=ELECTRODES, max_length=ELECTRODES)]
+
+
+class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
+    """A unit against the simulated one: reading - rest = gain * simulated change + offset, E1 .. E19.
+
+    gain : counts a count; offset_counts : counts; note : how it was made
+    rest_counts : what its electrodes read without contact, where that was found; rest_spread_counts : half the range of
+        what the recordings that it was found in give for it; rest_pdc : counts
+    """
+
+    note: str
+    gain: Row
+    offset_counts: Row
+    rest_counts: Row | None = None
+    rest_spread_counts: Row | None = None
+    rest_pdc: float | None = None
+
+    def rest(self) -> Rest | None:
+        """The unit's rest as `prepare` takes it."""
+        if self.rest_counts is None:
+            return None
+        return Rest(tuple(self.rest_counts), tuple(self.rest_spread_counts or [0.0] * ELECTRODES), self.rest_pdc)
+
+
+class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
+    """One unit, or the units of a hand's fingers, each in a section of its own."""
+
+    format: str
+    unit: ElectrodeGains | None = None
+    finger0: ElectrodeGains | None = None
+    finger1: ElectrodeGains | None = None
+    finger2: ElectrodeGains | None = None
+    finger3: ElectrodeGains | None = None
+    finger4: ElectrodeGains | None = None
+
+    def sections(self) -> dict[str, ElectrodeGains]:
+        """Sections that are there, by name."""
+        names = ("unit", *(f"finger{number}" for number in range(FINGERS)))
+        return {name: found for name in names if (found := getattr(self, name)) is not None}
+
+    def of(self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike) -> ElectrodeGains:
+        """The unit that a recording was made with. Raises TactileError where the file has no section for it."""
+        name = "unit" if finger is None else f"finger{finger}"
+        sections = self.sections()
+        if name in sections:
+            return sections[name]
+        found = f"[{'], ['.join(sections)}], and {os.path.basename(recording)} is of {_in_words(finger)}"
+        raise TactileError(where, found, f"a section [{name}]", "Adapt to recordings of that unit")
+
+
+def _in_words(finger: int | None) -> str:
+    return "one unit" if finger is None else f"finger {finger}"
+
+
+def prepare_unit(recording: Recording, options: PrepareOptions | None, unit: ElectrodeGains | None) -> Signals:
+    """Prepare a recording by its unit's rest, and take its gains and offsets off; None: as `prepare`.
+
+    Raises TactileError as `prepare`.
+    """
+    if unit is None:
+        return prepare(recording, options)
+    return apply(prepare(recording, dataclasses.replace(options or PrepareOptions(), rest=unit.rest())), unit)
+
+
+def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
+    """Signals as the simulated sensor would give them: (change - offset) / gain; the report says so.
+
+    A rectified change has lost its offset with its sign: it is only divided by the gain.
+    """
+    offset = np.zeros(ELECTRODES) if signals.kind == "rectified" else np.array(sensor.offset_counts)
+    told = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
+    change = (signals.change - offset) / np.array(sensor.gain)
+    return dataclasses.replace(signals, change=change, report={**signals.report, "sensor": told})
+
+
+def read(path: str | os.PathLike) -> SensorFile:
+    """Read a sensor file; raises TactileError naming file and field for what is unreadable, unknown or out of range."""
+    file = Path(path)
+    try:
+        text = read_toml_text(file)
+        if f'"{OLD_FORMAT}"' in text:
+            found = "offsets of counts that rise where a film thins"
+            raise TactileError(f"{file}, format", f"{OLD_FORMAT!r}: {found}", repr(FORMAT), ADVICE)
+        sensor = msgspec.toml.decode(text, type=SensorFile)
+    except OSError as error:
+        raise TactileError(file, f"cannot be read ({error.strerror})", "a file of `tactile adapt`") from error
+    except (ValueError, RecursionError) as error:
+        raise TactileError(file, str(error), "a file of `tactile adapt`", ADVICE) from error
+    check(sensor, file)
+    return sensor
+
+
+def check(sensor: SensorFile, where: str | os.PathLike) -> None:
+    """Raises TactileError naming the field that is out of range."""
+    if sensor.format != FORMAT:
+        raise TactileError(f"{where}, format", repr(sensor.format), repr(FORMAT), ADVICE)
+    if not sensor.sections():
+        raise TactileError(where, "no section", "[unit], or [finger0], [finger1], ...", ADVICE)
+    limits = {
+        "gain": (LEAST, MOST), "offset_counts": (-LARGEST_OFFSET, LARGEST_OFFSET), "rest_counts": (0.0, LARGEST_COUNT),
+        "rest_spread_counts": (0.0, LARGEST_COUNT),
+    }  # fmt: skip
+    for name, section in sensor.sections().items():
+        for field, (least, most) in limits.items():
+            for electrode, value in enumerate(getattr(section, field) or (), start=1):
+                if not least <= value <= most:  # false for nan
+                    place = f"{where}, {name}.{field}, E{electrode}"
+                    raise TactileError(place, f"{value:g}", f"{least:g} to {most:g}", ADVICE)
+        if section.rest_pdc is not None and not 0 <= section.rest_pdc <= LARGEST_COUNT:
+            raise TactileError(f"{where}, {name}.rest_pdc", f"{section.rest_pdc:g}", f"0 to {LARGEST_COUNT:g}", ADVICE)
+
+
+def write(path: str | os.PathLike, sensor: SensorFile) -> None:
+    """Write a sensor file, whole or not at all; equal sensors give equal bytes."""
+    lines = [
+        "# A BioTac against the simulated one: reading - rest = gain * simulated change + offset, E1 to E19.",
+        "# Used by: tactile convert RECORDING --sensor THIS_FILE",
+        f"format = {_quoted(sensor.format)}",
+    ]
+    for name, section in sensor.sections().items():
+        lines += ["", f"[{name}]", f"note = {_quoted(section.note)}"]
+        lines += [f"gain = {_numbers(section.gain)}  # counts a count"]
+        lines += [f"offset_counts = {_numbers(section.offset_counts)}"]
+        for field in ("rest_counts", "rest_spread_counts"):
+            if getattr(section, field) is not None:
+                lines.append(f"{field} = {_numbers(getattr(section, field))}")
+        if section.rest_pdc is not None:
+            lines.append(f"rest_pdc = {section.rest_pdc:.4f}  # counts")
+    atomic.write_bytes(path, "\n".join([*lines, ""]).encode())
+
+
+def _quoted(text: str) -> str:
+    """A TOML basic string; JSON's escapes are among TOML's, and its ASCII keeps file names that are no UTF-8."""
+    return json.dumps(text.encode(errors="replace").decode())
+
+
+def _numbers(values: list[float]) -> str:
+    return "[" + ", ".join(f"{value:.4f}" for value in values) + "]"

@@ -1,0 +1,26 @@
+"""What may be remarkable about one frame, as bits of an integer; a recording's flags are (T,) uint16."""
+
+from __future__ import annotations
+
+import enum
+
+
+class Flag(enum.IntFlag):
+    """Bits of the dataset ``flags``. Their names are written into every file that holds them."""
+
+    REPAIRED = 1  # one or more electrode samples were bad (drop-out, NaN, glitch) and were interpolated
+    TIME_JUMP = 2  # the time stamp went back, stood still or left a gap before this frame
+    RECTIFIED = 4  # the recording holds absolute changes: their sign is lost
+    NO_QUIET_PART = 8  # no part without contact was found, so the tare is a guess
+    SATURATED = 16  # an electrode is at an end of its 12-bit range
+    DEAD_CHANNEL = 32  # an electrode never changes in the whole recording
+    OUT_OF_RANGE = 64  # the signals lie outside those the networks were trained on
+    BEYOND_DIGIT = 128  # the contact has no counterpart on the DIGIT's gel
+    POLARITY_ASSUMED = 256  # whether counts fall or rise where a film thins is not shown: taken to fall, as raw ones do
+    POLARITY_DOUBTED = 512  # the user's word on it, or the file's, contradicts what the recording shows
+    BEYOND_PICTURE = 1024  # the contact lies on the DIGIT's gel, beside what its camera sees
+
+
+def names() -> dict[str, int]:
+    """Name in lower case -> bit, for attributes and notes."""
+    return {str(flag.name).lower(): int(flag) for flag in Flag}

@@ -1,0 +1,208 @@
+"""Find the parts of a recording without contact, wherever they lie, and the rest level they give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+WINDOW = 0.3  # s, the shortest part that is called quiet; 30 frames bring 1.5 counts of noise down to 0.3
+FEWEST = 8  # frames of a window, at slow rates
+CALM_STD = (
+    2.4  # counts within a window: noise is 0.7-1.5 (data README), plus 4 deviations of its estimate from 30 samples
+)
+CALM_TREND = 2.5  # counts from the first to the second half of a window: 4 deviations of that difference at 1.5 counts
+QUIET_PDC = 2.0  # counts over rest (data README: tare is right where PDC < 2)
+RECTIFIED_LEVEL = 4.0  # counts; without PDC a quiet electrode of a rectified recording stays below (noise folds to 1.2)
+RECTIFIED_LEVEL_PDC = 15.0  # counts; where PDC says that nothing touches, the rest is drift since the tare (assumed)
+LEVEL, LEVEL_RATE = (
+    3.0,
+    0.1,
+)  # counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts an hour = 0.024/s)
+LEVEL_PDC, LEVEL_PDC_RATE = 15.0, 0.2  # the same where PDC confirms both (assumed: skin creep after a contact)
+PDC_RATE = 0.1  # counts/s of drift allowed to PDC itself (assumed as for electrodes)
+TRACKED = 60.0  # s; over longer times drift is followed, or it would come to be as large as a press (assumed)
+TARED_LEVEL = 15.0  # counts that rest may have drifted from a tared file's own zero (assumed)
+TARED_PDC = 500.0  # counts; a lower median PDC has been tared too, so that its zero means no contact (assumed)
+LOWEST = 1.0  # percentile of PDC that is taken for rest where nothing is quiet: robust as a least value (assumed)
+NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is preferred as rest
+
+
+@dataclass(frozen=True, eq=False)
+class Quiet:
+    """mask : (T,) bool; parts : first and one-past-last frame of each quiet part; evidence in words."""
+
+    mask: np.ndarray
+    parts: tuple[tuple[int, int], ...]
+    evidence: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Figures of all windows of n frames, by start frame: mean (W, 19), calm, pdc or None, middle (s) (W,)."""
+
+    n: int
+    mean: np.ndarray
+    calm: np.ndarray
+    pdc: np.ndarray | None
+    middle: np.ndarray
+
+
+def window_frames(rate: float) -> int:
+    """Frames of the tare window at this rate (Hz)."""
+    return max(FEWEST, round(WINDOW * rate))
+
+
+def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind: str) -> Quiet:
+    """Quiet parts: calm in every electrode, at the rest level, and with the fluid pressure (PDC) of rest.
+
+    electrodes : (T, 19) float, counts, repaired; pdc : (T,) float, counts, or None; rate in Hz.
+
+    A held press is calm too. PDC tells it from rest: the fluid pressure is lowest without contact. Without PDC, calm
+    parts near the start or end are taken for rest, and others must agree with them. In tared recordings rest is near
+    zero.
+    Known limit: a raw recording that holds one even contact from its first frame to its last looks like rest.
+    """
+    n = window_frames(rate)
+    if len(electrodes) < n:
+        return Quiet(
+            np.zeros(len(electrodes), bool), (), f"{len(electrodes)} frames are fewer than the {n} of the tare window"
+        )
+    windows = _running(electrodes, pdc if pdc is not None and np.isfinite(pdc).all() else None, n, rate)
+    accepted = _rest_rectified(windows) if kind == "rectified" else _rest_signed(windows, kind, len(electrodes) / rate)
+    mask = np.zeros(len(electrodes), bool)
+    for start in np.flatnonzero(accepted):
+        mask[start : start + n] = True
+    parts = _runs(mask)
+    by = "calm electrodes and the lowest PDC" if windows.pdc is not None else "calm electrodes (no PDC to confirm it)"
+    told = f"{len(parts)} quiet part{'s' * (len(parts) != 1)} ({by})" if parts else "no calm part at the rest level"
+    return Quiet(mask, parts, told)
+
+
+def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:
+    """The window to guess rest from where nothing is quiet: lowest PDC if there is one, else least movement."""
+    n = min(window_frames(rate), len(electrodes))
+    windows = _running(electrodes, pdc if pdc is not None and np.isfinite(pdc).all() else None, n, rate)
+    if windows.pdc is not None:
+        start = int(np.argmin(windows.pdc))
+    else:
+        start = int(np.argmin(_spread(electrodes, n).max(axis=1)))
+    return slice(start, start + n)
+
+
+def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
+    """(T, 19) counts: what the electrodes would read without contact.
+
+    Level of each quiet part, linear between their middles, constant before the first and after the last: nothing is
+    known there, and contact is never taken for drift. Without drift: one level over all quiet frames.
+    """
+    if not drift or len(quiet.parts) < 2:
+        return np.broadcast_to(level(electrodes[quiet.mask]), electrodes.shape).copy()
+    middles = [0.5 * (a + b - 1) for a, b in quiet.parts]
+    levels = np.array([level(electrodes[a:b]) for a, b in quiet.parts])
+    index = np.arange(len(electrodes))
+    return np.column_stack([np.interp(index, middles, levels[:, j]) for j in range(electrodes.shape[1])])
+
+
+def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
+    """PDC at rest, counts: 0 of a file that was tared; else of the quiet frames, or the lowest where there are none."""
+    finite = pdc[np.isfinite(pdc)]
+    if not len(finite) or (kind != "raw" and np.median(finite) < TARED_PDC):
+        return 0.0
+    still = pdc[quiet.mask & np.isfinite(pdc)]
+    return float(np.median(still)) if len(still) else float(np.percentile(finite, LOWEST))
+
+
+def level(samples: np.ndarray) -> np.ndarray:
+    """(19,) mean of the middle half of (n, 19) samples: robust as a median, but not rounded to whole counts."""
+    cut = len(samples) // 4
+    return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0)
+
+
+def _sums(values: np.ndarray, n: int) -> np.ndarray:
+    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    return total[n:] - total[:-n]
+
+
+def _spread(values: np.ndarray, n: int) -> np.ndarray:
+    """(W, C) standard deviation within each window."""
+    centred = values - np.median(values, axis=0)  # keeps the squares small
+    mean = _sums(centred, n) / n
+    return np.sqrt(np.maximum(_sums(centred**2, n) / n - mean**2, 0.0))
+
+
+def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
+    half = max(1, n // 2)
+    count = len(electrodes) - n + 1
+    halves = _sums(electrodes, half) / half
+    trend = halves[n - half : n - half + count] - halves[:count]
+    calm = (_spread(electrodes, n).max(axis=1) <= CALM_STD) & (np.abs(trend).max(axis=1) <= CALM_TREND)
+    pressure = _sums(pdc, n) / n if pdc is not None else None
+    return _Windows(n, _sums(electrodes, n) / n, calm, pressure, (np.arange(count) + 0.5 * (n - 1)) / rate)
+
+
+def _rest_rectified(windows: _Windows) -> np.ndarray:
+    """(W,) bool. Rectified readings are zero at the tare, so quiet is small and calm."""
+    largest = windows.mean.max(axis=1)
+    if windows.pdc is None:
+        return windows.calm & (largest <= RECTIFIED_LEVEL)
+    return windows.calm & (windows.pdc < QUIET_PDC) & (largest <= RECTIFIED_LEVEL_PDC)
+
+
+def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
+    """(W,) bool. One calm window is taken as rest, and all calm ones that agree with it."""
+    possible = windows.calm
+    if kind != "raw":
+        possible = possible & (np.abs(windows.mean).max(axis=1) <= TARED_LEVEL)
+        if windows.pdc is not None and np.median(windows.pdc) < TARED_PDC:
+            possible &= windows.pdc < QUIET_PDC
+    calm = np.flatnonzero(possible)
+    if len(calm) == 0:
+        return possible
+    anchor = _anchor(windows, calm, kind, duration)
+    apart = np.abs(windows.middle - windows.middle[anchor])
+    off = np.abs(windows.mean - windows.mean[anchor]).max(axis=1)
+    if windows.pdc is None:
+        agree = possible & (off <= LEVEL + LEVEL_RATE * apart)
+        return agree & _tracked(windows.mean, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
+    pressure = windows.pdc - windows.pdc[anchor]
+    agree = possible & (pressure < QUIET_PDC + PDC_RATE * apart) & (off <= LEVEL_PDC + LEVEL_PDC_RATE * apart)
+    agree &= _tracked(windows.mean, windows.middle, agree, anchor, LEVEL_PDC, LEVEL_PDC_RATE)
+    return agree & _tracked(windows.pdc[:, None], windows.middle, agree, anchor, QUIET_PDC, PDC_RATE)
+
+
+def _tracked(
+    values: np.ndarray, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
+) -> np.ndarray:
+    """(W,) bool, windows whose values (W, C) lie near a level that follows them from the anchor on, at ``rate`` a
+    second at most: what drift may have done in an hour is more than a press."""
+    accepted = np.ones(len(values), bool)
+    if np.abs(middle - middle[anchor]).max() <= TRACKED:
+        return accepted
+    candidates = np.flatnonzero(possible)
+    for way in (candidates[candidates >= anchor], candidates[candidates < anchor][::-1]):
+        now, last = values[anchor].copy(), middle[anchor]
+        for k in way:
+            since, off = abs(middle[k] - last), values[k] - now
+            accepted[k] = np.abs(off).max() <= level + rate * (since + TRACKED)
+            if accepted[k]:
+                now, last = now + np.clip(off, -rate * since, rate * since), middle[k]
+    return accepted
+
+
+def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> int:
+    if windows.pdc is not None:
+        low = windows.pdc[calm]
+        calm = calm[low <= low.min() + 0.5 * QUIET_PDC]
+    if kind != "raw":
+        return int(calm[np.argmin(np.abs(windows.mean[calm]).max(axis=1))])
+    early = windows.middle[calm] <= NEAR_END + 0.5 * WINDOW
+    late = windows.middle[calm] >= duration - NEAR_END - 0.5 * WINDOW
+    if early.any():
+        return int(calm[0])
+    return int(calm[-1]) if late.any() else int(calm[0])
+
+
+def _runs(mask: np.ndarray) -> tuple[tuple[int, int], ...]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))

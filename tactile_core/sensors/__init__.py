@@ -1,0 +1,78 @@
+"""The two fingertips as data: surfaces, materials, electrodes; each constant with its source.
+
+Frame shared by both sensors, that of the public meshes, metres: x along the finger, tip toward -x;
+y normal to the pad, contact side -y; z lateral. The DIGIT's camera and lights are in ``camera``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ..geometry.lattice import Lattice
+from . import biotac, digit
+
+
+@dataclasses.dataclass(frozen=True)
+class Material:
+    """An isotropic elastic solid at small strain. youngs : Pa; poisson : below 0.5."""
+
+    youngs: float
+    poisson: float
+
+
+# Skin: E = 6 (C10 + C01) of the independent COMSOL model of the BioTac SP, C10 = 0.1203, C01 = 0.0305 MPa
+# (sensors.md). The 1.552 MPa of the Isaac Gym authors is an effective value of a mesh that locks (mechanics.md).
+BIOTAC_SKIN = Material(youngs=0.905e6, poisson=0.48)  # Poisson's ratio assumed: silicone, nearly incompressible
+
+# Gel: Smooth-On Solaris, Shore 10A (sensors.md); E by Gent's relation (A. N. Gent, Rubber Chem. Technol. 31, 1958),
+# E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)) MPa, S = 10.
+DIGIT_GEL = Material(youngs=0.4126e6, poisson=0.48)  # Poisson's ratio assumed
+
+SAMPLE_RATE = 100.0  # Hz, one frame of 19 electrodes (sensors.md)
+COUNT_MAX = 4095  # 12-bit electrodes
+REST_COUNT = 3300.0  # counts, typical reading without contact (sensors.md)
+# Raw counts fall where the fluid film over an electrode thins: each electrode is read in a voltage divider, and "as the
+# impedance over the sensing electrode increases, the measured voltage decreases" (SynTouch, BioTac SP manual). Fingers
+# that hold a flat object agree: where they are squeezed, counts fall as the fluid's pressure rises (sensors.md).
+COUNT_SIGN = -1.0
+
+PRESSURE_PER_COUNT = 36.5  # Pa a count of PDC (SynTouch, BioTac SP manual; sensors.md)
+
+# Electrodes E1..E19, mm, SynTouch's frame: x to the tip, z <= 0 on the pad (sensors.md).
+_ELECTRODES_SYNTOUCH_MM = np.array([
+    [0.993, -4.855, -1.116], [-2.7, -3.513, -3.67], [-6.2, -3.513, -3.67], [-8.0, -4.956, -1.116],
+    [-10.5, -3.513, -3.67], [-13.4, -4.956, -1.116], [4.763, 0.0, -2.33], [3.031, -1.95, -3.33],
+    [3.031, 1.95, -3.33], [1.299, 0.0, -4.33], [0.993, 4.855, -1.116], [-2.7, 3.513, -3.67],
+    [-6.2, 3.513, -3.67], [-8.0, 4.956, -1.116], [-10.5, 3.513, -3.67], [-13.4, 4.956, -1.116],
+    [-2.8, 0.0, -5.08], [-9.8, 0.0, -5.08], [-13.6, 0.0, -5.08],
+])  # fmt: skip
+# The sign of z cannot be told from the symmetric mesh (sensors.md): +y of SynTouch's frame to +z, assumed.
+_LATERAL_SIGN = 1.0
+
+
+def electrodes() -> np.ndarray:
+    """Electrode positions (19, 3), m, shared frame."""
+    return from_syntouch(1e-3 * _ELECTRODES_SYNTOUCH_MM)
+
+
+def from_syntouch(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) m of SynTouch's frame -> shared frame: x = -x_e - 13.97 mm, y = z_e, z = +-y_e (sensors.md)."""
+    x, y, z = np.asarray(points).T
+    return np.column_stack([-x - 13.97e-3, z, _LATERAL_SIGN * y])
+
+
+def biotac_surface() -> Lattice:
+    """The BioTac's outer skin at rest, 3,650 nodes; see ``biotac.skin_surface``."""
+    return biotac.skin_surface("outer")
+
+
+def digit_surface() -> Lattice:
+    """The DIGIT's coated gel surface at rest, 2,867 nodes; see ``digit.gel_surface``."""
+    return digit.gel_surface()
+
+
+def sensor_surface(sensor: str) -> Lattice:
+    """The resting surface of ``"biotac"`` or ``"digit"``."""
+    return biotac_surface() if sensor == "biotac" else digit_surface()

@@ -1,0 +1,145 @@
+"""The BioTac's skin and core as structured surfaces, from the profile table of the public mesh."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..geometry.catmull_rom import catmull_rom
+from ..geometry.lattice import Lattice, cap_faces, grid_faces
+from .profiles import load_profile
+
+AXIS_Y = -1.237e-3  # the table's axis: (y, z) = (AXIS_Y, 0), also the pad's centre of curvature (sensors.md)
+TIP_X, BASE_X = -14.0e-3, 1.2e-3  # between them outer and inner skin are cylinders, paired at the same x
+
+# Where the meridians meet the axis, tip and base, and the rounding of the cap (public mesh).
+_POLES = {"outer": (-21.30e-3, 6.65e-3), "inner": (-19.725e-3, 5.08e-3)}
+
+TIP_ROWS, TRUNK_ROWS, BASE_ROWS = 18, 28, 12  # node intervals along a meridian, poles included
+PAD_ANGLE = np.pi / 2
+SKIN_THICKNESS = 1.58e-3  # uniform (sensors.md, public mesh)
+PAD_INTERVALS, BACK_INTERVALS = 40, 24  # round the axis: 4.5 degrees (0.56 mm) on the pad, 7.5 on the back
+
+
+@functools.cache
+def angles() -> np.ndarray:
+    """Angles (columns,) rad about the axis, 0 at the pad's lowest line, growing toward +z, from -pi up."""
+    pad = np.linspace(-PAD_ANGLE, PAD_ANGLE, PAD_INTERVALS + 1)
+    back = np.linspace(PAD_ANGLE, 2 * np.pi - PAD_ANGLE, BACK_INTERVALS + 1)[1:-1]
+    back = np.where(back > np.pi - 1e-9, back - 2 * np.pi, back)
+    return np.sort(np.concatenate([pad, back]))
+
+
+def _mean_of_known(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    mean = (a + b) / 2
+    return np.where(np.isnan(a), b, np.where(np.isnan(b), a, mean))
+
+
+@functools.cache
+def _table() -> dict[str, np.ndarray]:
+    """x (60,) m, theta (72,) rad and radii (60, 72) m of outer skin, inner skin and core, made even in theta."""
+    rows = load_profile("biotac_profile.csv").reshape(60, 72, 5)
+    mirror = (-np.arange(72)) % 72  # the table starts at -180 degrees in 5 degree steps
+    radii = _mean_of_known(rows[..., 2:], rows[:, mirror, 2:]) * 1e-3
+    return {
+        "x": rows[:, 0, 0] * 1e-3,
+        "theta": np.radians(rows[0, :, 1]),
+        "outer": radii[..., 0],
+        "inner": radii[..., 1],
+        "core": radii[..., 2],
+    }
+
+
+def _piece(x: np.ndarray, r: np.ndarray, low: float, high: float, fractions: np.ndarray) -> np.ndarray:
+    """Points (n, 2) at fractions of the arc length of the polyline (x, r) between x = low and x = high."""
+    keep = (x > low) & (x < high)
+    ends = np.interp([low, high], x, r)
+    line = np.column_stack([np.r_[low, x[keep], high], np.r_[ends[0], r[keep], ends[1]]])
+    length = np.r_[0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
+    at = fractions * length[-1]
+    return np.column_stack([np.interp(at, length, line[:, 0]), np.interp(at, length, line[:, 1])])
+
+
+def _meridian(layer: str, column: int) -> np.ndarray:
+    """(rows, 2) = (x, r) in m along one meridian of the table, from the tip pole to the base pole."""
+    table = _table()
+    known = np.isfinite(table[layer][:, column])
+    x, r = table["x"][known], table[layer][known, column]
+    tip, base = _POLES[layer]
+    x, r = np.r_[min(tip, x[0] - 1e-6), x, base], np.r_[0, r, 0]
+    if layer == "inner":  # the table ends before the inner cap's corner: rounded as the outer one is
+        x, r = np.insert(x, -1, base - 5e-6), np.insert(r, -1, r[-2] - 0.5e-3)
+    pieces = [
+        _piece(x, r, x[0], TIP_X, np.linspace(0, 1, TIP_ROWS + 1)),
+        _piece(x, r, TIP_X, BASE_X, np.linspace(0, 1, TRUNK_ROWS + 1))[1:],
+        _piece(x, r, BASE_X, base, np.linspace(0, 1, BASE_ROWS + 1))[1:],
+    ]
+    return np.concatenate(pieces)
+
+
+def _around(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Periodic cubic (Catmull-Rom) interpolation of values (..., 72) on the table's angles, at angles (n,)."""
+    return sum(weight * values[..., column] for column, weight in zip(*_columns(at), strict=True))
+
+
+def _columns(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The table's columns (4, n) next to angles (n,), and their weights (4, n)."""
+    position = (at + np.pi) / (2 * np.pi) * 72
+    cell = np.floor(position + 1e-9).astype(int)
+    return (cell + np.arange(-1, 3)[:, None]) % 72, catmull_rom(position - cell)
+
+
+@functools.cache
+def skin_grid(layer: str) -> np.ndarray:
+    """Nodes (stations, columns, 3) m of the ``"outer"`` or ``"inner"`` skin.
+
+    Stations run from the tip pole to the base pole (both included, each one point repeated over the columns);
+    outer and inner points of one station and column face each other through the skin.
+    """
+    return skin_points(layer, angles())
+
+
+def skin_points(layer: str, theta: np.ndarray) -> np.ndarray:
+    """The stations of ``skin_grid`` at any angles (columns,) rad: (stations, columns, 3) m."""
+    x, r = np.moveaxis(_around(_meridians(layer), theta), 1, 0)
+    x[[0, -1]] = x[[0, -1]].mean(axis=1, keepdims=True)
+    r[[0, -1]] = 0
+    return np.stack([x, AXIS_Y - r * np.cos(theta), r * np.sin(theta)], -1)
+
+
+@functools.cache
+def _meridians(layer: str) -> np.ndarray:
+    return np.stack([_meridian(layer, column) for column in range(72)], -1)  # (stations, 2, 72)
+
+
+def core_radius(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Radius of the rigid core, m, about the axis at stations x (n,) m and angles theta (n,) rad; nan off the core."""
+    table = _table()
+    row = np.clip(np.searchsorted(table["x"], x) - 1, 0, 58)
+    t = (x - table["x"][row]) / (table["x"][row + 1] - table["x"][row])
+    columns, weights = _columns(theta)
+    lower, upper = ((weights * table["core"][at, columns]).sum(axis=0) for at in (row, row + 1))
+    return lower * (1 - t) + upper * t
+
+
+@functools.cache
+def skin_surface(layer: str = "outer") -> Lattice:
+    """The outer (or inner) skin at rest: rows from tip to base, columns round the axis, then the two poles.
+
+    The inner skin's triangles point away from the solid too, into the fluid.
+    """
+    grid = skin_grid(layer)
+    stations, columns = grid.shape[:2]
+    rows = stations - 2
+    rest = np.concatenate([grid[1:-1].reshape(-1, 3), grid[:1, 0], grid[-1:, 0]])
+    ring = np.arange(columns)
+    faces = np.concatenate(
+        [
+            grid_faces(rows, columns, closed=True),
+            cap_faces(rows * columns, ring),
+            cap_faces(rows * columns + 1, (rows - 1) * columns + ring)[:, ::-1],
+        ]
+    )
+    outward = faces if layer == "outer" else faces[:, ::-1]
+    return Lattice(rest, np.ascontiguousarray(outward), (rows, columns))

@@ -1,0 +1,298 @@
+"""Calibrations as readable TOML: one file a unit, lengths in mm; unknown and missing fields are refused."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import os
+import sys
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import TactileError
+from ..files import atomic
+from ..files.shipped import shipped
+from ..files.text_file import read_toml_text
+from .calibration import BACKGROUND_TERMS, Background, Calibration, Fit, Gain
+from .camera import COLOURS, Camera, Led
+
+FORMAT = "tactile-calibration-1"
+SHIPPED = shipped("calibrations/default.toml")
+LARGEST = 1e6  # of a unit's numbers: none that means something comes near (assumed); a fit's errors may be larger
+ADVICE = "Make it again with `tactile calibrate`"
+
+_TABLES = {
+    "": ("format", "unit", "camera", "leds", "gain", "gel", "background", "noise", "fit"),
+    "camera": ("width_px", "height_px", "px_per_mm_x", "px_per_mm_y", "centre_x_mm", "centre_z_mm",
+               "apparent_height_mm", "right_z", "down_x"),
+    "leds": COLOURS,
+    "gain": ("centre", "along_right_per_mm", "along_down_per_mm"),
+    "gel": ("dome_scale", "albedo"),
+    "background": ("photograph", *COLOURS),
+    "noise": ("levels",),
+    "fit": ("note", "photographs", "ball_diameter_mm", "errors", "standard_errors", "not_identified"),
+}  # fmt: skip
+
+
+def load_calibration(path: str | os.PathLike | None = None) -> Calibration:
+    """The calibration in a TOML file; None for the one that ships.
+
+    A background's photograph is looked for beside the file. Raises TactileError naming file and field for what cannot
+    be read, is unknown, missing or out of its range.
+    """
+    return _shipped() if path is None else _read(Path(path))
+
+
+@functools.cache
+def _shipped() -> Calibration:
+    return _read(SHIPPED)
+
+
+def _read(file: Path) -> Calibration:
+    try:
+        content = tomllib.loads(read_toml_text(file))
+    except OSError as error:
+        raise TactileError(file, f"cannot be read ({error.strerror})", "a file of `tactile calibrate`") from error
+    except (ValueError, RecursionError) as error:
+        raise TactileError(file, str(error), "a file of `tactile calibrate`", ADVICE) from error
+    largest = max(map(abs, _finite({name: content[name] for name in content if name != "fit"})), default=0.0)
+    if largest > LARGEST:
+        raise TactileError(file, f"the number {largest:g}", f"millimetres, levels... up to {LARGEST:g}", ADVICE)
+    try:
+        return _Reader(content).calibration(file.parent)
+    except TactileError as error:
+        raise TactileError(f"{file}, {error.where}", error.found, error.expected, ADVICE) from error
+
+
+def _finite(value: Any) -> Iterator[float]:
+    """All finite numbers in tables and lists."""
+    if isinstance(value, dict | list):
+        for each in value.values() if isinstance(value, dict) else value:
+            yield from _finite(each)
+    elif isinstance(value, float) and math.isfinite(value):
+        yield value
+
+
+class _Reader:
+    """Takes a parsed file apart; errors name the field."""
+
+    def __init__(self, content: dict[str, Any]) -> None:
+        self._content = content
+        for table, names in _TABLES.items():
+            self._check_names(table or "top level", self._content if not table else self._table(table), names)
+
+    def _table(self, name: str) -> dict[str, Any]:
+        table = self._content[name]
+        if not isinstance(table, dict):
+            raise TactileError(name, repr(table), "a table")
+        return table
+
+    def _check_names(self, where: str, table: dict[str, Any], names: Sequence[str]) -> None:
+        unknown, missing = sorted(set(table) - set(names)), sorted(set(names) - set(table))
+        if unknown:
+            raise TactileError(where, f"unknown {', '.join(unknown)}", f"the fields {', '.join(names)}")
+        if missing:
+            raise TactileError(where, f"{', '.join(missing)} missing", f"the fields {', '.join(names)}")
+
+    def calibration(self, folder: Path) -> Calibration:
+        if self._content["format"] != FORMAT:
+            raise TactileError("format", repr(self._content["format"]), repr(FORMAT))
+        return Calibration(
+            unit=_text("unit", self._content["unit"]),
+            camera=self._camera(),
+            leds=tuple(self._led(colour) for colour in COLOURS),
+            gain=self._gain(),
+            dome_scale=_number("gel, dome_scale", self._content["gel"]["dome_scale"]),
+            albedo=_number("gel, albedo", self._content["gel"]["albedo"]),
+            background=self._background(folder),
+            noise=_numbers("noise, levels", self._content["noise"]["levels"], 3),
+            fit=self._fit(),
+        )
+
+    def _camera(self) -> Camera:
+        table = self._content["camera"]
+        number = {name: _number(f"camera, {name}", table[name]) for name in _TABLES["camera"]}
+        return Camera(
+            width=_whole("camera, width_px", table["width_px"]),
+            height=_whole("camera, height_px", table["height_px"]),
+            px_per_mm_x=number["px_per_mm_x"],
+            px_per_mm_y=number["px_per_mm_y"],
+            centre_x=number["centre_x_mm"] * 1e-3,
+            centre_z=number["centre_z_mm"] * 1e-3,
+            apparent_height=number["apparent_height_mm"] * 1e-3,
+            right_z=_whole("camera, right_z", table["right_z"]),
+            down_x=_whole("camera, down_x", table["down_x"]),
+        )
+
+    def _led(self, colour: str) -> Led:
+        where, table = f"leds, {colour}", self._content["leds"][colour]
+        if not isinstance(table, dict):
+            raise TactileError(where, repr(table), "a table")
+        self._check_names(where, table, ("position_mm", "radius_mm"))
+        position = _numbers(f"{where}, position_mm", table["position_mm"], 3)
+        radius = _number(f"{where}, radius_mm", table["radius_mm"])
+        return Led(colour, tuple(1e-3 * value for value in position), 1e-3 * radius)
+
+    def _gain(self) -> Gain:
+        table = {name: _rows(f"gain, {name}", self._content["gain"][name]) for name in _TABLES["gain"]}
+        along_right, along_down = (
+            tuple(tuple(1e3 * value for value in row) for row in table[name])
+            for name in ("along_right_per_mm", "along_down_per_mm")
+        )
+        return Gain(table["centre"], along_right, along_down)
+
+    def _background(self, folder: Path) -> Background:
+        table = self._content["background"]
+        rows = tuple(_numbers(f"background, {colour}", table[colour], BACKGROUND_TERMS) for colour in COLOURS)
+        name = _text("background, photograph", table["photograph"])
+        if name and Path(name).name != name:
+            raise TactileError("background, photograph", repr(name), "the name of a file beside the calibration")
+        return Background(rows, str(folder / name) if name else "")
+
+    def _fit(self) -> Fit:
+        table = self._content["fit"]
+        return Fit(
+            note=_text("fit, note", table["note"]),
+            photographs=_texts("fit, photographs", table["photographs"]),
+            ball_diameter=1e-3 * _number("fit, ball_diameter_mm", table["ball_diameter_mm"]),
+            errors=_named_numbers("fit, errors", table["errors"]),
+            standard_errors=_named_numbers("fit, standard_errors", table["standard_errors"]),
+            not_identified=_texts("fit, not_identified", table["not_identified"]),
+        )
+
+
+def _number(where: str, value: Any) -> float:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not (number and abs(value) <= sys.float_info.max):  # NaN and whole numbers beyond floats, too
+        raise TactileError(where, f"{value!r:.80}", "a finite number")
+    return float(value)
+
+
+def _whole(where: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TactileError(where, repr(value), "a whole number")
+    return value
+
+
+def _text(where: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise TactileError(where, repr(value), "text")
+    return value
+
+
+def _texts(where: str, value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise TactileError(where, repr(value), "a list of texts")
+    return tuple(_text(where, item) for item in value)
+
+
+def _numbers(where: str, value: Any, count: int) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) != count:
+        raise TactileError(where, repr(value), f"a list of {count} numbers")
+    return tuple(_number(where, item) for item in value)
+
+
+def _rows(where: str, value: Any) -> tuple[tuple[float, ...], ...]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise TactileError(where, repr(value), "3 rows of 3 numbers")
+    return tuple(_numbers(where, row, 3) for row in value)
+
+
+def _named_numbers(where: str, value: Any) -> dict[str, float]:
+    if not isinstance(value, dict):
+        raise TactileError(where, repr(value), "a table of numbers")
+    return {name: _number(f"{where}, {name}", item) for name, item in value.items()}
+
+
+def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None:
+    """Write a calibration file, whole or not at all; equal calibrations give equal bytes.
+
+    Numbers keep six digits. A photograph is named as it lies beside the file.
+    """
+    atomic.write_bytes(path, _as_text(calibration).encode())
+
+
+def _as_text(calibration: Calibration) -> str:
+    camera, gain, fit = calibration.camera, calibration.gain, calibration.fit
+    lines = [
+        "# A DIGIT unit: picture = background + C(right, down) (radiance in contact - radiance at rest), 8-bit values.",
+        "# Image frame: right, down, toward the camera; origin in the picture's middle on the plane of height zero.",
+        f"format = {_quoted(FORMAT)}",
+        f"unit = {_quoted(calibration.unit)}",
+        "",
+        "[camera]",
+        f"width_px = {camera.width}",
+        f"height_px = {camera.height}",
+        f"px_per_mm_x = {_digits(camera.px_per_mm_x)}  # at height zero",
+        f"px_per_mm_y = {_digits(camera.px_per_mm_y)}",
+        f"centre_x_mm = {_digits(1e3 * camera.centre_x)}  # of the gel, in the picture's middle",
+        f"centre_z_mm = {_digits(1e3 * camera.centre_z)}",
+        f"apparent_height_mm = {_digits(1e3 * camera.apparent_height)}  # of the pinhole",
+        f"right_z = {camera.right_z}  # the way z goes to the right",
+        f"down_x = {camera.down_x}  # the way x goes down",
+        "",
+        "[leds]  # spheres, right, down, toward the camera",
+    ]
+    for led in calibration.leds:
+        position = [1e3 * value for value in led.position]
+        lines.append(f"{led.colour} = {{ position_mm = {_list(position)}, radius_mm = {_digits(1e3 * led.radius)} }}")
+    lines += ["", "[gain]  # C, grey levels a unit of radiance: a row a channel of the picture, a column an LED"]
+    lines.append(f"centre = {_matrix(gain.centre)}")
+    for name, matrix in (("right", gain.along_right), ("down", gain.along_down)):
+        per_mm = [[1e-3 * value for value in row] for row in matrix]
+        lines.append(f"along_{name}_per_mm = {_matrix(per_mm)}")
+    lines += [
+        "",
+        "[gel]",
+        f"dome_scale = {_digits(calibration.dome_scale)}  # of the public mesh's dome",
+        f"albedo = {_digits(calibration.albedo)}  # of the coating, for interreflection",
+        "",
+        "[background]  # grey levels of right^i down^j / (10 mm)^(i + j), by i + j, then j; a photograph goes first",
+        f"photograph = {_quoted(Path(calibration.background.photograph).name)}",
+    ]
+    for colour, row in zip(COLOURS, calibration.background.polynomial, strict=True):
+        lines.append(f"{colour} = {_list(row)}")
+    lines += [
+        "",
+        "[noise]  # standard deviation, grey levels, red, green, blue; used when asked for",
+        f"levels = {_list(calibration.noise)}",
+        "",
+        "[fit]",
+        f"note = {_quoted(fit.note)}",
+        f"ball_diameter_mm = {_digits(1e3 * fit.ball_diameter)}",
+        f"photographs = [{', '.join(map(_quoted, fit.photographs))}]",
+        f"not_identified = [{', '.join(map(_quoted, fit.not_identified))}]",
+        "",
+        "[fit.errors]  # on those photographs",
+        *_named(fit.errors),
+        "",
+        "[fit.standard_errors]  # in each parameter's unit; how units differ (assumed) counts as a measurement",
+        *_named(fit.standard_errors),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _named(values: Mapping[str, float]) -> list[str]:
+    return [f"{_quoted(name)} = {_digits(value)}" for name, value in values.items()]
+
+
+def _quoted(text: str) -> str:
+    """A TOML basic string; JSON's escapes are among TOML's, and its ASCII keeps file names that are no UTF-8."""
+    return json.dumps(text.encode(errors="replace").decode())
+
+
+def _digits(value: float) -> str:
+    """Six digits, as TOML's float or integer."""
+    return f"{value + 0.0:.6g}"
+
+
+def _list(values: Sequence[float]) -> str:
+    return "[" + ", ".join(map(_digits, values)) + "]"
+
+
+def _matrix(rows: Sequence[Sequence[float]]) -> str:
+    return "[" + ", ".join(map(_list, rows)) + "]"

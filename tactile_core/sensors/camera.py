@@ -1,0 +1,158 @@
+"""A camera and lights as data: one camera model, used for every step between pixels and gel.
+
+Image frame, used by camera and lights: right and down along the picture, toward the camera as third axis,
+metres, origin in the picture's centre at height zero (``HEIGHT_ZERO_Y``). A unit's own camera and lights are in its
+calibration, see ``calibration_file``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ..errors import TactileError
+
+# Plane of height zero, shared frame: the lowest point of the public gel mesh at rest (sensors.md). Heights grow
+# with y, toward the camera, so that an indentation raises them.
+HEIGHT_ZERO_Y = -8.301e-3
+MOST_PIXELS = 10_000_000  # 2.5 GB for a fast picture; the camera has 76,800 (assumed enough)
+FINEST = 1000.0  # pixels a millimetre; the shipped unit's camera has 20 (assumed enough)
+LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a camera that is higher
+
+
+@dataclasses.dataclass(frozen=True)
+class Camera:
+    """A pinhole camera that looks at the coating along -y, from inside the gel, over the picture's middle.
+
+    It stands where refraction by gel and acrylic makes it appear. A gel point is seen where its central projection
+    onto the plane of height zero falls: (right, down, h) at (right, down) / (1 - h / apparent_height).
+
+    width, height : pixels
+    px_per_mm_x, px_per_mm_y : pixels a millimetre of gel at height zero, along the picture's rows (x) and columns (y)
+    centre_x, centre_z : m, the place on the gel, shared frame, in the middle of the picture
+    apparent_height : m, of the pinhole above the plane of height zero
+    right_z, down_x : +1 or -1, the way z goes to the right and x goes down the picture
+    """
+
+    width: int
+    height: int
+    px_per_mm_x: float
+    px_per_mm_y: float
+    centre_x: float
+    centre_z: float
+    apparent_height: float
+    right_z: int
+    down_x: int
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height"):
+            size = getattr(self, name)
+            if not (isinstance(size, int) and size >= 2):
+                raise TactileError(f"camera, {name}", repr(size), "a whole number of pixels, 2 or more")
+        if self.width * self.height > MOST_PIXELS:
+            found = f"{self.width} x {self.height} pixels"
+            raise TactileError("camera, size", found, f"at most {MOST_PIXELS // 10**6} million pixels")
+        for name in ("px_per_mm_x", "px_per_mm_y"):
+            scale = getattr(self, name)
+            if not 0 < scale <= FINEST:  # false for nan
+                raise TactileError(f"camera, {name}", repr(scale), f"pixels a millimetre, above 0, at most {FINEST:g}")
+        for name in ("right_z", "down_x"):
+            if getattr(self, name) not in (-1, 1):
+                raise TactileError(f"camera, {name}", repr(getattr(self, name)), "+1 or -1")
+        if not (math.isfinite(self.centre_x) and math.isfinite(self.centre_z)):
+            raise TactileError("camera, centre", f"({self.centre_x}, {self.centre_z})", "finite metres")
+        if not (math.isfinite(self.apparent_height) and self.apparent_height >= LOWEST_CAMERA):
+            expected = f"{LOWEST_CAMERA} m or more, above the gel"
+            raise TactileError("camera, apparent_height", repr(self.apparent_height), expected)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width) of arrays that hold a picture."""
+        return self.height, self.width
+
+    def at_size(self, width: int, height: int) -> Camera:
+        """The same view in other pixels; raises TactileError for another aspect ratio."""
+        if width * self.height != height * self.width:
+            expected = f"the aspect ratio of {self.width} x {self.height}"
+            raise TactileError("camera, size", f"{width} x {height} pixels", expected)
+        factor = width / self.width
+        scale_x, scale_y = self.px_per_mm_x * factor, self.px_per_mm_y * factor
+        return dataclasses.replace(self, width=width, height=height, px_per_mm_x=scale_x, px_per_mm_y=scale_y)
+
+    @property
+    def pixel_size(self) -> tuple[float, float]:
+        """(right, down), m of gel from one pixel to the next."""
+        return 1e-3 / self.px_per_mm_x, 1e-3 / self.px_per_mm_y
+
+    @property
+    def right(self) -> np.ndarray:
+        """Image coordinate (width,) m of the pixel centres of a row at height zero, to the right from the middle."""
+        return (np.arange(self.width) + 0.5 - self.width / 2) * self.pixel_size[0]
+
+    @property
+    def down(self) -> np.ndarray:
+        """Image coordinate (height,) m of the pixel centres of a column at height zero, down from the middle."""
+        return (np.arange(self.height) + 0.5 - self.height / 2) * self.pixel_size[1]
+
+    @property
+    def gel_x(self) -> np.ndarray:
+        """x (height,) m at height zero of each row of pixels: the rows of a height map."""
+        return self.centre_x + self.down_x * self.down
+
+    @property
+    def gel_z(self) -> np.ndarray:
+        """z (width,) m at height zero of each column of pixels: the columns of a height map."""
+        return self.centre_z + self.right_z * self.right
+
+    def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """(row, column), fractional, where gel points at x, z and height, m, are seen; whole numbers: pixel centres."""
+        right, down = self.pixel_size
+        nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
+        row = self.down_x * (np.asarray(x) - self.centre_x) * nearer / down + self.height / 2 - 0.5
+        column = self.right_z * (np.asarray(z) - self.centre_z) * nearer / right + self.width / 2 - 0.5
+        return row, column
+
+    def sees(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Whether places x, z (n,) m of the gel at height zero lie in the picture; false for NaN."""
+        row, column = self.to_pixel(x, z)
+        return (row > -0.5) & (row < self.height - 0.5) & (column > -0.5) & (column < self.width - 0.5)
+
+    def to_gel(self, row: np.ndarray, column: np.ndarray, height: np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """(x, z) m of the points at a height, m, that fractional pixels see: the inverse of ``to_pixel``."""
+        right, down = self.pixel_size
+        nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
+        x = self.centre_x + self.down_x * (np.asarray(row) + 0.5 - self.height / 2) * down / nearer
+        z = self.centre_z + self.right_z * (np.asarray(column) + 0.5 - self.width / 2) * right / nearer
+        return x, z
+
+
+@dataclasses.dataclass(frozen=True)
+class Led:
+    """One light of one colour: a sphere, equally bright from all sides.
+
+    colour : "red", "green" or "blue"; its light is a channel of radiance of its own
+    position : (right, down, toward the camera), m, image frame
+    radius : m, its apparent size, which makes shadows soft
+    """
+
+    colour: str
+    position: tuple[float, float, float]
+    radius: float
+
+    def __post_init__(self) -> None:
+        if self.colour not in COLOURS:
+            raise TactileError("led, colour", repr(self.colour), f"one of {', '.join(COLOURS)}")
+        if len(self.position) != 3 or not all(math.isfinite(c) for c in self.position) or self.position[2] <= 0:
+            raise TactileError(f"led {self.colour}, position", repr(self.position), "three metres, the third above 0")
+        if not (math.isfinite(self.radius) and self.radius > 0):
+            raise TactileError(f"led {self.colour}, radius", repr(self.radius), "metres above 0")
+
+    @property
+    def channel(self) -> int:
+        """Index of its colour in a picture's last axis."""
+        return COLOURS.index(self.colour)
+
+
+COLOURS = ("red", "green", "blue")

@@ -1,0 +1,117 @@
+"""Measures of a sensor surface, and the unrolling of the BioTac's pad onto the DIGIT's plane."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..geometry.catmull_rom import on_grid
+from ..geometry.lattice import Lattice
+from . import biotac
+
+PAD_RADIUS = 7.065e-3  # m, cross-section of the pad about biotac_shape.AXIS_Y, rms 4 um (sensors.md)
+_STENCIL = 1e-3 * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])  # of (row, column), for differences
+ROLL_ORIGIN_X = -8.0e-3  # m, the place in the middle of the pad where both sensors share x (sensors.md, "unfolding")
+
+
+def node_normals(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit outward normals (n, 3) at nodes (n, 3): the area-weighted mean of the triangles around."""
+    return _unit(_node_area_vectors(nodes, faces))
+
+
+def node_areas(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Area (n,) m2 that belongs to each node: a third of each triangle around it."""
+    corners = nodes[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 6
+    return np.bincount(faces.ravel(), np.repeat(area, 3), minlength=len(nodes))
+
+
+def _node_area_vectors(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    corners = nodes[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6
+    return np.stack([np.bincount(faces.ravel(), np.repeat(area[:, k], 3), minlength=len(nodes)) for k in range(3)], -1)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1)
+
+
+@functools.cache
+def _rolled_x() -> np.ndarray:
+    """Unrolled x (stations,) m of each station: arc length along the pad's lowest line from ROLL_ORIGIN_X."""
+    line = biotac.skin_grid("outer")[:, np.argmin(np.abs(biotac.angles()))]
+    length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
+    return ROLL_ORIGIN_X + length - np.interp(ROLL_ORIGIN_X, line[:, 0], length)
+
+
+def unrolled_nodes() -> np.ndarray:
+    """Where each node of ``sensors.biotac_surface()`` comes to lie on the DIGIT's plane, (n_nodes, 2) = (x, z) m.
+
+    The BioTac rolls on the plane: z = R theta across, arc length of the lowest line along (sensors.md).
+    NaN for nodes on the back, beyond 90 degrees, and for the poles, which never touch the plane.
+    """
+    theta = biotac.angles()
+    x, z = np.broadcast_arrays(_rolled_x()[1:-1, None], PAD_RADIUS * theta)
+    rolled = np.stack([x, z], -1)
+    rolled = np.where(np.abs(theta)[None, :, None] <= biotac.PAD_ANGLE + 1e-9, rolled, np.nan)
+    return np.concatenate([rolled.reshape(-1, 2), np.full((2, 2), np.nan)])
+
+
+@functools.cache
+def _skin_axes() -> np.ndarray:
+    """The outer skin's stations axis by axis, (3, stations, columns) m."""
+    return np.ascontiguousarray(np.moveaxis(biotac.skin_grid("outer"), 2, 0))
+
+
+def roll_up(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The place on the BioTac's resting skin that an unrolled point (x, z) m belongs to.
+
+    Returns the surface point (3,) m and the outward unit normal there (3,). The point is clamped to the pad:
+    unrolled x between the poles, angle within 90 degrees.
+    """
+    stations, angles = _rolled_x(), biotac.angles()
+    row = np.interp(point[0], stations, np.arange(len(stations)))
+    column = np.interp(point[1] / PAD_RADIUS, angles, np.arange(len(angles)))
+    places = np.array([[row], [column]]) + _STENCIL
+    position, above, below, right, left = on_grid(_skin_axes(), places, closed=True)
+    normal = np.cross(above - below, right - left)
+    return position, normal / np.linalg.norm(normal)
+
+
+def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nearest places on a surface to points (n, 3): face index (n,), barycentric weights (n, 3), place (n, 3) m.
+
+    Ericson, Real-Time Collision Detection, 5.1.5, by projection on the plane and on the three edges.
+    """
+    faces, weights, places = [], [], []
+    a, b, c = np.moveaxis(surface.rest[surface.faces], 1, 0)
+    for point in points:
+        w = _closest_weights(point, a, b, c)
+        at = np.einsum("fk,fkd->fd", w, np.stack([a, b, c], 1))
+        best = int(np.argmin(((at - point) ** 2).sum(1)))
+        faces.append(best), weights.append(w[best]), places.append(at[best])
+    return np.array(faces), np.array(weights), np.array(places)
+
+
+def _closest_weights(point: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    ab, ac, ap = b - a, c - a, point - a
+    d = np.einsum
+    g11, g12, g22 = d("fd,fd->f", ab, ab), d("fd,fd->f", ab, ac), d("fd,fd->f", ac, ac)
+    r1, r2 = d("fd,fd->f", ab, ap), d("fd,fd->f", ac, ap)
+    det = g11 * g22 - g12**2
+    v, w = (g22 * r1 - g12 * r2) / det, (g11 * r2 - g12 * r1) / det
+    inside = (v >= 0) & (w >= 0) & (v + w <= 1)
+    corners = np.stack([a, b, c])
+    choices = []
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        edge = corners[j] - corners[i]
+        t = np.clip(d("fd,fd->f", point - corners[i], edge) / d("fd,fd->f", edge, edge), 0, 1)
+        weight = np.zeros((len(a), 3))
+        weight[:, i], weight[:, j] = 1 - t, t
+        gap = ((corners[i] + t[:, None] * edge - point) ** 2).sum(1)
+        choices.append((gap, weight))
+    gaps = np.stack([gap for gap, _ in choices])
+    on_edge = np.stack([weight for _, weight in choices])[np.argmin(gaps, 0), np.arange(len(a))]
+    return np.where(inside[:, None], np.stack([1 - v - w, v, w], -1), on_edge)

@@ -1,0 +1,1 @@
+"""Scenes to recordings and to paired contacts of both sensors."""

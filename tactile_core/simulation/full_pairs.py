@@ -1,0 +1,179 @@
+"""One press of the test set: paired contacts, the same force on both sensors, solved by the full tier of mechanics.
+
+The rows are those of ``pair_sampling``, but for what only the full tier knows: it needs no correction, and the film
+over the electrodes is that of its own deformed inner skin. Press i draws all it needs from (seed, i).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..errors import TactileError
+from ..geometry.indenters import Box, Indenter, Pose, Ring
+from ..mechanics.electrodes.gap_law import signal_of_gaps
+from ..mechanics.fast.compliance import compliance_of
+from ..mechanics.fast.press import CorrectedPress
+from ..mechanics.finite_strain.press import FullContact, FullPress
+from ..mechanics.placement import Placement, pose_at
+from ..mechanics.thickness import DEPTH_LIMIT, depth_at
+from .pair_sampling import beyond_digit, draw_place
+from .pairs_file import quantise
+from .scene import Scene
+
+REGION_X = -14e-3  # m: the region of the pad toward the tip, x below this, that a network may be kept from seeing
+SHARES = 0.25, 0.55, 1.0  # of a press's greatest depth on the BioTac, at which it is sampled
+_SHALLOWEST, _DEEPEST = 0.3e-3, 1.5e-3  # m, a press's greatest depth on the BioTac, even between (issue 4)
+_SLIDE_MOST = 1e-3  # m, likewise of slides (issue 4)
+_SLIDING = 4, 11  # of twelve presses, those that end with a slide: one in the whole gel, one in the region
+# Of eight presses: the box's and the ring's, of which one is in the region; all others share the rest in turn.
+_BOX, _RING, _OTHERS = (0, 5), (2, 7), (1, 3, 4, 6)
+_SPARE = 1.1  # of the depth guessed for the DIGIT, on which its mesh is fine
+
+
+@dataclasses.dataclass(frozen=True)
+class TestPress:
+    """What press ``number`` is: an indenter of the scene at a place, how deep (m) on the BioTac, its last slide."""
+
+    __test__ = False  # not a test, whatever pytest takes its name for
+
+    number: int
+    which: int
+    indenter: Indenter
+    place: Placement
+    depth: float
+    slide: np.ndarray | None
+
+
+Pair = tuple[np.ndarray, FullContact, FullContact]  # slide (2,) m, and both sensors' contacts
+
+
+def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
+    """Press ``number``: its indenter, place (in ``REGION_X`` where odd), depth and slide.
+
+    Raises TactileError for a scene without pairs, or without exactly one box and one ring among other indenters.
+    """
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+    which = _turn(scene, number)
+    indenter = scene.indenters[which].build()
+    while True:
+        place = draw_place(random, scene.pairs)
+        if number % 2 == 0 or place.x < REGION_X:
+            break
+    drawn = random.uniform(_SHALLOWEST, _DEEPEST)
+    heading, length = random.uniform(0, 2 * np.pi), random.uniform(0, _SLIDE_MOST)
+    slide = length * np.array([np.cos(heading), np.sin(heading)]) if number % 12 in _SLIDING else None
+    thick = depth_at(DEPTH_LIMIT, "biotac", indenter, pose_at("biotac", indenter, place))
+    return TestPress(number, which, indenter, place, min(drawn, thick), slide)
+
+
+def _turn(scene: Scene, number: int) -> int:
+    """Whose turn it is: balanced however few presses there are."""
+    built = [spec.build() for spec in scene.indenters]
+    boxes, rings = ([i for i, one in enumerate(built) if isinstance(one, kind)] for kind in (Box, Ring))
+    others = [i for i in range(len(built)) if i not in boxes + rings]
+    if scene.pairs is None or len(boxes) != 1 or len(rings) != 1 or not others:
+        found = f"{len(boxes)} boxes, {len(rings)} rings, {len(others)} others"
+        raise TactileError("test set, scene", found, "[pairs], one box, one ring and other indenters")
+    cycle, turn = divmod(number, 8)
+    if turn in _BOX:
+        return boxes[0]
+    return rings[0] if turn in _RING else others[(len(_OTHERS) * cycle + _OTHERS.index(turn)) % len(others)]
+
+
+def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray]], dict[str, np.ndarray]]:
+    """Rows of a press as in the file, see ``pairs_file.UNITS``, and what was wanted and lost.
+
+    Of the latter: wanted () contacts; lost () str, why the last are missing, else empty; seconds () of this process.
+    """
+    began, rows = time.process_time(), []
+    steps = [(share * press.depth, np.zeros(2)) for share in SHARES]
+    if press.slide is not None:
+        steps.append((press.depth, press.slide))
+    named = {
+        "press": np.int32(press.number),
+        "indenter": np.int16(press.which),
+        "place": np.array(dataclasses.astuple(press.place), np.float32),
+    }
+    lost = ""
+    try:
+        for slide, biotac, digit in _pairs(press, steps, scene.pairs.friction):
+            rows.append({**named, "slide": slide.astype(np.float32), **_row(biotac, digit)})
+    except TactileError as error:
+        lost = str(error)
+    told = {"wanted": np.int32(len(steps)), "lost": np.str_(lost), "seconds": np.float64(time.process_time() - began)}
+    return rows, told
+
+
+def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float) -> Iterator[Pair]:
+    """Slide and both contacts of each step; raises TactileError where the next one is not found on one sensor."""
+    on_biotac, trouble = _on_biotac(press, steps, friction)
+    pose = pose_at("digit", press.indenter, press.place)
+    slides = [slide for _, slide in steps[: len(on_biotac)]]
+    guesses = _guesses(press, pose, [contact.axial_force for contact in on_biotac], slides, friction)
+    if guesses:
+        digit = FullPress("digit", press.indenter, pose, _SPARE * max(guesses), friction)
+    better = 1.0
+    for slide, biotac, guess in zip(slides, on_biotac, guesses, strict=False):
+        found = digit.at_force(biotac.axial_force, better * guess, pose.slid(*slide))
+        better = found.depth / guess
+        yield slide, biotac, found
+    if len(guesses) < len(on_biotac):
+        force = on_biotac[len(guesses)].axial_force
+        raise TactileError("fast tier, digit", f"{force:.4g} N", "a force within 60 % of its thickness")
+    if trouble:
+        raise trouble
+
+
+def _on_biotac(
+    press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float
+) -> tuple[list[FullContact], TactileError | None]:
+    """The contacts that were found, and the error that ended them."""
+    pose = pose_at("biotac", press.indenter, press.place)
+    biotac, found = FullPress("biotac", press.indenter, pose, press.depth, friction), []
+    try:
+        for depth, slide in steps:
+            there = pose.slid(*slide)
+            found.append(biotac.at_depth(depth + biotac.fall(there), there))
+            if found[-1].axial_force <= 0:
+                del found[-1]
+                raise TactileError("full tier, biotac", "no force", "a contact")
+    except TactileError as error:
+        return found, error
+    return found, None
+
+
+def _guesses(
+    press: TestPress, pose: Pose, forces: list[float], slides: list[np.ndarray], friction: float
+) -> list[float]:
+    """Depths, m, at which the fast tier finds the DIGIT to bear forces, N, as far as it does."""
+    limit = depth_at(DEPTH_LIMIT, "digit", press.indenter, pose)
+    fast = CorrectedPress(compliance_of("digit"), press.indenter, pose, limit, friction)
+    depths = []
+    for force, slide in zip(forces, slides, strict=True):
+        contact = fast.at_force(force, pose.slid(*slide))
+        if contact is None:
+            break
+        depths.append(contact.linear.depth)
+    return depths
+
+
+def _row(biotac: FullContact, digit: FullContact) -> dict[str, np.ndarray]:
+    return {
+        "displacement_biotac": quantise(biotac.displacement),
+        "displacement_digit": quantise(digit.displacement),
+        "signal": signal_of_gaps(biotac.gaps).astype(np.float32),
+        "gap": biotac.gaps.astype(np.float32),
+        "force": biotac.force.astype(np.float32),
+        "force_digit": digit.force.astype(np.float32),
+        "pressure": np.float32(biotac.pressure),
+        "depth_biotac": np.float32(biotac.depth),
+        "depth_digit": np.float32(digit.depth),
+        "contact_center": digit.centre.astype(np.float32),
+        "beyond_digit": beyond_digit(biotac.patch),
+        "contact_patch_biotac": biotac.patch,
+        "contact_patch_digit": digit.patch,
+    }

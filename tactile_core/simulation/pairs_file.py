@@ -1,0 +1,272 @@
+"""The file of paired contacts: HDF5 of compressed blocks, the same bytes whoever made them; read with checks."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import pathlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import __version__, sensors
+from ..errors import TactileError
+from ..files import array_pack, atomic
+from ..files.hdf5_checked import declared, open_checked
+from ..files.hdf5_writer import Disk
+from ..recordings.polarity import FALLS
+
+FORMAT = "tactile-pairs-1"
+ELECTRODES = 19
+ADVICE = "Make the file again with `tactile pairs`"
+ATTRIBUTES = ("biotac_nodes_sha256", "digit_nodes_sha256", "indenters", "polarity", "scene", "seed", "version")
+MIN_PRESSES = 5  # at least three to train on, one to validate, one to test
+# dataset -> trailing shape and kind of numbers (i whole, f real, b yes or no); None: as many nodes as the surface has
+DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
+    "displacement_biotac": ((None, 3), "i"),
+    "displacement_digit": ((None, 3), "i"),
+    "signal": ((ELECTRODES,), "f"),
+    "force": ((3,), "f"),
+    "contact_center": ((2,), "f"),
+    "contact_patch_digit": ((None,), "b"),
+    "depth_biotac": ((), "f"),
+    "depth_digit": ((), "f"),
+    "place": ((4,), "f"),
+    "slide": ((2,), "f"),
+    "press": ((), "i"),
+    "indenter": ((), "i"),
+}
+SCALED = ("displacement_biotac", "displacement_digit")
+SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
+
+# Unit of each dataset that is written; the leading axis counts contacts. A place is (x, z) on the DIGIT's plane,
+# tilt and heading.
+UNITS = {
+    "displacement_biotac": "m", "displacement_digit": "m", "signal": "counts", "gap": "m", "force": "N",
+    "force_digit": "N", "pressure": "Pa", "depth_biotac": "m", "depth_digit": "m", "contact_center": "m",
+    "place": "m, m, rad, rad", "slide": "m", "contact_patch_biotac": "1", "contact_patch_digit": "1",
+    "beyond_digit": "1", "press": "1", "indenter": "1",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Paired contacts, C of them. Displacements stay in the file's whole numbers; times their scale they are metres.
+
+    displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
+    scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change against rest
+    force : (C, 3) float32 N                         contact_center : (C, 2) float32 m, (x, z) on the DIGIT
+    depth_biotac, depth_digit : (C,) float32 m       press : (C,) int32
+    contact_patch_digit : (C, M) bool                place : (C, 4) float32, (x, z) m, tilt and heading rad
+    slide : (C, 2) float32 m
+    indenter : (C,) int16                            attributes : of the file, as text
+    sha256 : of the content, whatever the HDF5 layout
+    """
+
+    displacement_biotac: np.ndarray
+    displacement_digit: np.ndarray
+    scale_biotac: float
+    scale_digit: float
+    signal: np.ndarray
+    force: np.ndarray
+    contact_center: np.ndarray
+    contact_patch_digit: np.ndarray
+    depth_biotac: np.ndarray
+    depth_digit: np.ndarray
+    place: np.ndarray
+    slide: np.ndarray
+    press: np.ndarray
+    indenter: np.ndarray
+    attributes: dict[str, str]
+    sha256: str
+
+    def some(self, rows: np.ndarray) -> Pairs:
+        """The contacts of these rows alone."""
+        return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in DATASETS})
+
+    @property
+    def indenter_names(self) -> list[str]:
+        """By number, as in ``indenter``."""
+        return json.loads(self.attributes["indenters"])
+
+
+@dataclass(frozen=True)
+class Split:
+    """Row numbers of the contacts to train on, to choose by, and to report on; no press is in two of them."""
+
+    train: np.ndarray
+    validation: np.ndarray
+    test: np.ndarray
+
+
+def read_pairs(path: str | os.PathLike) -> Pairs:
+    """Read and check a pairs file.
+
+    raises: TactileError if it is missing, truncated, of another format, or if shapes or numbers are wrong
+    """
+    try:
+        with open_checked(path) as file:
+            found = str(file.attrs.get("format", ""))
+            if found != FORMAT:
+                raise TactileError(path, f"format {found!r}", f"format {FORMAT!r}", ADVICE)
+            missing = [name for name in ATTRIBUTES if name not in file.attrs]
+            if missing:
+                raise TactileError(path, f"no attribute {missing[0]}", ", ".join(ATTRIBUTES), ADVICE)
+            attributes = {name: str(file.attrs[name]) for name in ATTRIBUTES}
+            if attributes["polarity"] != FALLS:
+                expected = f"{FALLS!r}, as raw counts do where a film thins"
+                raise TactileError(f"{os.fspath(path)}, polarity", repr(attributes["polarity"]), expected, ADVICE)
+            arrays = {name: _dataset(file, name, path) for name in DATASETS}
+            scales = {name: _scale(file[name], f"{os.fspath(path)}, {name}") for name in SCALED}
+    except TactileError:
+        raise
+    except Exception as error:  # h5py raises a dozen types on damaged bytes
+        found = "cannot be read as HDF5, it is damaged or cut off" if os.path.exists(path) else "no such file"
+        raise TactileError(path, found, "a whole HDF5 file of pairs", ADVICE) from error
+    _check_values(arrays, path)
+    _check_names(attributes["indenters"], arrays["indenter"], path)
+    digest = _content_hash(arrays, scales, attributes)
+    return Pairs(
+        scale_biotac=scales["displacement_biotac"],
+        scale_digit=scales["displacement_digit"],
+        attributes=attributes,
+        sha256=digest,
+        **arrays,
+    )
+
+
+def _dataset(file: object, name: str, path: str | os.PathLike) -> np.ndarray:
+    """One dataset, its kind and trailing shape checked."""
+    place = f"{os.fspath(path)}, {name}"
+    if name not in file:
+        raise TactileError(place, "no such dataset", f"the datasets {', '.join(DATASETS)}", ADVICE)
+    data, (shape, kind) = file[name], DATASETS[name]
+    expected = "(C, " + ", ".join("n" if size is None else str(size) for size in shape) + ")"
+    fits = len(data.shape) == len(shape) + 1 and all(
+        size in (None, found) and found > 0 for size, found in zip(shape, data.shape[1:], strict=True)
+    )
+    if not fits:
+        raise TactileError(place, f"shape {data.shape}", expected, ADVICE)
+    if data.dtype.kind != kind or (shape == (None, 3) and data.dtype != np.int16):
+        expected = {"i": "int16", "f": "float32", "b": "bool"}[kind]
+        raise TactileError(place, f"dtype {data.dtype}", expected, ADVICE)
+    declared(data, place)
+    values = data[:]
+    return values.astype(np.float32) if kind == "f" else values
+
+
+def _scale(data: object, place: str) -> float:
+    """Metres per unit of a displacement dataset."""
+    scale = np.asarray(data.attrs.get("scale", np.nan), np.float64)
+    if scale.shape != () or not 0.0 < scale < 1.0:
+        raise TactileError(place, f"scale {scale}", "metres per unit, a number above 0", ADVICE)
+    return float(scale)
+
+
+def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> None:
+    """As many rows everywhere, and only finite numbers."""
+    count = len(arrays["press"])
+    for name, array in arrays.items():
+        if len(array) != count:
+            raise TactileError(f"{os.fspath(path)}, {name}", f"{len(array)} contacts", f"{count} as in press", ADVICE)
+        if array.dtype.kind == "f" and name != "contact_center" and not np.isfinite(array).all():
+            bad = int(np.flatnonzero(~np.isfinite(array.reshape(count, -1)).all(-1))[0])
+            raise TactileError(f"{os.fspath(path)}, {name}, contact {bad}", "NaN or infinite", "finite numbers", ADVICE)
+
+
+def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> None:
+    """The attribute `names` is a JSON list of texts, and has one for each number of `indenter`."""
+    place = f"{os.fspath(path)}, attribute indenters"
+    try:
+        found = json.loads(names)
+        if not isinstance(found, list) or not all(isinstance(name, str) for name in found):
+            raise ValueError(f"a {type(found).__name__}")
+    except (ValueError, RecursionError) as error:
+        raise TactileError(place, str(error), "a JSON list of names", ADVICE) from error
+    if indenter.size and not 0 <= indenter.min() <= indenter.max() < len(found):
+        told = f"{len(found)} names for numbers {indenter.min()} to {indenter.max()}"
+        raise TactileError(place, told, "a name for each number of the dataset indenter, from 0", ADVICE)
+
+
+def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attributes: dict[str, str]) -> str:
+    """SHA-256 over names, types, shapes, values and attributes."""
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
+        digest.update(np.ascontiguousarray(array).data)
+    digest.update(repr((sorted(scales.items()), sorted(attributes.items()))).encode())
+    return digest.hexdigest()
+
+
+def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
+    """Split contacts 80/10/10 by press, so that no neighbour of a training contact is tested.
+
+    raises: TactileError if there are fewer than five presses
+    """
+    presses = np.unique(press)
+    if len(presses) < MIN_PRESSES:
+        advice = "Make more contacts with `tactile pairs --count`"
+        raise TactileError(f"{os.fspath(where)}, press", f"{len(presses)} presses", f"at least {MIN_PRESSES}", advice)
+    order = np.random.default_rng([seed, len(presses)]).permutation(presses)
+    share = max(1, round(0.1 * len(presses)))
+    groups = order[2 * share :], order[:share], order[share : 2 * share]
+    return Split(*(np.flatnonzero(np.isin(press, group)) for group in groups))
+
+
+def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, text: str, seed: int, names: list[str]) -> None:
+    """One HDF5 file from the blocks in order, cut to ``count`` contacts; written beside and renamed."""
+    try:
+        _write_merged(files, count, out, text, seed, names)
+    except (OSError, RuntimeError) as error:  # h5py reports a full disk as either
+        raise no_room(out, error) from error
+
+
+def _write_merged(files, count, out, text, seed, names) -> None:  # noqa: ANN001
+    import h5py
+
+    with atomic.new_file(out) as partial, Disk(partial) as disk, h5py.File(disk, "w") as file:
+        file.attrs.update({
+            "format": FORMAT, "scene": text, "seed": seed, "version": __version__, "indenters": json.dumps(names),
+            "biotac_nodes_sha256": sensors.biotac_surface().sha256,
+            "digit_nodes_sha256": sensors.digit_surface().sha256, "polarity": FALLS,
+        })  # fmt: skip
+        done = 0
+        for path in files:
+            block = array_pack.read(path)
+            take = min(int(block["count"]), count - done)
+            for name in UNITS if take else ():
+                _append(file, name, block[name][:take], count, done)
+            done += take
+            disk.check()
+
+
+def _append(file, name: str, values: np.ndarray, count: int, start: int) -> None:  # noqa: ANN001
+    if name not in file:
+        chunk = (min(32, count), *values.shape[1:])
+        dataset = file.create_dataset(
+            name,
+            (count, *values.shape[1:]),
+            values.dtype,
+            chunks=chunk,
+            compression="gzip",
+            compression_opts=1,
+            shuffle=True,
+            track_times=False,
+        )
+        dataset.attrs["unit"] = UNITS[name]
+        if values.dtype == np.int16 and name.startswith("displacement"):
+            dataset.attrs["scale"] = SCALE
+    file[name][start : start + len(values)] = values
+
+
+def quantise(displacement: np.ndarray, scale: float = SCALE) -> np.ndarray:
+    """Displacement in m as int16 steps of ``scale`` m."""
+    return np.round(displacement / scale).astype(np.int16)
+
+
+def no_room(path: pathlib.Path, error: OSError | RuntimeError) -> TactileError:
+    """What is said where a file cannot be written."""
+    reason = getattr(error, "strerror", None) or str(error).split("\n")[0]
+    return TactileError(path, f"cannot be written ({reason})", "room for it", "Make room, then give the command again")

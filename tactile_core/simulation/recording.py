@@ -1,0 +1,174 @@
+"""A simulated BioTac recording: a scene's motion solved frame by frame, with the defects of real electrodes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Mapping
+
+import numpy as np
+
+from .. import __version__, sensors
+from ..errors import TactileError
+from ..files import atomic
+from ..geometry.indenters import Indenter
+from ..mechanics.electrodes.gap_law import Wiring, readings, signal_of_gaps
+from ..mechanics.placement import Placement, on_gel
+from ..recordings import Truth, write_simulated
+from .frame_contact import FrameContact, frame_contact
+from .scene import RecordingSpec, Scene, load_scene
+
+PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (sensors.md)
+_STILL_COUNT = 2000  # TDC and TAC, not simulated: a constant reading
+
+# What a file may hold beside time, force and, where there is a DIGIT, the contact's centre; and the sensor it needs.
+OUTPUTS = {"electrodes": "biotac", "displacement_biotac": "biotac", "displacement_digit": "digit"}
+ALL = tuple(OUTPUTS)
+
+Solved = dict[str, FrameContact]  # by sensor; empty without contact
+
+
+def simulate_recording(
+    scene_path: str | os.PathLike,
+    out: str | os.PathLike,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    wiring: Wiring | None = None,
+    *,
+    keep: Collection[str] = ALL,
+    tiers: Mapping[str, str] | None = None,
+    loaded: tuple[Scene, str] | None = None,
+) -> None:
+    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
+
+    The motion is linear between the scene's points; rolling and sliding differ in nothing else, for contact is without
+    friction here. progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
+    keep : words of OUTPUTS; a sensor that none of them needs is not solved. tiers : of each sensor, fast by default.
+    loaded : a scene and its text in place of the file's, which is then named in messages alone.
+    Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked, or
+    tared wiring: this kind of file holds raw counts.
+    """
+    scene, text = loaded or load_scene(scene_path)
+    spec = recording_of(scene, scene_path)
+    sensors_used = sensors_of(keep)
+    wiring = wiring or _wiring(spec)
+    if wiring.tared:
+        raise TactileError("wiring, tared", "True", "raw counts in a simulated recording", "Tare it when it is read")
+    atomic.claim(out)
+    check_places(scene_path, spec)
+    indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
+    time, place, force = motion(spec)
+    frames: list[Solved] = []
+    for t, (x, z), newtons in zip(time, place, force, strict=True):
+        at = Placement(x, z, np.radians(spec.tilt_deg))
+        frames.append(_solve(scene_path, indenter, at, newtons, t, sensors_used, tiers or {}))
+        if progress:
+            progress(len(frames), len(time))
+    told, counts = "", {}
+    if "electrodes" in keep:
+        pressure, still = _pressure(frames), np.full(len(time), _STILL_COUNT, np.int16)
+        counts = {"electrodes": readings(_signals(frames), time, wiring, seed), "pdc": pdc_counts(pressure)}
+        counts |= {"tac": still, "tdc": still}
+        told = " " + _told(pressure)
+    write_simulated(
+        out, time=time, **counts, truth=_truth(frames, keep), scene=text, seed=seed,
+        made_by=f"tactile {__version__}, mechanics.recording{_tiers_told(tiers)}",
+        note=f"Simulated, not measured: {scene.description}{told}",
+    )  # fmt: skip
+
+
+def sensors_of(keep: Collection[str]) -> tuple[str, ...]:
+    """The sensors that outputs need, of ``"biotac"`` and ``"digit"``."""
+    return tuple(dict.fromkeys(sensor for word, sensor in OUTPUTS.items() if word in keep))
+
+
+def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
+    """The scene's [recording]; raises TactileError where it has none."""
+    if scene.recording is None:
+        advice = "See scenes/press_roll_slide/scene.toml"
+        raise TactileError(f"{path}, recording", "missing", "a [recording] table", advice)
+    return scene.recording
+
+
+def _tiers_told(tiers: Mapping[str, str] | None) -> str:
+    return "" if not tiers else ", " + ", ".join(f"{sensor} {tier}" for sensor, tier in sorted(tiers.items()))
+
+
+def check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
+    """Raises TactileError for a point that presses beside the DIGIT's gel."""
+    for number, point in enumerate(spec.points, 1):
+        if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3):
+            raise TactileError(
+                f"{scene_path}, recording.points, point {number}", f"({point.x_mm:g}, {point.z_mm:g}) mm",
+                "a place on the DIGIT's gel, x -20.06 to 4.94 mm, z within 9.17 mm", "Move it or set its force_n to 0",
+            )  # fmt: skip
+
+
+def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """time (T,) s, place (T, 2) m and force (T,) N at 100 Hz."""
+    points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
+    time = np.arange(round(points[0, 0] * sensors.SAMPLE_RATE), round(points[-1, 0] * sensors.SAMPLE_RATE) + 1)
+    time = time / sensors.SAMPLE_RATE
+    x, z, force = (np.interp(time, points[:, 0], points[:, k]) for k in (1, 2, 3))
+    return time, np.column_stack([x, z]) * 1e-3, force
+
+
+def _solve(
+    scene_path: str | os.PathLike, indenter: Indenter, place: Placement, force: float, time: float,
+    sensors_used: tuple[str, ...], tiers: Mapping[str, str],
+) -> Solved:  # fmt: skip
+    if not force > 0:
+        return {}
+    found = {name: frame_contact(name, indenter, place, force, tiers.get(name, "fast")) for name in sensors_used}
+    for name, contact in found.items():
+        if contact is None:
+            which = "BioTac" if name == "biotac" else "DIGIT"
+            raise TactileError(
+                f"{scene_path}, recording, {time:.2f} s",
+                f"{force:.3g} N at ({place.x * 1e3:.1f}, {place.z * 1e3:.1f}) mm",
+                f"a force that the {which} bears within 60 % of its thickness", "Lower force_n there",
+            )  # fmt: skip
+    return found
+
+
+def _signals(frames: list[Solved]) -> np.ndarray:
+    return np.stack([signal_of_gaps(found["biotac"].gaps) if found else np.zeros(19) for found in frames])
+
+
+def _pressure(frames: list[Solved]) -> np.ndarray:
+    """The fluid's pressure (T,) Pa over the surrounding air."""
+    return PRESSURE_AT_REST + np.array([found["biotac"].pressure if found else 0.0 for found in frames])
+
+
+def pdc_counts(pressure: np.ndarray) -> np.ndarray:
+    """PDC (...,) int16 counts, 0..4095, for the fluid's pressure, Pa."""
+    return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
+
+
+def _told(pressure: np.ndarray) -> str:
+    """The fluid's pressure in words for the file."""
+    low, high = pressure.min() / 1e3, pressure.max() / 1e3
+    return f"Fluid pressure {low:.2f} to {high:.2f} kPa; PDC counts {sensors.PRESSURE_PER_COUNT:g} Pa each."
+
+
+def _wiring(spec: RecordingSpec) -> Wiring:
+    """The scene's defects; its drift is given from the first to the last frame."""
+    lasts = spec.points[-1].time_s - spec.points[0].time_s
+    return Wiring(noise=spec.noise_counts, drift=spec.drift_counts / lasts)
+
+
+def _truth(frames: list[Solved], keep: Collection[str]) -> Truth:
+    """Displacements as far as they are kept; the force is the BioTac's, or the DIGIT's where that is solved alone."""
+
+    def moved(sensor: str) -> np.ndarray | None:
+        if f"displacement_{sensor}" not in keep:
+            return None
+        nodes = len(sensors.sensor_surface(sensor).rest)
+        arrays = (found[sensor].displacement if found else np.zeros((nodes, 3)) for found in frames)
+        return np.stack([array.astype(np.float32) for array in arrays])
+
+    first, *_ = solved = sensors_of(keep)
+    centre = None
+    if "digit" in solved:
+        centre = np.stack([found["digit"].centre if found else np.full(2, np.nan) for found in frames])
+    force = np.stack([found[first].force if found else np.zeros(3) for found in frames])
+    return Truth(moved("biotac"), moved("digit"), force, centre)

@@ -1,0 +1,128 @@
+"""Scenes: TOML files that say what presses where. Units stand in the field names; unknown fields are refused."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from ..errors import TactileError
+from ..files.text_file import read_toml_text
+from .indenter_specs import IndenterSpec, NotNegative, Positive, with_files_of
+
+FORMAT = "tactile-scene-1"
+LARGEST = 1e9  # of any number: none that means something comes near, squares of far larger ones are infinite (assumed)
+
+
+class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """How paired contacts are drawn: places evenly over the gel, tilts evenly over a cone, force growing by a ratio."""
+
+    force_min_n: Positive = 0.02
+    force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5
+    tilt_max_deg: Annotated[float, Meta(ge=0, le=45)] = 20.0
+    rim_margin_mm: Annotated[float, Meta(ge=0, le=8)] = 1.0
+    depth_max_percent: Annotated[float, Meta(gt=0, le=60)] = 60.0  # of the thickness under the first touch
+    friction: Annotated[float, Meta(ge=0, le=5)] = 0.78  # Coulomb's coefficient (sensors.md)
+    slide_share: Annotated[float, Meta(ge=0, le=1)] = 0.0  # of the presses end with a slide at constant force
+    slide_max_mm: Annotated[float, Meta(ge=0, le=3)] = 0.0  # slides are evenly long up to this
+    depth_steps: Annotated[int, Meta(ge=0, le=100)] = 0  # contacts a press, paired by depth; 0: paired by force
+    depth_min_mm: Annotated[float, Meta(gt=0, le=3)] = 0.05
+    depth_max_mm: Annotated[float, Meta(gt=0, le=3)] = 1.2
+
+
+class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A moment of a recorded motion: where the indenter is on the DIGIT's (unrolled) plane, and how hard it presses."""
+
+    time_s: Annotated[float, Meta(ge=0, le=600)]
+    x_mm: float
+    z_mm: float
+    force_n: NotNegative
+
+
+class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A simulated recording: the motion, linear between its points, and the defects of real electrodes."""
+
+    indenter: str
+    points: Annotated[list[PointSpec], Meta(min_length=2)]
+    noise_counts: NotNegative = 1.0
+    drift_counts: NotNegative = 3.0
+    tilt_deg: Annotated[float, Meta(ge=0, le=45)] = 0.0
+
+
+class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One scene file."""
+
+    format: str
+    name: str
+    description: str
+    indenters: Annotated[list[IndenterSpec], Meta(min_length=1)]
+    pairs: PairSpec | None = None
+    recording: RecordingSpec | None = None
+
+
+def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
+    """The scene in a ``scene.toml`` (or in the folder that holds one), and its text.
+
+    Raises TactileError naming file and field for anything unreadable, unknown or out of range.
+    """
+    file = pathlib.Path(path)
+    file = file / "scene.toml" if file.is_dir() else file
+    try:
+        text = read_toml_text(file)
+    except UnicodeDecodeError as error:
+        raise TactileError(file, "no text", "a scene.toml or a folder that holds one") from error
+    except OSError as error:
+        raise TactileError(file, f"cannot be read ({error})", "a scene.toml or a folder that holds one") from error
+    try:
+        scene = msgspec.toml.decode(text, type=Scene)
+    except (ValueError, RecursionError) as error:
+        raise TactileError(file, str(error), "the fields of scenes/press_sphere/scene.toml") from error
+    check(file, scene)
+    found = [with_files_of(file.parent, spec) for spec in scene.indenters]
+    return msgspec.structs.replace(scene, indenters=found), text
+
+
+def check(file: str | os.PathLike, scene: Scene) -> None:
+    """Raises TactileError for what the fields' types do not say: finite numbers, names, growing times."""
+    if scene.format != FORMAT:
+        raise TactileError(f"{file}, format", repr(scene.format), repr(FORMAT))
+    numbers = list(_numbers(msgspec.to_builtins(scene)))
+    if not np.isfinite(numbers).all():
+        raise TactileError(file, "a number is nan or infinite", "finite numbers")
+    if np.max(np.abs(numbers), initial=0.0) > LARGEST:
+        raise TactileError(file, f"the number {max(numbers, key=abs):g}", f"millimetres, newtons... up to {LARGEST:g}")
+    names = [spec.name for spec in scene.indenters]
+    if len(set(names)) < len(names):
+        raise TactileError(f"{file}, indenters", f"names {names}", "different names")
+    if scene.pairs is not None and scene.pairs.depth_steps:
+        _check_depths(file, scene.pairs)
+    if scene.recording is None:
+        return
+    if scene.recording.indenter not in names:
+        raise TactileError(f"{file}, recording.indenter", repr(scene.recording.indenter), f"one of {names}")
+    times = [point.time_s for point in scene.recording.points]
+    if times != sorted(set(times)):
+        raise TactileError(f"{file}, recording.points", f"time_s {times}", "growing times")
+
+
+def _check_depths(file: str | os.PathLike, spec: PairSpec) -> None:
+    if spec.depth_min_mm >= spec.depth_max_mm:
+        expected = f"less than depth_max_mm, {spec.depth_max_mm:g}"
+        raise TactileError(f"{file}, pairs.depth_min_mm", f"{spec.depth_min_mm:g}", expected)
+    if spec.slide_share:
+        advice = "Slides are held at a force: pair by force, or leave them out"
+        raise TactileError(f"{file}, pairs.slide_share", f"{spec.slide_share:g} beside depth_steps", "0", advice)
+
+
+def _numbers(value):  # noqa: ANN001, ANN202 (any nesting of dict, list and numbers)
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from _numbers(item)
+    elif isinstance(value, float):
+        yield value

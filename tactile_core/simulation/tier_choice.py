@@ -1,0 +1,89 @@
+"""Which tier of contact is exact enough for a scene, by the measured table and how deep the scene goes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ..accuracy import Candidate, cheapest
+from ..mechanics.error_estimate import expected_error, measured
+from ..mechanics.fast.compliance import stored
+from ..mechanics.placement import Placement
+from ..mechanics.thickness import DEPTH_LIMIT
+from .frame_contact import frame_contact
+from .scene import RecordingSpec, load_scene
+
+TIERS = ("fast", "full", "reference")
+
+
+class TierChoice(NamedTuple):
+    """tier : its name; error : um rms, which 95 of 100 contacts stay below; ms : a contact; share : depth reached."""
+
+    tier: str
+    error: float
+    ms: float
+    share: float
+
+    def told(self, sensor: str) -> str:
+        """In words, and why."""
+        which = "BioTac" if sensor == "biotac" else "DIGIT"
+        return (
+            f"{which}: {self.tier} tier, to {self.share:.0%} of the thickness within {self.error:.3g} um of the exact "
+            "solution in 95 of 100 contacts"
+        )
+
+
+def tier_errors(sensor: str, share: float) -> list[Candidate]:
+    """Each tier's error, um, at a depth over the thickness, as 95 of 100 contacts stay below, and ms a contact.
+
+    The fast tier was measured against the full one, whose own error is added to it.
+    """
+    own = {tier: _up_to(tier, sensor, share) for tier in TIERS}
+    own["fast"] += own["full"]
+    return [Candidate(f"the {tier} tier", own[tier], measured()["tiers"][tier][sensor]["ms"]) for tier in TIERS]
+
+
+def _up_to(tier: str, sensor: str, share: float) -> float:
+    """The largest error, um, of any depth up to this one: a press passes through all of them."""
+    below = [each["depth_share_to"] for each in measured()["tiers"][tier][sensor]["bins"]]
+    depths = [each for each in below if each < share] + [share]
+    return 1e6 * max(expected_error(tier, sensor, depth)[0] for depth in depths)
+
+
+def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
+    """The cheapest tier within a bound, um; fast without one. Raises TactileError where none is."""
+    rows = tier_errors(sensor, share)
+    which = "BioTac" if sensor == "biotac" else "DIGIT"
+    what = f"shape, {which} to {share:.0%} of its thickness"
+    found = rows[0] if bound is None else cheapest(rows, bound, "um", what)
+    return TierChoice(found.name.split()[1], found.error, found.ms, share)
+
+
+def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: float | None) -> Mapping[str, TierChoice]:
+    """For each sensor of a scene's [recording]. Raises TactileError: a bad scene, a bound that no tier meets."""
+    from .recording import check_places, recording_of
+
+    scene, _ = load_scene(path)
+    spec = recording_of(scene, path)
+    check_places(path, spec)
+    indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
+    return {sensor: choose(sensor, depth_share(sensor, indenter, spec), bound) for sensor in used}
+
+
+def depth_share(sensor: str, indenter, spec: RecordingSpec) -> float:  # noqa: ANN001
+    """How deep a scene goes at its points, over the thickness there, by the fast tier.
+
+    The most that a scene may, where a point is beyond it, or where the sensor's matrices are yet to be built.
+    """
+    if not stored(sensor).bytes:
+        return DEPTH_LIMIT
+    share = 0.0
+    for point in spec.points:
+        if point.force_n > 0:
+            place = Placement(point.x_mm * 1e-3, point.z_mm * 1e-3, np.radians(spec.tilt_deg))
+            found = frame_contact(sensor, indenter, place, point.force_n)
+            share = max(share, DEPTH_LIMIT if found is None else found.depth / found.thickness)
+    return min(share, DEPTH_LIMIT)

@@ -1,0 +1,34 @@
+"""Signals as real electrodes give them: gains that differ, noise, whole counts, a sign that may be lost."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..sensors import COUNT_MAX, COUNT_SIGN, REST_COUNT
+from .options import Options
+
+
+def measured(change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0) -> np.ndarray:
+    """True changes (B, 19) counts -> as read, (B, 20): changes in counts, and whether they are rectified.
+
+    Rectified changes are given with the sign of a thinning film, as the networks read them.
+
+    Gain error a channel, noise, whole counts, the ends of the 12 bits. The rest lies near 3,300 counts (sensors.md) and
+    between whole counts, as the mean of many readings does.
+    rectified : share of frames that lose their sign. They stand for recordings of unknown units, whose tare cannot be
+        mended once folded: gains spread more, rest is off, channels may be missing, and the skin bulges more or less
+    """
+    folded = rng.random((len(change), 1)) < rectified
+    gain = 1.0 + options.gain * rng.standard_normal(change.shape)
+    rest = REST_COUNT + rng.random(change.shape)
+    noise = options.noise * rng.standard_normal(change.shape)
+    if rectified:
+        strange = np.exp(options.rectified_gain * rng.standard_normal(change.shape))
+        strange *= rng.random(change.shape) >= options.rectified_missing
+        gain = np.where(folded, strange, gain)
+        bulge = np.exp(options.rectified_bulge * rng.standard_normal((len(change), 1)))
+        change = np.where(folded & (COUNT_SIGN * change < 0), bulge * change, change)
+        noise += folded * options.rectified_offset * rng.standard_normal(change.shape)
+    found = np.clip(np.round(rest + gain * change + noise), 0, COUNT_MAX) - rest
+    found = np.where(folded, COUNT_SIGN * np.abs(found), found)
+    return np.concatenate([found, folded], -1).astype(np.float32)

@@ -1,0 +1,150 @@
+"""Each step of the translation on paired contacts, against the simulated truth, contact by contact."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import accuracy, sensors
+from ..geometry.lattice import Lattice
+from ..sensors import unrolling
+from ..simulation.pairs_file import Pairs
+from ..translation.contact_patch import contact_patch
+from ..translation.network_sizes import SURFACES
+from ..translation.networks import Networks
+from ..translation.translate import contact_center
+
+ROWS = 128  # contacts at a time, to bound memory
+LEAST_PATCH = 20  # nodes: on smaller patches a share says little
+Columns = dict[str, np.ndarray]  # name of a figure -> (C,) a number a contact; NaN where it does not apply
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """The DIGIT's surface, and where the BioTac's nodes come to lie on its plane, (N, 2) m."""
+
+    digit: Lattice
+    unrolled: np.ndarray
+
+
+def our_bodies() -> Bodies:
+    """Those of this version's sensors."""
+    return Bodies(sensors.digit_surface(), unrolling.unrolled_nodes())
+
+
+def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:
+    """(B, n, 3) float32 m of the contacts in these rows."""
+    return getattr(pairs, f"displacement_{sensor}")[rows].astype(np.float32) * np.float32(
+        getattr(pairs, f"scale_{sensor}")
+    )
+
+
+def translation_figures(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
+    """Errors of every step for the contacts in these rows, read as ``change`` (C, 19) counts.
+
+    Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
+    (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); the other way ``D2B`` (DIGIT mesh to BioTac mesh), and
+    ``B2S``, ``D2S`` (meshes to signal). Figures: see `mesh_columns`; ``null_*`` are those of no displacement.
+    """
+    return joined(_part(nets, pairs, rows[part], change[part], bodies) for part in parts(len(rows)))
+
+
+def _rms(values: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.square(values, dtype=np.float64).mean(-1))
+
+
+def parts(count: int) -> list[slice]:
+    """Slices of at most ROWS."""
+    return [slice(start, start + ROWS) for start in range(0, count, ROWS)]
+
+
+def joined(columns: Iterator[Columns]) -> Columns:
+    """One table from those of parts."""
+    found = list(columns)
+    return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
+
+
+def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
+    skin, gel = (true_displacement(pairs, sensor, rows) for sensor in ("biotac", "digit"))
+    patch = pairs.contact_patch_digit[rows]
+    mesh, signal = nets.encode_biotac(skin), nets.s2m(nets.encode_signal(change))
+    found = {
+        **mesh_columns("null_biotac", np.zeros_like(skin), skin, accuracy.lengths),
+        **mesh_columns("null_digit", np.zeros_like(gel), gel),
+        **mesh_columns("MVB", nets.decode_biotac(mesh), skin, accuracy.lengths),
+        **mesh_columns("MVD", nets.decode_digit(nets.encode_digit(gel)), gel),
+        **mesh_columns("S2MPN", nets.decode_biotac(signal), skin, accuracy.lengths),
+        "S2MPN_position_mm": 1e3 * _skin_offset(nets.decode_biotac(signal), skin, bodies),
+    }
+    for name, latent in (("M2MPN", mesh), ("chain", signal)):
+        answer = nets.decode_digit(nets.m2m(latent))
+        found |= mesh_columns(name, answer, gel) | digit_columns(name, answer, patch, bodies)
+    back = nets.m2m_back(nets.encode_digit(gel))
+    found |= mesh_columns("D2B", nets.decode_biotac(back), skin, accuracy.lengths)
+    for name, latent in (("B2S", mesh), ("D2S", back)):
+        found[f"{name}_counts"] = _rms(nets.decode_signal(nets.m2s(latent)) - pairs.signal[rows])
+    found["null_counts"] = _rms(pairs.signal[rows])
+    found |= digit_columns("true_mesh", gel, patch, bodies)
+    for name, latent in (("force_from_mesh", mesh), ("force", signal)):
+        load = accuracy.lengths(pairs.force[rows])
+        error = accuracy.lengths(nets.force(latent) - pairs.force[rows])
+        found[f"{name}_percent"] = np.where(load > FORCE_FROM, 100 * error / load, np.nan)
+    return found
+
+
+def error_columns(
+    nets: Networks,
+    pairs: Pairs,
+    rows: np.ndarray,
+    change: np.ndarray,
+    bodies: Bodies,
+    silent: float,
+    rectified: bool = False,
+) -> Columns:
+    """Largest node error (m) of signal to BioTac mesh and to DIGIT mesh, what the error head expects, and where.
+
+    ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m.
+    """
+    biotac = nets.s2m(nets.encode_signal(change, rectified), rectified)
+    answers = {"biotac": nets.decode_biotac(biotac), "digit": nets.decode_digit(nets.m2m(biotac))}
+    truth = {name: true_displacement(pairs, name, rows) for name in answers}
+    found = {f"{name}_max_m": accuracy.max_error(answer, truth[name]) for name, answer in answers.items()}
+    expected = nets.expected_error(change, rectified)
+    found |= {f"{name}_expected_m": expected[:, index] for index, name in enumerate(SURFACES)}
+    return found | {"x_m": contact_center(answers["digit"], bodies.digit.rest, silent)[:, 0]}
+
+
+FORCE_FROM = 0.2  # N: below, the share of an error says nothing (issue 4)
+PEAK_FROM = 0.3e-3  # m: as much of the peak depth
+
+
+def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
+    """rms over moving nodes, largest node error, error of the core's height (um), error of the peak (per cent)."""
+    figures = accuracy.mesh_figures(found, true, depth)
+    deep = depth(true).max(-1) > PEAK_FROM
+    figures["peak_depth_percent"] = np.where(deep, figures["peak_depth_percent"], np.nan)
+    return {f"{name}_{figure}": values for figure, values in figures.items()}
+
+
+def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodies) -> Columns:
+    """Intersection over union of the patches, and distance of their middles in mm."""
+    predicted = contact_patch(found, bodies.digit)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        overlap = (predicted & patch).sum(-1) / (predicted | patch).sum(-1)
+        places = bodies.digit.rest[:, [0, 2]]
+        middles = [(each @ places) / each.sum(-1, keepdims=True) for each in (predicted, patch)]
+    large = patch.sum(-1) >= LEAST_PATCH
+    return {
+        f"{name}_iou": np.where(large, overlap, np.nan),
+        f"{name}_position_mm": 1e3 * accuracy.lengths(middles[0] - middles[1]),
+    }
+
+
+def _skin_offset(found: np.ndarray, true: np.ndarray, bodies: Bodies) -> np.ndarray:
+    """(C,) m between the middles of two dents of the BioTac on the unrolled pad."""
+    on_pad = np.isfinite(bodies.unrolled[:, 0])
+    places = bodies.unrolled[on_pad]
+    first, second = (accuracy.core_center(accuracy.lengths(each[:, on_pad]), places, 0.0) for each in (found, true))
+    return accuracy.lengths(first - second)

@@ -1,0 +1,179 @@
+"""One sensor's displacements as training sees them: in the nodes' own frames, in coefficients, with a loss."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..accuracy import MOVING
+from ..translation.contact_frame import PLACE_UNIT, ContactFrame
+from .mirror_augmentation import across, image_of_nodes
+from .pca import ROWS, principal_basis
+
+SILENT = -1  # row number of a sample without contact
+FEWEST = 100  # nodes that an error is shared by at least: light touches move few (assumed)
+ROOT_FLOOR = 1e-6  # m, rounds the root of the loss at zero error
+LEAST_AWAY = 0.01  # cells, rounds the distance of places at zero
+BASIS_ROWS = 12_000  # contacts that the bases are drawn from, fifty times as many as fields are taken (assumed)
+SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, but none is blown up without end (assumed)
+
+
+class SurfaceCodec:
+    """One sensor's displacements, the frame that moves over them and their linear bases, in the host's memory.
+
+    data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i seen in a mirror
+    wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
+    place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
+    total : (C,) m2, sum of squared displacements; moving : (C,) nodes that move, at least FEWEST
+    null : m, loss of no displacement, mean over training contacts
+    """
+
+    def __init__(
+        self, data: np.ndarray, unit: float, rows: np.ndarray, frame: ContactFrame, wide: int, near: int,
+        generator: torch.Generator, *, mirrored: bool = False,
+    ) -> None:  # fmt: skip
+        self.frame, self.unit = frame, unit
+        self.data = _turned(data, frame)
+        self._image, every = None, np.arange(len(data))
+        if mirrored:
+            self._image, every = image_of_nodes(frame), np.arange(2 * len(data))
+            rows = np.concatenate([rows, rows + len(data)])
+        self.place = _in_parts(lambda part: torch.from_numpy(frame.place(self._local(part))), every).numpy()
+        self.cell, self.left = frame.cells(self.place)
+        some = rows[:: max(1, len(rows) // BASIS_ROWS)]
+        self.wide = principal_basis(self._whole, some, wide, generator)
+        self.near = principal_basis(self._tapered, some, near, generator)
+        metres = _in_parts(self._coefficients, every).mul_(1e-3)
+        spread = metres[rows].square().mean(0).sqrt()
+        self.scale = spread.clamp(min=max(SMALLEST_SCALE * float(spread.max()), 1e-9))
+        self.modes = metres.div_(self.scale)
+        self.total, self.moving = _in_parts(self._sizes, every).T
+        self.null = max(float((self.total[rows] / self.moving[rows]).sqrt().mean()), 1e-9)
+
+    @property
+    def nodes(self) -> int:
+        """n."""
+        return self.data.shape[1]
+
+    def _local(self, rows: np.ndarray) -> np.ndarray:
+        """(B, n, 3) float32 of contacts, in whole units and in the nodes' own frames."""
+        values, turned = self.data[rows % len(self.data)].astype(np.float32), rows >= len(self.data)
+        if turned.any():
+            values[turned] = across(values[turned][:, self._image])
+        return values
+
+    def _millimetres(self, rows: np.ndarray) -> Tensor:
+        return torch.from_numpy(self._local(rows)) * (1e3 * self.unit)
+
+    def _whole(self, rows: np.ndarray) -> Tensor:
+        return self._millimetres(rows).flatten(1)
+
+    def _rest_in_window(self, rows: np.ndarray) -> Tensor:
+        whole = self._whole(rows)
+        rest = whole - whole @ self.wide.T @ self.wide
+        fields = rest.view(len(rows), -1, 3).numpy()
+        return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
+
+    def _tapered(self, rows: np.ndarray) -> Tensor:
+        """What the near basis is drawn from: it fades toward the window's edge, where decoded gel would have a step."""
+        fade = torch.from_numpy(self.frame.fade())
+        return (self._rest_in_window(rows).view(len(rows), *fade.shape, 3) * fade[:, :, None]).flatten(1)
+
+    def _coefficients(self, rows: np.ndarray) -> Tensor:
+        return torch.cat([self._whole(rows) @ self.wide.T, self._rest_in_window(rows) @ self.near.T], -1)
+
+    def _sizes(self, rows: np.ndarray) -> Tensor:
+        squares = 1e-6 * self._millimetres(rows).square().sum(-1)
+        return torch.stack([squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()], -1)
+
+    def inputs(self, rows: np.ndarray) -> Tensor:
+        """(B, K + K' + 4) what the encoder reads: coefficients, place, what is left of it; zero for silent ones."""
+        at = np.maximum(rows, 0)
+        place = torch.from_numpy(np.concatenate([self.place[at], self.left[at]], -1))
+        return torch.cat([self.modes[at], place], -1) * touching(rows)
+
+    def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
+        """As `MovingFrame.cells`: whole cells (B, 2) and what is left, through which gradients flow to the place."""
+        middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
+        at = place * PLACE_UNIT + middle
+        cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
+        return cell.long(), (at - cell).clamp(-1.0, 1.0)
+
+    def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
+        """Mean distance, in cells, of places (B, 2) from those of the contacts; silent ones have none."""
+        true, touched = torch.from_numpy(self.place[np.maximum(rows, 0)]), touching(rows)
+        away = PLACE_UNIT * (place - true.to(place.device)) * touched.to(place.device)
+        return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
+
+    def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray, floor: Tensor | float = ROOT_FLOOR) -> Tensor:
+        """Mean over contacts of the rms error over moving nodes, for coefficients (B, K + K') round cells (B, 2).
+
+        1 for no displacement. The root is taken contact by contact, as in the figure we report: deep contacts do not
+        drown shallow ones. The bases being orthonormal, an error in coefficients is one of nodes; what no coefficients
+        reach is added, and only the product of errors in both bases is left out (near fields hold next to nothing of
+        the wide ones, from which they are what is left).
+        """
+        at, touched, device = np.maximum(rows, 0), touching(rows), modes.device
+        with torch.no_grad():
+            true = self._at_cells(at, cell) * touched
+            beyond = (self.total[at] - true.square().sum(-1)).clamp(min=0.0) * touched[:, 0]
+        squares = (modes * self.scale.to(device) - true.to(device)).square().sum(-1) + beyond.to(device)
+        return (squares / self.moving[at].to(device) + floor**2).sqrt().mean() / self.null
+
+    def field(self, modes: Tensor, cell: Tensor) -> Tensor:
+        """Coefficients (B, K + K') round cells (B, 2) -> displacement (B, n, 3) m in the nodes' own frames, in the
+        host's memory."""
+        metres, wide, width = modes.cpu() * self.scale, len(self.wide), self.frame.width
+        whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
+        near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()
+        return torch.from_numpy(self.frame.add(whole, near, cell.cpu().numpy()))
+
+    def true(self, rows: np.ndarray) -> Tensor:
+        """(B, n, 3) m, in the nodes' own frames."""
+        values = torch.from_numpy(self._local(np.maximum(rows, 0)))
+        return values * (self.unit * touching(rows)[:, :, None])
+
+    def _at_cells(self, rows: np.ndarray, cells: Tensor) -> Tensor:
+        """(B, K + K') m, the coefficients of contacts in windows round other cells (B, 2) than their own."""
+        metres, cell = self.modes[rows] * self.scale, cells.cpu().numpy()
+        moved = (cell != self.cell[rows]).any(-1)
+        if moved.any():
+            wide = len(self.wide)
+            rest = self._whole(rows[moved]) - 1e3 * metres[moved, :wide] @ self.wide
+            fields = rest.view(len(rest), -1, 3).numpy()
+            windows = torch.from_numpy(self.frame.windows(fields, cell[moved])).flatten(1)
+            metres[moved, wide:] = 1e-3 * windows @ self.near.T
+        return metres
+
+
+def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
+    """(C, n, 3) int16 in the nodes' own frames; where none is turned the data themselves, which are large."""
+    if not frame.turn.any():
+        return data
+    local = np.empty_like(data)
+    for part in _parts(len(data)):
+        local[part] = np.rint(frame.to_local(data[part]))
+    return local
+
+
+def _in_parts(values: Callable[[np.ndarray], Tensor], rows: np.ndarray) -> Tensor:
+    """Values of all rows, a part at a time into one place: parts kept apart would leave memory in pieces."""
+    parts = _parts(len(rows))
+    first = values(rows[parts[0]])
+    found = first.new_empty(len(rows), *first.shape[1:])
+    found[parts[0]] = first
+    for part in parts[1:]:
+        found[part] = values(rows[part])
+    return found
+
+
+def _parts(count: int) -> list[slice]:
+    return [slice(start, min(start + ROWS, count)) for start in range(0, count, ROWS)]
+
+
+def touching(rows: np.ndarray) -> Tensor:
+    """(B, 1): 1 for contacts, 0 for silent samples."""
+    return torch.from_numpy((rows != SILENT).astype(np.float32))[:, None]

@@ -1,0 +1,180 @@
+"""Fit rest, gains and offsets of an unknown sensor from its own recordings, of which nothing need be known."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from ..errors import TactileError
+from ..recordings import PrepareOptions, Recording, Signals, read
+from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit
+from ..recordings.fingers import split
+from ..recordings.readers import each_finger
+from . import reference_signals
+from .gain_matching import PRIOR, Match, match
+from .reference_signals import ReferenceSignals
+from .unit_rest import UnitRest, find_rest
+
+FEWEST_FRAMES = 50  # in contact, half a second: less holds no contact worth the name (assumed)
+MOST_FRAMES = 3_000  # looked at, evenly spread; neighbours at 100 Hz say the same
+FEW_CONTACTS = 20  # different ones; with fewer, gains of 30 % are found to 20 % only (simulated contacts at one place)
+TOUCHED = 2.0  # contacts that tell an electrode's gain; below, it is not fitted (assumed)
+MOVED = 5.0  # counts that the 99 % level of an electrode must reach, three times the noise: else it was never touched
+SHOWN = 3  # names spelled out
+LARGEST_OFFSET = 30.0  # counts; more is no tare error but a match gone wrong (assumed)
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """A fitted sensor and what the user should know of the fit. fitted : (19,) bool, the electrodes with a gain."""
+
+    sensor: ElectrodeGains
+    fitted: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def adapt(
+    paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None
+) -> Adapted:
+    """Fit one sensor from its recordings, all together.
+
+    Where recordings hold no calm part near the rest that all of them together show, that rest is taken. Raises
+    TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames in
+    contact.
+    """
+    parts, kinds, restless = [], set(), []
+    recordings = [read(path) for path in paths]
+    rest = _rest(recordings)
+    bare = _bare(rest)
+    for path, recording in zip(paths, recordings, strict=True):
+        signals = prepare_unit(recording, options, bare)
+        if signals.kind == "scaled":
+            advice = "Give its counts a unit, or use another recording"
+            raise TactileError(path, "a scaled recording, whose unit is not known", "counts", advice)
+        if not signals.quiet.any() and bare is None:
+            restless.append(os.path.basename(path))
+        kinds.add(signals.kind == "rectified")
+        parts.append(_contacts(signals))
+    if len(kinds) > 1:
+        raise TactileError(paths[0], "signed and rectified recordings together", "one kind", "Adapt to each by itself")
+    note = f"fitted by tactile adapt from {_listed([os.path.basename(path) for path in paths])}"
+    fitted = _fitted(parts, kinds.pop(), typical, note, bare)
+    if not restless:
+        return fitted
+    warning = f"no quiet part in {_listed(restless)}: where the tare is off, so are the gains and offsets"
+    return Adapted(fitted.sensor, fitted.fitted, (warning, *fitted.warnings))
+
+
+def adapt_hand(
+    paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None
+) -> tuple[SensorFile, tuple[str, ...]]:
+    """Fit each unit of a set of recordings: one, or one a finger where the files hold hands; and what to tell of them.
+
+    Raises TactileError as `adapt`, and for files of hands and of single fingers together.
+    """
+    units: dict[int | None, list[str]] = {}
+    for path in paths:
+        for finger in each_finger(path):
+            units.setdefault(split(finger)[1], []).append(finger)
+    if len(units) > 1 and None in units:
+        found = "files of several fingers, and of one"
+        raise TactileError(paths[0], found, "one kind", "Adapt to each by itself")
+    sections, warnings = {}, []
+    for finger, files in sorted(units.items(), key=lambda unit: unit[0] or 0):
+        done = adapt(files, typical, options)
+        name = "unit" if finger is None else f"finger{finger}"
+        sections[name] = done.sensor
+        warnings += [text if finger is None else f"{name}: {text}" for text in done.warnings]
+    return SensorFile(FORMAT, **sections), tuple(warnings)
+
+
+def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
+    """The unit's rest, None where the recordings are too few, or not raw."""
+    try:
+        return find_rest(recordings)
+    except TactileError:
+        return None
+
+
+def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
+    """A unit of which rest alone is known."""
+    if rest is None:
+        return None
+    counts, spread = ([round(value, 4) for value in each.tolist()] for each in (rest.counts, rest.spread))
+    note = f"rest from the {rest.recordings} least pressed recordings"
+    ones, zeros = [1.0] * len(counts), [0.0] * len(counts)
+    return ElectrodeGains(note, ones, zeros, counts, spread, None if rest.pdc is None else round(rest.pdc, 4))
+
+
+def _fitted(
+    parts: list[np.ndarray], rectified: bool, typical: ReferenceSignals, note: str, bare: ElectrodeGains | None
+) -> Adapted:
+    """Gains and offsets, beside the unit's rest; rest alone where there is too little contact to tell gains."""
+    change = np.concatenate(parts)
+    if bare is None:
+        return fit(change, rectified, typical, note)
+    try:
+        found = fit(change, rectified, typical, f"{note}; {bare.note}")
+    except TactileError as error:
+        return Adapted(bare, np.zeros(change.shape[1], bool), (f"no gains: {error}",))
+    fields = {name: getattr(bare, name) for name in ("rest_counts", "rest_spread_counts", "rest_pdc")}
+    return dataclasses.replace(found, sensor=msgspec.structs.replace(found.sensor, **fields))
+
+
+def _listed(names: list[str]) -> str:
+    """The names, or the first few and the number of the others."""
+    return ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+
+
+def _contacts(signals: Signals) -> np.ndarray:
+    """(n, 19) counts of the frames in contact, absolute where the recording is."""
+    change = np.abs(signals.change) if signals.kind == "rectified" else signals.change
+    return change[reference_signals.touching(change) & ~signals.quiet]
+
+
+def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: str) -> Adapted:
+    """Fit gains and offsets to frames in contact (n, 19) counts; raises TactileError for fewer than half a second."""
+    frames = len(change)
+    if frames < FEWEST_FRAMES:
+        advice = "Use recordings with more contact"
+        raise TactileError("adapt", f"{frames} frames in contact", f"at least {FEWEST_FRAMES}", advice)
+    change = change[np.linspace(0, frames - 1, min(frames, MOST_FRAMES)).round().astype(int)]
+    found = match(change, typical.typical, rectified)
+    log_gain = found.log_gain - typical.bias(rectified) * found.contacts / (found.contacts + PRIOR)
+    touched = (found.contacts >= TOUCHED) & (np.quantile(np.abs(change), 0.99, axis=0) >= MOVED)
+    gain, fitted, warnings = _believable(np.exp(log_gain), touched, found)
+    offset = np.where(np.abs(found.offset) <= LARGEST_OFFSET, found.offset, 0.0)
+    if (np.abs(found.offset) > LARGEST_OFFSET).any():
+        warnings.append(f"{_names(np.abs(found.offset) > LARGEST_OFFSET)}: no believable offset; taken as 0")
+    signs = "rectified, so no offsets" if rectified else "signed"
+    note = f"{note}; {frames} frames in contact ({signs}), {found.alike} different contacts"
+    sensor = ElectrodeGains(note, [round(g, 4) for g in gain.tolist()], [round(o, 4) for o in offset.tolist()])
+    return Adapted(sensor, fitted, tuple(warnings))
+
+
+def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Gains with 1 in place of what the frames do not tell, which of them were fitted, and why the others not."""
+    wild = touched & ~((gain >= LEAST) & (gain <= MOST))
+    warnings = []
+    if not touched.all():
+        warnings.append(f"{_names(~touched)}: hardly touched in these recordings; gain kept at 1")
+    for electrode in np.flatnonzero(wild):
+        told = f"outside {LEAST:g} to {MOST:g}; kept at 1 (a dead channel?)"
+        warnings.append(f"E{electrode + 1}: gain {gain[electrode]:.2f} is {told}")
+    if found.alike < FEW_CONTACTS:
+        warnings.append(
+            f"only {found.alike} different contacts: gains are uncertain; touch more places, softly and hard"
+        )
+    if not found.settled:
+        warnings.append("the fit did not settle: gains are uncertain")
+    fitted = touched & ~wild
+    return np.where(fitted, gain, 1.0), fitted, warnings
+
+
+def _names(which: np.ndarray) -> str:
+    return ", ".join(f"E{electrode + 1}" for electrode in np.flatnonzero(which))

@@ -1,0 +1,131 @@
+"""The frame that moves with a contact: a window of the surface's lattice round the dent, by whole cells.
+
+A dent keeps its shape where it moves, which a fixed linear basis cannot say: a frame that moves with the contact is
+worth a factor of three (networks.md). Whole cells need no interpolation, so nothing is lost; what is left of the
+place, within half a cell, is told to the networks.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import sensors
+from ..accuracy import CORE
+from ..sensors import biotac
+
+STILL = 1e-9  # m: below, there is no dent to follow and the frame stays in the middle
+FADE = 5  # cells (assumed)
+PLACE_UNIT = 10.0  # cells a unit of the networks' inputs: places then are of the order of one (assumed)
+
+
+@dataclass(frozen=True)
+class ContactFrame:
+    """The lattice of one surface and the window that moves over it.
+
+    rows, columns : of the lattice; nodes behind them (poles) lie in no window
+    half : cells from the window's middle to its edge
+    turn : (n,) rad, by which each node's frame is turned about x against the shared one
+    """
+
+    rows: int
+    columns: int
+    half: int
+    turn: np.ndarray
+
+    @property
+    def width(self) -> int:
+        """Nodes across the window."""
+        return 2 * self.half + 1
+
+    @functools.cached_property
+    def _cosine_sine(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.cos(self.turn).astype(np.float32), np.sin(self.turn).astype(np.float32)
+
+    def to_local(self, displacement: np.ndarray) -> np.ndarray:
+        """(T, n, 3) m in the shared frame -> the same in each node's frame: along, inward, around."""
+        cosine, sine = self._cosine_sine
+        local = np.array(displacement, np.float32)
+        local[..., 1] = cosine * displacement[..., 1] - sine * displacement[..., 2]
+        local[..., 2] = sine * displacement[..., 1] + cosine * displacement[..., 2]
+        return local
+
+    def to_shared(self, local: np.ndarray) -> np.ndarray:
+        """Inverse of `to_local`, in place."""
+        if self.turn.any():
+            cosine, sine = self._cosine_sine
+            inward, around = local[..., 1].copy(), local[..., 2]
+            local[..., 1] = cosine * inward + sine * around
+            local[..., 2] = cosine * around - sine * inward
+        return local
+
+    def place(self, displacement: np.ndarray) -> np.ndarray:
+        """(T, n, 3) -> (T, 2) float32, where the dent lies: PLACE_UNIT cells from the lattice's middle, row and column.
+
+        The mean of the nodes that move more than `CORE` of the largest, weighted with how far they move.
+        """
+        grid = displacement[:, : self.rows * self.columns].astype(np.float32)
+        moved = np.sqrt(np.square(grid).sum(-1))
+        peak = moved.max(-1, keepdims=True)
+        weight = np.where((moved > CORE * peak) & (peak > STILL), moved, 0).reshape(-1, self.rows, self.columns)
+        total = weight.sum((1, 2))
+        some = np.where(total > 0, total, 1)
+        row = weight.sum(2) @ np.arange(self.rows, dtype=np.float32) / some
+        column = weight.sum(1) @ np.arange(self.columns, dtype=np.float32) / some
+        place = (np.stack([row, column], -1) - self._middle) / PLACE_UNIT
+        return np.where(total[:, None] > 0, place, 0).astype(np.float32)
+
+    def cells(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places (T, 2) -> the cell (T, 2) int of each, inside the lattice, and what is left of the place, in cells."""
+        at = np.where(np.isfinite(place), place, 0) * np.float32(PLACE_UNIT) + self._middle
+        cell = np.rint(np.minimum(np.maximum(at, 0), 2 * self._middle))
+        left = np.minimum(np.maximum(at - cell, -1), 1)  # a place off the lattice counts as its edge
+        return cell.astype(np.int64), left.astype(np.float32)
+
+    @functools.cached_property
+    def _middle(self) -> np.ndarray:
+        return np.array([self.rows - 1, self.columns - 1], np.float32) / 2
+
+    def fade(self) -> np.ndarray:
+        """(width, width) float32: 1 in the window's middle, falling over FADE cells to 0 beyond its edge."""
+        inside = 1 + self.half - np.abs(np.arange(-self.half, self.half + 1))
+        along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(inside / (FADE + 1), 1))
+        return np.outer(along, along).astype(np.float32)
+
+    def windows(self, local: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        """Field (T, n, 3) -> what lies in the window round each cell, (T, width, width, 3); 0 beyond the lattice."""
+        grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)
+        out = np.zeros((len(local), self.width, self.width, 3), local.dtype)
+        for frame, cell in enumerate(cells):
+            on_grid, in_window = self._overlap(cell)
+            out[frame][in_window] = grid[frame][on_grid]
+        return out
+
+    def add(self, local: np.ndarray, windows: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        """Add windows (T, width, width, 3) to the field (T, n, 3) round each cell, in place."""
+        grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)  # a view
+        for frame, cell in enumerate(cells):
+            on_grid, in_window = self._overlap(cell)
+            grid[frame][on_grid] += windows[frame][in_window]
+        return local
+
+    def _overlap(self, cell: np.ndarray) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+        """Slices of the lattice and of the window in which they meet."""
+        on_grid, in_window = [], []
+        for middle, size in zip(cell.tolist(), (self.rows, self.columns), strict=True):
+            first, last = max(middle - self.half, 0), min(middle + self.half + 1, size)
+            on_grid.append(slice(first, last))
+            in_window.append(slice(first - middle + self.half, last - middle + self.half))
+        return tuple(on_grid), tuple(in_window)
+
+
+def frame_of(sensor: str, half: int) -> ContactFrame:
+    """The moving frame of a sensor's surface; the BioTac's nodes are turned with their angle round its axis."""
+    lattice = sensors.sensor_surface(sensor)
+    turn = np.zeros(len(lattice.rest), np.float32)
+    if sensor == "biotac":
+        rows, columns = lattice.shape
+        turn[: rows * columns] = np.tile(biotac.angles(), rows)
+    return ContactFrame(*lattice.shape, half, turn)

@@ -1,0 +1,62 @@
+"""What an expected error is multiplied by so that 95 of 100 largest errors stay below: a factor for each place.
+
+Split conformal prediction in groups with the ratio of the errors as score (Lei et al. 2018, section 5.2; Vovk 2012).
+The groups are places along the finger where the answer lies, and silent answers: with one factor for all, bounds were
+too wide over the electrodes and too narrow beyond them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..errors import TactileError
+from .network_sizes import SURFACES
+from .weights import ADVICE
+
+LEVEL = 0.95
+EDGES = (-14e-3, -8e-3, -2e-3)  # m, x of the contact's middle: tip, first and last electrodes, base (assumed)
+PLACES = len(EDGES) + 2  # silent answers first
+FEWEST = 100  # contacts of a place: of fewer the 95 % quantile says little, and the factor of all counts (assumed)
+KINDS = ("signed", "rectified")
+
+
+def place(x: np.ndarray) -> np.ndarray:
+    """(T,) int, which factor counts. x : (T,) m, of the answer's middle along the finger, NaN where it is silent."""
+    return np.where(np.isnan(x), 0, 1 + np.searchsorted(EDGES, x, side="right"))
+
+
+def fit(ratio: np.ndarray, x: np.ndarray) -> list[float]:
+    """The PLACES factors that cover LEVEL of the contacts of each place, four digits.
+
+    ratio : (C,) largest error over expected error; x : (C,) m, as in `place`
+    """
+    every = _factor(ratio)
+    parts = [ratio[place(x) == each] for each in range(PLACES)]
+    return [_factor(part) if len(part) >= FEWEST else every for part in parts]
+
+
+def _factor(ratio: np.ndarray) -> float:
+    return float(f"{np.quantile(ratio, min(1.0, LEVEL * (1 + 1 / len(ratio)))):.4g}")
+
+
+def bound(expected: np.ndarray, x: np.ndarray, factors: list[float]) -> np.ndarray:
+    """(T,) float32 m, what 95 of 100 largest errors stay below. expected : (T,) m; x : (T,) m, as in `place`."""
+    return (np.asarray(factors)[place(x)] * expected).astype(np.float32)
+
+
+def check(card: Mapping[str, object], where: str) -> None:
+    """Raises TactileError unless the card has PLACES positive factors a surface for signed and rectified signals."""
+    bounds = card.get("error_bounds")
+    for kind in KINDS:
+        for name in SURFACES:
+            kinds = bounds.get(kind) if isinstance(bounds, dict) else None
+            value = kinds.get(name) if isinstance(kinds, dict) else None
+            if not (isinstance(value, list) and len(value) == PLACES and all(map(_is_factor, value))):
+                entry = f"{where}, error_bounds.{kind}.{name}"
+                raise TactileError(entry, f"{value!r:.80}", f"{PLACES} factors above 0, one a place", ADVICE)
+
+
+def _is_factor(value: object) -> bool:
+    return type(value) in (int, float) and 0 < value < 1e6

@@ -1,0 +1,80 @@
+"""What the networks' sizes in a card must be, and the tensors that follow from them: names and shapes of each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import TactileError
+from .layers import plain_shapes, residual_shapes
+from .weights import ADVICE
+
+ELECTRODES = 19
+SIGNAL_HIDDEN = (256, 128, 64)  # SVB of the authors' later code (sensors.md)
+PLACE = 2  # numbers of a mesh's latent that are the place of its dent
+SURFACES = ("biotac", "digit")
+ERROR_FEATURES = 3  # beside the latent: what SVB leaves, how large the signal is, whether it is rectified
+NETS = ("SVB", "MVB", "S2MPN", "R2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "error")
+MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small enough to refuse a damaged number
+
+
+def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]:
+    """Tensor names and shapes of one network from the sizes in its card."""
+    if net == "SVB":
+        latent, hidden = sizes["latent"], SIGNAL_HIDDEN
+        shapes = plain_shapes("encoder", (ELECTRODES + 1, *hidden, 2 * latent))
+        shapes |= plain_shapes("decoder", (latent, *hidden[::-1], ELECTRODES))
+        shapes |= {"distance.mean": (latent,), "distance.whitening": (latent, latent)}
+        return shapes | {"distance.residual": (ELECTRODES,)}
+    width, blocks = sizes["width"], sizes["blocks"]
+    if net in ("MVB", "MVD"):
+        wide, near, latent, window = sizes["wide"], sizes["near"], sizes["latent"], (2 * sizes["half"] + 1) ** 2
+        shapes = residual_shapes("encoder", wide + near + 2 * PLACE, 2 * (latent - PLACE), width, blocks)
+        shapes |= residual_shapes("decoder", latent + PLACE, wide + near, width, blocks)
+        shapes |= {"wide": (wide, 3 * sizes["nodes"]), "near": (near, 3 * window)}
+        return shapes | {"scale": (wide + near,), "turn": (sizes["nodes"],)}
+    return residual_shapes("map", sizes["inputs"], sizes["outputs"], width, blocks)
+
+
+_MESH = ("blocks", "columns", "half", "latent", "near", "nodes", "rows", "wide", "width")
+_MAP = ("blocks", "inputs", "outputs", "width")
+SIZE_NAMES = {net: {"SVB": ("latent",), "MVB": _MESH, "MVD": _MESH}.get(net, _MAP) for net in NETS}
+
+
+def card_entry(card: dict, net: str, path: Path) -> dict:
+    """The card's entry for one network: its sha256 and sizes."""
+    nets = card.get("nets")
+    entry = nets.get(net) if isinstance(nets, dict) else None
+    sizes = entry.get("sizes") if isinstance(entry, dict) else None
+    names = SIZE_NAMES[net]
+    whole = isinstance(sizes, dict) and sorted(sizes) == sorted(names)
+    whole = whole and all(type(size) is int and 0 <= size <= MAX_SIZE for size in sizes.values())
+    if not whole or not isinstance(entry.get("sha256"), str):
+        expected = f"sha256 and the sizes {', '.join(names)} as whole numbers"
+        raise TactileError(f"{path}, nets.{net}", "an incomplete entry", expected, ADVICE)
+    if "rows" in sizes and not 0 < sizes["rows"] * sizes["columns"] <= sizes["nodes"]:
+        found = f"a lattice of {sizes['rows']} x {sizes['columns']} in {sizes['nodes']} nodes"
+        raise TactileError(f"{path}, nets.{net}", found, "a lattice among the nodes", ADVICE)
+    return entry
+
+
+def check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
+    """The networks fit together: the latent one writes is the latent the next one reads."""
+    links = [
+        ("S2MPN", "inputs", sizes["SVB"]["latent"]),
+        ("S2MPN", "outputs", sizes["MVB"]["latent"]),
+        ("R2MPN", "inputs", sizes["SVB"]["latent"]),
+        ("R2MPN", "outputs", sizes["MVB"]["latent"]),
+        ("M2MPN", "inputs", sizes["MVB"]["latent"] + PLACE),
+        ("M2MPN", "outputs", sizes["MVD"]["latent"]),
+        ("D2BPN", "inputs", sizes["MVD"]["latent"] + PLACE),
+        ("D2BPN", "outputs", sizes["MVB"]["latent"]),
+        ("B2SPN", "inputs", sizes["MVB"]["latent"] + PLACE),
+        ("B2SPN", "outputs", sizes["SVB"]["latent"]),
+        ("error", "inputs", sizes["SVB"]["latent"] + ERROR_FEATURES),
+        ("error", "outputs", len(SURFACES)),
+        ("force", "inputs", sizes["MVB"]["latent"]),
+        ("force", "outputs", 3),
+    ]
+    for net, size, expected in links:
+        if sizes[net][size] != expected:
+            raise TactileError(f"{path}, nets.{net}", f"{size} {sizes[net][size]}", f"{expected}", ADVICE)

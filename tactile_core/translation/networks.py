@@ -1,0 +1,272 @@
+"""The five networks and the force estimate as numpy: what runs where there is no torch, Blender included.
+
+Every network of `training/modules.py` has its forward pass here, with the same tensor names; float32 throughout.
+SVB  signal autoencoder       MVB  BioTac mesh autoencoder       MVD  DIGIT mesh autoencoder
+S2MPN  signal latent -> BioTac latent       M2MPN  BioTac latent -> DIGIT latent
+R2MPN  as S2MPN, for rectified signals: what makes it cope with unknown units would make S2MPN worse
+D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
+force and error  heads: force from the BioTac's latent, expected error from the signal
+
+Results are computed in blocks of `BLOCK` frames, padded with zeros, so that a frame gives the same numbers whatever
+part of a recording it is asked for with: the matrix products then have the same shape (equal bits with OpenBLAS as
+measured by the tests' machines; where a BLAS splits work otherwise, equal to a relative 1e-5). A frame alone goes by
+itself, in a twentieth of the time, and is equal to a relative 1e-5.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import TactileError
+from ..files.shipped import shipped
+from .contact_frame import ContactFrame
+from .layers import Tensors, plain, residual
+from .network_sizes import ELECTRODES, NETS, PLACE, SIGNAL_HIDDEN, card_entry, check_chain, tensor_shapes
+from .weights import ADVICE, CARD_NAME, read_card, read_verified
+
+Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network
+BLOCK = 64  # frames a block: enough for matrix products at full speed
+COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
+FORCE_SCALE = 0.1  # N: the force is 0.1 N sinh(head), which spans light touches and firm presses alike (assumed)
+COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
+ERROR_UNIT = 10e-6  # m, of the error head's logarithm
+WEIGHTS_FOLDER = shipped("weights")
+# The card names the hash of every file of weights; this names the card that ships.
+SHIPPED_CARD_SHA256 = "b10f364ddb9ce12ceb6096912cb7bcbc44594daceb9c01e7af8c5691134e0840"
+
+
+@dataclass(frozen=True)
+class SignalDistance:
+    """How far signals lie from those the networks were trained on; the card holds quantiles of each.
+
+    mahalanobis : (T,) float32, distance of the signal latent to the training latents in their standard deviations
+    residual : (T,) float32, what SVB cannot reproduce, rms over the electrodes in units of its residual in validation
+    largest : (T,) float32, counts, largest absolute change of an electrode
+    """
+
+    mahalanobis: np.ndarray
+    residual: np.ndarray
+    largest: np.ndarray
+
+
+DISTANCES = tuple(field.name for field in fields(SignalDistance))
+
+
+def compress(change: np.ndarray) -> np.ndarray:
+    """Counts -> the scale the networks see: arcsinh(change / 15 counts).
+
+    A reading s has a noise variance of 1.5^2 + (0.1 s)^2 counts^2 (training augmentation); arcsinh(s / 15) is the
+    variance-stabilising transform of that law (Bartlett 1947), so a light touch weighs as much as a firm one.
+    """
+    return np.arcsinh(np.asarray(change, np.float32) / np.float32(COUNT_SCALE))
+
+
+def expand(compressed: np.ndarray) -> np.ndarray:
+    """Inverse of `compress`, in counts."""
+    return np.sinh(np.clip(compressed, -COMPRESSED_LIMIT, COMPRESSED_LIMIT)) * np.float32(COUNT_SCALE)
+
+
+class Networks:
+    """The trained networks. Arrays are float32, T first; displacements in metres, forces in newtons, changes in counts.
+
+    tensors : network -> tensor name -> array
+    card : the model card (see `training/export.py` for its fields)
+    sha256 : hash of the card, which pins every file: the name of these weights
+    """
+
+    def __init__(self, tensors: dict[str, Tensors], card: dict, sha256: str = "") -> None:
+        self.card, self.sha256 = card, sha256
+        self.sizes: dict[str, dict[str, int]] = {net: card["nets"][net]["sizes"] for net in NETS}
+        self.tensors = {
+            net: {name: np.ascontiguousarray(array, np.float32) for name, array in tensors[net].items()} for net in NETS
+        }
+        self.frames = {net: self._frame(net) for net in ("MVB", "MVD")}
+
+    def _frame(self, net: str) -> ContactFrame:
+        sizes = self.sizes[net]
+        return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"])
+
+    def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """change (T, 19) counts against rest, that fall (`sensors.COUNT_SIGN`), rectified (T,) or one ->
+        latent_signal (T, 8), SVB's mean."""
+        return self._blocks(self._encode_signal, *_signal(change, rectified), "encode_signal")
+
+    def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
+        """latent_signal (T, 8) -> change (T, 19) counts as SVB understood them."""
+        size = self.sizes["SVB"]["latent"]
+        return self._blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
+
+    def s2m(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """latent_signal (T, 8), rectified (T,) or one -> latent_biotac (T, L)."""
+        which = np.broadcast_to(np.asarray(rectified, bool), len(latent_signal))
+        if which.all() and len(which):
+            return self._map("R2MPN", latent_signal)
+        found = self._map("S2MPN", latent_signal)
+        if which.any():
+            found[which] = self._map("R2MPN", latent_signal)[which]
+        return found
+
+    def m2m(self, latent_biotac: np.ndarray) -> np.ndarray:
+        """latent_biotac (T, L) -> latent_digit (T, L')."""
+        return self._map_placed("M2MPN", "MVB", latent_biotac)
+
+    def m2m_back(self, latent_digit: np.ndarray) -> np.ndarray:
+        """latent_digit (T, L') -> latent_biotac (T, L)."""
+        return self._map_placed("D2BPN", "MVD", latent_digit)
+
+    def m2s(self, latent_biotac: np.ndarray) -> np.ndarray:
+        """latent_biotac (T, L) -> latent_signal (T, 8)."""
+        return self._map_placed("B2SPN", "MVB", latent_biotac)
+
+    def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """change (T, 19) counts, rectified (T,) or one -> (T, 2) m, expected largest node error on BioTac and DIGIT."""
+        return self._blocks(self._expected_error, *_signal(change, rectified), "expected_error")
+
+    def encode_biotac(self, displacement: np.ndarray) -> np.ndarray:
+        """displacement (T, N, 3) m of the BioTac's outer skin -> latent_biotac (T, L)."""
+        return self._encode_mesh("MVB", displacement)
+
+    def encode_digit(self, displacement: np.ndarray) -> np.ndarray:
+        """displacement (T, M, 3) m of the DIGIT's gel -> latent_digit (T, L')."""
+        return self._encode_mesh("MVD", displacement)
+
+    def decode_biotac(self, latent_biotac: np.ndarray) -> np.ndarray:
+        """latent_biotac (T, L) -> displacement (T, N, 3) m of the BioTac's outer skin."""
+        return self._decode_mesh("MVB", latent_biotac)
+
+    def decode_digit(self, latent_digit: np.ndarray) -> np.ndarray:
+        """latent_digit (T, L') -> displacement (T, M, 3) m of the DIGIT's gel."""
+        return self._decode_mesh("MVD", latent_digit)
+
+    def force(self, latent_biotac: np.ndarray) -> np.ndarray:
+        """latent_biotac (T, L) -> force (T, 3) N exerted by the object, sensor frame."""
+        return self._blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
+
+    def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
+        """change (T, 19) counts, rectified (T,) or one -> how far each frame lies from the training signals."""
+        distances = self._blocks(self._distance, *_signal(change, rectified), "signal_distance")
+        return SignalDistance(*np.ascontiguousarray(distances.T))
+
+    def _encode_signal(self, signal: np.ndarray) -> np.ndarray:
+        seen = np.concatenate([compress(signal[:, :ELECTRODES]), signal[:, ELECTRODES:]], -1)
+        hidden = plain(seen, self.tensors["SVB"], "encoder", len(SIGNAL_HIDDEN) + 1)
+        return hidden[:, : self.sizes["SVB"]["latent"]]
+
+    def _decode_signal(self, latent: np.ndarray) -> np.ndarray:
+        return plain(latent, self.tensors["SVB"], "decoder", len(SIGNAL_HIDDEN) + 1)
+
+    def _distance(self, signal: np.ndarray) -> np.ndarray:
+        tensors, latent, change = self.tensors["SVB"], self._encode_signal(signal), signal[:, :ELECTRODES]
+        steps = (latent - tensors["distance.mean"]) @ tensors["distance.whitening"]
+        left = (self._decode_signal(latent) - compress(change)) / tensors["distance.residual"]
+        largest = np.abs(change).max(-1)
+        return np.stack([np.sqrt(np.square(steps).sum(-1)), np.sqrt(np.square(left).mean(-1)), largest], -1)
+
+    def _expected_error(self, signal: np.ndarray) -> np.ndarray:
+        latent, change = self._encode_signal(signal), compress(signal[:, :ELECTRODES])
+        rest = self._decode_signal(latent) - change
+        features = [np.sqrt(np.square(each).mean(-1, keepdims=True)) for each in (rest, change)]
+        seen = np.concatenate([latent, *features, signal[:, ELECTRODES:]], -1)
+        head = residual(seen, self.tensors["error"], "map", self.sizes["error"]["blocks"])
+        return np.float32(ERROR_UNIT) * np.exp(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
+
+    def _force(self, latent: np.ndarray) -> np.ndarray:
+        head = residual(latent, self.tensors["force"], "map", self.sizes["force"]["blocks"])
+        return np.float32(FORCE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
+
+    def _map(self, net: str, latent: np.ndarray) -> np.ndarray:
+        tensors, sizes = self.tensors[net], self.sizes[net]
+        return self._blocks(lambda z: residual(z, tensors, "map", sizes["blocks"]), latent, (sizes["inputs"],), net)
+
+    def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
+        """Through a map that is told, beside the latent, what the whole cell leaves of its place."""
+        tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
+        size = self.sizes[vae]["latent"]
+        return self._blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
+
+    def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Latent (B, L) with what the whole cell leaves of its place (B, L + 2), and the cells (B, 2)."""
+        cells, left = self.frames[net].cells(latent[:, :PLACE])
+        return np.concatenate([latent, left], -1), cells
+
+    def _encode_mesh(self, net: str, displacement: np.ndarray) -> np.ndarray:
+        tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
+
+        def encode(block: np.ndarray) -> np.ndarray:
+            local = frame.to_local(block)
+            place = frame.place(local)
+            cells, left = frame.cells(place)
+            wide = local.reshape(len(local), -1) @ tensors["wide"].T
+            rest = local - (wide @ tensors["wide"]).reshape(local.shape)
+            near = frame.windows(rest, cells).reshape(len(local), -1) @ tensors["near"].T
+            seen = np.concatenate([np.concatenate([wide, near], -1) / tensors["scale"], place, left], -1)
+            code = residual(seen, tensors, "encoder", sizes["blocks"])[:, : sizes["latent"] - PLACE]
+            return np.concatenate([place, code], -1)
+
+        return self._blocks(encode, displacement, (sizes["nodes"], 3), f"{net} encoder")
+
+    def _decode_mesh(self, net: str, latent: np.ndarray) -> np.ndarray:
+        tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
+
+        def decode(block: np.ndarray) -> np.ndarray:
+            placed, cells = self._placed(net, block)
+            modes = residual(placed, tensors, "decoder", sizes["blocks"]) * tensors["scale"]
+            wide, near = modes[:, : sizes["wide"]], modes[:, sizes["wide"] :]
+            local = (wide @ tensors["wide"]).reshape(len(block), -1, 3)
+            windows = (near @ tensors["near"]).reshape(len(block), frame.width, frame.width, 3)
+            return frame.to_shared(frame.add(local, windows, cells))
+
+        return self._blocks(decode, latent, (sizes["latent"],), f"{net} decoder")
+
+    def _blocks(self, function: Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
+        """Apply a function in padded blocks, or to one frame alone; raises TactileError if x is not (T, *shape)."""
+        x = np.asarray(x, np.float32)
+        if x.shape[1:] != shape:
+            expected = "(T, " + ", ".join(map(str, shape)) + ")"
+            raise TactileError(f"networks, {name}", f"array of shape {x.shape}", expected, "Give frames first")
+        if len(x) == 1:
+            return function(x)
+        out: np.ndarray | None = None
+        for start in range(0, max(len(x), 1), BLOCK):  # an empty recording still tells the shape of its result
+            part = x[start : start + BLOCK]
+            if len(part) < BLOCK:
+                part = np.concatenate([part, np.zeros((BLOCK - len(part), *shape), np.float32)])
+            result = function(part)[: len(x) - start]
+            if out is None:
+                out = np.empty((len(x), *result.shape[1:]), np.float32)
+            out[start : start + BLOCK] = result
+        return out
+
+
+def _signal(change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarray, tuple[int]]:
+    """What SVB reads (T, 20) and the shape of a frame of it; wrong shapes are told by `_blocks`."""
+    change = np.asarray(change, np.float32)
+    if change.shape[1:] != (ELECTRODES,):
+        return change, (ELECTRODES,)
+    told = np.broadcast_to(np.asarray(rectified, np.float32), len(change))[:, None]
+    # A rectified change is read as one that falls, as most do; less its level at rest it may lie below zero.
+    change = np.where(told > 0, -np.abs(change), change)
+    return np.concatenate([change, told], -1), (ELECTRODES + 1,)
+
+
+def load(folder: str | os.PathLike | None = None) -> Networks:
+    """Read and verify a weights folder; None: the weights that ship with the package.
+
+    raises: TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)
+    """
+    shipped = folder is None
+    folder = Path(WEIGHTS_FOLDER if shipped else folder)
+    card, digest = read_card(folder)
+    if shipped and digest != SHIPPED_CARD_SHA256:
+        raise TactileError(folder / CARD_NAME, f"sha256 {digest}", SHIPPED_CARD_SHA256, ADVICE)
+    tensors = {}
+    for net in NETS:
+        entry = card_entry(card, net, folder / CARD_NAME)
+        tensors[net] = read_verified(folder / f"{net}.safetensors", entry["sha256"], tensor_shapes(net, entry["sizes"]))
+    check_chain({net: card["nets"][net]["sizes"] for net in NETS}, folder / CARD_NAME)
+    return Networks(tensors, card, digest)

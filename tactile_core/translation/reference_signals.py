@@ -1,0 +1,113 @@
+"""A few hundred simulated signals that stand for all contacts of the training: what `tactile adapt` matches to.
+
+They ship with the weights as ``signals.safetensors``, whose hash is in the card under "signals".
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import TactileError
+from . import weights
+from .gain_matching import match
+from .network_sizes import ELECTRODES
+from .networks import compress, expand
+
+FILE = "signals.safetensors"
+COUNT = 512  # typical signals; fewer are worse (gains of 30 % found to 16-20 % with 256, to 10-12 % with 512 and more)
+FEWEST = 16  # of them: from fewer contacts nothing can be matched (assumed)
+TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a signal tells nothing of gains
+TURNS = 15  # of k-means; more change nothing that matters
+MOST = 10_000  # signals that k-means looks at
+NOISE = 1.5  # counts (data README)
+TRIES = 2_000  # readings made up to find the match's own bias
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceSignals:
+    """typical : (P, 19) counts, signed; bias : what a match finds on the simulated signals themselves, log gain (19,).
+
+    The bias of signed and of rectified readings; a typical signal is a mean of signals, and so smaller than they are.
+    """
+
+    typical: np.ndarray
+    bias_signed: np.ndarray
+    bias_rectified: np.ndarray
+
+    def bias(self, rectified: bool) -> np.ndarray:
+        """(19,) log gain to take off a match."""
+        return self.bias_rectified if rectified else self.bias_signed
+
+
+def touching(change: np.ndarray) -> np.ndarray:
+    """(n,) bool: frames (n, 19) counts that say something of the gains."""
+    return np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
+
+
+def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
+    """Typical signals of simulated changes (C, 19) counts without noise: k-means in the networks' scale.
+
+    Raises TactileError where too few of them are contacts.
+    """
+    random = np.random.default_rng(seed)
+    signal = np.asarray(signal, np.float64)
+    signal = signal[touching(signal)]
+    if len(signal) < 2 * FEWEST:
+        raise TactileError("typical signals", f"{len(signal)} contacts", f"at least {2 * FEWEST}", "Make more pairs")
+    chosen = compress(signal[random.permutation(len(signal))[:MOST]]).astype(np.float64)
+    typical = expand(_k_means(chosen, random)).astype(np.float16).astype(np.float64)
+    read = signal[random.integers(len(signal), size=TRIES)] + NOISE * random.standard_normal((TRIES, ELECTRODES))
+    bias = [
+        match(np.abs(read) if rectified else read, typical, rectified, prior=0.01).log_gain
+        for rectified in (False, True)
+    ]
+    return ReferenceSignals(typical, *bias)
+
+
+def _k_means(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """(p, 19) centres of points (n, 19), beginning at some of them (Lloyd); at most COUNT, and half the points."""
+    count = min(COUNT, len(points) // 2)
+    centres = points[random.choice(len(points), count, replace=False)]
+    for _ in range(TURNS):
+        near = (np.square(centres).sum(axis=1) - 2 * points @ centres.T).argmin(axis=1)
+        sums = np.zeros_like(centres)
+        np.add.at(sums, near, points)
+        held = np.bincount(near, minlength=count)
+        centres = np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], centres)
+    return centres
+
+
+def write(folder: str | os.PathLike, signals: ReferenceSignals) -> dict:
+    """Write ``signals.safetensors`` into a weights folder; returns what the card says of it under "signals"."""
+    arrays = {
+        "typical": signals.typical.astype(np.float16),
+        "bias.signed": signals.bias_signed.astype(np.float32),
+        "bias.rectified": signals.bias_rectified.astype(np.float32),
+    }
+    data = weights.to_safetensors(arrays)
+    weights.write_bytes(Path(folder) / FILE, data)
+    return {"count": len(signals.typical), "file": FILE, "sha256": weights.sha256(data), "unit": "counts"}
+
+
+def read(folder: str | os.PathLike) -> ReferenceSignals:
+    """The typical signals of a weights folder.
+
+    Raises TactileError: a card without them, or a file that is missing, changed or of another shape.
+    """
+    card, _ = weights.read_card(folder)
+    entry = card.get("signals")
+    whole = isinstance(entry, dict) and isinstance(entry.get("sha256"), str)
+    if not whole or type(entry.get("count")) is not int or not 0 < entry["count"] <= MOST:
+        where = f"{Path(folder) / weights.CARD_NAME}, signals"
+        raise TactileError(where, "no typical signals", "their count and sha256", weights.ADVICE)
+    shapes = {"typical": (entry["count"], ELECTRODES), "bias.signed": (ELECTRODES,), "bias.rectified": (ELECTRODES,)}
+    arrays = weights.read_verified(Path(folder) / FILE, entry["sha256"], shapes)
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            raise TactileError(f"{Path(folder) / FILE}, {name}", "nan or infinite", "finite numbers", weights.ADVICE)
+    names = ("typical", "bias.signed", "bias.rectified")
+    return ReferenceSignals(*(arrays[name].astype(np.float64) for name in names))

@@ -1,0 +1,202 @@
+"""The three steps as one pure function: signals to BioTac deformation to DIGIT deformation, force and confidence."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import sys
+
+import numpy as np
+
+from .. import accuracy, sensors
+from ..errors import TactileError
+from ..recordings import Signals
+from ..recordings.flags import Flag
+from ..sensors import digit as digit_shape
+from ..sensors import unrolling as surface
+from . import error_bounds, networks
+from .error_bounds import KINDS
+from .network_sizes import SURFACES
+from .networks import Networks
+from .weights import ADVICE
+
+# Frames that differ from training in kind, not in degree, are worth little.
+UNTRAINED_CONFIDENCE = 0.2  # assumed
+FAR = 2.0  # times validation's outermost quantile: there confidence is gone (assumed)
+# Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
+# (scripts/evaluate_translation.py --kept-apart) it flags half of that part's frames, and most of those it should.
+IN_RANGE = 0.99
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Translation:
+    """What a recording becomes; T frames first, float32, SI units.
+
+    latent_signal (T, 8), latent_biotac, latent_digit : means of the networks' latents
+    displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
+    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, but for rectified signals
+    contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
+    confidence : (T,), 1 as in training, 0 far from it
+    expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
+        below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
+    flags : (T,) uint16, bits of ``flags.Flag``: those of the signals and OUT_OF_RANGE, BEYOND_DIGIT
+    """
+
+    latent_signal: np.ndarray
+    latent_biotac: np.ndarray
+    latent_digit: np.ndarray
+    displacement_biotac: np.ndarray
+    displacement_digit: np.ndarray
+    force: np.ndarray
+    contact_center: np.ndarray
+    confidence: np.ndarray
+    expected_error_biotac: np.ndarray
+    expected_error_digit: np.ndarray
+    error_bound_biotac: np.ndarray
+    error_bound_digit: np.ndarray
+    flags: np.ndarray
+
+
+def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
+    """The most that 99 of 100 frames of noise without contact make of a quantity of a card's ``silence``."""
+    return float(np.interp(0.99, silence["levels"], silence[quantity]))
+
+
+def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
+    """(T, 2) float32 m, (x, z) of the dent in a gel at ``rest``; NaN where no node moves by ``silent`` m."""
+    center = accuracy.dent_center(displacement, rest).astype(np.float32)
+    center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
+    return center
+
+
+class Translator:
+    """Verified networks, ready to translate. card : what they are; sha256 : of the card, which names all weights."""
+
+    def __init__(self, nets: Networks) -> None:
+        self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
+        self._unrolled = surface.unrolled_nodes()
+
+    def __call__(self, signals: Signals) -> Translation:
+        """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours."""
+        nets = self.nets
+        rectified = (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
+        change = np.asarray(signals.change, np.float32)
+        latent_signal = nets.encode_signal(change, rectified)
+        latent_biotac = nets.s2m(latent_signal, rectified)
+        latent_digit = nets.m2m(latent_biotac)
+        biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
+        center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m"))
+        # Without its sign a weak signal leaves the dent undecided, but not the force: strength would stutter.
+        silent = np.isnan(center[:, 0]) & ~rectified
+        confidence = self._confidence(change, signals.flags, rectified)
+        flags = signals.flags.copy()
+        flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
+        flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
+        return Translation(
+            latent_signal, latent_biotac, latent_digit, biotac, digit,
+            force=np.where(silent[:, None], np.float32(0), nets.force(latent_biotac)),
+            contact_center=center,
+            confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
+        )  # fmt: skip
+
+    def silent(self, quantity: str) -> float:
+        """As `silent_level`, of the card."""
+        return silent_level(self.card["silence"], quantity)
+
+    def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
+        """Expected largest errors and their bounds by the names of `Translation`; x : (T,) m of the contact's middle"""
+        expected, found = self.nets.expected_error(change, rectified), {}
+        for index, name in enumerate(SURFACES):
+            kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
+            found[f"expected_error_{name}"] = expected[:, index]
+            found[f"error_bound_{name}"] = np.where(rectified, kinds["rectified"], kinds["signed"])
+        return found
+
+    def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
+        """(T,) m, what 95 of 100 largest errors stay below, by `error_bounds.bound`."""
+        return error_bounds.bound(expected, x, self.card["error_bounds"][kind][surface])
+
+    def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """(T,) bool, whether changes (T, 19) counts lie outside those of the training, by any distance's quantile."""
+        return (self._distances(change, rectified) > self._quantile(IN_RANGE, rectified)).any(axis=0)
+
+    def _confidence(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> np.ndarray:
+        """(T,), 1 for signals like those of the training, 0 far from them.
+
+        Each distance to the training signals counts against its quantiles in validation: all is well up to the 95 %
+        quantile, nothing at ``FAR`` times the outermost. Not a calibrated probability: that is what bounds are for.
+        """
+        usual, far = self._quantile(0.95, rectified), FAR * self._quantile(1.0, rectified)
+        confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
+        untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
+        confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
+        return confidence.astype(np.float32)
+
+    def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
+        """(distances, T) of `networks.SignalDistance`."""
+        distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
+        return np.stack([getattr(distance, name) for name in networks.DISTANCES])
+
+    def _quantile(self, level: float, rectified: np.ndarray | bool) -> np.ndarray:
+        """(distances, T) or (distances, 1), what as many of validation's frames of the same kind lay within."""
+        table = self.card["distance"]
+        limits = {
+            kind: np.array([[np.interp(level, table["levels"], table[kind][name])] for name in networks.DISTANCES])
+            for kind in KINDS
+        }
+        return np.where(rectified, limits["rectified"], limits["signed"])
+
+    def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
+        """Whether the BioTac is touched (T,) where the gel has no counterpart: the dent's centre rolls off the gel."""
+        moved = accuracy.lengths(displacement)
+        peak = moved.max(axis=1, keepdims=True)
+        core = (moved > accuracy.CORE * peak) & (peak > self.silent("biotac_m"))
+        weight = np.where(core & np.isfinite(self._unrolled[:, 0]), moved, 0)
+        total = weight.sum(axis=1)
+        center = weight @ np.nan_to_num(self._unrolled) / np.where(total > 0, total, 1)[:, None]
+        outside = digit_shape.outline_distance(center[:, 0], center[:, 1]) <= 0
+        return core.any(axis=1) & (outside | (total == 0))
+
+
+def _check_quantiles(card: dict, where: str) -> None:
+    """What confidence and silence are measured by: growing finite numbers, as many as there are levels."""
+    _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
+    distance = card.get("distance") if isinstance(card.get("distance"), dict) else {}
+    for kind in KINDS:
+        table = distance.get(kind) if isinstance(distance.get(kind), dict) else {}
+        _check_table({"levels": distance.get("levels"), **table}, networks.DISTANCES, f"{where}, distance.{kind}")
+
+
+def _check_table(table: object, names: tuple[str, ...], where: str) -> None:
+    levels = table.get("levels") if isinstance(table, dict) else None
+    for name in ("levels", *names):
+        values = table.get(name) if isinstance(table, dict) else None
+        if not (_grows(values) and len(values) == len(levels)):
+            expected = "as many growing, finite numbers as levels"
+            raise TactileError(f"{where}.{name}", f"{values!r:.80}", expected, ADVICE)
+
+
+def _grows(values: object) -> bool:
+    numbers = isinstance(values, list) and len(values) > 0 and all(type(v) in (int, float) for v in values)
+    return numbers and all(0 <= v <= sys.float_info.max for v in values) and values == sorted(values)
+
+
+def load_translator(folder: str | os.PathLike | None = None) -> Translator:
+    """The networks of a weights folder, the shipped ones by default.
+
+    Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces.
+    """
+    nets = networks.load(folder)
+    card_file = f"{folder or networks.WEIGHTS_FOLDER}, card.json"
+    _check_quantiles(nets.card, card_file)
+    error_bounds.check(nets.card, card_file)
+    for key, here in (
+        ("biotac_nodes_sha256", sensors.biotac_surface().sha256),
+        ("digit_nodes_sha256", sensors.digit_surface().sha256),
+    ):
+        if nets.card.get(key) != here:
+            raise TactileError(
+                f"{card_file}, {key}", f"{str(nets.card.get(key))[:12]}...",
+                f"{here[:12]}..., the surface of this version", "Use weights trained with this version of the sensors",
+            )  # fmt: skip
+    return Translator(nets)

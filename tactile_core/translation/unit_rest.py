@@ -1,0 +1,77 @@
+"""What a unit's electrodes read without contact, from a set of its recordings that may hold no quiet part at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import TactileError
+from ..recordings import Recording
+from ..recordings.repair import fill
+from ..recordings.rest_level import TARED_PDC, level, window_frames
+from ..recordings.signal_kind import detect
+
+FEWEST = 3  # recordings: of fewer nothing says how far a grip is from rest (assumed)
+LEAST_PRESSED = 0.25  # share of the recordings, those of the lowest pressure, whose mean is taken for rest
+SPREAD_OVER = 0.5  # share of the recordings whose range tells how far rest may be off
+
+
+@dataclass(frozen=True)
+class UnitRest:
+    """counts : (19,), rest; spread : (19,) counts, half the range of the less pressed half of the recordings' levels,
+    or of their middle half.
+
+    pdc : counts, None where the recordings have none; recordings : how many rest was taken from
+    """
+
+    counts: np.ndarray
+    spread: np.ndarray
+    pdc: float | None
+    recordings: int
+
+
+def find_rest(recordings: Sequence[Recording]) -> UnitRest:
+    """Find one unit's rest in recordings that may all be of contacts.
+
+    Each gives the level of the window of its lowest fluid pressure; the least pressed quarter of the levels is
+    averaged. Where one of them has no PDC, each electrode's median over the recordings is taken instead: it holds as
+    long as different contacts leave different electrodes alone (on two real fingers, trials 01 to 03 of the PHAC set,
+    17 and 34 counts rms from what pressure gives; the least squeezed recordings by the sum of counts: 32 and 49).
+    Raises TactileError for fewer than three recordings, and for recordings that are not raw.
+    """
+    if len(recordings) < FEWEST:
+        advice = "Give more recordings of the unit, among them softly touched ones"
+        raise TactileError("rest of the unit", f"{len(recordings)} recordings", f"at least {FEWEST}", advice)
+    by_pressure = all(one.pdc is not None and np.isfinite(one.pdc).all() for one in recordings)
+    if not by_pressure:
+        levels = np.array([level(_raw(one)) for one in recordings])
+        low, middle, high = np.percentile(levels, [25, 50, 75], axis=0)
+        return UnitRest(middle, (high - low) / 2, None, len(levels))
+    levels, pressed = zip(*map(_least_pressed, recordings), strict=True)
+    order = np.argsort(pressed, kind="stable")
+    levels, pressed = np.array(levels)[order], np.array(pressed)[order]
+    few = max(1, round(LEAST_PRESSED * len(levels)))
+    half = levels[: max(2, round(SPREAD_OVER * len(levels)))]
+    tared = any(np.median(one.pdc) < TARED_PDC for one in recordings)  # each to a zero of its own
+    pdc = None if tared else float(pressed[:few].mean())
+    return UnitRest(levels[:few].mean(axis=0), np.ptp(half, axis=0) / 2, pdc, few)
+
+
+def _least_pressed(recording: Recording) -> tuple[np.ndarray, float]:
+    """Level (19,) counts of the window of the lowest pressure, and that pressure, counts of PDC."""
+    electrodes = _raw(recording)
+    n = min(window_frames(recording.rate), len(electrodes))
+    windows = np.convolve(recording.pdc, np.full(n, 1 / n), mode="valid")
+    start = int(np.argmin(windows))
+    return level(electrodes[start : start + n]), float(windows[start])
+
+
+def _raw(recording: Recording) -> np.ndarray:
+    """Counts (T, 19) without gaps. Raises TactileError for a recording of another kind."""
+    electrodes = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
+    kind, evidence = detect(electrodes)
+    if kind != "raw":
+        raise TactileError(recording.path, f"a {kind} recording ({evidence})", "raw counts, which have a rest to find")
+    return electrodes

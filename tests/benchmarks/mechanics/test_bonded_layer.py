@@ -1,0 +1,48 @@
+"""Known answers of bonded layers agree with each other where their ranges meet."""
+
+import numpy as np
+import pytest
+from benchmarks.mechanics.bonded_layer import dimitriadis, exact_layer
+
+BALL, YOUNGS = 1.0, 1e6
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.48, 0.5])
+def test_a_deep_layer_is_a_half_space(poisson):
+    depth = 1e-4
+    contact, found, force = exact_layer(depth, BALL, 1e4 * np.sqrt(BALL * depth), YOUNGS, poisson)
+    hertz = 4 / 3 * YOUNGS / (1 - poisson**2) * np.sqrt(BALL) * depth**1.5
+    # the layer's first correction is 1.133 sqrt(R d) / h at nu = .5
+    assert found == pytest.approx(depth, rel=1e-10)
+    assert force == pytest.approx(hertz, rel=1.5e-4)
+    assert contact == pytest.approx(np.sqrt(BALL * depth), rel=1.5e-4)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.48, 0.5])
+def test_dimitriadis_is_the_beginning_of_the_exact_solution(poisson):
+    """Its first correction is right (to the four digits of its coefficients), its second is too small."""
+    off = []
+    for ratio in (0.04, 0.1, 0.35):
+        depth = (ratio * 0.01) ** 2 / BALL
+        exact = exact_layer(depth, BALL, 0.01, YOUNGS, poisson)[2]
+        off.append(1 - dimitriadis(depth, BALL, 0.01, YOUNGS, poisson) / exact)
+    assert abs(off[0]) < 0.0003 and 0 < off[1] < 0.002 and 0.02 < off[2] < 0.05
+
+
+def test_exponent_grows_from_hertz_to_the_thin_layer():
+    """Force goes as depth^1.5 on a half space and as depth^3 on a thin incompressible layer."""
+    slopes = []
+    for ratio in (0.05, 1.0, 6.0):
+        depth = (ratio * 0.01) ** 2 / BALL
+        forces = [exact_layer(part * depth, BALL, 0.01, YOUNGS, 0.5)[2] for part in (0.99, 1.01)]
+        slopes.append(np.log(forces[1] / forces[0]) / np.log(1.01 / 0.99))
+    assert slopes[0] == pytest.approx(1.5, abs=0.05)
+    assert slopes[0] < slopes[1] < slopes[2] < 3.2
+
+
+def test_thin_incompressible_layer():
+    """F = (2 pi / 3) E R^2 d^3 / h^3, within the tenth that is left at a contact of eleven thicknesses."""
+    thickness, depth = 0.01, 36e-4
+    contact, _, force = exact_layer(depth, BALL, thickness, YOUNGS, 0.5)
+    assert contact / thickness == pytest.approx(11, abs=1)
+    assert force == pytest.approx(2 * np.pi / 3 * YOUNGS * BALL**2 * depth**3 / thickness**3, rel=0.13)

@@ -1,0 +1,79 @@
+"""Rows and report: what counts as missed, and what is written."""
+
+import json
+
+import pytest
+from benchmarks.mechanics import report, validate
+from benchmarks.mechanics.golden import GOLDEN_FORCE
+
+from tactile_core.accuracy import failed, order, row
+
+
+@pytest.fixture
+def script():
+    return validate
+
+
+def test_a_row_is_judged_by_its_size_or_from_below():
+    assert row("error", -0.4, "percent", 0.5)["ok"] is True
+    assert row("error", -0.6, "percent", 0.5)["ok"] is False
+    assert row("error", float("nan"), "percent", 0.5)["ok"] is False
+    assert row("order", 1.8, "1", 1.9, at_least=True)["ok"] is False
+    assert row("order", 2.8, "1", 1.9, at_least=True)["ok"] is True
+    assert row("time", 3.0, "s")["ok"] is None
+
+
+def test_slow_is_no_failure():
+    rows = [row("time", 3.0, "s", 1.0), row("memory", 3.0, "MB", 1.0), row("error", 3.0, "um", 1.0)]
+    assert [found["name"] for found in failed(rows)] == ["error"]
+
+
+def test_order_is_the_slope():
+    sizes = [1.0, 0.5, 0.25]
+    assert order(sizes, [7 * size**3 for size in sizes]) == pytest.approx(3, rel=1e-12)
+
+
+def test_report_holds_every_row_and_small_plots(tmp_path):
+    forces = [row(f"golden_force_{depth * 1e3:.1f}mm_error", 0.1, "percent", 0.5) for depth in GOLDEN_FORCE]
+    refined = [
+        row(f"disc_{name}_{depth}mm_{spacing}", spacing, "percent")
+        for name in ("force_error", "shape_rms") for depth in ("0.6", "1.4") for spacing in (0.4, 0.2, 0.1)
+    ]  # fmt: skip
+    speed = [row("digit_fast_0.2mm_shape_rms", 3.0, "um", 2.0), row("digit_fast_0.2mm_time", 2.0, "ms")]
+    report.write(tmp_path / "mechanics.md", {"Golden": forces, "Refined": refined, "Speed": speed})
+    text = (tmp_path / "mechanics.md").read_text(encoding="utf-8")
+    for found in forces + refined + speed:
+        assert report.line(found) in text
+    assert text.count("MISSED") == 1
+    plots = sorted(tmp_path.glob("*.png"))
+    assert [plot.name for plot in plots] == ["mechanics_force.png", "mechanics_spacing.png", "mechanics_speed.png"]
+    assert all(f"({plot.name})" in text and plot.stat().st_size < 100_000 for plot in plots)
+
+
+def test_script_writes_its_rows_and_says_what_missed(script, monkeypatch, tmp_path, capsys):
+    good, bad, slow = row("a", 0.1, "1", 1.0), row("b", 2.0, "1", 1.0), row("c", 2.0, "s", 1.0)
+    monkeypatch.setattr(script, "CHECKS", {"good": (lambda quick: [good, slow], ""), "bad": (lambda quick: [bad], "")})
+    assert script.main(["--quick", "--only", "good", "--json", str(tmp_path / "rows.json")]) == 0
+    assert json.loads((tmp_path / "rows.json").read_text()) == [good, slow]
+    assert script.main(["--quick"]) == 1
+    said = capsys.readouterr()
+    assert "MISSED: b = 2.0 1, target 1.0" in said.err and report.line(bad) in said.out
+
+
+def test_a_check_that_breaks_off_is_a_miss_and_the_others_go_on(script, monkeypatch, tmp_path, capsys):
+    good = row("a", 0.1, "1", 1.0)
+
+    def broken(quick):
+        yield good
+        raise ArithmeticError("no equilibrium")
+
+    monkeypatch.setattr(script, "CHECKS", {"broken": (broken, ""), "good": (lambda quick: [good], "")})
+    assert script.main(["--quick", "--json", str(tmp_path / "rows.json")]) == 1
+    rows = json.loads((tmp_path / "rows.json").read_text())
+    assert [found["name"] for found in rows] == ["a", "broken_completed", "a"]
+    assert "no equilibrium" in capsys.readouterr().err
+
+
+def test_script_offers_its_checks(script):
+    assert len(script.CHECKS) >= 12
+    assert all(callable(rows) and 0 < len(shows) < 120 for rows, shows in script.CHECKS.values())

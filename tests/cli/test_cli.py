@@ -1,0 +1,324 @@
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import fake_tools
+import pytest
+
+from tactile_core.cli.main import main
+from tactile_core.cli.verbs import VERBS
+from tactile_core.jobs import convert
+from tactile_core.translation import networks
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def tactile(monkeypatch, capsys):
+    """Run a command line in this process, without networks; returns (status, stdout, stderr)."""
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+
+    def run(*arguments):
+        status = main([str(argument) for argument in arguments])
+        return status, *capsys.readouterr()
+
+    return run
+
+
+def command(*arguments, **more) -> subprocess.CompletedProcess:
+    """Run the real command in a process of its own."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    line = [sys.executable, "-m", "tactile_core", *map(str, arguments)]
+    return subprocess.run(line, env=environment, capture_output=True, text=True, timeout=120, **more)
+
+
+def only_line(text: str) -> str:
+    (line,) = text.splitlines()
+    return line
+
+
+@pytest.mark.parametrize("verb", ["convert", "info", "render", "simulate", "pairs", "train", "mesh", "adapt"])
+def test_each_verb_teaches_with_an_example(verb, capsys):
+    with pytest.raises(SystemExit) as leave:
+        main([verb, "--help"])
+    assert leave.value.code == 0
+    assert f"  tactile {verb} " in capsys.readouterr().out
+
+
+def test_help_names_every_verb_and_the_exit_statuses():
+    done = command("--help")
+    assert done.returncode == 0
+    assert all(word in done.stdout for word in (*VERBS, "Exit status"))
+
+
+def test_help_costs_no_numpy():
+    code = """
+import sys
+from tactile_core.cli import main as cli, verbs
+for verb in ([], *([name] for name in verbs.VERBS)):
+    try: cli.main([*verb, "--help"])
+    except SystemExit: pass
+assert not {"numpy", "scipy", "h5py", "tqdm"} & set(sys.modules), sorted(sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": str(ROOT)},
+                          capture_output=True, text=True, timeout=60)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("arguments", [[], ["convert"], ["convert", "a.csv"], ["fly"], ["convert", "a", "--out"]])
+def test_a_wrong_command_line_exits_with_2(arguments, capsys):
+    with pytest.raises(SystemExit) as leave:
+        main(arguments)
+    assert leave.value.code == 2
+    assert "usage: tactile" in capsys.readouterr().err
+
+
+def test_convert_names_its_folder_and_tells_its_warnings(tactile, slide_csv, tmp_path):
+    status, out, err = tactile("convert", slide_csv(), "--out", tmp_path / "out")
+    assert status == 0
+    assert only_line(out) == str(tmp_path / "out" / "touch")
+    assert all(line.startswith("tactile: warning: touch: ") for line in err.splitlines())
+    assert "out_of_range" in err
+
+
+def test_one_bad_recording_is_named_and_the_others_go_on(tactile, slide_csv, tmp_path):
+    paths = [slide_csv("a"), tmp_path / "absent.csv", slide_csv("b")]
+    status, out, err = tactile("convert", *paths, "--out", tmp_path / "out", "--keep", "")
+    assert status == 2
+    assert [Path(line).name for line in out.splitlines()] == ["a", "b"]
+    errors = [line for line in err.splitlines() if line.startswith("tactile: error:")]
+    assert "absent.csv: there is no such file" in errors[0]
+    assert errors[1] == "tactile: error: 1 of 3 recordings were not converted"
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a", "b"]
+
+
+def truncated(lines: list[str]) -> list[str]:
+    return [*lines[:-1], lines[-1][: len(lines[-1]) // 2]]
+
+
+def without_ele7(lines: list[str]) -> list[str]:
+    at = lines[0].split(",").index("ele7")
+    return [",".join(line.split(",")[:at] + line.split(",")[at + 1 :]) for line in lines]
+
+
+def text_cell(lines: list[str]) -> list[str]:
+    cells = lines[10].split(",")
+    return [*lines[:10], ",".join([*cells[:28], "broken", *cells[29:]]), *lines[11:]]
+
+
+def time_goes_back(lines: list[str]) -> list[str]:
+    return [*lines[:40], lines[41], lines[40], *lines[42:]]
+
+
+def biotac_sp(lines: list[str]) -> list[str]:
+    return [",".join(f"ff_e{i}" for i in range(1, 25)), *[",".join(["3000"] * 24)] * 50]
+
+
+# What a user can give `convert`: how the file is damaged, the exit status, and words of the message or warning.
+DAMAGES = {
+    "truncated": (truncated, 0, "line 151"),
+    "missing column": (without_ele7, 2, "ele7"),
+    "text cell": (text_cell, 0, "line 11, ele3"),
+    "empty": (lambda lines: [], 2, "empty"),
+    "header only": (lambda lines: lines[:1], 2, "without data rows"),
+    "24 electrodes": (biotac_sp, 2, "BioTac SP"),
+    "time goes back": (time_goes_back, 0, "time stamps"),
+    "shorter than the tare window": (lambda lines: lines[:6], 0, "no quiet part"),
+    "no recording": (lambda lines: ["name,colour", "apple,red"], 2, "no known recording"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_recording_ends_in_one_message_or_in_flagged_frames(damage, tactile, slide_csv, tmp_path):
+    harm, expected, words = DAMAGES[damage]
+    path = slide_csv()
+    path.write_text("\n".join(harm(path.read_text().splitlines())))
+    status, out, err = tactile("convert", path, "--out", tmp_path / "out", "--keep", "")
+    assert status == expected
+    assert words in err
+    if status:
+        assert only_line(err).startswith(f"tactile: error: {path}")
+        assert list((tmp_path / "out").iterdir()) == []
+    else:
+        assert (Path(only_line(out)) / "contact_sheet.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--frames", "7"], "--frames"),
+        (["--keep", "pictures"], "--keep"),
+        (["--tare", "soon"], "tare"),
+        (["--tare", "100:5000"], "tare"),
+        (["--frames", "900:"], "none of the 150 frames"),
+    ],
+)
+def test_bad_options_end_in_one_message(arguments, words, tactile, slide_csv, tmp_path):
+    status, _, err = tactile("convert", slide_csv(), "--out", tmp_path / "out", *arguments)
+    assert status == 2
+    assert words in only_line(err)
+
+
+def test_options_reach_the_note(tactile, slide_csv, tmp_path):
+    path, out = slide_csv(), tmp_path / "out"
+    given = ("--kind", "raw", "--tare", "0:40", "--no-drift", "--keep", "latent", "--frames", "::3")
+    assert tactile("convert", path, "--out", out, *given)[0] == 0
+    options = json.loads((out / "touch" / "note.json").read_text(encoding="utf-8"))["options"]
+    assert options["keep"] == ["latent"] and options["frames"] == "::3"
+    prepare = options["prepare"]
+    assert (prepare["kind"], prepare["tare"], prepare["drift"]) == ("raw", "0:40", False)
+
+
+def test_an_older_result_stops_before_any_work(tactile, slide_csv, tmp_path, monkeypatch):
+    path = slide_csv()
+    assert tactile("convert", path, "--out", tmp_path / "out", "--keep", "")[0] == 0
+    monkeypatch.setattr(convert, "convert", lambda *arguments: pytest.fail("work was done"))
+    status, _, err = tactile("convert", slide_csv("new"), path, "--out", tmp_path / "out")
+    assert status == 2
+    assert "already holds a result" in only_line(err) and "--overwrite" in err
+
+
+def test_an_output_that_is_a_file_stops_before_any_work(tactile, slide_csv, monkeypatch):
+    path = slide_csv()
+    monkeypatch.setattr(convert, "convert", lambda *arguments: pytest.fail("work was done"))
+    status, _, err = tactile("convert", path, "--out", path)
+    assert status == 2
+    assert "cannot be written" in only_line(err)
+
+
+def test_missing_weights_end_in_one_message(slide_csv, tmp_path):
+    done = command("convert", slide_csv(), "--out", tmp_path / "out", "--weights", tmp_path / "none")
+    assert done.returncode == 2
+    assert only_line(done.stderr).startswith(f"tactile: error: {tmp_path / 'none'}")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_weights_with_a_flipped_byte_end_in_one_message(slide_csv, tmp_path, capsys):
+    copy = Path(shutil.copytree(networks.WEIGHTS_FOLDER, tmp_path / "weights"))
+    file = copy / "S2MPN.safetensors"
+    content = bytearray(file.read_bytes())
+    content[-7] ^= 1
+    file.write_bytes(content)
+    status = main(["convert", str(slide_csv()), "--out", str(tmp_path / "out"), "--weights", str(copy)])
+    assert status == 2
+    assert "S2MPN.safetensors" in only_line(capsys.readouterr().err)
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_the_shipped_weights_convert_a_recording(slide_csv, tmp_path):
+    done = command("convert", slide_csv(frames=70), "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert len(list((tmp_path / "out" / "touch" / "images").iterdir())) == 70
+
+
+def test_info_describes_and_goes_on_after_a_bad_file(tactile, slide_csv, tmp_path):
+    status, out, err = tactile("info", tmp_path / "absent.csv", slide_csv())
+    assert status == 2
+    assert "19 electrodes" in out and "150" in out
+    assert "absent.csv" in only_line(err)
+
+
+def test_info_may_be_cut_by_its_reader(slide_csv):
+    line = f'"{sys.executable}" -m tactile_core info {" ".join([str(slide_csv())] * 40)}'
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {line} | head -n 1"],
+        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)}, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["pairs", "absent.toml", "--count", "4", "--out", "p.h5"], "absent.toml"),
+        (["pairs", "absent.toml", "--count", "4", "--out", "p.h5", "--workers", "0"], "--workers"),
+        (["pairs", "absent.toml", "--count", "4", "--out", "p.h5", "--seed", "-1"], "--seed"),
+        (["simulate", "absent.toml", "--out", "r.h5"], "absent.toml"),
+        (["simulate", "absent.toml", "--out", "r.h5", "--isaac-like", "absent.tet"], "absent.toml"),
+        (["simulate", "absent.toml", "--out", "r.h5", "--core", "core.obj"], "--core"),
+        (["simulate", "absent.toml", "--out", "r.h5", "--seed", "-1"], "--seed"),
+        (["train", "absent.h5", "--out", "t", "--seed", "-1"], "--seed"),
+        (["train", "absent.h5", "--out", "t", "--effort", "nan"], "--effort"),
+    ],
+)
+def test_bad_jobs_end_in_one_message(arguments, words, tactile, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, _, err = tactile(*arguments)
+    assert status == 2
+    assert words in only_line(err)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_frames_that_an_isaac_like_run_missed_are_told(tactile, tmp_path, monkeypatch):
+    from tactile_core.simulation import isaac_recording
+
+    asked = []
+    monkeypatch.setattr(isaac_recording, "simulate_isaac_like", lambda *given: asked.append(given[:4]) or 3)
+    given = ("simulate", "scene", "--isaac-like", "skin.tet", "--core", "core.obj", "--out", tmp_path / "a.h5")
+    status, out, err = tactile(*given)
+    assert (status, out) == (0, f"{tmp_path / 'a.h5'}\n")
+    assert "3 frames did not reach their force" in only_line(err)
+    assert asked == [("scene", "skin.tet", str(tmp_path / "a.h5"), "core.obj")]
+
+
+def test_a_verb_names_the_extra_it_lacks(tactile, monkeypatch, tmp_path):
+    def absent(options):
+        raise ModuleNotFoundError("No module named 'torch'", name="torch")
+
+    monkeypatch.setattr(VERBS["train"], "run", absent)
+    status, _, err = tactile("train", "pairs.h5", "--out", tmp_path)
+    assert status == 2
+    assert 'pip install "tactile-core[train]"' in only_line(err)
+
+
+def test_ctrl_c_ends_in_one_line(tactile, slide_csv, tmp_path, monkeypatch):
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(convert, "convert", interrupted)
+    status, _, err = tactile("convert", slide_csv(), "--out", tmp_path / "out")
+    assert status == 130
+    assert only_line(err).startswith("tactile: interrupted")
+
+
+@pytest.mark.parametrize(("verb", "left"), [("pairs", "goes on"), ("train", "goes on"), ("simulate", "no half file")])
+def test_what_an_interrupted_verb_leaves_is_told(verb, left, tactile, tmp_path, monkeypatch):
+    def interrupted(options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(VERBS[verb], "run", interrupted)
+    count = ["--count", "4"] if verb == "pairs" else []
+    status, _, err = tactile(verb, "given", "--out", tmp_path / "out", *count)
+    assert status == 130
+    assert left in only_line(err)
+
+
+@pytest.mark.parametrize("verb", ["convert", "simulate", "pairs", "train"])
+def test_an_empty_out_is_refused(verb, tactile, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    count = ["--count", "4"] if verb == "pairs" else []
+    status, _, err = tactile(verb, "given", "--out", "", *count)
+    assert status == 2
+    assert only_line(err).startswith("tactile: error: --out: an empty name")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows allows no line break in a file name")
+def test_each_warning_is_one_line(tactile, slide_csv, tmp_path):
+    status, _, err = tactile("convert", slide_csv("two\nlines"), "--out", tmp_path / "out", "--keep", "")
+    assert status == 0
+    assert err
+    assert all(line.startswith("tactile: warning: two lines: ") for line in err.splitlines())
+
+
+def test_progress_is_silent_without_a_terminal_unless_asked(tactile, slide_csv, tmp_path):
+    path = slide_csv(frames=5)
+    _, _, quiet = tactile("convert", path, "--out", tmp_path / "a", "--keep", "")
+    _, _, told = tactile("convert", path, "--out", tmp_path / "b", "--keep", "", "--progress")
+    assert "5/5" in told and "5/5" not in quiet

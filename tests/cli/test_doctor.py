@@ -1,0 +1,68 @@
+"""`tactile doctor` tells, and never fails."""
+
+from __future__ import annotations
+
+import pytest
+
+from tactile_core.cli import doctor
+from tactile_core.cli.main import main
+from tactile_core.pictures.mitsuba import variant
+
+
+def test_every_library_is_named(capsys, monkeypatch):
+    few = [library for library in doctor.LIBRARIES if library.module in ("numpy", "h5py", "mitsuba")]
+    monkeypatch.setattr(doctor, "LIBRARIES", few)  # torch alone takes seconds
+    assert main(["doctor"]) == 0
+    told = capsys.readouterr().out
+    assert all(library.package in told for library in doctor.LIBRARIES)
+    assert "pictures: " in told
+
+
+@pytest.mark.parametrize(
+    ("module", "words"),
+    [("no_such_library", "missing, pip install"), ("broken_library", "ValueError: torn"), ("crashing_library", "exit")],
+)
+def test_a_library_that_fails_is_told(module, words, tmp_path, monkeypatch):
+    (tmp_path / "broken_library.py").write_text("raise ValueError('torn')")
+    (tmp_path / "crashing_library.py").write_text("import os; os._exit(7)")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(tmp_path)
+    version, trouble = doctor.try_library(doctor.Library(module, module, "fem", "nothing"))
+    assert version == "" and words in trouble
+
+
+def test_without_llvm_it_says_why_and_how_to_get_it(monkeypatch):
+    monkeypatch.setattr(doctor, "llvm_trouble", lambda library: "LLVM was not found")
+    lines = list(doctor._mitsuba(True))
+    assert "scalar_rgb" in lines[0] and "LLVM was not found" in lines[0]
+    assert "LLVM 18 or newer" in lines[1]
+    assert "fast alone" in next(doctor._mitsuba(False))
+
+
+def test_a_path_to_nothing_is_trouble(monkeypatch):
+    variant.llvm_trouble.cache_clear()
+    assert (
+        "not there" in variant.llvm_trouble("/no/such/libLLVM.so") or variant.llvm_trouble("/no/such/libLLVM.so") == ""
+    )
+
+
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        ("LLVM 19 /usr/lib/libLLVM.so.19.1\n", ""),
+        ("", ""),
+        ("LLVM 16 /usr/lib/libLLVM-16.so\n", "is LLVM 16"),
+        ("LLVM 0 /usr/lib/my libLLVM-15.so\n", "my libLLVM-15.so is LLVM before 16"),
+    ],
+)
+def test_an_old_llvm_is_not_trusted(told, words):
+    assert words in variant._too_old(told)
+    assert bool(variant._too_old(told)) == bool(words)
+
+
+def test_nothing_is_imported_from_the_current_folder(tmp_path, monkeypatch):
+    """A stranger's folder may hold an h5py.py; the probe of Mitsuba's LLVM is started in the same way."""
+    (tmp_path / "h5py.py").write_text("open('ran', 'w')\n")
+    monkeypatch.chdir(tmp_path)
+    version, trouble = doctor.try_library(next(one for one in doctor.LIBRARIES if one.module == "h5py"))
+    assert version and not trouble and not (tmp_path / "ran").exists()

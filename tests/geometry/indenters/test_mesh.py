@@ -1,0 +1,156 @@
+"""Mesh indenters: the smooth grid against the mesh and the analytic shape, placing, cache."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from tactile_core.files.cache import cache_folder
+from tactile_core.geometry.indenters import Box, MeshIndenter, Sphere, mesh, pose_on
+
+BALL = Sphere(2.5e-3)
+SPACING = 0.2e-3
+
+
+def near_ball(count=2000):
+    """Places within 0.5 mm of the ball's surface."""
+    random = np.random.default_rng(0)
+    along = random.standard_normal((count, 3))
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return [0, 0, 2.5e-3] + along * (2.5e-3 + random.uniform(-0.5e-3, 0.5e-3, (count, 1)))
+
+
+def test_ball_agrees_with_the_sphere(ball):
+    points = near_ball()
+    (distance, normal), (exact, exact_normal) = ball.distance(points), BALL.distance(points)
+    # um: facets of 0.17 mm lie up to 0.17^2 / (6 x 2.5) = 2 um under the sphere, corners on it; the spline adds 2.
+    assert np.abs(distance - exact).max() < 5e-6
+    assert np.sqrt(np.mean((distance - exact) ** 2)) < 2.5e-6
+    # Facets lean by up to 0.17 / 2 / 2.5 rad = 2 degrees, which the spline smooths.
+    angle = np.degrees(np.arccos(np.clip((normal * exact_normal).sum(axis=1), -1, 1)))
+    assert angle.mean() < 0.5 and angle.max() < 2
+
+
+def test_error_is_measured(ball):
+    rms, largest = ball.error
+    assert 0 < rms < 1e-6 and rms < largest < 4e-6  # against the mesh itself, so without the facets
+
+
+def test_normal_and_curvature_belong_to_the_level_surface(ball):
+    points = near_ball(300)
+    value, slope = ball.grid.value_and_gradient(points)
+    distance, normal = ball.distance(points)
+    curvature = ball.curvature(points)
+    step = 1e-7
+    turn = np.empty((300, 3, 3))
+    for k, axis in enumerate(np.eye(3) * step):
+        ahead, behind = (ball.grid.value_and_gradient(points + s * axis)[0] for s in (1, -1))
+        np.testing.assert_allclose((ahead - behind) / (2 * step), slope[:, k], atol=1e-6)
+        turn[:, :, k] = (ball.distance(points + axis)[1] - ball.distance(points - axis)[1]) / (2 * step)
+    np.testing.assert_array_equal(distance, value)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, rtol=1e-12)
+    np.testing.assert_allclose(normal * np.linalg.norm(slope, axis=1)[:, None], slope, atol=1e-12)
+    along = np.eye(3) - normal[:, :, None] * normal[:, None, :]
+    # 1/m; the spline's third derivative, some 1e7 / m2, times the step, which may cross a cell's border.
+    np.testing.assert_allclose(curvature, along @ turn @ along, atol=2)
+    np.testing.assert_allclose(curvature, curvature.swapaxes(1, 2), atol=1e-9)
+
+
+def test_beyond_the_grid_the_distance_goes_on(ball):
+    far = np.array([[9e-3, 0, 2.5e-3], [0, 0, -6e-3], [7e-3, 7e-3, 12e-3], [0.1, 0, 0]])
+    distance, normal = ball.distance(far)
+    exact, exact_normal = BALL.distance(far)
+    assert (distance >= exact - 5e-6).all()  # the way round by the grid's box is no shorter
+    assert (distance < 1.5 * exact).all()
+    assert ((normal * exact_normal).sum(axis=1) > 0.8).all()
+    assert np.isfinite(ball.curvature(far)).all()
+    edge = ball.grid.origin[0] + ball.grid.spacing * (ball.grid.coefficients.shape[0] - 2)
+    sides = np.array([[edge - 1e-9, 0, 2.5e-3], [edge + 1e-9, 0, 2.5e-3]])
+    assert np.ptp(ball.distance(sides)[0]) < 1e-8
+
+
+def test_pose_just_touches(ball):
+    pose = pose_on(ball, np.array([1e-3, 2e-3, 3e-3]), np.array([0.0, -0.6, 0.8]), 0.3, 1.0)
+    distance, normal = pose.distance(ball, np.array([[1e-3, 2e-3, 3e-3]]))
+    assert abs(distance[0]) < 5e-6  # a vertex of the mesh, against its smooth surface
+    assert normal[0] @ [0, 0.6, -0.8] > 0.998  # 3.6 degrees: facets lean by 2
+
+
+@pytest.mark.parametrize(("up", "shift"), [("z", 0), ("x", 1), ("y", 2), ("-z", 0), ("-x", 1), ("-y", 2)])
+def test_any_axis_may_point_up(tmp_path, up, shift):
+    """A box whose size tells its axes, far from the file's origin, in metres."""
+    solid = trimesh.creation.box(np.roll([1e-3, 2e-3, 3e-3], shift))
+    solid.apply_translation([5e-3, -3e-3, 2e-3])
+    solid.export(tmp_path / "box.ply")
+    indenter = MeshIndenter.from_file(tmp_path / "box.ply", scale=1.0, up=up, spacing=0.25e-3)
+    lower, upper = indenter.bounds()
+    np.testing.assert_allclose(upper - lower, [1e-3, 2e-3, 3e-3], atol=1e-9)
+    np.testing.assert_allclose((lower + upper) / 2, [0, 0, 1.5e-3], atol=1e-9)
+
+
+def test_up_may_point_down():
+    """A cone stands on its base, or, upside down, on its tip."""
+    for up, sign in (("z", 1), ("-z", -1)):
+        turn = mesh.mesh_file._turn(up)
+        assert np.linalg.det(turn) == pytest.approx(1)
+        np.testing.assert_array_equal(turn @ [0, 0, 1], [0, 0, sign])
+
+
+@pytest.mark.parametrize("suffix", ["obj", "off", "ply", "stl"])
+def test_every_format_gives_the_same_body(tmp_path, suffix):
+    path = tmp_path / f"box.{suffix}"
+    trimesh.creation.box((3, 3, 3)).export(path)
+    indenter = MeshIndenter.from_file(path, spacing=0.25e-3)
+    points = np.random.default_rng(1).uniform(-0.25e-3, 0.25e-3, (200, 3))
+    exact, _ = Box((3e-3,) * 3, 2e-6).distance(points)
+    # What edges do to a spline fades by 0.27 a node, and they and the creases inside are 4 nodes away.
+    np.testing.assert_allclose(indenter.distance(points)[0], exact, atol=1e-6)
+
+
+def test_hollow_and_separate_bodies_are_fine(tmp_path):
+    shell = trimesh.creation.icosphere(2, 2.0)
+    cavity = trimesh.creation.icosphere(2, 1.0)
+    cavity.invert()
+    other = trimesh.creation.icosphere(2, 1.0)
+    other.apply_translation([3.5, 0, 0])
+    trimesh.util.concatenate([shell, cavity, other]).export(tmp_path / "bodies.stl")
+    indenter = MeshIndenter.from_file(tmp_path / "bodies.stl", spacing=0.25e-3)
+    distance, _ = indenter.distance(np.array([[0, 0, 2.2e-3], [0, 0, 0.5e-3], [3.5e-3, 0, 2e-3], [0, 0, -0.5e-3]]))
+    assert distance[0] > 0.5e-3 and distance[3] > 0.4e-3
+    assert distance[1] < -0.3e-3 and distance[2] < -0.3e-3
+
+
+def test_the_cache_gives_the_same_bytes(ball, ball_file):
+    (kept,) = [path for path in cache_folder().glob("indenter-*.npz") if len(load(path)["hull"]) == len(ball.hull)]
+    written, changed = kept.read_bytes(), kept.stat().st_mtime_ns
+    mesh._load.cache_clear()
+    again = MeshIndenter.from_file(ball_file, spacing=SPACING)
+    assert kept.stat().st_mtime_ns == changed  # read, not built
+    np.testing.assert_array_equal(again.grid.coefficients, ball.grid.coefficients)
+    assert again.error == ball.error
+    kept.write_bytes(written[: len(written) // 2])  # damaged: built again
+    mesh._load.cache_clear()
+    MeshIndenter.from_file(ball_file, spacing=SPACING)
+    assert kept.read_bytes() == written
+
+
+def load(path):
+    with np.load(path, allow_pickle=False) as arrays:
+        return dict(arrays)
+
+
+def test_settings_and_content_have_their_own_cache(ball, tmp_path):
+    before = set(cache_folder().glob("indenter-*.npz"))
+    path = tmp_path / "ball.stl"
+    for radius, spacing in ((1.0, 0.25e-3), (1.0, 0.3e-3), (1.1, 0.25e-3)):
+        trimesh.creation.icosphere(1, radius).export(path)
+        MeshIndenter.from_file(path, spacing=spacing)
+    assert len(set(cache_folder().glob("indenter-*.npz")) - before) == 3
+
+
+def test_public_meshes_build(outside_data):
+    """A 7 mm ball on a shaft, in metres, its tip toward +y, made by others."""
+    path = outside_data("biotac_mesh") / "indenters" / "sphere_7mm.obj"
+    indenter = MeshIndenter.from_file(path, scale=1.0, up="-y", spacing=0.3e-3)
+    points = np.random.default_rng(5).uniform(-1.5e-3, 1.5e-3, (200, 3)) * [1, 1, 0.3]
+    exact, _ = Sphere(3.5e-3).distance(points)
+    assert np.abs(indenter.distance(points)[0] - exact).max() < 40e-6  # its facets of 0.8 mm lie 24 um under the ball

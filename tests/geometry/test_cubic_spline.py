@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from tactile_core.geometry.cubic_spline import EvenSpline
+
+
+def test_nodes_are_reproduced_exactly() -> None:
+    spline = EvenSpline(-1.0, 0.1, 21)
+    values = np.random.default_rng(0).normal(size=(21, 3))
+    np.testing.assert_array_equal(spline.matrix(spline.nodes) @ values, values)
+
+
+def test_cubics_are_reproduced_with_their_slopes() -> None:
+    spline, at = EvenSpline(-1.0, 0.25, 9), np.linspace(-1, 1, 101)
+    cubic = np.polynomial.Polynomial([1, -2, 0.5, 3])
+    values = cubic(spline.nodes)
+    np.testing.assert_allclose(spline.matrix(at) @ values, cubic(at), atol=1e-13)  # rounding
+    np.testing.assert_allclose(spline.matrix(at, 1) @ values, cubic.deriv()(at), atol=1e-12)
+
+
+def test_agrees_with_scipy_not_a_knot() -> None:
+    interpolate = pytest.importorskip("scipy.interpolate", reason="scipy is no requirement of the package")
+    spline, at = EvenSpline(0.0, 0.5, 12), np.linspace(0, 5.5, 77)
+    values = np.random.default_rng(1).normal(size=12)
+    oracle = interpolate.CubicSpline(spline.nodes, values, bc_type="not-a-knot")
+    np.testing.assert_allclose(spline.matrix(at) @ values, oracle(at), atol=1e-12)
+    np.testing.assert_allclose(spline.matrix(at, 1) @ values, oracle(at, 1), atol=1e-11)
+
+
+def test_refined_grid_holds_the_same_spline() -> None:
+    coarse, at = EvenSpline(0.0, 0.5, 12), np.linspace(0, 5.5, 77)
+    fine = coarse.refined(3)
+    values = np.random.default_rng(2).normal(size=12)
+    through_fine = fine.matrix(at) @ (coarse.matrix(fine.nodes) @ values)
+    np.testing.assert_allclose(through_fine, coarse.matrix(at) @ values, atol=1e-12)
+
+
+def test_ends_are_held() -> None:
+    spline = EvenSpline(0.0, 1.0, 6)
+    values = np.arange(6.0) ** 2
+    np.testing.assert_allclose(spline.matrix(np.array([-3.0, 99.0])) @ values, [0, 25], atol=1e-12)
+
+
+def test_too_few_nodes() -> None:
+    with pytest.raises(ValueError, match="5 nodes"):
+        EvenSpline(0.0, 1.0, 4)

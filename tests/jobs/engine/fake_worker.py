@@ -1,0 +1,54 @@
+"""A worker, or the command ``tactile batch``, with the tools of ``fake_tools``: no weights, one dent.
+
+``python fake_worker.py FOLDER`` serves tasks; FAKE_KILL names a shard that kills its worker (FAKE_KILL_ONCE: a file
+that is made first, so that it happens once). ``python fake_worker.py batch ...`` is the command, with such workers.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+TESTS = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(TESTS), str(TESTS.parent)]
+
+import fake_tools  # noqa: E402
+
+from tactile_core.cli.main import main  # noqa: E402
+from tactile_core.jobs import (  # noqa: E402
+    convert,
+    frame_shard,
+)
+from tactile_core.jobs.engine import local, worker  # noqa: E402
+from tactile_core.translation import translate  # noqa: E402
+
+COMMAND = (sys.executable, str(Path(__file__).resolve()))
+
+
+def killing(make):
+    """`make`, but for the shard that FAKE_KILL names: the worker dies over it."""
+
+    def made(folder, job, index, number, tools):
+        once = os.environ.get("FAKE_KILL_ONCE")
+        if f"{job.inputs[index].name}-{number:06d}" == os.environ.get("FAKE_KILL") and not (
+            once and Path(once).exists()
+        ):
+            if once:
+                Path(once).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return make(folder, job, index, number, tools)
+
+    return made
+
+
+if __name__ == "__main__":
+    convert.load_tools = lambda *words: fake_tools.tools()
+    translate.load_translator = lambda weights=None: SimpleNamespace(sha256="0" * 64)
+    frame_shard.make = killing(frame_shard.make)
+    local.WORKER_COMMAND = COMMAND
+    if sys.argv[1] == "batch":
+        sys.exit(main())
+    worker.main()

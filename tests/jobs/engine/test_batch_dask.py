@@ -1,0 +1,163 @@
+"""Dask as one more place: the same bytes, over TLS too. Workers are threads; scripts/fault_test.py kills real ones."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import shutil
+import subprocess
+import threading
+from contextlib import nullcontext
+
+import fake_tools
+import numpy as np
+import pytest
+
+from tactile_core.errors import TactileError
+from tactile_core.jobs import convert
+from tactile_core.jobs.engine import dask_cluster
+from tactile_core.jobs.engine import run as runs
+from tactile_core.jobs.engine.dask_cluster import CONFIGURED, Cluster, QueueFile, _read, loop
+from tactile_core.jobs.render import Options, render
+from tactile_core.jobs.render_shards import render_in_parts
+
+distributed = pytest.importorskip("distributed", reason="distributed is absent: pip install tactile-core[batch]")
+
+
+@pytest.fixture(autouse=True)
+def tools(monkeypatch):
+    monkeypatch.setattr(convert, "load_tools", lambda *words: fake_tools.tools())
+
+
+def run_on(folder, job, address):
+    with runs.opened(folder, None):
+        return runs.run(folder, job, Cluster(folder, address), None, lambda done, total: None)
+
+
+def workers(**more):
+    few = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None, "host": "127.0.0.1"}
+    return distributed.LocalCluster(**few, loop=loop(), **more)
+
+
+def test_dask_makes_the_same_bytes(new_job, do, content):
+    folder, job = new_job("local")
+    do(folder, job)
+    other, same = new_job("dask")
+    with workers(protocol="tcp://") as cluster:
+        assert run_on(other, same, cluster.scheduler_address).made == 5
+        assert run_on(other, same, cluster.scheduler_address).kept == 5
+    assert content(folder) == content(other)
+
+
+def test_dask_renders(tmp_path):
+    random = np.random.default_rng(1)
+    np.savez(tmp_path / "heights.npz", height_map=1e-4 * random.random((60, 8, 6)))
+    asked = Options(preset="fast")
+    one = render(tmp_path / "heights.npz", tmp_path / "one", asked, lambda word: nullcontext(lambda done, total: None))
+    with workers(protocol="tcp://") as cluster:
+        address = cluster.scheduler_address
+        other = render_in_parts(
+            tmp_path / "heights.npz", tmp_path / "dask", asked, lambda folder: Cluster(folder, address), print
+        )
+    names = [*(f"images/{frame:05d}.png" for frame in range(60)), "note.json"]
+    assert [(one / name).read_bytes() for name in names] == [(other / name).read_bytes() for name in names]
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates with")
+def test_tls_needs_the_certificate(new_job, tmp_path):
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=tactile",
+         "-keyout", key, "-out", certificate],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    files = {f"tls_{role}_{what}": str(path) for role in ("scheduler", "worker", "client")
+             for what, path in (("key", key), ("cert", certificate))}  # fmt: skip
+    security = distributed.Security(tls_ca_file=str(certificate), require_encryption=True, **files)
+    folder, job = new_job()
+    tls = {f"distributed.comm.tls.{role}.{what}": str(path) for role in ("scheduler", "worker", "client")
+           for what, path in (("key", key), ("cert", certificate))}  # fmt: skip
+    import dask
+
+    with workers(protocol="tls://", security=security) as cluster:
+        address = cluster.scheduler_address
+        assert address.startswith("tls://")
+        with pytest.raises(TactileError, match="no scheduler answers"):
+            run_on(folder, job, address)
+        with dask.config.set({"distributed.comm.tls.ca-file": str(certificate), **tls}):
+            assert run_on(folder, job, address).made == 5
+
+
+def test_a_client_that_found_no_scheduler_is_gone_before_the_next(tmp_path, monkeypatch):
+    monkeypatch.setattr(dask_cluster, "wait", lambda: 1.0)
+    gc.disable()  # collected later, by chance within the next client's start, it would wait there for ever
+    try:
+        with pytest.raises(TactileError, match="no scheduler answers"), Cluster(tmp_path, "tcp://127.0.0.1:9"):
+            pass
+        left = [each for each in gc.get_objects() if type(each) is distributed.Client]
+    finally:
+        gc.enable()
+    assert not left
+
+
+def test_a_queue_without_workers_is_told(new_job, monkeypatch):
+    monkeypatch.setattr(dask_cluster, "PATIENCE", 0.5)
+    folder, job = new_job()
+    with workers(protocol="tcp://") as cluster:
+        cluster.sync(cluster.scale_down, list(cluster.workers))
+        said = []
+
+        def joined(text):
+            said.append(text)
+            cluster.scale(1)
+
+        place = Cluster(folder, cluster.scheduler_address, joined)
+        with runs.opened(folder, None):
+            assert runs.run(folder, job, place, None, lambda done, total: None).made == 5
+        assert said == [f"{cluster.scheduler_address}: no worker has come yet; 2 tasks wait for one"]
+
+
+def test_nobody_listening_is_told(new_job):
+    import dask
+
+    folder, job = new_job()
+    place = Cluster(folder, "tcp://127.0.0.1:9")
+    told = pytest.raises(TactileError, match="no scheduler answers")
+    with dask.config.set({CONFIGURED: "1s"}), told, runs.opened(folder, None):
+        runs.run(folder, job, place, None, lambda done, total: None)
+
+
+@pytest.mark.parametrize(("patience", "starts"), [("600s", True), ("100ms", False)])
+def test_a_loop_that_starts_late_is_waited_for_as_long_as_configured(patience, starts, monkeypatch):
+    """As on a busy machine, where Dask's own loop gives up after 10 s."""
+    import dask
+
+    may_start, run = threading.Event(), asyncio.run
+    monkeypatch.setattr(asyncio, "run", lambda coroutine: (may_start.wait(), run(coroutine)))
+    with dask.config.set({CONFIGURED: patience}):
+        if starts:
+            threading.Timer(0.5, may_start.set).start()
+            assert loop.__wrapped__().asyncio_loop.is_running()
+        else:
+            with pytest.raises(TactileError, match="loop has not started"):
+                loop.__wrapped__()
+            may_start.set()
+
+
+def test_a_queue_file_is_checked(tmp_path):
+    file = tmp_path / "slurm.toml"
+    file.write_text('queue = "slurm"\njobs = 10\n[options]\ncores = 1\nmemory = "4GB"\nwalltime = "01:00:00"\n')
+    assert _read(str(file)) == QueueFile("slurm", 10, {"cores": 1, "memory": "4GB", "walltime": "01:00:00"})
+    file.write_text('queue = "abacus"\njobs = 10\n[options]\n')
+    with pytest.raises(TactileError, match="queue"):
+        _read(str(file))
+    with pytest.raises(TactileError, match="tls://HOST:PORT"):
+        _read("here:8786")
+
+
+def test_the_script_that_a_slurm_cluster_would_submit(tmp_path):
+    jobqueue = pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
+    options = {"cores": 1, "memory": "4GB", "walltime": "01:00:00", "queue": "cpu", "interface": "lo"}
+    with jobqueue.SLURMCluster(**options, scheduler_options={"dashboard_address": None}) as cluster:
+        script = cluster.job_script()
+    assert "#SBATCH -p cpu" in script and "#SBATCH -t 01:00:00" in script and "distributed.cli.dask_worker" in script

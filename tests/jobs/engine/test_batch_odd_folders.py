@@ -1,0 +1,186 @@
+"""Jobs in folders that hold what others put there, and inputs that are no plain files."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+
+import pytest
+
+from tactile_core.errors import TactileError
+from tactile_core.jobs import pairs
+from tactile_core.jobs.engine import inputs, local, manifest, recipes, result_parts
+from tactile_core.jobs.engine import job as jobs
+from tactile_core.jobs.engine import run as runs
+from tactile_core.jobs.engine.tasks import Task
+
+
+def none(done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
+
+def test_a_worker_takes_no_modules_from_the_folder_it_is_started_in(new_job, tmp_path, monkeypatch):
+    folder, _ = new_job()
+    (folder / jobs.PREPARED).mkdir()
+    (tmp_path / "h5py.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    monkeypatch.chdir(tmp_path)
+    with local.Local(folder, 1) as place:
+        place.submit(Task(0))
+        ((_, reply),) = [next(place.results(lambda: 1))]
+    assert reply.shards == 3 and not (tmp_path / "ran").exists()
+
+
+def test_the_folder_of_parts_keeps_what_others_put_there(new_job, do, tmp_path):
+    _, job = new_job()
+    out = tmp_path / "result"
+    folder = result_parts.folder_of(out)
+    folder.mkdir()
+    (folder / "thesis.txt").write_text("mine")
+    with pytest.raises(TactileError, match=r"holds thesis\.txt, and no job"), result_parts.begun(out, job):
+        pass
+    (folder / "thesis.txt").rename(tmp_path / "thesis.txt")
+    with result_parts.begun(out, job):
+        runs.run(folder, job, local.Local(folder, 1, command=do.__globals__["COMMAND"]), None, none)
+        (tmp_path / "thesis.txt").rename(folder / "thesis.txt")
+        result_parts.finished(folder)
+    assert [path.name for path in folder.iterdir()] == ["thesis.txt"]
+
+
+def test_parts_behind_a_link_are_removed(new_job, tmp_path):
+    _, job = new_job()
+    (tmp_path / "scratch").mkdir()
+    result_parts.folder_of(tmp_path / "result").symlink_to(tmp_path / "scratch")
+    with result_parts.begun(tmp_path / "result", job) as folder:
+        result_parts.finished(folder)
+    assert not list((tmp_path / "scratch").iterdir())
+
+
+def test_shards_that_are_gone_or_exchanged_are_seen_and_made_anew(new_job, do, content):
+    folder, job = new_job()
+    do(folder, job)
+    before = content(folder)
+    first, second, third, *_ = sorted((folder / jobs.SHARDS).iterdir())
+    first.unlink()
+    shutil.copy(second, third)
+    assert manifest.damaged(folder, none) == [first, third]
+    done = do(folder, job)
+    assert (done.made, done.kept) == (2, 3) and content(folder) == before
+
+
+def test_verify_says_what_is_missing_and_what_is_not_complete(command, recordings, tmp_path):
+    out = tmp_path / "job"
+    command(*recordings, "--out", out, "--shard-frames", "50", "--plan")
+    assert "not complete: 0 of 0 shards" in command("--out", out, "--verify").stderr
+    command("--out", out)
+    sorted((out / "shards").iterdir())[1].unlink()
+    told = command("--out", out, "--verify")
+    assert told.returncode == 2 and "00000_a-000001.h5: missing; the same command makes it anew" in told.stderr
+
+
+def test_a_damaged_prepared_recording_is_no_end_of_the_job(new_job, do, recordings):
+    folder, job = new_job()
+    do(folder, job)
+    file = jobs.prepared_file(folder, job.inputs[0].name)
+    file.write_bytes(file.read_bytes()[:2000])
+    recordings[0].unlink()
+    done = do(folder, job)
+    assert list(done.aside) == ["00000_a"] and "cannot be read" in done.aside["00000_a"]
+    assert json.loads((folder / jobs.MANIFEST).read_text())["recordings"][0]["shards"] == []
+
+
+@pytest.mark.parametrize("name", [jobs.SHARDS, jobs.ASIDE, jobs.MANIFEST])
+def test_what_stands_in_a_jobs_way_is_told(name, new_job, do):
+    folder, job = new_job()
+    if name == jobs.MANIFEST:
+        (folder / name).mkdir()
+    else:
+        (folder / name).write_text("")
+    with pytest.raises(TactileError, match=f"{name}: cannot be written"):
+        do(folder, job)
+
+
+def test_only_a_jobs_own_leftovers_are_cleared(tmp_path):
+    (tmp_path / ".x.tactile-partial").write_text("of a living writer")
+    with runs.opened(tmp_path, None):
+        pass
+    assert (tmp_path / ".x.tactile-partial").exists()
+
+
+def test_a_conflicted_copy_is_no_block_of_pairs(tmp_path):
+    made = inputs.Input("00000_presses", "/a", "0" * 64, 1)
+    job = jobs.make([made], recipes.Pairs(10, 0, [], []), None)
+    (tmp_path / jobs.SHARDS).mkdir()
+    (tmp_path / jobs.SHARDS / "00000_presses-000000 (conflicted copy).h5").write_bytes(b"")
+    assert pairs.seen(tmp_path, job, 0) is None
+
+
+def test_lists_name_what_is_there(recordings, tmp_path):
+    folder, listed = recordings[0].parent, tmp_path / "list.txt"
+    (folder / "empty").mkdir()
+    listed.write_bytes(b"\xef\xbb\xbfin/a.csv\r\n\r\nin/b.csv\r\n")  # as Windows' editor writes it
+    assert inputs.find([f"@{listed}"], tmp_path / "out") == recordings
+    for line, told in (("in/empty", "names no recording"), ("in/none*", "names no recording"), ("@other", "no lists")):
+        listed.write_text(f"in/a.csv\n{line}\n")
+        with pytest.raises(TactileError, match=rf"list\.txt, line 2.*{told}"):
+            inputs.find([f"@{listed}"], tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", ["a" * 300, "a" * 300 + "#1"])
+def test_names_that_no_disk_takes_are_told(name, tmp_path):
+    (tmp_path / "list.txt").write_text(name)
+    with pytest.raises(TactileError, match=r"cannot be read \(File name too long\)"):
+        inputs.hashed(inputs.find([f"@{tmp_path / 'list.txt'}"], tmp_path / "out"), none)
+
+
+def test_a_folder_that_cannot_be_looked_into_is_told(recordings, tmp_path, monkeypatch, caplog):
+    scandir = os.scandir
+
+    def refused(path):
+        if "closed" in str(path):
+            raise PermissionError(13, "Permission denied", str(path))
+        return scandir(path)
+
+    (recordings[0].parent / "closed").mkdir()
+    monkeypatch.setattr(os, "scandir", refused)
+    assert inputs.find([str(recordings[0].parent)], tmp_path / "out") == recordings
+    assert "closed: cannot be looked into (Permission denied), passed over" in caplog.text
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links and pipes of POSIX")
+def test_links_to_nothing_and_pipes_are_told(tmp_path):
+    (tmp_path / "*.csv").symlink_to(tmp_path / "none")
+    (tmp_path / "loop.csv").symlink_to(tmp_path / "loop.csv")
+    os.mkfifo(tmp_path / "pipe.csv")
+    for name, told in (("*.csv", "cannot be read"), ("loop.csv", "cannot be read"), ("pipe.csv", "no regular file")):
+        with pytest.raises(TactileError, match=told):
+            inputs.hashed(inputs.find([str(tmp_path / name)], tmp_path / "out"), none)
+    with pytest.raises(TactileError, match="no regular file"):
+        inputs.find([f"@{tmp_path / 'pipe.csv'}"], tmp_path / "out")
+    os.mkfifo(tmp_path / jobs.FILE)
+    with pytest.raises(TactileError, match="no regular file"):
+        jobs.read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--counts-per-unit", "nan"], "counts_per_unit: nan"),
+        (["--smooth", "2"], "smooth: 2 frames"),
+        (["--shard-frames", "200000"], "--shard-frames: 200000"),
+    ],
+)
+def test_options_that_no_recording_can_meet_make_no_job(words, told, command, recordings, tmp_path):
+    done = command(*recordings, "--out", tmp_path / "job", *words)
+    assert done.returncode == 2 and told in done.stderr
+    assert not (tmp_path / "job" / jobs.FILE).exists()
+
+
+@pytest.mark.parametrize("path", ["/a\0b", "/a\ud800"])
+def test_a_job_file_with_impossible_paths_is_refused(path, new_job):
+    folder, _ = new_job()
+    told = json.loads((folder / jobs.FILE).read_text())
+    told["inputs"][0]["path"] = path
+    (folder / jobs.FILE).write_text(json.dumps(told))
+    with pytest.raises(TactileError, match="inputs"):
+        jobs.read(folder)

@@ -1,0 +1,197 @@
+"""A growing recording: every row once, none half, and the newest shown."""
+
+from __future__ import annotations
+
+import os
+from types import SimpleNamespace
+
+import fake_tools
+import numpy as np
+import pytest
+from PIL import Image
+
+from tactile_core import recordings
+from tactile_core.cli.main import main
+from tactile_core.cli.verbs import watch
+from tactile_core.errors import TactileError
+from tactile_core.jobs import convert, live
+from tactile_core.recordings import polarity
+
+
+class Clock:
+    """Stands in for the module `time`: only sleeping makes it go on. slept : s"""
+
+    def __init__(self) -> None:
+        self.slept = 0.0
+
+    def perf_counter(self) -> float:
+        return self.slept
+
+    def sleep(self, seconds: float) -> None:
+        self.slept += seconds
+
+
+def test_rows_come_once_and_whole_however_the_file_grows(slide_csv, tmp_path):
+    path = slide_csv(frames=80)
+    data, whole = path.read_bytes(), recordings.read(path).electrodes
+    path.write_bytes(b"")
+    growing, found, place = live.Growing(path), [], 0
+    for size in np.random.default_rng(5).integers(1, 900, 1000):
+        with open(path, "ab") as file:
+            file.write(data[place : place + size])
+        place += size
+        rows = growing.poll()
+        if rows is not None:
+            found.append(rows.electrodes)
+    np.testing.assert_array_equal(np.concatenate(found), whole)
+    assert growing.poll() is None and len(found) > 20
+
+
+def test_a_file_that_becomes_shorter_and_one_that_is_no_recording_are_told(slide_csv, tmp_path):
+    path = slide_csv(frames=5)
+    growing = live.Growing(path)
+    growing.poll()
+    path.write_bytes(b"")
+    with pytest.raises(TactileError, match="became shorter"):
+        growing.poll()
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(TactileError, match="no known recording"):
+        live.Growing(tmp_path / "other.csv").poll()
+    with pytest.raises(TactileError, match="no such file"):
+        live.Growing(tmp_path / "none.csv")
+
+
+def test_a_bad_row_is_passed_over_and_many_are_not(slide_csv):
+    path = slide_csv(frames=30)
+    growing = live.Growing(path)
+    assert len(growing.poll()) == 30
+    good = path.read_bytes().splitlines(keepends=True)[-1]
+    bad = good.replace(good.split(b",")[-1], b"nan\n")
+    for row in (bad, good[:40] + b"\n"):
+        with open(path, "ab") as file:
+            file.write(row)
+        assert growing.poll() is None
+        with open(path, "ab") as file:
+            file.write(good)
+        assert len(growing.poll()) == 1
+    assert (growing.rows, growing.bad) == (34, 2)
+    with pytest.raises(TactileError, match="rows are bad"):
+        for _ in range(20):
+            with open(path, "ab") as file:
+                file.write(bad)
+            growing.poll()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows replaces no open file")
+def test_another_file_of_the_same_name_is_told(slide_csv, tmp_path):
+    path, other = slide_csv(frames=5), slide_csv("other", frames=90)
+    growing = live.Growing(path)
+    growing.poll()
+    os.replace(other, path)
+    with pytest.raises(TactileError, match="replaced by another file"):
+        growing.poll()
+
+
+def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    electrodes = recordings.read(slide_csv(frames=40)).electrodes
+    np.savez(tmp_path / "gap.npz", electrodes=electrodes, time=np.r_[0.0, 1e6 + np.arange(39) / 100])
+    monkeypatch.setattr(watch, "time", clock := Clock())
+    assert main(["watch", str(tmp_path / "gap.npz"), "--play", "--out", str(tmp_path / "now.png")]) == 0
+    told = capsys.readouterr()
+    assert "before frame 1: skipped" in told.err and told.out.startswith("40 frames: ")
+    assert clock.slept < 1.0  # s that were waited for, of a million
+
+
+def test_live_signals_are_those_of_the_whole_recording(slide_csv):
+    recording = recordings.read(slide_csv(frames=150))
+    signals = live.LiveSignals()
+    known = [signals.learn(recording.electrodes[i : i + 10]) for i in range(0, 150, 10)]
+    assert known.index(True) == 2  # 30 frames are the tare's window
+    change = signals.signals(recording.electrodes).change
+    # Rest from 30 frames with noise of 1 count has an error of 0.2; the whole recording's quiet part is longer.
+    np.testing.assert_allclose(change, recordings.prepare(recording).change, atol=1.0)
+
+
+def test_without_a_quiet_part_rest_is_guessed_in_the_end():
+    signals = live.LiveSignals()
+    frames = 3000 + 500 * np.sin(np.arange(1200)[:, None] / 3) * np.ones(19)
+    assert not signals.learn(frames[:900])
+    assert signals.learn(frames[900:]) and "guess" in signals.found
+
+
+def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    monkeypatch.setattr(watch, "time", Clock())
+    for more in (["--idle", "0.2"], ["--play"], ["--play", "--speed", "4"], ["--play", "--speed", "0"]):
+        out = tmp_path / "now.png"
+        path = str(slide_csv(frames=90))
+        assert main(["watch", path, "--out", str(out), *more]) == 0
+        told = capsys.readouterr().out
+        assert told.startswith("90 frames: ") and "ms from frame to picture" in told
+        if "0" in more:
+            assert ", 0 frames passed over" in told  # every frame has its picture
+        grey = np.asarray(Image.open(out))[0, -1, 0]
+        assert 50 < grey < 70  # the last frame is pressed by 29 counts times 1 to 3, a grey level a count
+        out.unlink()
+
+
+def test_watch_without_a_display_says_what_to_do(slide_csv, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    import matplotlib
+
+    matplotlib.use("agg")
+    assert main(["watch", str(slide_csv(frames=5))]) == 2
+    assert "--out now.png" in capsys.readouterr().err
+
+
+def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
+    import bags
+
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    electrodes = 3000 + np.random.default_rng(2).normal(0, 1, (60, 19))
+    still = np.full(60, 2000.0)
+    press = SimpleNamespace(time=np.arange(60) / 100, electrodes=electrodes, pdc=still, tac=still, tdc=still)
+    bags.write_bag(tmp_path / "touch.bag", press, "ros1", "hand")
+    words = ["watch", "--rosbag-play", str(tmp_path / "touch.bag"), "--out", str(tmp_path / "now.png")]
+    monkeypatch.setattr(watch, "time", clock := Clock())
+    assert main(words) == 0
+    assert clock.slept > 0.5  # s: at its own pace, 60 frames of 10 ms
+    assert capsys.readouterr().out.startswith("60 frames: ")
+    assert main([*words, "--speed", "0"]) == 0 and (tmp_path / "now.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([], "no recording, or two"),
+        (["a.csv", "--rosbag-play", "b.bag"], "no recording, or two"),
+        (["a.csv", "--speed", "2"], "--play or --rosbag-play beside it"),
+        (["a.csv", "--play", "--speed", "-1"], "0 to 1000"),
+        (["a.csv", "--play", "--speed", "nan"], "0 to 1000"),
+        (["--rosbag-play", "none.bag"], "there is no such file"),
+        (["--rosbag-play", __file__], "no bag"),
+    ],
+)
+def test_words_that_do_not_go_together_are_told(words, told, capsys):
+    assert main(["watch", *words]) == 2
+    assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_polarity_is_found_by_pressure_and_assumed_until_then(sign):
+    contact = np.load(polarity.shipped(polarity.PATTERNS)).astype(float)[7]
+    strength = np.r_[np.zeros(60), np.clip(np.sin(np.linspace(0, 9, 200)), 0, 1)]
+    noise = np.random.default_rng(0).normal(0, 1, (260, 19))
+    electrodes, pdc = 3300 + sign * strength[:, None] * contact + noise, 1000 + 100 * strength
+    signals = live.LiveSignals()
+    for start in range(0, 260, 10):
+        signals.learn(electrodes[start : start + 10], pdc[start : start + 10])
+        if start == 40:
+            assert signals.polarity.name == "falls" and not signals.polarity.sure
+    assert signals.polarity.sure and signals.polarity.sign == sign
+    change = signals.signals(electrodes).change
+    np.testing.assert_allclose(change[60:], strength[60:, None] * contact, atol=8)
+    assert live.LiveSignals(polarity="rises").polarity.sign == -1

@@ -1,0 +1,282 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fake_tools
+import h5py
+import numpy as np
+import pytest
+from PIL import Image
+
+from tactile_core.accuracy import Budget
+from tactile_core.cli.main import main
+from tactile_core.errors import TactileError
+from tactile_core.jobs import convert, frame_range, results, sampling_error
+from tactile_core.jobs.frame_pass import CHUNK
+from tactile_core.jobs.frames_file import ALWAYS, KEPT
+from tactile_core.pictures import presets, renderer
+from tactile_core.pictures.mitsuba.variant import SCALAR, Choice
+from tactile_core.recordings.flags import Flag
+
+FRAMES = 150  # of slide_csv: more than two chunks
+
+
+@pytest.fixture(scope="module")
+def tools():
+    return fake_tools.tools()
+
+
+@pytest.fixture
+def run(tmp_path, tools):
+    """Convert one recording with options and return its result folder."""
+
+    def one(path, out="out", **options):
+        options = convert.Options(**options)
+        (folder,) = results.result_folders([path], tmp_path / out, options.overwrite)
+        return convert.convert(path, folder, options, tools).folder
+
+    return one
+
+
+def test_a_result_is_complete_and_one_frame_a_row(run, slide_csv):
+    path = slide_csv(frames=FRAMES)
+    folder = run(path)
+    assert sorted(child.name for child in folder.iterdir()) == sorted(
+        ["contact_sheet.png", "frames.h5", "images", "note.json", "timings.json"]
+    )
+    assert [image.name for image in sorted((folder / "images").iterdir())] == [f"{i:05d}.png" for i in range(FRAMES)]
+    read = np.loadtxt(path, delimiter=",", skiprows=1)
+    with h5py.File(folder / "frames.h5") as file:
+        assert set(file) == {*ALWAYS, *KEPT["latent"], *KEPT["displacement"]}
+        assert {len(dataset) for dataset in file.values()} == {FRAMES}
+        np.testing.assert_allclose(file["time"], read[:, 0] - read[0, 0], atol=1e-6)  # the file's microseconds
+        assert file["time"].attrs["start_time"] == pytest.approx(1.6e9)
+        assert (file["electrodes"][:] == read[:, 26:]).all()
+        depth = file["displacement_digit"][..., 1].max(axis=1)
+        assert {file[name].dtype for name in ("force", "confidence", "displacement_biotac")} == {np.dtype("float32")}
+    for frame in (0, FRAMES // 2, FRAMES - 1):
+        picture = np.asarray(Image.open(folder / "images" / f"{frame:05d}.png"))
+        assert picture.shape == (320, 240, 3)
+        assert (picture == fake_tools.shade(np.full(fake_tools.SHAPE, depth[frame]))).all()
+
+
+def test_chunks_leave_no_seam(run, slide_csv, tools):
+    folder = run(slide_csv(frames=FRAMES))
+    single = run(slide_csv("again", frames=FRAMES), keep=("displacement",))
+    with h5py.File(folder / "frames.h5") as file, h5py.File(single / "frames.h5") as other:
+        assert (file["displacement_biotac"][:] == other["displacement_biotac"][:]).all()
+        depth = file["latent_signal"][:, 0]
+    rises = np.diff(depth[60:120])
+    assert CHUNK in range(60, 120) and np.abs(rises).max() < 4  # counts: the press adds 2 a frame, noise below 2
+
+
+def test_keep_and_frames_choose_what_is_written(run, slide_csv):
+    path = slide_csv(frames=FRAMES)
+    full = run(path, out="full")
+    part = run(path, out="part", keep=("height",), frames=slice(20, 120, 25))
+    chosen = np.arange(20, 120, 25)
+    assert not (part / "images").exists()
+    with h5py.File(part / "frames.h5") as file, h5py.File(full / "frames.h5") as whole:
+        assert set(file) == {*ALWAYS, "height_map"}
+        assert file["height_map"].shape == (len(chosen), 320, 240)
+        assert (file["frame"][:] == chosen).all()
+        for name in ("time", "electrodes", "force", "flags"):
+            assert (file[name][:] == whole[name][:][chosen]).all()  # the tare saw the whole recording
+    images = run(path, out="images", keep=("image",), frames=slice(-3, None))
+    assert [image.name for image in sorted((images / "images").iterdir())] == ["00147.png", "00148.png", "00149.png"]
+
+
+def test_the_same_input_gives_the_same_bytes(run, slide_csv):
+    path = slide_csv(frames=80)
+    first, second = run(path, out="a"), run(path, out="b")
+    files = sorted(p.relative_to(first) for p in first.rglob("*") if p.is_file() and p.name != "timings.json")
+    assert len(files) == 80 + 3
+    for file in files:
+        assert (first / file).read_bytes() == (second / file).read_bytes(), file
+
+
+def test_the_note_tells_what_is_reproducible_and_no_path(run, slide_csv, tmp_path):
+    folder = run(slide_csv(frames=80), frames=slice(0, 70))
+    text = (folder / "note.json").read_text(encoding="utf-8")
+    note = json.loads(text)
+    assert str(tmp_path) not in text
+    assert note["recording"]["file"] == "touch.csv" and len(note["recording"]["sha256"]) == 64
+    assert note["options"]["frames"] == "0:70" and note["frames_converted"] == 70
+    assert note["weights"] == {"sha256": "0" * 64, "card": {"name": "fake"}}
+    assert {"numpy", "h5py", "python", "tactile_core"} <= set(note["versions"])
+    timings = json.loads((folder / "timings.json").read_text(encoding="utf-8"))
+    stages = {"read", "prepare", "translate", "height_map", "shade", "png", "hdf5", "sheet", "all"}
+    assert set(timings["ms_a_frame"]) == stages
+
+
+def test_flags_of_recording_and_translation_meet_and_are_told(run, slide_csv):
+    path = slide_csv(frames=FRAMES)
+    lines = path.read_text().splitlines()
+    cells = lines[31].split(",")
+    cells[30] = "nan"
+    lines[31] = ",".join(cells)
+    path.write_text("\n".join(lines) + "\n")
+    folder = run(path, keep=())
+    note = json.loads((folder / "note.json").read_text(encoding="utf-8"))
+    with h5py.File(folder / "frames.h5") as file:
+        bits = file["flags"][:]
+        assert np.isfinite(file["electrodes"][:]).all()
+    assert bits[30] & Flag.REPAIRED and not bits[40] & Flag.REPAIRED
+    beyond = int(np.count_nonzero(bits & Flag.OUT_OF_RANGE))
+    assert beyond == note["flagged_frames"]["out_of_range"] > 0
+    assert any("line 32, ele5" in warning for warning in note["warnings"])
+    assert any(f"{beyond} of {FRAMES} frames" in warning for warning in note["warnings"])
+
+
+def test_overwrite_replaces_the_whole_result(run, slide_csv):
+    path = slide_csv(frames=80)
+    run(path)
+    with pytest.raises(TactileError, match="already holds a result"):
+        run(path)
+    folder = run(path, overwrite=True, keep=(), frames=slice(0, 5))
+    assert not (folder / "images").exists()
+    with h5py.File(folder / "frames.h5") as file:
+        assert len(file["time"]) == 5
+
+
+def test_a_recording_of_one_frame_converts(run, slide_csv):
+    folder = run(slide_csv(frames=1))
+    assert [image.name for image in (folder / "images").iterdir()] == ["00000.png"]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [(":", slice(None)), ("3:", slice(3, None)), ("::7", slice(None, None, 7)), ("-9:-1:2", slice(-9, -1, 2))],
+)
+def test_frames_are_read_as_python_reads_them(text, expected):
+    assert frame_range.parse_frames(text) == expected
+    assert frame_range.parse_frames(frame_range.frames_text(expected).replace("all", ":")) == expected
+
+
+@pytest.mark.parametrize("text", ["", "5", "1:2:3:4", "a:b", "::0", "::-1", "1.5:", "1 :2", "9999999999:"])
+def test_other_selections_are_refused(text):
+    with pytest.raises(TactileError, match="--frames"):
+        frame_range.parse_frames(text)
+
+
+def test_a_selection_without_frames_is_refused():
+    with pytest.raises(TactileError, match=r"--frames: 200:300 takes none of the 150 frames; expected indices from 0"):
+        frame_range.select(slice(200, 300), 150)
+
+
+def test_a_disk_that_fills_up_ends_in_one_message_and_no_folder(slide_csv, tmp_path, tools, monkeypatch):
+    def full(*arguments, **more):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tactile_core.jobs.frame_pass.write_png", full)
+    out = tmp_path / "out"
+    (folder,) = results.result_folders([tmp_path / "touch.csv"], out, False)
+    with pytest.raises(TactileError, match="No space left on device"):
+        convert.convert(slide_csv(frames=80), folder, convert.Options(), tools)
+    assert list(out.iterdir()) == []
+
+
+def interrupt(how: int, path: Path, out: Path) -> subprocess.Popen:
+    """Start a conversion that stops at its second chunk, interrupt it when pictures are there, wait for its end."""
+    root = Path(__file__).parents[2]
+    environment = {**os.environ, "FAKE_HOLD": "1", "PYTHONPATH": str(root)}
+    command = [sys.executable, str(root / "tests" / "fake_tools.py"), "convert", str(path), "--out", str(out)]
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+    partial = out / f".{path.stem}.tactile-partial" / "images"
+    while process.poll() is None and not (partial.exists() and len(list(partial.iterdir())) > CHUNK // 2):
+        time.sleep(0.01)
+    assert process.poll() is None, "the conversion ended before it could be interrupted"
+    process.send_signal(how)
+    process.communicate(timeout=60)
+    return process
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on the size of a process's files")
+@pytest.mark.parametrize("keep", ["displacement", "height"])  # plain and packed in frames.h5
+def test_a_full_disk_costs_one_recording_and_no_half_result_is_left(keep, slide_csv, tmp_path):
+    paths, out = [slide_csv("long", frames=500), slide_csv("short", frames=5)], tmp_path / "out"
+    root = Path(__file__).parents[2]
+    limited = (  # 500 kB: enough for 5 frames and a sheet. Python ignores SIGXFSZ: writing gives OSError
+        "import resource, runpy, sys; sys.argv = sys.argv[1:]; sys.path.insert(0, sys.argv[0].rpartition('/')[0]);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000)); runpy.run_path(sys.argv[0], None, '__main__')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", limited, str(root / "tests" / "fake_tools.py"),
+         "convert", *map(str, paths), "--out", str(out), "--keep", keep],
+        env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    errors = [line for line in done.stderr.splitlines() if not line.startswith("tactile: warning:")]
+    assert errors[0].startswith(f"tactile: error: {out / 'long'}: frames.h5 cannot be written (File too large)")
+    assert errors[1:] == ["tactile: error: 1 of 2 recordings were not converted"]
+    assert [child.name for child in out.iterdir()] == ["short"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT and SIGKILL for one process")
+def test_an_interrupted_run_leaves_nothing_and_a_killed_one_is_cleared_by_the_next(slide_csv, tmp_path, run):
+    path, out = slide_csv(frames=500), tmp_path / "out"
+    assert interrupt(signal.SIGINT, path, out).returncode == 130
+    assert list(out.iterdir()) == []
+    for how in (signal.SIGTERM, signal.SIGHUP):
+        assert interrupt(how, path, out).returncode == 128 + how
+        assert list(out.iterdir()) == []
+    assert interrupt(signal.SIGKILL, path, out).returncode == -signal.SIGKILL
+    assert not (out / "touch").exists()
+    assert len(list(out.iterdir())) == 2  # its half result and its lock, both hidden
+    run(slide_csv("other", frames=5))
+    assert [child.name for child in out.iterdir()] == ["other"]
+
+
+@pytest.fixture
+def sampled(monkeypatch):
+    """Heights between nodes add 2 um to 20 % of the thickness, 3 um deeper; rounding 0.001 um."""
+    bins = [{"depth_share_to": 0.2, "rms_95_m": 2e-6}, {"depth_share_to": 0.6, "rms_95_m": 3e-6}]
+    monkeypatch.setattr(sampling_error, "measured", lambda: {"bins": bins, "float32_m": 1e-9})
+
+
+def test_heights_are_as_exact_as_they_are(sampled):
+    assert sampling_error.height_error(0.1) == pytest.approx(2) and sampling_error.height_error(0.9) == pytest.approx(3)
+    assert "3 um, at most 3.5" in sampling_error.check(3.5, 0.3) and "float32" in sampling_error.check(0.1, None)
+    with pytest.raises(TactileError, match=r"3 or more, which heights between nodes add, 30% of the gel deep"):
+        sampling_error.check(2.9, 0.3)
+
+
+def test_a_conversion_is_as_deep_as_its_deepest_node(sampled, run, slide_csv, tmp_path):
+    """fake_tools: 1 um a count of the mean change, 120 counts at the end, of a gel of 4 mm: 3 %."""
+    path = slide_csv()
+    run(path, error=Budget(um=2.1))
+    with pytest.raises(TactileError, match=r"2 or more, which heights between nodes add, 3% of the gel deep"):
+        run(path, out="other", error=Budget(um=1.9))
+    assert list((tmp_path / "other").iterdir()) == []
+    run(path, out="other", error=Budget(um=0.1), keep=("displacement",))
+
+
+def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(renderer, "Renderer", lambda preset: drawn.append(preset) or str)
+    monkeypatch.setattr(presets, "choose_variant", lambda wanted: Choice(SCALAR, ""))
+    tools, told = convert.within(fake_tools.tools(), 5)
+    assert (tools.preset, drawn) == ("fast", []) and "fast" in told
+    exact = presets.measured()["presets"]["quality"]["error"]
+    tools, told = convert.within(fake_tools.tools(), exact)
+    assert (tools.preset, tools.shade, drawn) == ("quality", str, ["quality"]) and "quality" in told
+
+
+def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None: fake_tools.tools())
+    line = ["convert", str(slide_csv()), "--out", str(tmp_path / "out"), "--error"]
+    assert main([*line, "5levels"]) == 0
+    err = capsys.readouterr().err
+    # fake_tools: in contact beyond 5 counts, off by a fifth of the dent's depth, 1 um a count.
+    assert "pictures: fast" in err and "the translation itself" in err and "0.01 mm" in err
+    note = json.loads((tmp_path / "out" / "touch" / "note.json").read_text(encoding="utf-8"))
+    assert note["options"]["error"] == "5levels" and note["options"]["preset"] == "fast"
+    for bound, words in (("1e-6levels", "reference has"), ("1e-9um", "or more"), ("much", "5um,0.6levels")):
+        assert main([*line, bound, "--overwrite"]) == 2
+        assert words in capsys.readouterr().err

@@ -1,0 +1,147 @@
+"""`tactile plan`: what is built for which outputs, and that its numbers follow the tables."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tactile_core.accuracy import Budget
+from tactile_core.cli.main import main
+from tactile_core.errors import TactileError
+from tactile_core.jobs import plan
+from tactile_core.mechanics.fast import compliance
+from tactile_core.pictures import presets
+from tactile_core.simulation import tier_choice
+from tactile_core.simulation.tier_choice import TierChoice
+
+ROOT = Path(__file__).parents[2]
+PRESS = ROOT / "scenes" / "press"
+PART = {"start": 1.0, "ms": 10.0, "mb": 100.0, "kb": 2.0}
+NAMES = (
+    "simulate_nothing", "simulate_digit", "simulate_biotac", "simulate_electrodes", "convert_latent",
+    "convert_displacement", "convert_height", "convert_image", "render_fast",
+)  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def tables(monkeypatch):
+    """Round numbers: 10 ms a frame of everything, 30 on the BioTac; contacts are not solved."""
+    parts = {name: dict(PART) for name in NAMES} | {"simulate_biotac": PART | {"ms": 30.0, "mb": 150.0}}
+    monkeypatch.setattr(plan, "costs", lambda: {"parts": parts, "full_ms": {"biotac": 2000.0, "digit": 1000.0}})
+
+    def choose(path, used, bound):
+        tier = "fast" if bound is None or bound > 20 else "full"
+        return {sensor: TierChoice(tier, 20.0, 1.0, 0.3) for sensor in used}
+
+    monkeypatch.setattr(tier_choice, "choose_for_scene", choose)
+
+
+def of(path=PRESS, keep=None, budget=None, preset=None):
+    return plan.plan(path, keep, budget or Budget(), preset)
+
+
+def built(found):
+    return [part.what for part in found.parts]
+
+
+@pytest.mark.parametrize(
+    ("keep", "has", "lacks"),
+    [
+        ("electrodes", {"BioTac contacts", "electrodes"}, {"DIGIT contacts", "DIGIT matrices", "networks", "pictures"}),
+        ("displacement_digit", {"DIGIT contacts"}, {"BioTac contacts", "BioTac matrices", "electrodes", "pictures"}),
+        ("image", {"DIGIT contacts", "pictures"}, {"BioTac contacts", "electrodes", "networks"}),
+        ("translation", {"BioTac contacts", "electrodes", "networks"}, {"DIGIT contacts", "pictures"}),
+        (None, {"BioTac contacts", "DIGIT contacts", "electrodes", "networks", "pictures"}, set()),
+    ],
+)
+def test_only_what_outputs_need_is_built(keep, has, lacks):
+    found = of(keep=keep)
+    assert has <= set(built(found)) and not lacks & set(built(found))
+    for name in ("BioTac", "DIGIT"):
+        assert any(text.startswith(name) for text in found.left_out) == (f"{name} contacts" not in built(found))
+
+
+def test_outputs_add_up(monkeypatch, tmp_path):
+    """The press has 201 frames, 129 of them in contact; a start of 1 s, and 10 ms, 2 kB each on the DIGIT."""
+    monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))  # so that nothing is cached, on every machine
+    found = of(keep="displacement_digit")
+    contacts = next(part for part in found.parts if part.what == "DIGIT contacts")
+    number = int(contacts.told.split()[0])
+    assert 100 < number < 160 and contacts.seconds == pytest.approx(0.01 * number)
+    assert contacts.disk == pytest.approx(0.002 * number)
+    alone, both = found.seconds, of(keep="displacement_digit,displacement_biotac").seconds
+    assert both - alone == pytest.approx(0.03 * number + plan.BUILD_S)
+    assert of(keep="displacement_biotac").memory == plan.BUILD_MB + 150 and found.memory == plan.BUILD_MB + 100
+    assert of(keep="displacement_digit,displacement_biotac").memory == plan.BUILD_MB + 150  # one after the other
+
+
+def test_an_exact_bound_costs_the_full_tier():
+    found, exact = (of(keep="displacement_digit", budget=Budget(um=um)) for um in (30, 5))
+    assert exact.seconds > found.seconds + 100 and "full tier" in "\n".join(exact.lines())
+
+
+def test_matrices_that_are_not_cached_are_to_be_built(monkeypatch, tmp_path):
+    monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))
+    monkeypatch.setattr(compliance, "build", lambda *given: pytest.fail("matrices were built"))
+    found = of(keep="displacement_digit")
+    matrices = next(part for part in found.parts if part.what == "DIGIT matrices")
+    assert matrices.seconds == plan.BUILD_S and matrices.disk == 151 and str(tmp_path) in matrices.told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_matrices_that_are_cached_are_told_with_their_size(monkeypatch, tmp_path):
+    monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))
+    folder = compliance.stored("digit").folder
+    folder.mkdir()
+    for name in compliance.Arrays._fields:
+        (folder / f"{name}.npy").write_bytes(bytes(1_000_000))
+    matrices = next(part for part in of(keep="image").parts if part.what == "DIGIT matrices")
+    assert matrices.seconds == 0 and "7 MB, cached" in matrices.told and "2867 surface nodes" in matrices.told
+
+
+def test_pictures_cost_what_their_preset_was_measured_to(monkeypatch):
+    fast, reference = (of(keep="image", preset=name).seconds for name in ("fast", "reference"))
+    ms = {name: plan._preset_ms(name) for name in ("fast", "reference")}
+    assert reference - fast == pytest.approx(201 * (ms["reference"] - ms["fast"]) / 1e3)
+    monkeypatch.setattr(plan, "_variant", lambda preset: "scalar_rgb")
+    assert plan._preset_ms("standard") == presets.measured()["presets"]["standard"]["ms"]["scalar_rgb"]
+    exact = presets.measured()["presets"]["fast"]["error"]
+    assert any("preset fast" in part.told for part in of(keep="image", budget=Budget(levels=exact)).parts)
+
+
+def test_a_recording_is_planned_as_it_is_converted(slide_csv):
+    latent, everything = of(slide_csv(), "latent"), of(slide_csv(), "latent,displacement,height,image")
+    assert built(latent) == ["networks"] and "contact mechanics" in latent.left_out
+    assert built(everything) == ["networks", "height maps", "pictures"]
+    assert built(of(slide_csv())) == ["networks", "pictures"]  # as `convert` keeps them
+    assert latent.seconds == pytest.approx(1.0 + 0.01 * 150) and "150 frames" in latent.parts[0].told
+
+
+@pytest.mark.parametrize(
+    ("keep", "preset", "words"),
+    [("electrodes,gel", None, "gel"), (",", None, "nothing"), ("image", "draft", "draft"), ("latent", None, "latent")],
+)
+def test_unknown_words_are_refused(keep, preset, words):
+    with pytest.raises(TactileError, match=words):
+        of(keep=keep, preset=preset)
+
+
+def test_the_command_prints_a_table_or_json(capsys):
+    assert main(["plan", str(PRESS), "--keep", "electrodes"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "scene press: electrodes" and lines[-1].startswith("not built: DIGIT")
+    assert main(["plan", str(PRESS), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["seconds"] == pytest.approx(sum(part["seconds"] for part in found["parts"]), abs=1e-3)
+    assert main(["plan", str(ROOT / "scenes" / "press_sphere")]) == 2  # pairs alone, no recording
+    assert "[recording]" in capsys.readouterr().err
+
+
+def test_the_shipped_table_holds_every_part():
+    found = json.loads(plan.COSTS.read_text(encoding="utf-8"))
+    for name in NAMES:
+        part = found["parts"][name]
+        assert all(part[key] >= 0 for key in PART) and part["mb"] > 0
+    assert all(ms > 0 for ms in found["full_ms"].values())

@@ -1,0 +1,62 @@
+"""A long recording, prepared part by part, gives the signals that `convert` prepares of the whole."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from conftest import SLIDE_HEADER
+
+from tactile_core import recordings
+from tactile_core.jobs import prepared_signals
+from tactile_core.jobs.engine import recipes
+from tactile_core.recordings import PrepareOptions, chunks, polarity
+from tactile_core.recordings.flags import Flag
+
+
+@pytest.fixture
+def write(tmp_path):
+    """write(sign) -> a CSV of 20 s: rest, a contact from 5 s on, held to the end; sign -1: rest minus reading."""
+
+    def make(sign):
+        contact = np.load(polarity.shipped(polarity.PATTERNS)).astype(float)[7]
+        strength = np.clip((np.arange(2000) - 500) / 300, 0, 1)
+        noise = np.random.default_rng(0).normal(0, 1, (2000, 19))
+        rows = np.full((2000, len(SLIDE_HEADER)), 2000.0)
+        rows[:, 0] = 1.6e9 + np.arange(2000) / 100
+        rows[:, 3] = 1000 + np.rint(100 * strength)
+        rows[:, 26:] = np.rint(3300 + sign * strength[:, None] * contact + noise)
+        path = tmp_path / "long.csv"
+        formats = ["%.6f"] + ["%d"] * 44
+        np.savetxt(path, rows, fmt=formats, delimiter=",", header=",".join(SLIDE_HEADER), comments="")
+        return path
+
+    return make
+
+
+def prepared(path, **words):
+    """Change (T, 19), PDC (T,) and flags (T,) of all parts, and how many there were."""
+    recipe = recipes.Translate(["latent"], "0" * 64, prepare=recipes.Prepare(**words))
+    parts = list(prepared_signals._signals(str(path), SimpleNamespace(recipe=recipe)))
+    arrays = [
+        np.concatenate([getattr(signals, name)[repeated:] for _, signals, repeated in parts])
+        for name in ("change", "pdc", "flags")
+    ]
+    return *arrays, len(parts)
+
+
+@pytest.mark.parametrize("words", [{}, {"polarity": "falls"}])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_parts_have_one_rest_one_pressure_and_one_polarity(sign, words, write, monkeypatch):
+    path = write(sign)
+    monkeypatch.setattr(chunks, "TEXT_BYTES", path.stat().st_size // 5)
+    change, pdc, flags, count = prepared(path, **words)
+    whole = recordings.prepare(recordings.read(path), PrepareOptions(**words))
+    assert count > 3 and len(change) == 2000
+    np.testing.assert_allclose(change, whole.change, atol=2)  # of rest, by the quiet frames of the first part alone
+    np.testing.assert_allclose(pdc, whole.pdc, atol=1)
+    doubts = Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED
+    assert len(np.unique(flags & doubts)) == 1
+    if not words:  # the first part holds no contact: a later one shows the polarity
+        assert not (flags & doubts).any() and change[-1] @ (sign * whole.electrodes[-1] - sign * 3300) > 0

@@ -1,0 +1,316 @@
+"""`tactile render`: every kind of input, what it leaves behind, and bad input."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gel_pictures import NO_MITSUBA, Press
+
+from tactile_core.accuracy import Candidate, cheapest
+from tactile_core.cli.main import main
+from tactile_core.jobs.frames_file import FramesFile
+from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.renderer import Renderer
+from tactile_core.sensors import digit_surface
+from tactile_core.sensors.calibration_file import load_calibration
+
+SCENES = Path(__file__).parents[2] / "scenes"
+RECORDING = SCENES / "press_roll_slide" / "press_roll_slide.h5"
+
+
+@pytest.fixture
+def render(tmp_path, capsys):
+    """Render into tmp_path/out by the fast preset; returns (status, stdout, stderr)."""
+
+    def run(given, *more, out="out"):
+        preset = () if {"--preset", "--error"} & set(more) else ("--preset", "fast")
+        status = main(["render", str(given), "--out", str(tmp_path / out), *preset, *map(str, more)])
+        return status, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def small():
+    """The shipped unit, which the command takes by default, with 60 x 80 pixels."""
+    return load_calibration().at_size(60, 80)
+
+
+@pytest.fixture
+def heights(tmp_path, small):
+    """A file of three height maps of 60 x 80."""
+    path = tmp_path / "heights.npz"
+    maps = [Press(depth=depth).on(small.camera) for depth in (0.3e-3, 0.6e-3, 0.9e-3)]
+    np.savez(path, height_map=np.array(maps))
+    return path
+
+
+def picture(path):
+    from PIL import Image
+
+    return np.asarray(Image.open(path))
+
+
+def test_height_maps_become_pictures(render, heights, tmp_path, small):
+    status, out, err = render(heights)
+    assert (status, out, err) == (0, f"{tmp_path / 'out'}\n", "")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["images", "note.json", "timings.json"]
+    expected = Renderer(small, "fast")(np.load(heights)["height_map"][1])
+    np.testing.assert_array_equal(picture(tmp_path / "out" / "images" / "00001.png"), expected)
+
+
+def test_frames_of_a_simulated_recording_keep_their_numbers(render, tmp_path):
+    assert render(RECORDING, "--frames", "300:302")[0] == 0
+    images = sorted((tmp_path / "out" / "images").iterdir())
+    assert [path.name for path in images] == ["00300.png", "00301.png"]
+    assert picture(images[0]).shape == (320, 240, 3)
+
+
+def test_frames_of_a_conversion(render, tmp_path):
+    move = np.zeros((2, len(digit_surface().rest), 3), np.float32)
+    move[1, :, 1] = 2e-4
+    with FramesFile(tmp_path / "frames.h5", 2, ("displacement",), {}) as file:
+        file.write(0, {"frame": np.array([7, 9]), "displacement_digit": move})
+    assert render(tmp_path / "frames.h5")[0] == 0
+    unit, images = load_calibration(), tmp_path / "out" / "images"
+    renderer = Renderer(unit, "fast")
+    np.testing.assert_array_equal(picture(images / "00007.png"), np.rint(renderer.background))
+    np.testing.assert_array_equal(picture(images / "00009.png"), renderer(digit_mapper(unit.camera)(move[1])))
+
+
+def test_a_scene_is_simulated_first(render, tmp_path, monkeypatch):
+    from tactile_core.simulation import recording
+
+    asked = []
+
+    def simulated(scene, out, progress, keep, tiers):
+        asked.append((Path(scene), keep, tiers))
+        shutil.copy(RECORDING, out)
+
+    monkeypatch.setattr(recording, "simulate_recording", simulated)
+    assert render(SCENES / "press_roll_slide", "--frames", "300:301")[0] == 0
+    assert asked == [(SCENES / "press_roll_slide", ("displacement_digit",), {"digit": "fast"})]
+    note = json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))
+    assert note["input"]["kind"] == "scene" and note["input"]["file"] == "scene.toml"
+
+
+def test_another_size(render, tmp_path):
+    status, _, err = render(RECORDING, "--size", "480x480")
+    assert status == 2 and "aspect ratio" in err
+    assert render(RECORDING, "--frames", "300:301", "--size", "480x640")[0] == 0
+    assert picture(tmp_path / "out" / "images" / "00300.png").shape == (640, 480, 3)
+
+
+def test_exr_holds_radiance_and_the_picture_follows_from_it(render, heights, tmp_path, small):
+    pytest.importorskip("OpenEXR", reason='OpenEXR is missing: pip install "tactile-core[render]"')
+    from tactile_core.files.exr import read_exr
+
+    assert render(heights, "--exr")[0] == 0
+    planes, about = read_exr(tmp_path / "out" / "exr" / "00002.exr")
+    rest, _ = read_exr(tmp_path / "out" / "rest.exr")
+    assert set(planes) == {"R", "G", "B", "basis.red", "basis.green", "basis.blue"}
+    assert all(values.dtype == np.float32 for values in planes.values())
+    assert (about["calibration"], about["preset"], about["frame"]) == (small.unit, "fast", "2")
+    assert "levels" in about["units"]
+    change = np.stack([planes[name] - rest[name] for name in "RGB"], -1)
+    levels = np.clip(np.rint(Renderer(small, "fast").background + change), 0, 255)
+    shown = picture(tmp_path / "out" / "images" / "00002.png")
+    assert np.abs(levels - shown).max() <= 1  # the sum in another order may round otherwise
+    assert np.mean(levels != shown) < 1e-3
+    basis = np.stack([planes[f"basis.{colour}"] for colour in ("red", "green", "blue")], -1)
+    np.testing.assert_array_equal(basis, Renderer(small, "fast").radiance(np.load(heights)["height_map"][2]))
+
+
+def test_height_maps_come_as_exr_too(render, tmp_path, small, press):
+    pytest.importorskip("OpenEXR", reason='OpenEXR is missing: pip install "tactile-core[render]"')
+    from tactile_core.files.exr import write_exr
+
+    height = press.on(small.camera)
+    for number, channels in enumerate(({"height": height}, {"anything": height}, {"height": height, "Y": 0 * height})):
+        write_exr(tmp_path / f"{number}.exr", channels, {})
+        assert render(tmp_path / f"{number}.exr", out=f"out{number}")[0] == 0
+        shown = picture(tmp_path / f"out{number}" / "images" / "00000.png")
+        np.testing.assert_array_equal(shown, Renderer(small, "fast")(height))
+
+
+def test_the_note_says_how_and_equal_input_gives_equal_bytes(render, heights, tmp_path):
+    for out in ("one", "two"):
+        assert render(heights, out=out)[0] == 0
+    for name in ("note.json", "images/00002.png"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    note = json.loads((tmp_path / "one" / "note.json").read_text(encoding="utf-8"))
+    assert note["preset"]["name"] == "fast" and note["preset"]["measured"]["error"] > 0
+    assert note["input"]["kind"] == "height map" and len(note["calibration"]["sha256"]) == 64
+
+
+def test_mitsuba_draws_where_it_is(render, heights, tmp_path, any_variant):
+    assert render(heights, "--preset", "standard", "--frames", "2:")[0] == 0
+    note = json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))
+    assert note["versions"]["mitsuba_variant"] == any_variant
+    assert len(list((tmp_path / "out" / "images").iterdir())) == 1
+
+
+def test_an_error_chooses_the_preset(render, heights, tmp_path):
+    assert render(heights, "--error", "50levels")[0] == 0
+    assert json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))["preset"]["name"] == "fast"
+
+
+def test_a_missing_mitsuba_is_named(render, heights, monkeypatch):
+    from tactile_core.pictures import renderer
+
+    def absent(wanted):
+        raise ModuleNotFoundError("No module named 'mitsuba'", name="mitsuba")
+
+    monkeypatch.setattr(renderer, "choose_variant", absent)
+    status, _, err = render(heights, "--preset", "quality")
+    assert status == 2
+    assert 'pip install "tactile-core[render]"' in err
+    assert NO_MITSUBA.endswith('"tactile-core[render]"')
+
+
+def test_noise_is_the_units_and_the_same_in_every_run(render, heights, tmp_path, small):
+    for out, more in (("plain", ()), ("one", ("--noise",)), ("two", ("--noise",))):
+        assert render(heights, *more, out=out)[0] == 0
+    plain, one, two = (
+        picture(tmp_path / out / "images" / "00001.png").astype(float) for out in ("plain", "one", "two")
+    )
+    np.testing.assert_array_equal(one, two)
+    found = (one - plain).std((0, 1))
+    expected = np.sqrt(np.square(small.noise) + 1 / 6)  # both pictures are rounded, a variance of 1/12 each
+    np.testing.assert_allclose(found, expected, rtol=0.1)  # 4,800 pixels: 1 %; and clipping at 0 and 255
+    assert not np.array_equal(one, picture(tmp_path / "one" / "images" / "00002.png"))
+
+
+def test_an_older_result_is_replaced_only_when_asked(render, heights, tmp_path):
+    assert render(heights)[0] == 0
+    status, _, err = render(heights)
+    assert status == 2 and "--overwrite" in err
+    assert render(heights, "--overwrite")[0] == 0
+    (tmp_path / "mine").mkdir()
+    status, _, err = render(heights, "--overwrite", out="mine")
+    assert status == 2 and "no result" in err
+
+
+def save(**arrays):
+    return lambda path: np.savez(path, **arrays)
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "words"),
+    [
+        ("absent.npz", lambda path: None, "no such file"),
+        ("a.npz", lambda path: path.write_bytes(b"not a zip"), "a.npz"),
+        ("a.h5", lambda path: path.write_bytes(b"not HDF5"), "a.h5"),
+        ("a.txt", lambda path: path.write_text("hello"), "a.txt"),
+        ("a.npz", save(height_map=np.zeros((80, 60)) + np.nan), "not finite"),
+        ("a.npz", save(height_map=np.zeros((80, 60)) + 6.0), "metres"),
+        ("a.npz", save(height_map=np.zeros((80, 50))), "aspect ratio"),
+        ("a.npz", save(height_map=np.zeros(80)), "shape"),
+        ("a.npz", save(height_map=np.zeros((0, 80, 60))), "shape"),
+        ("a.npz", save(height_map=np.array("text")), "shape"),
+        ("a.npz", save(one=np.zeros((80, 60)), two=np.zeros((80, 60))), "height_map"),
+        ("a.npz", save(height_map=np.array([[{}]])), "a.npz"),
+    ],
+)
+def test_a_bad_input_ends_in_one_message_and_leaves_nothing(name, write, words, render, tmp_path):
+    write(tmp_path / name)
+    status, out, err = render(tmp_path / name)
+    (line,) = err.splitlines()
+    assert (status, out) == (2, "")
+    assert line.startswith("tactile: error: ") and words in line
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--size", "large"], "--size"),
+        (["--size", "120x160"], "the height map"),
+        (["--frames", "7:"], "none of the 3 frames"),
+        (["--error", "0levels"], "--error"),
+        (["--error", "0.5"], "--error"),
+        (["--error", "1e-9levels"], "reference has"),
+        (["--error", "1levels", "--preset", "fast"], "one of the two"),
+        (["--calibration", "absent.toml"], "absent.toml"),
+    ],
+)
+def test_bad_options_end_in_one_message(more, words, render, heights, tmp_path):
+    status, _, err = render(heights, *more)
+    assert status == 2
+    assert words in err.splitlines()[-1]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def tiers(monkeypatch):
+    """The scene goes 8 % deep, where heights between nodes add 1 um; fast is within 30 um, full within 4."""
+    from tactile_core.jobs import sampling_error
+    from tactile_core.simulation import recording, tier_choice
+
+    asked = []
+
+    def choose(sensor, share, bound):
+        rows = [Candidate("the fast tier", 30.0, 1.0), Candidate("the full tier", 4.0, 1e3)]
+        found = rows[0] if bound is None else cheapest(rows, bound, "um")
+        return tier_choice.TierChoice(found.name.split()[1], found.error, found.ms, share)
+
+    def simulated(scene, out, progress, keep, tiers):
+        asked.append(tiers)
+        shutil.copy(RECORDING, out)
+
+    monkeypatch.setattr(tier_choice, "choose", choose)
+    found = {"digit": choose("digit", 0.08, None)}
+    monkeypatch.setattr(tier_choice, "choose_for_scene", lambda path, used, bound: found)
+    monkeypatch.setattr(sampling_error, "height_error", lambda share: 1.0 if share < 0.1 else 9.0)
+    monkeypatch.setattr(recording, "simulate_recording", simulated)
+    return asked
+
+
+@pytest.mark.parametrize(("bound", "tier"), [("31um,5levels", "fast"), ("30um,5levels", "full")])
+def test_a_scene_gets_the_tier_that_leaves_room_for_its_heights(bound, tier, render, tiers, tmp_path):
+    status, _, err = render(SCENES / "press", "--error", bound, "--frames", "100:101")
+    assert status == 0 and tiers == [{"digit": tier}]
+    assert f"{tier} tier" in err and "heights between nodes add 1 um" in err and "pictures: fast" in err
+    assert json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))["input"]["tier"] == tier
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"),
+    [("4.9um", "4 or more, which the full tier has"), ("0.9um", "which heights between nodes add alone")],
+)
+def test_a_scene_whose_bound_nothing_meets_is_refused(bound, words, render, tiers):
+    status, _, err = render(SCENES / "press", "--preset", "fast", "--error", bound)
+    assert status == 2 and words in err and tiers == []
+
+
+def test_a_recording_is_as_exact_as_its_heights(render, tiers):
+    """The shipped recording's gel moves by about a tenth of its thickness."""
+    assert render(RECORDING, "--preset", "fast", "--error", "9.5um", "--frames", "300:301")[0] == 0
+    status, _, err = render(RECORDING, "--preset", "fast", "--error", "8.5um", "--frames", "300:301", out="other")
+    assert status == 2 and "9 or more, which heights between nodes" in err
+
+
+def test_a_bound_on_a_scene_s_gel_is_not_met_in_parts(render):
+    status, _, err = render(SCENES / "press", "--preset", "fast", "--error", "9um", "--workers", "2")
+    assert status == 2 and "Simulate the scene first" in err
+
+
+def test_the_result_of_convert_that_is_rendered_is_not_replaced(render, tmp_path):
+    """A result's note tells which verb made it."""
+    (tmp_path / "out").mkdir()
+    with FramesFile(tmp_path / "out" / "frames.h5", 1, ("displacement",), {}) as file:
+        still = np.zeros((1, len(digit_surface().rest), 3), np.float32)
+        file.write(0, {"frame": np.array([0]), "displacement_digit": still})
+    (tmp_path / "out" / "note.json").write_text('{"format": "tactile-result-1"}')
+    status, _, err = render(tmp_path / "out" / "frames.h5", "--overwrite")
+    assert status == 2 and "no result of this verb" in err and (tmp_path / "out" / "frames.h5").exists()
+
+
+@pytest.mark.parametrize("size", ["24000x32000", "3000x4000"])
+def test_a_size_without_bound_is_refused(size, render):
+    status, _, err = render(RECORDING, "--frames", "0:1", "--size", size)
+    assert status == 2 and "at most 10 million pixels" in err

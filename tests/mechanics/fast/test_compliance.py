@@ -1,0 +1,73 @@
+"""The cache of compliance matrices: damage is repaired, a folder that cannot be written is told before the work."""
+
+import numpy as np
+import pytest
+from slab import slab_mesh
+
+from tactile_core.errors import TactileError
+from tactile_core.mechanics.fast import compliance
+from tactile_core.mechanics.fast.compliance_block import ComplianceBlock
+from tactile_core.sensors import Material
+
+
+@pytest.fixture
+def tiny(tmp_path, monkeypatch):
+    """Load the compliance of a small block through the cache in a folder of its own."""
+    monkeypatch.setenv("TACTILE_CACHE", str(tmp_path / "cache"))
+    x = np.linspace(-2e-3, 2e-3, 5)
+    mesh, lattice = slab_mesh(x, x, np.linspace(0, -1e-3, 3))
+    touchable = np.arange(len(lattice.rest))
+
+    def load(youngs=1e6):
+        return compliance._cached(compliance._Solid("tiny", lattice, touchable, mesh, Material(youngs, 0.45)))
+
+    return load
+
+
+def test_second_load_reads_the_first_ones_files(tiny, tmp_path, monkeypatch):
+    first = np.array(tiny().move)
+    monkeypatch.setattr(compliance, "build", lambda *arguments: pytest.fail("built again"))
+    np.testing.assert_array_equal(tiny().move, first)
+
+
+def test_softer_material_has_matrices_of_its_own(tiny):
+    np.testing.assert_allclose(tiny(0.5e6).move, 2 * np.array(tiny().move), atol=1e-7)  # single precision of 0.03
+
+
+def test_a_damaged_file_is_built_again(tiny, tmp_path):
+    first = np.array(tiny().move)
+    file = next((tmp_path / "cache").glob("*/move.npy"))
+    file.write_bytes(file.read_bytes()[:200])
+    np.testing.assert_array_equal(tiny().move, first)
+
+
+def test_a_cache_that_cannot_be_written_is_told_before_the_work(tiny, tmp_path, monkeypatch):
+    (tmp_path / "cache").write_text("a file in the way")
+    monkeypatch.setattr(compliance, "build", lambda *arguments: pytest.fail("worked first"))
+    with pytest.raises(TactileError, match="TACTILE_CACHE"):
+        tiny()
+
+
+def test_too_little_memory_is_told_in_words(tiny, monkeypatch):
+    def full(*arguments):
+        raise MemoryError
+
+    monkeypatch.setattr(compliance, "condense", full)
+    with pytest.raises(TactileError, match="memory"):
+        tiny()
+
+
+def test_a_full_disk_is_told_and_leaves_nothing_half_written(tiny, tmp_path, monkeypatch):
+    def no_room(*arguments, **named):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(compliance.np, "save", no_room)
+    with pytest.raises(TactileError, match="No space left"):
+        tiny()
+    assert not list((tmp_path / "cache").rglob("*.npy"))
+
+
+def test_response_between_two_nodes_is_mutual(tiny):
+    """Maxwell and Betti, on the mirror plane too."""
+    block = ComplianceBlock(tiny(), np.arange(25), np.empty(0, int)).matrix
+    np.testing.assert_array_equal(block, block.T)

@@ -1,0 +1,34 @@
+"""Bodies of the full tier: the mesh is fine where the indenter is, whatever its depth."""
+
+import numpy as np
+import pytest
+
+from tactile_core.geometry.indenters import Sphere
+from tactile_core.mechanics.finite_strain.body import _footprint
+from tactile_core.mechanics.placement import Placement, biotac_pose, digit_pose
+from tactile_core.sensors import biotac, digit
+
+BALL, PLACE = Sphere(3.5e-3), Placement(-5e-3, 1e-3)
+POSES = {"digit": digit_pose, "biotac": biotac_pose}
+LATTICES = {"digit": digit.gel_surface, "biotac": biotac.skin_surface}
+
+
+@pytest.mark.parametrize("sensor", POSES)
+@pytest.mark.parametrize("depth", [-1e-3, 0.0, 1e-9, 1e-3])
+def test_the_footprint_lies_at_the_indenter_at_any_depth(sensor, depth):
+    """Before it touches, too: no node overlaps then."""
+    pose, lattice = POSES[sensor](BALL, PLACE), LATTICES[sensor]()
+    rows, columns = lattice.shape
+    grid = lattice.rest[: rows * columns].reshape(rows, columns, 3)
+    nearest = np.linalg.norm(grid - pose.apex, axis=-1).argmin()
+    row, column = np.divmod(nearest, columns)
+    footprint = _footprint(sensor, BALL, pose, depth)
+    middle = (np.array(footprint.low) + footprint.high) / 2
+    assert np.abs(middle - [row + (sensor == "biotac"), column]).max() < 1.6  # lattice lines
+
+
+@pytest.mark.parametrize("sensor", POSES)
+def test_a_deeper_ball_has_a_larger_footprint(sensor):
+    pose = POSES[sensor](BALL, PLACE)
+    sizes = [np.ptp([f.low[1], f.high[1]]) for f in (_footprint(sensor, BALL, pose, d) for d in (0.1e-3, 1.2e-3))]
+    assert sizes[1] > 1.2 * sizes[0]

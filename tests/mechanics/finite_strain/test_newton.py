@@ -1,0 +1,131 @@
+"""Finite-strain contact on a small block: friction's cone and direction, a core that stops the skin, hard starts."""
+
+import numpy as np
+import pytest
+from slab import slab_mesh
+
+from tactile_core.errors import TactileError
+from tactile_core.geometry.indenters import Box, Pose, Sphere, pose_on
+from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
+from tactile_core.sensors import Material
+
+BALL, RUBBER = Sphere(4e-3), Material(1e6, 0.45)
+DOWN = np.array([0, -1.0, 0])
+
+
+@pytest.fixture(scope="module")
+def solid():
+    x, y = np.linspace(-3, 3, 13) * 1e-3, np.array([0, -1, -2, -2.5, -3]) * 1e-3
+    return FiniteStrainSolid(slab_mesh(x, x, y)[0], RUBBER)
+
+
+def problem(solid, indenter=BALL, **more):
+    pose = pose_on(indenter, np.array([0.1e-3, -3e-3, 0.2e-3]), DOWN)
+    return FiniteStrainContact(solid, solid.mesh.surface, indenter, pose, **more)
+
+
+def slid(touch, x):
+    return Pose(touch.pose.apex + np.array([x, 0, 0]), touch.pose.axes)
+
+
+def test_without_friction_nothing_rubs(solid):
+    touch = problem(solid).press(0.4e-3, step=0.4e-3)
+    assert not touch.outer.rubbing.any() and (touch.pressing > 0).all()
+    assert abs(touch.force[0]) < 0.05 * touch.force[1]  # the block's sides are near, and the ball is off its middle
+
+
+def test_sliding_friction_is_mu_times_the_normal_force_and_against_the_slip(solid):
+    contact = problem(solid, friction=0.4)
+    touch = contact.press(0.4e-3, step=0.2e-3)
+    stuck = touch.force[0]
+    touch = contact.move(slid(touch, 1.2e-3), touch, 0.3e-3)
+    slips = touch.outer.slipping[touch.outer.active]
+    assert slips.mean() > 0.7  # nodes that the ball has just reached still stick
+    rubbing = np.linalg.norm(touch.outer.rubbing, axis=1)
+    np.testing.assert_allclose(rubbing[slips], 0.4 * touch.pressing[slips], rtol=1e-4)  # the iteration's tolerance
+    assert (rubbing <= 0.4 * touch.pressing + 1e-5 * touch.pressing.max()).all()
+    assert (touch.outer.rubbing[slips, 0] > 0.8 * rubbing[slips]).all()
+    assert touch.force[0] > stuck + 0.5 * 0.4 * touch.force[1]
+
+
+def test_a_small_shear_sticks_and_stays_inside_the_cone(solid):
+    contact = problem(solid, friction=0.78)
+    touch = contact.press(0.4e-3, step=0.2e-3)
+    shorn = contact.move(slid(touch, 20e-6), touch, 0.2e-3)
+    sticks = ~shorn.outer.slipping[shorn.outer.active]
+    assert sticks.mean() > 0.5 and shorn.force[0] > touch.force[0]
+    rubbing = np.linalg.norm(shorn.outer.rubbing, axis=1)
+    assert (rubbing <= 0.78 * shorn.pressing + 1e-5 * shorn.pressing.max()).all()
+
+
+def test_a_leaning_press_hardly_depends_on_its_load_steps(solid):
+    """Nodes stick where they met the ball, not where it stands when the step ends."""
+    pose = pose_on(BALL, np.array([0.1e-3, -3e-3, 0.2e-3]), DOWN, 0.4, 0.5)
+    contact = FiniteStrainContact(solid, solid.mesh.surface, BALL, pose, friction=0.78)
+    coarse, fine = (contact.press(0.4e-3, step=step).force for step in (0.2e-3, 0.05e-3))
+    # 2 %: 0.9 % was measured; with nodes tied to the nearest place of the ball it was 7 %.
+    np.testing.assert_allclose(coarse, fine, atol=0.02 * np.linalg.norm(fine))
+
+
+def test_shear_back_and_forth_returns_while_everything_sticks(solid):
+    contact = problem(solid, friction=20.0)
+    touch = contact.press(0.3e-3, step=0.3e-3)
+    there = contact.move(slid(touch, 50e-6), touch, 0.1e-3)
+    back = contact.move(touch.pose, there, 0.1e-3)
+    np.testing.assert_allclose(back.force, touch.force, atol=1e-5 * np.abs(touch.force).max())
+
+
+def test_unloading_gives_the_resting_shape_back(solid):
+    contact = problem(solid)
+    touch = contact.press(0.4e-3, step=0.4e-3)
+    away = contact.move(touch.pose.moved(-0.5e-3), touch, 1e-3)
+    assert len(away.nodes) == 0 and np.abs(away.state.displacement).max() < 1e-11  # 1e-8 of the depth
+
+
+class Floor:
+    """A flat obstacle below y = height, as seen by nodes that come down on it from -y."""
+
+    def __init__(self, height):
+        self.height = height
+
+    def distance(self, points):
+        return self.height - points[:, 1], np.broadcast_to(DOWN, points.shape)
+
+    def curvature(self, points):
+        return np.zeros((len(points), 3, 3))
+
+
+def test_inner_nodes_stop_at_the_core(solid):
+    """Nodes a third of the way up may not come closer to the back than the floor lets them."""
+    mesh = solid.mesh
+    row = np.flatnonzero(np.abs(mesh.nodes[:, 1] + 2e-3) < 1e-9)
+    free = problem(solid).press(0.8e-3, step=0.4e-3)
+    floor = Floor(-2e-3 + 0.1e-3)
+    stopped = problem(solid, core=floor, inner=row).press(0.8e-3, step=0.4e-3)
+    assert (mesh.nodes + free.state.displacement)[row, 1].max() > floor.height + 20e-6
+    assert (mesh.nodes + stopped.state.displacement)[row, 1].max() < floor.height + 1e-9
+    assert len(stopped.inner.nodes) and (stopped.inner.pressing > 0).all()
+    assert stopped.force[1] > 1.02 * free.force[1]
+
+
+def test_a_sharp_edge_in_one_step_is_found_or_refused_in_words(solid):
+    """A box with an edge far sharper than the mesh, tilted: steps are cut back, cells are never left inside out."""
+    box = Box((3e-3, 3e-3, 3e-3), 0.1e-3)
+    contact = FiniteStrainContact(
+        solid, solid.mesh.surface, box, pose_on(box, np.array([0, -3e-3, 0]), DOWN, np.radians(25))
+    )
+    try:
+        touch = contact.press(0.9e-3, step=5e-3)
+    except TactileError as error:
+        assert "no equilibrium beyond" in str(error)  # noqa: PT017
+        return
+    assert (solid.deformation(touch.state.displacement)[1] > 0).all()
+    gap = touch.outer.gaps(solid.mesh.nodes + touch.state.displacement)
+    assert gap.min() > -1e-9 and (touch.pressing > 0).all()
+
+
+def test_the_answer_does_not_depend_on_the_first_guess(solid):
+    one = problem(solid).press(0.5e-3, step=5e-3)
+    other = problem(solid, first_share=0.9).press(0.5e-3, step=0.1e-3)
+    np.testing.assert_allclose(one.force, other.force, rtol=1e-7, atol=1e-7 * np.abs(one.force).max())

@@ -1,0 +1,106 @@
+"""Folders of photographs: what is read out of them, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from plain_unit import plain_unit
+from pressed_unit import PLACES, photograph, write_photographs
+
+from tactile_core.errors import TactileError
+from tactile_core.pictures.calibrate.photographs import chosen, estimated_background, read_photographs
+
+UNIT = plain_unit()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_photographs(tmp_path_factory.mktemp("unit") / "presses", UNIT)
+
+
+def test_presses_background_and_noise_are_found(folder: Path) -> None:
+    found = read_photographs(folder)
+    assert [press.name for press in found.presses] == [f"press_{k}.png" for k in range(5)]
+    assert found.estimated and not found.untouched
+    # The median of five noisy pictures (1 level) of which up to two show a press at a pixel.
+    assert np.abs(found.background - 128).mean() < 0.7
+    assert np.abs(found.background - 128).max() <= 8
+    # Noise of 1 level, rounding to whole levels (sd 0.29) and the median's own noise (about 0.5) add up.
+    assert all(0.9 < level < 1.3 for level in found.noise)
+
+
+def test_photographed_background_is_taken(folder: Path) -> None:
+    found = read_photographs(folder, folder.parent / "untouched.png")
+    np.testing.assert_array_equal(found.background, np.asarray(Image.open(folder.parent / "untouched.png")))
+    assert not found.estimated
+
+
+def test_untouched_photograph_among_presses_is_named(folder: Path, tmp_path: Path) -> None:
+    for file in [*folder.iterdir(), folder.parent / "untouched.png"]:
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    assert read_photographs(tmp_path).untouched == ("untouched.png",)
+
+
+def test_presses_hardly_pull_the_estimate(tmp_path: Path) -> None:
+    # Two of five presses overlap all over; the other three tell what lies below.
+    places = (PLACES[0], (0.8, 0.5, 0.9), PLACES[1], PLACES[2], PLACES[3])
+    folder = write_photographs(tmp_path / "presses", UNIT, places)
+    pictures = np.stack([np.asarray(Image.open(file)) for file in sorted(folder.iterdir())])
+    error = np.abs(estimated_background(pictures) - 128)
+    assert (error > 5).mean() < 0.002
+    assert error.max() < 18
+
+
+def test_some_are_chosen_by_name(folder: Path) -> None:
+    whole = read_photographs(folder)
+    some = chosen(whole, ["press_3.png", "press_1.png"])
+    assert [press.name for press in some.presses] == ["press_3.png", "press_1.png"]
+    np.testing.assert_array_equal(some.background, whole.background)
+    with pytest.raises(TactileError, match=r"press_9\.png"):
+        chosen(whole, ["press_9.png"])
+
+
+def test_over_exposed_photograph_is_flagged(tmp_path: Path) -> None:
+    folder = write_photographs(tmp_path / "presses", UNIT, PLACES[:3])
+    bright = photograph(UNIT, PLACES[0]).astype(int)
+    Image.fromarray((bright + 90).clip(0, 255).astype(np.uint8)).save(folder / "press_0.png")
+    background = np.full((320, 240, 3), 218, np.uint8)
+    Image.fromarray(background).save(tmp_path / "bright.png")
+    flags = {press.name: press.flags for press in read_photographs(folder, tmp_path / "bright.png").presses}
+    assert "over-exposed" in flags["press_0.png"]
+    assert any("another lighting" in flag for flag in flags["press_1.png"])
+
+
+def test_no_folder_no_picture_no_press(tmp_path: Path) -> None:
+    with pytest.raises(TactileError, match="no folder"):
+        read_photographs(tmp_path / "absent")
+    with pytest.raises(TactileError, match="no photographs"):
+        read_photographs(tmp_path)
+    random = np.random.default_rng(0)
+    for k in range(4):
+        noise = random.normal(128, 2, (320, 240, 3)).clip(0, 255)
+        Image.fromarray(noise.astype(np.uint8)).save(tmp_path / f"{k}.png")
+    with pytest.raises(TactileError, match="no press in 4 photographs"):
+        read_photographs(tmp_path)
+
+
+def test_different_sizes_and_unreadable_files_are_named(folder: Path, tmp_path: Path) -> None:
+    for file in folder.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    Image.fromarray(np.zeros((100, 80, 3), np.uint8)).save(tmp_path / "press_2.png")
+    with pytest.raises(TactileError, match=r"press_2\.png: 80 x 100 pixels"):
+        read_photographs(tmp_path)
+    (tmp_path / "press_2.png").write_bytes(b"no picture")
+    with pytest.raises(TactileError, match=r"press_2\.png"):
+        read_photographs(tmp_path)
+
+
+def test_two_photographs_need_a_background(tmp_path: Path) -> None:
+    folder = write_photographs(tmp_path / "presses", UNIT, PLACES[:2])
+    with pytest.raises(TactileError, match="--background"):
+        read_photographs(folder)
+    assert len(read_photographs(folder, tmp_path / "untouched.png").presses) == 2
+    Image.fromarray(np.zeros((160, 120, 3), np.uint8)).save(tmp_path / "small.png")
+    with pytest.raises(TactileError, match=r"small\.png: 120 x 160"):
+        read_photographs(folder, tmp_path / "small.png")

@@ -1,0 +1,187 @@
+"""Mitsuba's pictures: exact zeros, Lambert's law, symmetry, repeats, variants, bad input."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from gel_pictures import Press, levels, with_leds, works
+
+from tactile_core.errors import TactileError
+from tactile_core.pictures.height_map import rest_height_map
+from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR
+from tactile_core.pictures.presets import NAMES, PRESETS, REFERENCE
+from tactile_core.pictures.renderer import MitsubaLight, Renderer
+
+SHORT = dataclasses.replace(REFERENCE, name="short", passes=2)
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """The reference preset with two passes, so that tests of what holds for any number are quick."""
+    monkeypatch.setitem(PRESETS, "reference", SHORT)
+
+
+@pytest.mark.parametrize("preset", NAMES)
+def test_an_undeformed_gel_is_the_background_exactly(preset, variant, small, short):
+    background = np.random.default_rng(0).integers(0, 256, (80, 60, 3), dtype=np.uint8)
+    renderer = Renderer(small, preset, variant, background=background)
+    rest = rest_height_map(small.camera)
+    np.testing.assert_array_equal(renderer.radiance(rest) - renderer.rest_radiance, 0)
+    np.testing.assert_array_equal(renderer(rest), background)
+
+
+def test_a_point_light_over_a_plane_is_lambert(variant, small):
+    unit = with_leds(small, radius=1e-7)
+    camera, flat = unit.camera, np.zeros(small.camera.shape, np.float32)
+    radiance = Renderer(unit, "standard", variant, rest=flat).radiance(flat)
+    right, down = np.meshgrid(camera.right, camera.down)
+    for led in unit.leds:
+        x, y, z = led.position
+        expected = (x**2 + y**2 + z**2) * z / ((x - right) ** 2 + (y - down) ** 2 + z**2) ** 1.5
+        # Rays pass 0.013 pixels, 3 um, off the pixels' middles: 3 um in 8 mm, thrice for the inverse cube.
+        np.testing.assert_allclose(radiance[..., led.channel], expected, rtol=2e-3)
+
+
+def test_each_led_dims_in_its_own_shadow_alone(any_variant, small, press):
+    renderer = Renderer(small, "standard", any_variant)
+    change = renderer.radiance(press.on(small.camera)) - renderer.rest_radiance
+    right, down = np.meshgrid(small.camera.right, small.camera.down)
+    for led in small.leds:
+        away = -np.array(led.position[:2]) / np.hypot(*led.position[:2])
+        behind = np.array([press.right, press.down]) + away * (np.sqrt(2 * press.ball * press.depth) + 0.3e-3)
+        at = np.hypot(right - behind[0], down - behind[1]) < 0.3e-3
+        assert change[at][:, led.channel].mean() < -0.15  # of about 0.4 that a level gel has
+        assert np.abs(np.delete(change[at].mean(0), led.channel)).max() < 0.1
+
+
+def test_a_mirrored_scene_makes_the_mirrored_picture(any_variant, small):
+    flat = np.zeros(small.camera.shape, np.float32)
+    mirrored = dataclasses.replace(
+        small,
+        leds=tuple(dataclasses.replace(led, position=(-led.position[0], *led.position[1:])) for led in small.leds),
+    )
+    one, other = Press(right=1.2e-3), Press(right=-1.2e-3)
+    for preset in ("standard", "quality"):
+        left = Renderer(small, preset, any_variant, rest=flat).radiance(one.over(flat, small.camera))
+        right = Renderer(mirrored, preset, any_variant, rest=flat).radiance(other.over(flat, small.camera))
+        difference = levels(small, left - right[:, ::-1])
+        # Cells of the mesh are cut along one diagonal, which is not mirrored, and pixels here are four times as wide
+        # as the real ones: at a shadow's edge one light point of four flips, a fifth of a level rms.
+        assert np.sqrt(np.mean(difference**2)) < 0.5
+        assert np.abs(difference.mean()) < 0.01
+
+
+def test_a_dent_that_moves_takes_its_picture_along(any_variant, small):
+    far = dataclasses.replace(
+        small, albedo=0.0, camera=dataclasses.replace(small.camera, apparent_height=1.0),
+        leds=tuple(dataclasses.replace(led, position=tuple(20 * c for c in led.position)) for led in small.leds),
+    )  # fmt: skip
+    flat, camera = np.zeros(small.camera.shape, np.float32), far.camera
+    renderer = Renderer(far, "standard", any_variant, rest=flat)
+    step = camera.pixel_size[0]
+    one = renderer.radiance(Press(0.4e-3, 0, 0, soft=0.1e-3).over(flat, camera)) - renderer.rest_radiance
+    moved = renderer.radiance(Press(0.4e-3, -6 * step, 8 * step, soft=0.1e-3).over(flat, camera))
+    moved = np.roll(moved - renderer.rest_radiance, (-8, 6), (0, 1))
+    # Lights 0.3 m away see a shift of 2 mm as 1.5 % of distance at most: inverse square and angle, a few per cent.
+    inside = np.s_[12:-12, 10:-10]
+    assert np.sqrt(np.mean((moved - one)[inside] ** 2)) < 0.06 * np.sqrt(np.mean(one[inside] ** 2))
+
+
+def test_repeats_are_bit_equal(variant, small, press, short):
+    unit = small.at_size(30, 40)
+    height = press.on(unit.camera)
+    for preset in ("standard", "quality", "reference"):
+        one, other = (Renderer(unit, preset, variant) for _ in range(2))
+        other(rest_height_map(unit.camera))  # what was drawn before leaves no trace
+        np.testing.assert_array_equal(one.radiance(height), other.radiance(height))
+
+
+def test_the_number_of_threads_changes_nothing(small, press):
+    variant = works(LLVM)
+    import drjit
+
+    renderer, height = Renderer(small, "standard", variant), press.on(small.camera)
+    before, found = drjit.thread_count(), []
+    try:
+        for count in (1, 2, 3):
+            drjit.set_thread_count(count)
+            found.append(renderer.radiance(height))
+    finally:
+        drjit.set_thread_count(before)
+    np.testing.assert_array_equal(found[1:], [found[0]] * 2)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_variants_draw_the_same_picture(preset, small, press, short):
+    height = press.on(small.camera)
+    one, other = (Renderer(small, preset, works(variant)) for variant in (LLVM, SCALAR))
+    # The same rays in two libraries: one light point in a hundred thousand may flip at an edge.
+    difference = levels(small, one.radiance(height) - other.radiance(height))
+    assert np.sqrt(np.mean(difference**2)) < 0.02
+    assert np.mean(np.abs(difference) > 1e-3) < 1e-3
+
+
+def test_pixels_need_not_be_square(variant, small, press):
+    camera = dataclasses.replace(small.camera, px_per_mm_y=small.camera.px_per_mm_y * 1.05)
+    unit = dataclasses.replace(small, camera=camera)
+    fast, traced = (Renderer(unit, preset, variant).radiance(press.on(camera)) for preset in ("fast", "standard"))
+    near = levels(unit, fast - traced)
+    assert np.sqrt(np.mean(near**2)) < 2.0  # as with square pixels of 0.2 mm; a wrong scale makes it 5
+
+
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (lambda h: np.where(np.indices(h.shape).sum(0) == 9, np.nan, h), "not finite"),
+        (lambda h: np.where(np.indices(h.shape).sum(0) == 9, np.inf, h), "not finite"),
+        (lambda h: h[:-1], "shape"),
+        (lambda h: h[None], "shape"),
+        (lambda h: h * 1e3, "LED"),
+        (lambda h: h + 5.8e-3, "LED"),
+    ],
+)
+def test_bad_heights_are_refused(harm, words, any_variant, small, press):
+    renderer = Renderer(small, "standard", any_variant)
+    with pytest.raises(TactileError, match=words):
+        renderer(harm(press.on(small.camera)))
+    assert renderer(rest_height_map(small.camera)).shape == (80, 60, 3)  # and it goes on
+
+
+def test_a_gel_that_reaches_the_camera_is_refused(any_variant, small):
+    low = dataclasses.replace(small, camera=dataclasses.replace(small.camera, apparent_height=5e-3))
+    high = with_leds(low, position=(9e-3, 9e-3, 30e-3))
+    with pytest.raises(TactileError, match="camera"):
+        Renderer(high, "standard", any_variant).radiance(np.full(small.camera.shape, 5.2e-3))
+
+
+def test_an_unknown_preset_or_variant_is_refused(any_variant, small):
+    with pytest.raises(TactileError, match="--preset"):
+        Renderer(small, "best")
+    with pytest.raises(TactileError, match="variant"):
+        Renderer(small, "standard", "cuda_ad_rgb")
+
+
+def test_memory_stays_flat(any_variant, small, press):
+    resource = pytest.importorskip("resource", reason="the system counts no memory for a process")
+    del resource
+    unit = small.at_size(30, 40)
+    light = MitsubaLight(unit, PRESETS["standard"], any_variant, rest_height_map(unit.camera), 0)
+    height = press.on(unit.camera)
+    for _ in range(50):
+        light.radiance(height)
+    before = resident()
+    for k in range(200):
+        light.radiance(height + np.float32(k * 1e-7))
+    # 1,000 frames of 240 x 320 grow by less than 20 MB; a leak of one frame's vertices alone would be 5 MB here.
+    assert resident() - before < 4e6
+
+
+def resident() -> int:
+    """Bytes of memory that this process holds."""
+    try:
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * 4096
+    except OSError:
+        pytest.skip("the system has no /proc/self/statm")

@@ -1,0 +1,54 @@
+"""A recording in parts is the recording."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_core import recordings
+from tactile_core.errors import TactileError
+from tactile_core.recordings import chunks, table
+
+
+def joined(path):
+    found = list(chunks.read_parts(path))
+    columns = {
+        name: np.concatenate([getattr(part.recording, name)[part.repeated :] for part in found])
+        for name in ("electrodes", "time", "pdc", "rows")
+        if getattr(found[0].recording, name) is not None
+    }
+    return columns, found
+
+
+@pytest.mark.parametrize("layout", ["csv_slide", "csv_31", "hdf5_electrode_vals", "hdf5_simulated"])
+def test_parts_join_to_the_whole(layout, make, in_layout, monkeypatch):
+    monkeypatch.setattr(chunks, "TEXT_BYTES", 30_000)
+    monkeypatch.setattr(chunks, "ARRAY_BYTES", 100_000)
+    path = in_layout(layout, make(frames=1500))
+    whole, (columns, found) = recordings.read(path), joined(path)
+    assert len(found) > 2 and all(part.repeated == chunks.CONTEXT for part in found[2:])
+    for name, values in columns.items():
+        if name == "rows" and layout.startswith("hdf5"):
+            continue  # counted from each part's first frame
+        np.testing.assert_allclose(values, getattr(whole, name), atol=1e-6, err_msg=name)  # stamps of 1.6e9 s: 2e-7
+
+
+def test_short_recordings_and_npz_are_one_part(make, in_layout):
+    for layout in ("csv_slide", "npz", "hdf5_simulated"):
+        (part,) = chunks.read_parts(in_layout(layout, make(frames=60)))
+        assert part.repeated == 0 and len(part.recording) == 60
+
+
+def test_a_bad_cell_far_into_a_long_text_is_told_with_its_line(slide_lines, write, monkeypatch):
+    monkeypatch.setattr(chunks, "TEXT_BYTES", 30_000)
+    slide_lines[600] = slide_lines[600].replace("2000", "x", 1)
+    _, found = joined(write(slide_lines))
+    assert any("line 601" in text for part in found for text in part.recording.warnings)
+
+
+def test_a_text_without_lines_costs_no_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr(chunks, "TEXT_BYTES", 1000)
+    monkeypatch.setattr(table, "MAX_LINE", 1000)
+    (tmp_path / "a.csv").write_bytes(b"7" * 5000)
+    with pytest.raises(TactileError, match="a line of over"):
+        list(chunks.read_parts(tmp_path / "a.csv"))

@@ -1,0 +1,81 @@
+"""Each verb loads the libraries it needs and no others, and help loads none; the cases are those that are profiled."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from benchmarks import profile_verbs as profile
+
+from tactile_core.cli.verbs import VERBS
+
+ROOT = Path(__file__).parents[2]
+CASES = {case.name: case for case in profile.CASES}
+READS = {"render_fast": "convert", "render_standard": "convert", "export": "batch"}
+NEEDS = {"render_standard": "mitsuba", "train": "torch", "mesh_full": "pypardiso"}  # beyond what all tests have
+
+
+@pytest.fixture(scope="module")
+def scratch(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lean")
+    profile.write_inputs(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def cost_of(scratch):
+    """``cost_of("export")``: what the case costs, after those that write what it reads."""
+    found = {}
+
+    def cost(name):
+        if name in READS:
+            cost(READS[name])
+        if name not in found:
+            found[name] = profile.run(CASES[name], scratch)
+        return found[name]
+
+    return cost
+
+
+# The doctor looks at libraries in other processes.
+@pytest.mark.parametrize("name", [name for name in CASES if name != "doctor"])
+def test_a_verb_loads_what_it_needs_and_nothing_else(name, cost_of):
+    needed = NEEDS.get(name)
+    if needed and importlib.util.find_spec(needed) is None:
+        pytest.skip(f"{needed} is not installed")
+    case = CASES[name]
+    cost = cost_of(name)
+    assert cost.status == case.status
+    # Torch and Mitsuba choose for themselves which of their helpers they load.
+    assert cost.loaded - {"tqdm"} == set(case.loads.split()) - {"tqdm"}
+
+
+def test_every_verb_is_among_the_cases():
+    assert {case.words.split()[0] for case in CASES.values()} >= set(VERBS) - {"calibrate"}
+
+
+def test_the_table_in_the_documentation_names_every_case():
+    text = (ROOT / "docs" / "lean.md").read_text(encoding="utf-8")
+    assert {name for name in CASES if not re.search(rf"^\| `{name}` ", text, re.MULTILINE)} == set()
+
+
+@pytest.mark.parametrize("script", ["measure_sampling", "measure_costs"])
+def test_what_plans_and_bounds_are_read_from_is_measured(script, tmp_path):
+    """A short run leaves the table that ships as it is."""
+    tables = sorted((ROOT / "tactile_core" / "data").glob("*.json"))
+    before = [table.read_bytes() for table in tables]
+    out = tmp_path / "rows.json"
+    command = [sys.executable, str(ROOT / "scripts" / "benchmarks" / f"{script}.py"), "--quick", "--json", str(out)]
+    subprocess.run(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True, timeout=300)
+    rows = {row["name"]: row["value"] for row in json.loads(out.read_text(encoding="utf-8"))}
+    assert [table.read_bytes() for table in tables] == before
+    if script == "measure_costs":
+        assert rows["cost_simulate_digit"] > 0 and 50 < rows["memory_simulate_digit"] < 1000
+    else:  # nodes 0.35 mm apart show a ball to a few micrometres, and float32 rounds far below one
+        assert 0.05 < rows["sampling_height_error_10%"] < 5 and 0 < rows["float32_error"] < 0.01

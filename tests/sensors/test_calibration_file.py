@@ -1,0 +1,119 @@
+"""Calibration files: what is written is read back, what is wrong is named."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_core.errors import TactileError
+from tactile_core.pictures.background import background_picture, fit_polynomial
+from tactile_core.sensors.calibration_file import SHIPPED, load_calibration, write_calibration
+
+SHIPPED_TEXT = SHIPPED.read_text(encoding="utf-8")
+
+
+def test_shipped_calibration_is_the_one_in_scenes() -> None:
+    scenes = Path(__file__).parents[2] / "scenes" / "calibrations" / "default.toml"
+    assert scenes.read_bytes() == SHIPPED.read_bytes()
+
+
+def test_written_file_reads_back_and_is_stable(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
+    calibration = dataclasses.replace(load_calibration(), unit='a "unit" of ours')
+    write_calibration(first, calibration)
+    again = load_calibration(first)
+    assert again.unit == calibration.unit
+    assert again.camera.apparent_height == pytest.approx(calibration.camera.apparent_height, rel=1e-5)
+    np.testing.assert_allclose(again.gain.along_right, calibration.gain.along_right, rtol=1e-5)
+    write_calibration(second, again)
+    assert second.read_bytes() == first.read_bytes()
+
+
+def test_shipped_file_is_written_as_this_version_writes_it(tmp_path: Path) -> None:
+    write_calibration(tmp_path / "again.toml", load_calibration())
+    assert (tmp_path / "again.toml").read_bytes() == SHIPPED.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where"),
+    [
+        ("px_per_mm_x =", "px_per_cm_x =", "unknown px_per_cm_x"),
+        ("albedo =", "# albedo =", "gel: albedo missing"),
+        ("radius_mm", "radius", "leds, .*unknown radius"),
+        ("[noise]", "[other]", "unknown other"),
+        ('format = "tactile-calibration-1"', 'format = "tactile-calibration-9"', "format"),
+        ("width_px = 240", "width_px = 240.5", "width_px"),
+        ("height_px = 320", "height_px = true", "height_px"),
+        ("down_x = 1", "down_x = 0", "down_x"),
+        ("position_mm = [", "position_mm = [nan, ", "position_mm"),
+        ("position_mm = [", f"position_mm = [{10**400}, ", "position_mm"),
+        ("centre = [[", "centre = [[1], [", "gain, centre"),
+        ("centre = [[", "centre = [[-", "gain, centre"),
+        ("dome_scale = ", "dome_scale = 100", "dome_scale"),
+        ("position_mm = [", "position_mm = [1e300, ", r"the number 1e\+300"),
+        ("px_per_mm_x = ", "px_per_mm_x = 1000", "px_per_mm_x"),
+        ("[camera]", "[camera", "table declaration"),
+    ],
+)
+def test_bad_file_is_refused(tmp_path: Path, old: str, new: str, where: str) -> None:
+    assert old in SHIPPED_TEXT
+    file = tmp_path / "unit.toml"
+    file.write_text(SHIPPED_TEXT.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(TactileError, match=where) as raised:
+        load_calibration(file)
+    assert str(file) in str(raised.value)
+
+
+def test_absent_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TactileError, match="cannot be read"):
+        load_calibration(tmp_path / "none.toml")
+
+
+def test_zero_light_is_refused() -> None:
+    calibration = load_calibration()
+    gain = np.array(calibration.gain.centre)
+    gain[1, 1] = 0
+    with pytest.raises(TactileError, match="0 levels of green"):
+        dataclasses.replace(calibration.gain, centre=tuple(map(tuple, gain)))
+
+
+def test_photograph_takes_the_background_s_place(tmp_path: Path) -> None:
+    from PIL import Image
+
+    photograph = np.random.default_rng(0).integers(0, 256, (320, 240, 3), dtype=np.uint8)
+    Image.fromarray(photograph).save(tmp_path / "rest.png")
+    file = tmp_path / "unit.toml"
+    file.write_text(SHIPPED_TEXT.replace('photograph = ""', 'photograph = "rest.png"'), encoding="utf-8")
+    np.testing.assert_array_equal(background_picture(load_calibration(file)), photograph)
+    Image.fromarray(photograph[:-2]).save(tmp_path / "rest.png")
+    with pytest.raises(TactileError, match="240 x 318"):
+        background_picture(load_calibration(file))
+    (tmp_path / "rest.png").unlink()
+    with pytest.raises(TactileError, match=r"rest\.png"):
+        background_picture(load_calibration(file))
+
+
+def test_background_is_smooth_and_its_polynomial_is_found_again() -> None:
+    calibration = load_calibration()
+    picture = background_picture(calibration)
+    assert picture.shape == (320, 240, 3)
+    for axis in (0, 1):
+        assert np.abs(np.diff(picture, axis=axis)).max() <= 3  # levels a pixel: no edge
+    found = fit_polynomial(picture, calibration.camera)
+    again = dataclasses.replace(calibration, background=dataclasses.replace(calibration.background, polynomial=found))
+    assert np.abs(background_picture(again) - picture).max() <= 1  # rounding to whole levels
+
+
+def test_start_of_unlike_units_reads() -> None:
+    start = load_calibration(Path(__file__).parents[2] / "scenes" / "calibrations" / "start.toml")
+    assert not start.fit.photographs
+    assert start.camera.shape == (320, 240)
+
+
+@pytest.mark.parametrize("name", ["../rest.png", "/etc/rest.png", "sub/rest.png"])
+def test_photograph_lies_beside_the_file(tmp_path: Path, name: str) -> None:
+    file = tmp_path / "unit.toml"
+    file.write_text(SHIPPED_TEXT.replace('photograph = ""', f'photograph = "{name}"'), encoding="utf-8")
+    with pytest.raises(TactileError, match="background, photograph"):
+        load_calibration(file)

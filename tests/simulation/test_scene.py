@@ -1,0 +1,80 @@
+"""Scenes that ship load; anything else is refused with file and field."""
+
+import pathlib
+import re
+
+import pytest
+
+from tactile_core.errors import TactileError
+from tactile_core.geometry.indenters import Cylinder, Sphere
+from tactile_core.simulation.scene import load_scene
+
+SCENES = pathlib.Path(__file__).parents[2] / "scenes"
+GOOD = (SCENES / "press_sphere" / "scene.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("folder", sorted(p.parent.name for p in SCENES.glob("*/scene.toml")))
+def test_shipped_scenes_load(folder):
+    scene, text = load_scene(SCENES / folder)
+    assert scene.name == folder
+    assert text == (SCENES / folder / "scene.toml").read_text(encoding="utf-8")
+    assert [type(spec.build()) for spec in scene.indenters]
+
+
+def test_kinds_build_in_metres(tmp_path):
+    text = GOOD.replace('kind = "sphere"\nname = "sphere_7mm"', 'kind = "cylinder"\nname = "sphere_7mm"', 1)
+    scene, _ = load_scene(write(tmp_path, text))
+    assert scene.indenters[0].build() == Cylinder(3.5e-3, 0.5e-3)
+    assert scene.indenters[1].build() == Sphere(7e-3)
+
+
+def write(folder, text):
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("radius_mm = 3.5", "radius = 3.5", "radius"),
+        ("radius_mm = 3.5", "radius_mm = -3.5", "radius_mm"),
+        ("radius_mm = 3.5", 'radius_mm = "3.5"', "radius_mm"),
+        ("radius_mm = 3.5", "radius_mm = inf", "infinite"),
+        ("force_ratio = 1.5", "force_ratio = 1.0", "force_ratio"),
+        ("tilt_max_deg = 20.0", "tilt_max_deg = 80.0", "tilt_max_deg"),
+        ('kind = "sphere"', 'kind = "teapot"', "teapot"),
+        ('"sphere_14mm"', '"sphere_7mm"', "different names"),
+        ("tactile-scene-1", "tactile-scene-9", "tactile-scene-1"),
+        ("[pairs]", "[pears]", "pears"),
+        ("[pairs]", "[pairs", "end of a table"),
+        ("[pairs]", "[pairs]\ndepth_steps = 5\ndepth_min_mm = 2.0", "depth_min_mm"),
+        ("[pairs]", "[pairs]\ndepth_steps = 5\nslide_share = 0.3", "slide_share"),
+    ],
+)
+def test_bad_scene_is_refused(tmp_path, old, new, said):
+    assert old in GOOD
+    path = write(tmp_path, GOOD.replace(old, new))
+    with pytest.raises(TactileError, match=said) as caught:
+        load_scene(path)
+    assert str(path) in str(caught.value)
+
+
+def test_missing_scene(tmp_path):
+    with pytest.raises(TactileError, match="cannot be read"):
+        load_scene(tmp_path)
+
+
+def test_recording_times_must_grow(tmp_path):
+    text = (SCENES / "press_roll_slide" / "scene.toml").read_text(encoding="utf-8")
+    with pytest.raises(TactileError, match="growing times"):
+        load_scene(write(tmp_path, text.replace("time_s = 0.5,", "time_s = 9.5,")))
+
+
+def test_numbers_beyond_all_measure_are_refused(tmp_path):
+    text = (SCENES / "press" / "scene.toml").read_text(encoding="utf-8")
+    changed = re.sub(r"force_n = [0-9.]+", "force_n = 1e300", text, count=1)
+    assert changed != text
+    (tmp_path / "scene.toml").write_text(changed)
+    with pytest.raises(TactileError, match="the number 1e\\+300"):
+        load_scene(tmp_path)

@@ -1,0 +1,100 @@
+"""Each metric against a case that can be worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_core import accuracy
+from tactile_core.accuracy import Budget, Candidate, cheapest, parse_budget
+from tactile_core.errors import TactileError
+
+REST = np.array([[x * 1e-3, -8e-3, z * 1e-3] for x in range(5) for z in range(4)])
+WAYS = [Candidate("rough", 20.0, 1.0), Candidate("fine", 5.0, 100.0), Candidate("odd", 4.0, 90.0)]
+
+
+def dent(depth: float, node: int) -> np.ndarray:
+    """(1, 20, 3) m, one node pushed in."""
+    displacement = np.zeros((1, len(REST), 3), np.float32)
+    displacement[0, node, 1] = depth
+    return displacement
+
+
+def test_perfect_answer_has_no_error():
+    true = dent(1e-3, 7)
+    for value in accuracy.mesh_figures(true, true).values():
+        assert value == [0.0]
+
+
+def test_rms_counts_moving_nodes_only():
+    true, found = dent(100e-6, 3), dent(60e-6, 3)
+    true[0, 4, 0] = 20e-6  # moves, and the answer misses it
+    found[0, 5, 2] = 500e-6  # rests in truth: not in the contact, but the largest error
+    expected = np.sqrt((40e-6**2 + 20e-6**2) / 2)
+    assert accuracy.rms_in_contact(found, true) == pytest.approx([expected], rel=1e-6)  # float32 input
+    assert accuracy.max_error(found, true) == pytest.approx([500e-6], rel=1e-6)
+
+
+def test_core_is_above_a_share_of_the_peak():
+    true = dent(100e-6, 3)
+    true[0, [4, 5], 1] = 31e-6, 29e-6
+    found = true.copy()
+    found[0, [3, 4, 5], 1] += np.float32([-10e-6, 20e-6, 90e-6])
+    assert accuracy.core_height_error(found, true) == pytest.approx([np.sqrt((10e-6**2 + 20e-6**2) / 2)], rel=1e-5)
+    assert accuracy.peak_depth_error(found, true) == pytest.approx([0.19], rel=1e-5)  # the new peak is node 5, 119 um
+
+
+def test_no_contact_is_no_figure():
+    still = np.zeros((1, len(REST), 3), np.float32)
+    assert np.isnan(accuracy.rms_in_contact(still, still)).all()
+    assert np.isnan(accuracy.core_height_error(still, still)).all()
+    assert np.isnan(accuracy.peak_depth_error(still, still)).all()
+    assert np.isnan(accuracy.dent_center(still, REST)).all()
+    assert accuracy.mean(np.array([np.nan])) is None
+
+
+def test_depth_on_a_curved_pad_is_the_length():
+    true = np.zeros((1, len(REST), 3), np.float32)
+    true[0, 2] = 0.0, 30e-6, 40e-6
+    assert accuracy.peak_depth_error(0.5 * true, true, accuracy.lengths) == pytest.approx([0.5])
+
+
+def test_center_of_a_dent():
+    displacement = dent(1e-3, 0) + dent(1e-3, 1) + dent(0.2e-3, 19)  # the last is below 30 % of the peak
+    assert accuracy.dent_center(displacement, REST)[0] == pytest.approx([0.0, 0.5e-3])
+
+
+@pytest.mark.parametrize(
+    ("text", "budget"),
+    [
+        ("5um", Budget(um=5)), ("0.6levels", Budget(levels=0.6)), ("1level", Budget(levels=1)),
+        (" 5 µm ", Budget(um=5)), (".5UM,2levels", Budget(0.5, 2)), ("2levels, 1e-1um", Budget(0.1, 2)),
+    ],
+)  # fmt: skip
+def test_a_bound_is_a_number_and_its_unit(text, budget):
+    assert parse_budget(text) == budget
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "5", "um", "5mm", "-5um", "0um", "0levels", "nanum", "infum", "1e999um", "5um,6um", "5um,", "5 6um"],
+)
+def test_anything_else_is_refused(text):
+    with pytest.raises(TactileError, match=r"such as 5um or 0\.6levels"):
+        parse_budget(text)
+
+
+def test_a_unit_that_means_nothing_here_is_refused():
+    assert parse_budget("5um").only("um", "why") == 5
+    with pytest.raises(TactileError, match=r"2levels.*um.*Drawn elsewhere"):
+        parse_budget("5um,2levels").only("um", "Drawn elsewhere")
+
+
+@pytest.mark.parametrize(("bound", "name"), [(30, "rough"), (20, "rough"), (19.9, "odd"), (4, "odd")])
+def test_the_cheapest_that_meets_a_bound_is_picked(bound, name):
+    assert cheapest(WAYS, bound, "um").name == name
+
+
+def test_a_bound_that_none_meets_names_the_best():
+    with pytest.raises(TactileError, match=r"3 um of shape; expected 4 or more, which odd has"):
+        cheapest(WAYS, 3, "um", "shape")

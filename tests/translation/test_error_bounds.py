@@ -1,0 +1,39 @@
+"""Bounds by place: each covers 95 of 100 contacts of its own place."""
+
+import numpy as np
+import pytest
+
+from tactile_core.errors import TactileError
+from tactile_core.translation import error_bounds
+
+X = np.array([np.nan, -16e-3, -14e-3, -10e-3, -2.1e-3, -2e-3, 3e-3])
+
+
+def test_places_follow_the_finger():
+    np.testing.assert_array_equal(error_bounds.place(X), [0, 1, 2, 2, 3, 4, 4])
+
+
+def test_each_place_is_covered_by_its_own_factor():
+    random = np.random.default_rng(0)
+    x = random.choice([np.nan, -16e-3, -10e-3, -5e-3, 0.0], 10_000)
+    scale = 1.0 + error_bounds.place(x)
+    ratio = scale * random.exponential(1.0, len(x))
+    factors = error_bounds.fit(ratio, x)
+    below = ratio <= error_bounds.bound(np.ones(len(x)), x, factors)
+    for each in range(error_bounds.PLACES):
+        assert below[error_bounds.place(x) == each].mean() == pytest.approx(0.95, abs=0.002)  # one contact in 2,000
+    assert factors == sorted(factors)
+
+
+def test_a_place_with_few_contacts_has_the_factor_of_all():
+    ratio = np.r_[np.full(200, 2.0), np.full(error_bounds.FEWEST - 1, 9.0)]
+    x = np.r_[np.full(200, -10e-3), np.full(error_bounds.FEWEST - 1, 0.0)]
+    assert error_bounds.fit(ratio, x) == [9.0, 9.0, 2.0, 9.0, 9.0]
+
+
+@pytest.mark.parametrize("value", [None, 2.2, [2.2] * 4, [2.2] * 4 + [0.0], [2.2] * 4 + [float("nan")], ["2"] * 5])
+def test_a_card_with_other_factors_is_refused(value):
+    good = {kind: {name: [2.0] * 5 for name in ("biotac", "digit")} for kind in error_bounds.KINDS}
+    error_bounds.check({"error_bounds": good}, "card.json")
+    with pytest.raises(TactileError, match=r"error_bounds\.rectified\.digit"):
+        error_bounds.check({"error_bounds": good | {"rectified": good["rectified"] | {"digit": value}}}, "card.json")

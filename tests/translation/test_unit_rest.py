@@ -1,0 +1,121 @@
+"""A unit's rest is found among recordings that all begin and end in contact, and used where nothing calm is near it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tactile_core import recordings
+from tactile_core.errors import TactileError
+from tactile_core.recordings import PrepareOptions, polarity
+from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile, prepare_unit
+from tactile_core.recordings.flags import Flag
+from tactile_core.translation.unit_rest import find_rest
+
+REST = np.linspace(3100.0, 3500.0, 19)
+
+
+def held(strength: float, seed: int, *, pdc: bool = True, drift: float = 3.0) -> recordings.Recording:
+    """A steady grip of a simulated contact, 2 s, by a unit whose rest drifts a little from recording to recording."""
+    random = np.random.default_rng(seed)
+    contacts = np.load(polarity.shipped(polarity.PATTERNS)).astype(float)
+    contact = contacts[np.argsort(np.abs(contacts).max(axis=1))[-40 + seed % 30]]
+    level = REST + drift * random.standard_normal(19) + strength * contact
+    pressure = 1000 + 200 * strength + random.normal(0, 0.7, 200)
+    return recordings.Recording(
+        name=f"grip_{seed}", path=f"grip_{seed}", layout="made", time=np.arange(200) / 100, start_time=0.0,
+        electrodes=np.rint(level + random.normal(0, 1, (200, 19))), rows=np.arange(200),
+        flags=np.zeros(200, np.uint16), pdc=np.rint(pressure) if pdc else None,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("pdc", [True, False])
+def test_it_is_that_of_the_least_pressed_recordings(pdc):
+    strengths = [0.01, 0.02, 0.02, *np.linspace(0.1, 1.0, 9)]
+    found = find_rest([held(strength, seed, pdc=pdc) for seed, strength in enumerate(strengths)])
+    assert found.recordings == (3 if pdc else 12) and (found.pdc is None) == (not pdc)
+    # What a hundredth of a grip moves, and drift of 3 counts; without pressure, what half of the contacts move.
+    assert np.abs(found.counts - REST).max() < (12 if pdc else 60)
+    assert (found.spread > 1).all()
+
+
+def test_too_few_and_rectified_recordings_are_refused():
+    with pytest.raises(TactileError, match=r"2 recordings.*at least 3"):
+        find_rest([held(0.1, 0), held(0.2, 1)])
+    folded = [dataclasses.replace(held(0.3, k), electrodes=np.abs(held(0.3, k).electrodes - REST)) for k in range(3)]
+    with pytest.raises(TactileError, match=r"a (rectified|scaled) recording"):
+        find_rest(folded)
+
+
+def test_a_grip_without_rest_is_measured_from_the_unit_s_own():
+    unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
+    grip = held(0.6, 3)
+    bare, found = recordings.prepare(grip), prepare_unit(grip, None, unit)
+    assert np.abs(bare.change).max() < 10  # the grip is calm, and taken for rest
+    np.testing.assert_allclose(found.change.mean(axis=0), grip.electrodes.mean(axis=0) - REST, atol=1e-6)
+    assert not (found.flags & Flag.NO_QUIET_PART).any() and found.report["polarity"] == "falls"
+    assert found.pdc.mean() == pytest.approx(120, abs=2)
+    light = prepare_unit(held(0.01, 4), None, unit)  # calm and near the unit's rest: its own is better
+    assert light.quiet.any() and np.abs(light.change).max() < 10
+    told = prepare_unit(grip, PrepareOptions(tare="0:50"), unit)
+    assert np.abs(told.change).max() < 10  # the user's own frames stand
+
+
+def test_a_hand_s_file_is_read_by_finger(tmp_path):
+    unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19)
+    sensor = SensorFile(FORMAT, finger0=unit)
+    assert sensor.of("hand.mat#0", 0, "unit.toml") is unit
+    with pytest.raises(TactileError, match=r"unit\.toml.*finger1"):
+        sensor.of("hand.mat#1", 1, "unit.toml")
+    with pytest.raises(TactileError, match=r"of one unit.*\[unit\]"):
+        sensor.of("touch.csv", None, "unit.toml")
+
+
+def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
+    """The place of a flat object held by two real fingers, against the electrodes that it squeezes (data README)."""
+    pytest.importorskip("scipy", reason="scipy is absent: pip install tactile-core[matlab]")
+    from tactile_core.recordings.signals import FRAMEWISE
+    from tactile_core.translation import adapt, networks, reference_signals, translate
+
+    files = [path for path in sorted(outside_data("biotac_phac").glob("*.mat")) if path.stem.split("_")[-2] < "04"]
+    hard = [path for path in files if path.name.startswith(("acrylic", "steel"))]
+    soft = [path for path in files if path not in hard]
+    sensor, _ = adapt.adapt_hand(soft, reference_signals.read(networks.WEIGHTS_FOLDER))
+    translator, shuffled = translate.load_translator(), np.random.default_rng(0).permutation(19)
+    centres = {"as read": [], "shuffled": []}
+    for path in hard:
+        for finger in (0, 1):
+            recording = recordings.read(f"{path}#{finger}")
+            signals = prepare_unit(recording, None, sensor.of(path, finger, "made"))
+            some = {name: getattr(signals, name)[::100] for name in FRAMEWISE}
+            for name, order in (("as read", slice(None)), ("shuffled", shuffled)):
+                part = dataclasses.replace(signals, **(some | {"change": some["change"][:, order]}))
+                centres[name].append(np.nanmedian(1e3 * translator(part).contact_center, axis=0))
+    within = {name: in_box(np.array(places)).mean() for name, places in centres.items()}
+    assert within["as read"] >= 0.95 and within["shuffled"] <= 0.2
+
+
+def in_box(places: np.ndarray) -> np.ndarray:
+    """Whether places (n, 2) mm = (x, z) lie over the squeezed electrodes E7-E10 and E17, x -18.7 to -15.3, and 1.5."""
+    return (places[:, 0] >= -20.2) & (places[:, 0] <= -13.8) & (np.abs(places[:, 1]) <= 3)
+
+
+def test_a_quiet_part_under_the_pressure_of_rest_is_kept_however_far_it_drifted():
+    unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
+    drifted = held(0.0, 5, drift=0.0)
+    drifted = dataclasses.replace(drifted, electrodes=drifted.electrodes + 90)
+    found = prepare_unit(drifted, None, unit)
+    assert found.quiet.any() and np.abs(found.change).max() < 10
+    grip = prepare_unit(held(0.6, 3), None, unit)
+    assert any("rest is the unit's own: what is calm lies up to" in warning for warning in grip.warnings)
+
+
+def test_pressure_of_another_zero_is_not_measured_from_the_unit_s(tmp_path):
+    unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
+    grip = held(0.6, 3)
+    found = prepare_unit(dataclasses.replace(grip, pdc=grip.pdc - 1000), None, unit)
+    assert np.abs(found.pdc).max() < 200
+    tared = [dataclasses.replace(one, pdc=one.pdc - 1000) for one in (held(s, k) for k, s in enumerate((0.01, 0.1, 1)))]
+    assert find_rest(tared).pdc is None
