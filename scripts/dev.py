@@ -27,8 +27,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 OLDEST, NEWEST = (3, 11), (3, 13)
 DEMO_RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+TEST_PACKAGES = ("pytest", "pytest-timeout")
 # What the extension's tests need beside bpy; 4.2 to 5.0 were built for the first numpy's binary interface.
-BLENDER_PACKAGES = ("pytest", "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree")
+BLENDER_PACKAGES = (*TEST_PACKAGES, "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree")
 BLENDER_SECONDS = 1800  # some Blenders hang at exit (4.5 where an operator stays registered): no run may last longer
 STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
@@ -153,8 +154,8 @@ def run_in_binary(binary: Path, pytest_arguments: list[str]) -> int:
     site, wheels = work / "site", work / "dist"
     build = [sys.executable, str(ROOT / "scripts" / "build_extension.py"), "--python", found.group(1)]
     constraint = ["--constraint", str(ROOT / "constraints.txt")]
-    pytest = [sys.executable, "-m", "pip", "install", "--upgrade", "--target", str(site), *constraint, "pytest"]
-    for step in ([*build, "--out", str(wheels)], pytest):
+    pytest = [sys.executable, "-m", "pip", "install", "--upgrade", "--target", str(site), *constraint]
+    for step in ([*build, "--out", str(wheels)], [*pytest, *TEST_PACKAGES]):
         if subprocess.call(step, env=environment()):
             raise SetupError("the step before failed")
     packed = max(wheels.glob(f"*-py{found.group(1)}.zip"), key=lambda path: path.stat().st_mtime)
