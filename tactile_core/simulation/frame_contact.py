@@ -9,7 +9,6 @@ import numpy as np
 
 from ..errors import TactileError
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.gap_law import electrode_gaps
 from ..mechanics.fast.compliance import compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.finite_strain.press import FullPress
@@ -45,7 +44,7 @@ class FrameContact:
         """Film (19,) m over the BioTac's electrodes."""
         solved = self._solved
         if isinstance(solved, FastContact):
-            return electrode_gaps(solved.linear)
+            return solved.linear.electrode_gaps
         return solved.gaps
 
     @functools.cached_property

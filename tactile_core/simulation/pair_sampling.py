@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.gap_law import electrode_gaps, signal_of_gaps
+from ..mechanics.electrodes.gap_law import signal_of_gaps
 from ..mechanics.fast.compliance import biotac_compliance, compliance_of, digit_compliance
 from ..mechanics.fast.contact_state import Contact
 from ..mechanics.fast.press import CorrectedPress, FastContact
@@ -112,7 +112,7 @@ def draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
 def pair_row(biotac: FastContact, digit: FastContact) -> dict[str, np.ndarray]:
     """What one paired contact stores; arrays as in the file, see ``DATASETS``. Electrode gaps are not corrected."""
     skin, gel = biotac_compliance(), digit_compliance()
-    gaps = electrode_gaps(biotac.linear)
+    gaps = biotac.linear.electrode_gaps
     return {
         "displacement_biotac": quantise(biotac.corrected.displacement),
         "displacement_digit": quantise(digit.corrected.displacement),

@@ -8,7 +8,7 @@ import functools
 import numpy as np
 
 from tactile_core import accuracy
-from tactile_core.mechanics.electrodes.gap_law import electrode_gaps, signal_of_gaps
+from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
 from tactile_core.recordings.flags import Flag
 
 from .case import TRANSLATION, Found, case
@@ -26,7 +26,7 @@ def _translated(name: str, share: float) -> Found:
     digit = press("digit", indenter, place, friction).at_force(biotac.axial_force)
     if digit is None:
         return Found(1.0, "said", 1.0, at_least=True, words="the fast tier says that it finds no contact of this force")
-    change = signal_of_gaps(electrode_gaps(biotac.linear))[None]
+    change = signal_of_gaps(biotac.linear.electrode_gaps)[None]
     signals = dataclasses.replace(
         prepared()[1],
         change=change,

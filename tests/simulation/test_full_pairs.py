@@ -14,7 +14,7 @@ from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.files import array_pack
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.mechanics.electrodes.gap_law import electrode_gaps, signal_of_gaps
+from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
 from tactile_core.mechanics.fast.compliance import biotac_compliance
 from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
@@ -118,7 +118,7 @@ def test_the_film_is_that_of_the_linear_model_for_a_small_force():
     rest = electrode_feet().gap
     per_newton = [
         (full.gaps - rest) / full.axial_force,
-        (electrode_gaps(linear) - rest) / linear.axial_force,
+        (linear.electrode_gaps - rest) / linear.axial_force,
     ]
     assert np.linalg.norm(per_newton[0] - per_newton[1]) < 0.12 * np.linalg.norm(per_newton[0])
 

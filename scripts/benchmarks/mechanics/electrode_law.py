@@ -11,7 +11,8 @@ from tactile_core import sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.geometry.indenters import Cylinder, Indenter, Sphere
 from tactile_core.mechanics.electrodes.biotac_sheet import CONDUCTIVITY, BiotacSheet, biotac_sheet, divider_counts
-from tactile_core.mechanics.electrodes.gap_law import FILM_CONSTANT, electrode_gaps, signal_of_gaps
+from tactile_core.mechanics.electrodes.gap_law import FILM_CONSTANT, signal_of_gaps
+from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
 from tactile_core.mechanics.electrodes.thin_sheet import ThinSheet, resistances
 from tactile_core.mechanics.fast.compliance import biotac_compliance
 from tactile_core.mechanics.fast.contact import Contact, ContactProblem
@@ -40,20 +41,21 @@ def electrode_rows(contacts: int = 240, *, each: bool = True) -> Iterator[Row]:
     inner_skin = _inner_skin()
     touches = _contacts(contacts)
     skin = np.stack([inner_skin(contact) for contact in touches])
-    gaps = np.stack([electrode_gaps(contact) for contact in touches])
+    gaps = np.stack([contact.electrode_gaps for contact in touches])
     over_e18 = [inner_skin(contact) for contact in _press(INDENTERS[1], OVER_E18, E18_DEPTHS)]
     yield from _grid_rows(biotac_sheet(), [*skin[:: max(len(skin) // 3, 1)], over_e18[-1]])
+    yield from _reduced_rows(biotac_sheet(), touches, skin)
     for of, sheet in (
         ("core at the electrodes", biotac_sheet()),
         ("core of the mesh", biotac_sheet(core_of_mesh=True)),
     ):
-        rest = sheet.resistances(np.zeros_like(skin[0]))
+        rest = sheet.resistances(sheet.film)
         for depth, moved in zip(E18_DEPTHS, over_e18, strict=True):
-            change = 100 * (sheet.resistances(moved) / rest - 1)
+            change = 100 * (sheet.resistances(sheet.films(moved)) / rest - 1)
             name = f"sheet_over_E18_{depth * 1e3:.1f}mm"
             yield row(f"{name}_E18", change[17], "percent", null=0.0, of=f"7 mm ball, {of}")
             yield row(f"{name}_largest_fall", change.min(), "percent", null=0.0, of=f"7 mm ball, {of}")
-        found = np.stack([sheet.resistances(moved) for moved in skin])
+        found = np.stack([sheet.resistances(sheet.films(moved)) for moved in skin])
         yield from _law_rows(found - rest, gaps, of, each=each)
         divided = divider_counts(found, rest) - divider_counts(rest, rest)
         yield from _law_rows(divided, gaps, f"{of}, through a divider", each=False)
@@ -80,15 +82,42 @@ def _grid_rows(sheet: BiotacSheet, skin: list[np.ndarray]) -> Iterator[Row]:
     fine = ThinSheet(*sheet.sheet.given, refine=3)
 
     def changes(solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        rest = solve(np.zeros_like(skin[0]))
-        return 100 * np.stack([solve(moved) / rest - 1 for moved in skin])
+        rest = solve(sheet.film)
+        return 100 * np.stack([solve(sheet.films(moved)) / rest - 1 for moved in skin])
 
-    exact = changes(lambda moved: resistances(fine.potentials(sheet.films(moved), CONDUCTIVITY), 19))
+    exact = changes(lambda films: resistances(fine.potentials(films, CONDUCTIVITY), 19))
     started = time.perf_counter()
     coarse = changes(sheet.resistances)
     yield row("sheet_solve_time", 1e3 * (time.perf_counter() - started) / (len(skin) + 1), "ms", of="19 electrodes")
     of = f"{len(skin)} contacts, against a grid 8 times as fine"
     yield row("sheet_grid_error", _rms(coarse - exact), "percent of rest", null=_rms(exact), of=of)
+
+
+def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) -> Iterator[Row]:
+    """The sheet on few fields: its time and error a contact, and with films that a contact of the fast tier watches."""
+    reduced, watched = reduced_sheet(), watched_films(touches)
+    films = [sheet.films(moved) for moved in skin]
+    started = time.perf_counter()
+    exact = np.stack([sheet.resistances(each) for each in films])
+    between = time.perf_counter()
+    found = np.stack([reduced.resistances(each) for each in films])
+    ended = time.perf_counter()
+    rest, of = sheet.resistances(sheet.film), f"{len(films)} contacts, against the whole sheet"
+    yield row("reduced_sheet_time", 1e3 * (ended - between) / len(films), "ms", 3.0, of=of)
+    yield row("reduced_sheet_time_ratio", (ended - between) / (between - started), "1", null=1.0, of=of)
+    change = 100 * (exact / rest - 1)
+    for name, answer in (
+        ("reduced_sheet_error", found),
+        ("reduced_sheet_error_of_watched_films", np.stack([reduced.resistances(each) for each in watched])),
+    ):
+        yield row(name, _rms(100 * (answer / rest - 1) - change), "percent of rest", null=_rms(change), of=of)
+
+
+def watched_films(contacts: list[Contact]) -> list[np.ndarray]:
+    """Films (k,) m of the sheet in contacts of the fast tier, from the inner nodes that it watches."""
+    skin = biotac_compliance()
+    changes = (contact.watched_gaps - skin.watch_gap for contact in contacts)
+    return [biotac_sheet().films_of(change[skin.feet :]) for change in changes]
 
 
 def _inner_skin() -> Callable[[Contact], np.ndarray]:

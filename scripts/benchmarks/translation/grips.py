@@ -45,11 +45,16 @@ def soft_to_choose_by(files: list[Path]) -> list[Path]:
     return [path for path in files if _trial(path) in CHOOSING and not path.name.startswith(HARD)]
 
 
+def hard_to_report(files: list[Path]) -> list[Path]:
+    """Grips of hard flat objects in the trials that nothing was chosen by."""
+    return [path for path in files if _trial(path) in REPORTING and path.name.startswith(HARD)]
+
+
 def rows(folder: Path, network: Translator) -> list[Row]:
     """Rows of a folder. Raises TactileError where trials to choose or to report by are missing."""
     files = find(folder)
     soft = soft_to_choose_by(files)
-    hard = [path for path in files if _trial(path) in REPORTING and path.name.startswith(HARD)]
+    hard = hard_to_report(files)
     if not soft or not hard:
         raise TactileError(folder, f"{len(soft)} soft and {len(hard)} hard grips", "some of each, by their trials")
     sensor, _ = adapt.adapt_hand(soft, reference_signals.read(networks.WEIGHTS_FOLDER))

@@ -16,7 +16,7 @@ from tactile_core import recordings
 from tactile_core.accuracy import Row, row
 from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
-from tactile_core.sensors import COUNT_MAX, biotac
+from tactile_core.sensors import COUNT_MAX
 from tactile_core.translation.unit_rest import find_rest
 
 from . import grips
@@ -31,7 +31,7 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
         return
     soft = grips.soft_to_choose_by(grips.find(folder))
     units = [impedance_at_rest(soft, finger) for finger in (0, 1)]
-    sheet = biotac_sheet().resistances(np.zeros_like(biotac.skin_surface("inner").rest))
+    sheet = biotac_sheet().resistances(biotac_sheet().film)
     ones = np.ones_like(sheet)
     models = {
         "gap": (1 / electrode_feet().gap)[:, None],

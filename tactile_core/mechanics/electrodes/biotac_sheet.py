@@ -17,6 +17,8 @@ from ... import sensors
 from ...geometry.lattice import Lattice, cap_faces
 from ...sensors import biotac
 from ...sensors.unrolling import closest_on_triangles
+from ..fast.sensing_points import watched_nodes
+from ..solids.biotac_core import above_core
 from ..solids.hex_mesh import skin_mesh
 from .gap_law import FILM_FLOOR
 from .thin_sheet import ThinSheet, resistances
@@ -30,7 +32,6 @@ ELECTRODE_RADIUS = 0.3e-3  # m: assumed (mechanics.md, 0.6 mm patches)
 _EXCITATION_SYNTOUCH_MM = np.array(
     [[-3.9, -4.956, -1.116], [-15.9, -3.588, -3.595], [-15.9, 3.588, -3.595], [-3.9, 4.956, -1.116]]
 )
-_CORE_STEP = (0.05e-3, np.radians(1.0))  # m and rad between the points that stand for the core: at most 0.09 mm apart
 _FINE = 2  # times the triangles are halved to find what the grid leaves unresolved near an electrode: 0.12 mm
 
 
@@ -40,12 +41,14 @@ class BiotacSheet:
 
     sheet : on the nodes that bound fluid, with the 19 electrodes and the 4 of the excitation
     wet : (k,) the sheet's nodes in ``biotac.skin_surface("inner")``
+    watched : (k,) which of ``sensing_points.watched_nodes`` they are
     film : (k,) m, thickness at rest; outward : (k, 3), from the core to the skin
     unresolved : (23,) what the grid is too coarse for: resistance of each electrode in a film of 1 m and 1 S/m
     """
 
     sheet: ThinSheet
     wet: np.ndarray
+    watched: np.ndarray
     film: np.ndarray
     outward: np.ndarray
     unresolved: np.ndarray
@@ -54,12 +57,17 @@ class BiotacSheet:
         """Thickness (k,) m for a displacement (n_inner, 3) m of the whole inner skin; at least ``FILM_FLOOR``."""
         return np.maximum(self.film + np.einsum("ki,ki->k", displacement[self.wet], self.outward), FILM_FLOOR)
 
-    def resistances(self, displacement: np.ndarray) -> np.ndarray:
-        """Resistance (19,) ohm of each electrode to the excitation, for a displacement (n_inner, 3) m."""
-        films = self.films(displacement)
-        potentials = self.sheet.potentials(films, CONDUCTIVITY)
-        near = self.unresolved / (CONDUCTIVITY * self.sheet.mean_over_electrodes(films))
-        return resistances(potentials + np.diag(near), 19)
+    def films_of(self, change: np.ndarray) -> np.ndarray:
+        """Thickness (k,) m where the gaps of ``sensing_points.watched_nodes`` (f,) have changed by so much, m."""
+        return np.maximum(self.film + change[self.watched], FILM_FLOOR)
+
+    def near(self, films: np.ndarray) -> np.ndarray:
+        """What the grid misses of each electrode's resistance (23,) ohm in films (k,) m."""
+        return self.unresolved / (CONDUCTIVITY * self.sheet.mean_over_electrodes(films))
+
+    def resistances(self, films: np.ndarray) -> np.ndarray:
+        """Resistance (19,) ohm of each electrode to the excitation for films (k,) m."""
+        return resistances(self.sheet.potentials(films, CONDUCTIVITY) + np.diag(self.near(films)), 19)
 
 
 def divider_counts(resistance: np.ndarray, rest: np.ndarray) -> np.ndarray:
@@ -87,7 +95,7 @@ def biotac_sheet(*, core_of_mesh: bool = False) -> BiotacSheet:
     of the trunk and 0.6 mm under those of the tip.
     """
     inner = biotac.skin_surface("inner")
-    outward, film = _from_core()
+    outward, film = above_core()
     free = ~skin_mesh().clamped[skin_mesh().inner]
     faces = _mirrored_faces(inner)
     faces = faces[free[faces].all(1)]
@@ -101,23 +109,8 @@ def biotac_sheet(*, core_of_mesh: bool = False) -> BiotacSheet:
     centers = np.einsum("ek,ekd->ed", weights, middle[corners])
     wet, faces = np.unique(_connected(faces[(film > FILM_FLOOR)[faces].all(1)]), return_inverse=True)
     sheet = ThinSheet(middle[wet], faces.reshape(-1, 3), centers, ELECTRODE_RADIUS)
-    return BiotacSheet(sheet, wet, film[wet], outward[wet], sheet.unresolved(_FINE))
-
-
-@functools.cache
-def _from_core() -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (n, 3) from the public mesh's core to the nodes of the resting inner skin; distances (n,) m."""
-    import scipy.spatial
-
-    points = biotac.skin_surface("inner").rest
-    step, turn = _CORE_STEP
-    x, theta = np.meshgrid(np.arange(-20e-3, 5.3e-3, step), np.arange(-np.pi, np.pi - turn / 2, turn), indexing="ij")
-    x, theta = x.ravel(), theta.ravel()
-    radius = biotac.core_radius(x, theta)
-    core = np.column_stack([x, biotac.AXIS_Y - radius * np.cos(theta), radius * np.sin(theta)])
-    core = core[np.isfinite(radius)]
-    distance, nearest = scipy.spatial.cKDTree(core).query(points)
-    return (points - core[nearest]) / np.maximum(distance, 1e-9)[:, None], distance
+    watched = np.argsort(watched_nodes())[np.searchsorted(np.sort(watched_nodes()), wet)]
+    return BiotacSheet(sheet, wet, watched, film[wet], outward[wet], sheet.unresolved(_FINE))
 
 
 def _spread(places: np.ndarray, values: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -12,7 +12,6 @@ import numpy as np
 
 from ... import sensors
 from ...errors import TactileError
-from ..fast.contact_state import Contact
 from ..fast.sensing_points import electrode_feet
 
 FILM_FLOOR = 20e-6  # m, thinnest film the law knows (networks.md: s = 1 / max(gap, 0.02 mm))
@@ -47,11 +46,6 @@ class Wiring:
             if not (0 <= value <= largest and np.isfinite(value)):
                 expected = "a finite number from 0" + (f" to {largest:g}" if np.isfinite(largest) else "")
                 raise TactileError(f"wiring, {name}", repr(value), expected)
-
-
-def electrode_gaps(contact: Contact) -> np.ndarray:
-    """Film thickness (19,) m over each electrode in a contact; negative where the linear model has run out."""
-    return contact.watched_gaps[: len(electrode_feet().gap)]
 
 
 def signal_of_gaps(gaps: np.ndarray) -> np.ndarray:

@@ -27,10 +27,10 @@ from ..solids.fluid_cavity import FluidCavity
 from ..solids.hex_mesh import HexMesh, gel_mesh, inner_faces, skin_mesh
 from .condense import condense, mirror_nodes
 from .mirror_symmetry import MirrorSymmetry, axes_of
-from .sensing_points import ON_PLANE, electrode_feet, images, sensing_points_of
+from .sensing_points import ON_PLANE, electrode_feet, facing_nodes, images, sensing_points_of
 
 log = logging.getLogger(__name__)
-_FORMAT = 5  # raise when the meaning of the cached arrays changes
+_FORMAT = 6  # raise when the meaning of the cached arrays changes
 
 # Skin nodes that can be touched: those that unroll onto the gel or up to this far beside it, m.
 _BESIDE_GEL = 2.0e-3
@@ -46,13 +46,14 @@ class Compliance:
     move : (3 r, 3 n) float32, m/N; row 3 i + k is the surface displacement under 1 N along axis k at the i-th of the r
         touchable nodes with z >= 0, and mirrored that under the same force on its image (``answers``)
     watch : (3 m, w) float32, m/N; motion of the watched inner points along their watch directions (BioTac only:
-        first the electrode feet, then the inner skin under the pad; toward the core is negative)
+        first the electrode feet, then the inner skin under the pad and beside it; toward the core is negative)
     watch_gap : (w,) float64, m, their distance to electrode or core at rest
     pressure : (3 m,) float64, Pa/N, fluid pressure under the same forces (zero for the gel)
     inner_move : (w, 3 n) float32, m/N, surface displacement under 1 N at a watched point along its direction
     inner_watch : (w, w) float32, m/N, motion of the watched points under the same forces
     inner_pressure : (w,) float64, Pa/N, fluid pressure under them
-    feet : how many of the watched points, the first ones, are electrode feet; the core presses on the others
+    feet : how many of the watched points, the first ones, are electrode feet
+    facing : how many after them face the core, which may press on them
     """
 
     name: str
@@ -66,6 +67,7 @@ class Compliance:
     inner_watch: np.ndarray
     inner_pressure: np.ndarray
     feet: int = 0
+    facing: int = 0
 
     @functools.cached_property
     def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -173,7 +175,8 @@ def _cached(solid: _Solid) -> Compliance:
         _claim(folder)
         _store(folder, build(mesh, material, touchable, lattice)._asdict())
         loaded = _load(folder)
-    return Compliance(name, lattice, touchable, *loaded, len(electrode_feet().gap) if len(mesh.inner) else 0)
+    counts = (len(electrode_feet().gap), len(facing_nodes(mesh))) if len(mesh.inner) else (0, 0)
+    return Compliance(name, lattice, touchable, *loaded, *counts)
 
 
 def _load(folder: pathlib.Path) -> Arrays:
@@ -190,7 +193,7 @@ def _claim(folder: pathlib.Path) -> None:
         (folder / "probe").unlink()
     except OSError as error:
         found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, "a folder for 300 MB", "Name one in TACTILE_CACHE") from error
+        raise TactileError(folder, found, "a folder for 400 MB", "Name one in TACTILE_CACHE") from error
 
 
 def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
@@ -201,7 +204,7 @@ def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
                 np.save(file, values)
     except OSError as error:
         found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, "room for 300 MB", "Make room, or name a folder in TACTILE_CACHE") from error
+        raise TactileError(folder, found, "room for 400 MB", "Make room, or name a folder in TACTILE_CACHE") from error
 
 
 def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lattice) -> Arrays:

@@ -248,7 +248,9 @@ class ContactProblem:
         moved = self._place(touching, pressed, self._rows.moved(nodes, force, inner, inner_force))
         gap, normal = self._distance(pose, self.near, moved)
         sideways = sideways_share(pressed, normal[np.searchsorted(self.near, touching)])
-        core = surface_response.sensing_gaps(self.compliance, nodes, force, inner, inner_force)[self.compliance.feet :]
+        over_core = self.compliance.feet + self.compliance.facing
+        gaps = surface_response.sensing_gaps(self.compliance, nodes, force, inner, inner_force, over_core)
+        core = gaps[self.compliance.feet :]
         penetration = max(-float(gap.min(initial=0.0)), -float(core.min(initial=0.0)))
         total = force.sum(axis=0)
         contact = Contact(

@@ -56,9 +56,17 @@ class Contact:
 
     @property
     def watched_gaps(self) -> np.ndarray:
-        """(w,) m, of the watched points: 19 electrodes, then inner skin over the core."""
+        """(w,) m, of the watched points: 19 electrodes, then inner skin over the core, then beside it."""
+        return self._gaps(len(self.compliance.watch_gap))
+
+    @property
+    def electrode_gaps(self) -> np.ndarray:
+        """(19,) m, film over each electrode; none on the DIGIT."""
+        return self._gaps(self.compliance.feet)
+
+    def _gaps(self, count: int) -> np.ndarray:
         return surface_response.sensing_gaps(
-            self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
+            self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force, count
         )
 
     @property

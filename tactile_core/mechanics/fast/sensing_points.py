@@ -1,4 +1,4 @@
-"""What is watched inside a solid while its surface is pressed: the electrodes' feet, and inner nodes over the core."""
+"""What is watched inside a solid while its surface is pressed: electrodes' feet, nodes over the core and beside it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from ... import sensors
 from ...sensors import biotac, unrolling
-from ..solids.biotac_core import BiotacCore, facing_core
-from ..solids.hex_mesh import HexMesh
+from ..solids.biotac_core import BiotacCore, above_core, facing_core
+from ..solids.hex_mesh import HexMesh, skin_mesh
 from .condense import mirror_nodes
 from .mirror_symmetry import axes_of
 
@@ -37,16 +37,23 @@ class SensingPoints(NamedTuple):
 
 
 def sensing_points_of(mesh: HexMesh) -> SensingPoints:
-    """The electrodes' feet, three nodes each, then the inner nodes over the core."""
+    """The electrodes' feet, three nodes each, then the inner nodes over the core, then the free ones beside it."""
     if not len(mesh.inner):
         return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     feet = electrode_feet()
     corners = biotac.skin_surface("inner").faces[feet.face]
     core_nodes, core_out, core_gap = _over_core(mesh)
-    nodes = mesh.inner[np.r_[corners.ravel(), core_nodes]]
-    columns = np.r_[np.repeat(np.arange(len(feet.gap)), 3), len(feet.gap) + np.arange(len(core_nodes))]
-    out = np.concatenate([(feet.weights[..., None] * feet.outward[:, None]).reshape(-1, 3), core_out])
-    return SensingPoints(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap])
+    side_nodes, side_out, side_gap = _beside_core(mesh)
+    nodes = mesh.inner[np.r_[corners.ravel(), core_nodes, side_nodes]]
+    single = len(core_nodes) + len(side_nodes)
+    columns = np.r_[np.repeat(np.arange(len(feet.gap)), 3), len(feet.gap) + np.arange(single)]
+    out = np.concatenate([(feet.weights[..., None] * feet.outward[:, None]).reshape(-1, 3), core_out, side_out])
+    return SensingPoints(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap, side_gap])
+
+
+def watched_nodes() -> np.ndarray:
+    """Nodes (f,) of the inner skin that are watched after the electrodes' feet: all that can move, in their order."""
+    return np.r_[facing_nodes(skin_mesh()), _beside(skin_mesh())]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,15 +78,37 @@ def electrode_feet() -> ElectrodeFeet:
 def _over_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m; even in
     z."""
-    inner = biotac.skin_surface("inner")
-    nodes = _facing(mesh)
-    image = mirror_nodes(inner.rest)
-    mirrored = inner.rest[nodes, 2] < -ON_PLANE
-    gap, outward = BiotacCore().distance(inner.rest[np.where(mirrored, image[nodes], nodes)])
+    nodes = facing_nodes(mesh)
+    mirrored, right = _right_images(nodes)
+    gap, outward = BiotacCore().distance(biotac.skin_surface("inner").rest[right])
     return nodes, np.where(mirrored[:, None], outward * [1.0, 1.0, -1.0], outward), gap
 
 
-def _facing(mesh: HexMesh) -> np.ndarray:
+def _beside_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Free inner nodes that never meet the core: node, direction from its nearest point (n, 3), gap (n,) m; even in
+    z."""
+    nodes = _beside(mesh)
+    mirrored, right = _right_images(nodes)
+    outward, gap = above_core()
+    return nodes, np.where(mirrored[:, None], outward[right] * [1.0, 1.0, -1.0], outward[right]), gap[right]
+
+
+def _right_images(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether nodes (n,) of the inner skin lie on the side z < 0, (n,) bool, and the one of each pair with z >= 0."""
+    rest = biotac.skin_surface("inner").rest
+    mirrored = rest[nodes, 2] < -ON_PLANE
+    return mirrored, np.where(mirrored, mirror_nodes(rest)[nodes], nodes)
+
+
+def _beside(mesh: HexMesh) -> np.ndarray:
+    """Free inner nodes that do not face the core, each with its mirror image."""
+    free = ~mesh.clamped[mesh.inner]
+    free &= free[mirror_nodes(biotac.skin_surface("inner").rest)]
+    free[facing_nodes(mesh)] = False
+    return np.flatnonzero(free)
+
+
+def facing_nodes(mesh: HexMesh) -> np.ndarray:
     """Inner nodes that may come to press on the core, each with its mirror image."""
     inner = biotac.skin_surface("inner")
     faces = facing_core(inner.rest) & ~mesh.clamped[mesh.inner]
@@ -90,10 +119,10 @@ def images(mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
     """For each of ``count`` watched points the one whose mirror image it is, else itself; and whether it is an
     image."""
     source, mirrored = np.arange(count), np.zeros(count, bool)
-    if count:
-        nodes, rest = _facing(mesh), biotac.skin_surface("inner").rest
-        first = count - len(nodes)
-        image = mirror_nodes(rest)[nodes]
-        mirrored[first:] = rest[nodes, 2] < -ON_PLANE
-        source[first:] = first + np.where(mirrored[first:], np.searchsorted(nodes, image), np.arange(len(nodes)))
+    first = count
+    for nodes in (_beside(mesh), facing_nodes(mesh)) if count else ():
+        first -= len(nodes)
+        here = slice(first, first + len(nodes))
+        mirrored[here], right = _right_images(nodes)
+        source[here] = first + np.searchsorted(nodes, right)
     return source, mirrored

@@ -44,14 +44,14 @@ def _under(compliance: Compliance, row: np.ndarray, force: np.ndarray) -> np.nda
 
 
 def sensing_gaps(
-    compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
+    compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray, count: int
 ) -> np.ndarray:
-    """Gaps (w,) m of the watched points under the same forces."""
-    gaps = compliance.watch_gap.astype(float)
+    """Gaps (count,) m of the first watched points under the same forces."""
+    gaps = compliance.watch_gap[:count].astype(float)
     if not len(gaps):
         return gaps
     for start, stop, first, last in runs(nodes) if len(nodes) else ():
-        gaps = gaps + force[start:stop].ravel().astype(np.float32) @ compliance.watch[3 * first : 3 * last]
+        gaps = gaps + force[start:stop].ravel().astype(np.float32) @ compliance.watch[3 * first : 3 * last, :count]
     if len(inner):
-        gaps = gaps + inner_force.astype(np.float32) @ compliance.inner_watch[inner]
+        gaps = gaps + inner_force.astype(np.float32) @ compliance.inner_watch[inner, :count]
     return gaps

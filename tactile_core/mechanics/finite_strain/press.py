@@ -119,7 +119,7 @@ def full_contact(body: Body, touch: ContactState) -> FullContact:
 
 
 def film(body: Body, touch: ContactState) -> np.ndarray:
-    """Film (19,) m over each electrode: as ``gap_law.electrode_gaps`` has it, from the inner skin's own shape."""
+    """Film (19,) m over each electrode: as ``Contact.electrode_gaps`` has it, from the inner skin's own shape."""
     feet, inner = electrode_feet(), biotac.skin_surface("inner")
     moved = body.graded.on_lattice(touch.state.displacement[body.solid.mesh.inner])
     at_feet = np.einsum("ek,ekj->ej", feet.weights, moved[inner.faces[feet.face]])

@@ -13,6 +13,7 @@ _X = -18.9e-3, 5.0e-3
 _THETA = np.radians(120.0)
 _ROUGHNESS = 10e-6  # m rms, the table's facets, which the spline smooths away (assumed: half of the skin's 20 um fit)
 _HESSIAN_STEP = 1e-6  # m, of the differences of the exact gradient
+_POINT_STEP = (0.05e-3, np.radians(1.0))  # m and rad between points that stand for the core: at most 0.09 mm apart
 
 
 class BiotacCore:
@@ -69,3 +70,22 @@ def facing_core(nodes: np.ndarray) -> np.ndarray:
     x, y, z = nodes.T
     inside = (x > _X[0]) & (x < _X[1]) & (np.abs(np.arctan2(z, biotac.AXIS_Y - y)) < np.radians(100.0))
     return inside & (BiotacCore().distance(nodes)[0] > 0.1e-3)
+
+
+@functools.cache
+def above_core() -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (n, 3) from the core's nearest point to each node of the resting inner skin; distances (n,) m.
+
+    On the sides too, where ``BiotacCore`` has no table.
+    """
+    import scipy.spatial
+
+    points = biotac.skin_surface("inner").rest
+    step, turn = _POINT_STEP
+    x, theta = np.meshgrid(np.arange(-20e-3, 5.3e-3, step), np.arange(-np.pi, np.pi - turn / 2, turn), indexing="ij")
+    x, theta = x.ravel(), theta.ravel()
+    radius = biotac.core_radius(x, theta)
+    core = np.column_stack([x, biotac.AXIS_Y - radius * np.cos(theta), radius * np.sin(theta)])
+    core = core[np.isfinite(radius)]
+    distance, nearest = scipy.spatial.cKDTree(core).query(points)
+    return (points - core[nearest]) / np.maximum(distance, 1e-9)[:, None], distance

@@ -45,9 +45,9 @@ def test_the_mesh_has_its_core_elsewhere():
 
 def test_a_symmetric_sensor_reads_symmetrically():
     sheet = biotac_sheet()
-    rest = sheet.resistances(REST)
+    rest = sheet.resistances(sheet.films(REST))
     np.testing.assert_allclose(rest, rest[MIRROR], rtol=1e-3)  # nearest points of the core, 0.09 mm apart
-    left, right = sheet.resistances(dent(1, 0.5e-3)) / rest, sheet.resistances(dent(11, 0.5e-3)) / rest
+    left, right = (sheet.resistances(sheet.films(dent(electrode, 0.5e-3))) / rest for electrode in (1, 11))
     np.testing.assert_allclose(left, right[MIRROR], rtol=0.01)  # the dents' places differ by 0.02 mm
 
 
@@ -58,14 +58,15 @@ def test_half_the_film_doubles_every_resistance():
     start, halved = REST.copy(), REST.copy()
     start[sheet.wet] = sheet.outward * (far - sheet.film)[:, None]
     halved[sheet.wet] = sheet.outward * (far / 2 - sheet.film)[:, None]
-    np.testing.assert_allclose(sheet.resistances(halved), 2 * sheet.resistances(start), rtol=1e-8)
+    whole, half = (sheet.resistances(sheet.films(moved)) for moved in (start, halved))
+    np.testing.assert_allclose(half, 2 * whole, rtol=1e-8)
 
 
 @pytest.mark.parametrize("electrode", [1, 6, 17])
 def test_a_dent_is_felt_where_it_is_and_little_elsewhere(electrode):
     sheet = biotac_sheet()
-    rest = sheet.resistances(REST)
-    shallow, deep = (sheet.resistances(dent(electrode, share * electrode_feet().gap[electrode])) / rest - 1
+    rest = sheet.resistances(sheet.films(REST))
+    shallow, deep = (sheet.resistances(sheet.films(dent(electrode, share * electrode_feet().gap[electrode]))) / rest - 1
                      for share in (0.3, 0.6))  # fmt: skip
     assert deep[electrode] > 2 * shallow[electrode] > 0  # more than linear
     assert deep[electrode] > 3 * np.delete(deep, electrode).max()
@@ -74,7 +75,7 @@ def test_a_dent_is_felt_where_it_is_and_little_elsewhere(electrode):
 def test_a_skin_on_its_core_leaves_the_floor():
     films = biotac_sheet().films(dent(17, 3e-3))
     assert films.min() == FILM_FLOOR
-    assert np.isfinite(biotac_sheet().resistances(dent(17, 3e-3))).all()
+    assert np.isfinite(biotac_sheet().resistances(biotac_sheet().films(dent(17, 3e-3)))).all()
 
 
 def test_excitation_stands_on_both_sides_of_the_core():
@@ -85,7 +86,7 @@ def test_excitation_stands_on_both_sides_of_the_core():
 
 
 def test_the_divider_rests_where_sensors_do_and_never_leaves_its_bits():
-    rest = biotac_sheet().resistances(REST)
+    rest = biotac_sheet().resistances(biotac_sheet().film)
     assert np.median(divider_counts(rest, rest)) == pytest.approx(sensors.REST_COUNT)
     assert (np.diff(divider_counts(np.outer([0.1, 1, 10, 1e6], rest), rest), axis=0) < 0).all()
     assert divider_counts(1e9 * rest, rest).min() >= 0
