@@ -35,7 +35,7 @@ from benchmarks.mechanics import (
     work,
 )
 from benchmarks.mechanics.report import write
-from benchmarks.translation import grip_patterns, rest_impedance
+from benchmarks.translation import rest_impedance, simulated_patterns
 from tactile_core.accuracy import HEADER, Row, failed, line
 from tactile_core.accuracy import row as make_row
 from tactile_core.files import atomic
@@ -64,9 +64,9 @@ CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
         lambda quick: rest_impedance.rows(quick, DATA),
         "Electrodes of two real fingers at rest, by models of the film (needs the outside data)",
     ),
-    "grip_patterns": (
-        lambda quick: grip_patterns.rows(quick, DATA),
-        "Grips of two real fingers against the nearest simulated contact, by law (needs the outside data)",
+    "simulated_patterns": (
+        lambda quick: simulated_patterns.rows(quick, DATA),
+        "Real grips and slides against the nearest simulated contact, by the electrodes' law (needs the outside data)",
     ),
     "public_mesh": (
         lambda quick: public_mesh.rows(quick, DATA),

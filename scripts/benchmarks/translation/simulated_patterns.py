@@ -1,14 +1,16 @@
-"""Changes that real fingers read in grips against the nearest simulated contact, by each law of the electrodes.
+"""Changes that real fingers read in contact against the nearest simulated contact, by each law of the electrodes.
 
-The grips are those of hard flat objects in the PHAC set (outside data), trials 04 and 05; rest is found in the soft
-objects' trials 01 to 03. The sheet's resistances become counts of the very unit: each electrode's impedance Z grows by
-the factor of its resistance, and a divider reads E = 4095 / (1 + Z / load) (SynTouch, BioTac SP manual), so that rest
-counts alone tell the change, whatever load and conductivity are. Nothing is fitted to the grips.
+Grips are those of hard flat objects in the PHAC set (outside data), trials 04 and 05; rest is found in the soft ones'
+trials 01 to 03. Slides are recordings without sample 7 of each material: they hold sizes without signs, and counts at
+rest that nobody knows, so the sensors' typical one stands for them. The sheet's resistances become counts of the very
+unit: each electrode's impedance Z grows by the factor of its resistance, and a divider reads E = 4095 / (1 + Z / load)
+(SynTouch, BioTac SP manual), so that rest counts alone tell the change, whatever load and conductivity are. Nothing is
+fitted to these recordings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -23,42 +25,61 @@ from tactile_core.mechanics.fast.contact import Contact, ContactProblem
 from tactile_core.mechanics.placement import pose_at
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
 from tactile_core.recordings.readers import each_finger
-from tactile_core.sensors import COUNT_MAX
+from tactile_core.sensors import COUNT_MAX, REST_COUNT
 from tactile_core.simulation.pair_sampling import draw_place
 from tactile_core.simulation.scene import load_scene
 from tactile_core.translation.unit_rest import find_rest
 
 from ..mechanics.electrode_law import watched_films
-from . import grips
+from . import grips, slide_set
+from .slide_metrics import CONTACT
 
 SCENE = Path(__file__).resolve().parents[3] / "scenes" / "training" / "scene.toml"
+EVERY = 50  # frames of a slide between two that are judged
 SIZE = 0.5  # a contact's change may be smaller or larger by this share of the real one, where its size is held
 
 
 def rows(quick: bool, data: Path) -> Iterator[Row]:
     """Median cosines of each law, free and with the size held; null: electrodes shuffled. None without the data."""
-    folder = data / "biotac_phac"
-    if not folder.exists():
+    folders = data / "biotac_phac", data / "biotac_recordings"
+    if not all(folder.exists() for folder in folders):
         return
-    real, rest = _grips(grips.find(folder))
     contacts = _training_contacts(200 if quick else 2000)
+    laws = _laws(contacts)
+    grip, rest = _grips(grips.find(folders[0]))
+    slide = _slides(slide_set.reporting(folders[1]))
+    typical = np.full(slide.shape, float(REST_COUNT))
+    of = f"{len(contacts)} simulated contacts; null: electrodes shuffled"
+    yield from _cosines("grip", grip, rest, laws, (0.92, 0.88), f"{len(grip)} grips, {of}")
+    sizes = {name: lambda at_rest, law=law: np.abs(law(at_rest)) for name, law in laws.items() if name != "wrong_sign"}
+    yield from _cosines("slide", slide, typical, sizes, (None, 0.95), f"{len(slide)} frames, {of}")
+
+
+def _laws(contacts: list[Contact]) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
+    """Name -> what gives the changes (n, 19) of contacts on a unit that rests at counts (19,)."""
     gap = signal_of_gaps(np.stack([contact.electrode_gaps for contact in contacts]))
     growth = np.stack([reduced_sheet().resistances(films) for films in watched_films(contacts)])
     growth /= reduced_sheet().resistances(biotac_sheet().film)
-    laws = {
+    return {
         "wrong_sign": lambda at_rest: -gap,
         "gap": lambda at_rest: gap,
         "sheet": lambda at_rest: COUNT_MAX / (1 + (COUNT_MAX / at_rest - 1) * growth) - at_rest,
     }
+
+
+def _cosines(
+    name: str, real: np.ndarray, rest: np.ndarray, laws: dict[str, Callable[[np.ndarray], np.ndarray]],
+    targets: tuple[float | None, float], of: str,
+) -> Iterator[Row]:  # fmt: skip
+    """Rows of changes (n, 19) of units at rest counts (n, 19); the targets are the sheet's, the others stand beside."""
     shuffle = np.random.default_rng(0).permutation(real.shape[1])
-    of = f"{len(real)} grips, {len(contacts)} simulated contacts; null: electrodes shuffled"
-    for name, law in laws.items():
+    for word, law in laws.items():
         told = [nearest(change, law(at_rest)) for change, at_rest in zip(real, rest, strict=True)]
         null = [nearest(change[shuffle], law(at_rest)) for change, at_rest in zip(real, rest, strict=True)]
-        for k, (held, target) in enumerate((("free", 0.92), ("size_held", 0.88))):
-            values = (float(np.median([one[k] for one in each])) for each in (told, null))
-            value, nothing = values
-            yield row(f"grip_cosine_{name}_{held}", value, "1", target, null=nothing, of=of, at_least=True)
+        for k, held in enumerate(("free", "size_held")):
+            value, nothing = (float(np.median([one[k] for one in each])) for each in (told, null))
+            target = targets[k] if word == "sheet" else None
+            yield row(f"{name}_cosine_{word}_{held}", value, "1", target, null=nothing, of=of, at_least=True)
 
 
 def nearest(change: np.ndarray, simulated: np.ndarray) -> tuple[float, float]:
@@ -77,6 +98,16 @@ def _grips(files: list[Path]) -> tuple[np.ndarray, np.ndarray]:
             for finger, one in enumerate(each_finger(path))]  # fmt: skip
     at_rest = np.stack([rest[finger] for finger, _ in held])
     return np.stack([np.median(one.electrodes, axis=0) for _, one in held]) - at_rest, at_rest
+
+
+def _slides(paths: list[Path]) -> np.ndarray:
+    """Sizes (n, 19), counts, of the frames surely in contact, every half second."""
+    found = []
+    for path in filter(slide_set.is_whole, paths):
+        slide = slide_set.load(path)
+        touches = np.flatnonzero(slide.pressure > CONTACT)[::EVERY]
+        found.append(np.abs(slide.electrodes[touches]))
+    return np.concatenate(found)
 
 
 def _training_contacts(count: int) -> list[Contact]:
