@@ -15,8 +15,9 @@ from .biotac_sheet import CONDUCTIVITY, BiotacSheet, biotac_sheet
 from .gap_law import FILM_FLOOR
 from .thin_sheet import resistances
 
-# 60 fields of 60 dents leave 0.26 % rms of rest where contacts change resistances by 9.6 %; 20 fields 0.7 %, 150 dents
-# no less. Dents as wide and deep as contacts make them, and sides that bulge (assumed ranges, m).
+# 60 fields of 60 dents leave 0.24 % rms of rest where contacts change resistances by 9.7 % (docs/mechanics.md); in
+# trials by hand 20 fields left 0.7 %, and 150 dents were no better. Dents as wide and deep as contacts make them, and
+# sides that bulge (assumed ranges, m).
 _DENTS, _FIELDS = 60, 60
 _WIDTH, _DEPTH, _BULGE = (1.5e-3, 5e-3), (0.24e-3, 1.2e-3), (0.0, 0.15e-3)
 _PAD = -2e-3  # m, y below which dents lie
