@@ -109,7 +109,8 @@ def biotac_sheet(*, core_of_mesh: bool = False) -> BiotacSheet:
     centers = np.einsum("ek,ekd->ed", weights, middle[corners])
     wet, faces = np.unique(_connected(faces[(film > FILM_FLOOR)[faces].all(1)]), return_inverse=True)
     sheet = ThinSheet(middle[wet], faces.reshape(-1, 3), centers, ELECTRODE_RADIUS)
-    watched = np.argsort(watched_nodes())[np.searchsorted(np.sort(watched_nodes()), wet)]
+    order = np.argsort(watched_nodes())
+    watched = order[np.searchsorted(watched_nodes(), wet, sorter=order)]
     return BiotacSheet(sheet, wet, watched, film[wet], outward[wet], sheet.unresolved(_FINE))
 
 

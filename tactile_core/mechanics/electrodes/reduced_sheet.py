@@ -40,7 +40,7 @@ class ReducedSheet:
 
 @functools.cache
 def reduced_sheet() -> ReducedSheet:
-    """The reduced sheet of the resting BioTac: 1 s once, then 2 ms a contact."""
+    """The reduced sheet of the resting BioTac: 1 s once, then 3 ms a contact."""
     sheet = biotac_sheet()
     rest = sheet.sheet.matrix(sheet.film)[1:, 1:].tocsc()
     at_rest, dented = _potentials(sheet, sheet.film), [_potentials(sheet, films) for films in _dents(sheet)]

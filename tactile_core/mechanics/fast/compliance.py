@@ -193,7 +193,7 @@ def _claim(folder: pathlib.Path) -> None:
         (folder / "probe").unlink()
     except OSError as error:
         found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, "a folder for 400 MB", "Name one in TACTILE_CACHE") from error
+        raise TactileError(folder, found, "a folder for 350 MB", "Name one in TACTILE_CACHE") from error
 
 
 def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
@@ -204,7 +204,7 @@ def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
                 np.save(file, values)
     except OSError as error:
         found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, "room for 400 MB", "Make room, or name a folder in TACTILE_CACHE") from error
+        raise TactileError(folder, found, "room for 350 MB", "Make room, or name a folder in TACTILE_CACHE") from error
 
 
 def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lattice) -> Arrays:
@@ -214,10 +214,10 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
     nowhere, TactileError where the memory does not suffice.
     """
     watched = sensing_points_of(mesh)
-    watch, watch_gap = watched.dense(3 * len(mesh.nodes)), watched.gap
-    source, mirrored = images(mesh, watch.shape[1])
+    source, mirrored = images(mesh, len(watched.gap))
     kept = np.unique(source)
-    loads, column, sign = watch[:, kept], np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
+    loads = watched.dense(3 * len(mesh.nodes), kept)
+    column, sign = np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
     if len(mesh.inner):
         loads = np.column_stack([loads, _volume_gradient(mesh)])
         column, sign = np.r_[column, len(kept)], np.r_[sign, 1.0]
@@ -230,7 +230,7 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
         inner_move = place.loads(even.under_loads, odd.under_loads, column, sign)
         every = np.ix_(column, column)
         among = even.among[every] + odd.among[every] * np.outer(sign, sign)
-        inner_pressure, pressure = np.zeros(watch.shape[1]), np.zeros(3 * len(touchable))
+        inner_pressure, pressure = np.zeros(len(watched.gap)), np.zeros(3 * len(touchable))
         touch_dofs = axes_of(touchable)
         if len(mesh.inner):  # the fluid keeps its volume: its pressure is one more force, and takes one more row away
             swell, stiffness = inner_move[-1], 1 / among[-1, -1]
@@ -243,9 +243,9 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
             among = among[:-1, :-1] + np.outer(inner_pressure, among[-1, :-1])
         watch = np.ascontiguousarray(inner_move[:, touch_dofs].T, np.float32)
     except MemoryError as error:
-        raise TactileError("compliance", "out of memory", "2 GB of free memory", "Close other programs") from error
+        raise TactileError("compliance", "out of memory", "2.2 GB of free memory", "Close other programs") from error
     inner = inner_move.astype(np.float32), among.astype(np.float32), inner_pressure
-    return Arrays(move, watch, watch_gap, pressure, *inner)
+    return Arrays(move, watch, watched.gap, pressure, *inner)
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
