@@ -78,6 +78,7 @@ def write_pairs(
                 "indenters": json.dumps(["sphere"]),
                 "format": "tactile-pairs-1",
                 "polarity": "falls",
+                "electrodes": "gap",
             }
         )
     return path

@@ -96,7 +96,7 @@ EDGES = {
     "files": "errors",
     "accuracy": "errors",
     "geometry": "files errors",
-    "recordings": "files errors",
+    "recordings": "sensors geometry files errors",
     "sensors": "geometry files errors",
     "mechanics": "sensors geometry files accuracy errors",
     "pictures": "sensors geometry files accuracy errors",

@@ -26,6 +26,7 @@ class Contents:
     """What a sheet of a recording of T frames shows, in k columns. Raises ValueError where these do not count alike.
 
     name : of the recording; time : (T,) s; electrodes : (T, 19) counts, change from rest
+    pressure, pressure_measured : (T,) Pa, rise of the fluid's as translated and by PDC; NaN where it was not measured
     frames : (k,) which of the T frames are the columns
     displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
     force : (k, 3) N; confidence : (k,) 0..1; expected_error_digit : (k,) m, of the largest node
@@ -44,6 +45,8 @@ class Contents:
     confidence: np.ndarray
     expected_error_digit: np.ndarray
     contact_center: np.ndarray | None = None
+    pressure: np.ndarray | None = None
+    pressure_measured: np.ndarray | None = None
     true_displacement_biotac: np.ndarray | None = None
     simulated: bool = False
     warnings: Sequence[str] = ()
@@ -102,10 +105,19 @@ def _plain_matplotlib() -> Iterator[None]:
 
 def _drawn(shown: Contents, camera: Camera) -> SheetFigure:
     displacement, truth = shown.displacement_biotac, shown.true_displacement_biotac
-    figure = SheetFigure(len(shown.frames), camera, _sentences(shown.warnings, shown.confidence), truth is not None)
+    figure = SheetFigure(
+        len(shown.frames),
+        camera,
+        _sentences(shown.warnings, shown.confidence),
+        truth is not None,
+        pressure=shown.pressure is not None,
+    )
     # File names may hold what is no text at all.
     figure.title("".join(letter if letter.isprintable() else "?" for letter in shown.name), shown.simulated)
     figure.electrodes(shown.time, shown.electrodes, shown.frames)
+    if shown.pressure is not None:
+        figure.pressure(shown.time, shown.pressure, shown.pressure_measured)
+    figure.headings(shown.time[shown.frames])
     largest = scale(displacement, truth)
     label = "BioTac, unrolled\n" + ("translated" if shown.simulated else "displacement")
     figure.biotac_row(label, displacement, largest, shown.contact_center)

@@ -89,6 +89,7 @@ class FramePass:
         self.tools, self.clock = tools, clock
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._errors: list[np.ndarray] = []
+        self._pressure: list[np.ndarray] = []
         self.folded = 0  # height maps of a gel that folds over itself
         self.share = 0.0  # the deepest move of a node so far, over the gel's thickness
         chosen = choose_frames(np.abs(signals.change[frames]).mean(axis=1))
@@ -138,6 +139,7 @@ class FramePass:
     def _keep_measures(self, arrays: dict[str, np.ndarray]) -> None:
         touching = np.isfinite(arrays["contact_center"][:, 0])
         self._errors.append(np.stack([arrays[name][touching] for name in LEFT]))
+        self._pressure.append(arrays["pressure"])
         self.share = max(self.share, depth_share(arrays["displacement_digit"]))
 
     def _translate(self, frames: np.ndarray) -> dict[str, np.ndarray]:
@@ -192,6 +194,8 @@ class FramePass:
             frames=np.searchsorted(self.frames, shown),
             true_displacement_biotac=None if skin is None else skin[shown],
             simulated=self.recording.simulated,
+            pressure=np.concatenate(self._pressure),
+            pressure_measured=PRESSURE_PER_COUNT * self.signals.pdc[self.frames],
             warnings=self.warnings(),
             **columns,
         )

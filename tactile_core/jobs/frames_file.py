@@ -24,6 +24,7 @@ ALWAYS = {
     "time": ("s", "from the recording's first frame; attribute start_time: unix time of that frame, 0 if unknown"),
     "electrodes": ("count", "(T, 19) E1..E19 as read, bad samples repaired; attribute rest: reading without contact"),
     "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame; 0 without contact (not where rectified)"),
+    "pressure": ("Pa", "by which the fluid's has risen, told from the electrodes alone; 0 where the force is"),
     "contact_center": ("m", "(T, 2) = (x, z) on the DIGIT after unrolling; NaN without contact"),
     "confidence": ("1", "0 (a guess) to 1"),
     "expected_error_biotac": ("m", "expected largest node error: half of such frames have less"),
@@ -35,7 +36,7 @@ ALWAYS = {
 }
 KEPT = {
     "latent": {
-        "latent_signal": ("1", "(T, 8) code of the electrodes (SVB)"),
+        "latent_signal": ("1", "(T, K) code of the electrodes (SVB)"),
         "latent_biotac": ("1", "(T, L) code of the BioTac's deformation (MVB)"),
         "latent_digit": ("1", "(T, L) code of the DIGIT's deformation (MVD)"),
     },

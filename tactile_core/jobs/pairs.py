@@ -18,6 +18,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
+from ..mechanics.electrodes.law import SHEET
 from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
 from ..simulation.pairs_card import card, card_path
 from ..simulation.pairs_file import merge
@@ -47,26 +48,30 @@ def make_pairs(
     workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
     place: Callable[[pathlib.Path], Place] | None = None,
+    electrodes: str = SHEET,
 ) -> None:
     """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
 
     progress : called with (blocks of presses done, known so far). Blocks wait in ``<out>.parts``, a folder as of
         ``tactile batch``, which is removed at the end; the file's card (``pairs_card``) is written beside it.
     workers : processes, this one alone for 1; place : where blocks are made instead, from the job's folder
+    electrodes : the law of their counts, of ``law.LAWS``
     Raises TactileError for a bad scene, count, or for parts of another scene or seed.
     """
     out = pathlib.Path(out)
-    job, names, text = plan(scene_path, count, seed, out)
+    job, names, text = plan(scene_path, count, seed, out, electrodes)
     digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
     with result_parts.begun(out, job) as folder:
         where = (place or (lambda folder: Here(folder) if workers == 1 else Local(folder.resolve(), workers)))(folder)
         result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
-        merge(blocks(folder, job), count, out, text, seed, names)
+        merge(blocks(folder, job), count, out, text, seed, names, electrodes)
         atomic.write_json(card_path(out), card(out))
         result_parts.finished(folder)
 
 
-def plan(scene_path: str | os.PathLike, count: int, seed: int, out: pathlib.Path) -> tuple[jobs.Job, list[str], str]:
+def plan(
+    scene_path: str | os.PathLike, count: int, seed: int, out: pathlib.Path, electrodes: str = SHEET
+) -> tuple[jobs.Job, list[str], str]:
     """The job, the names of the indenters and the scene's text; raises what ``make_pairs`` raises before it begins."""
     scene, text, inputs, files = scene_input.found(scene_path, ["presses"])
     if scene.pairs is None:
@@ -77,7 +82,7 @@ def plan(scene_path: str | os.PathLike, count: int, seed: int, out: pathlib.Path
         spec.build()  # an impossible one is refused before anything is written
     atomic.claim(out)
     surfaces = [sensors.biotac_surface().sha256, sensors.digit_surface().sha256]
-    job = jobs.make(inputs, Pairs(count, seed, surfaces, files), None)
+    job = jobs.make(inputs, Pairs(count, seed, surfaces, files, electrodes), None)
     return job, [spec.name for spec in scene.indenters], text
 
 
@@ -96,7 +101,8 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     if checksummed.verified_checksum(file) is not None:
         return False
     scene = _scene(one, tuple(job.recipe.files))
-    rows = [row for i in range(BLOCK) for row in press_rows(scene, job.recipe.seed, number * BLOCK + i)]
+    seed, law = job.recipe.seed, job.recipe.electrodes
+    rows = [row for i in range(BLOCK) for row in press_rows(scene, seed, number * BLOCK + i, law)]
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
     array_pack.write(file, columns | {COUNT: np.int64(len(rows))})
     return True

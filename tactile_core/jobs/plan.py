@@ -197,7 +197,7 @@ def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
 
 def _translation(frames: int, keep: str, verb: str) -> list[Part]:
     part = _part(f"convert_{keep}")
-    nets = ", ".join(("SVB", "S2MPN", "MVB", "M2MPN", "MVD", "force", "error"))
+    nets = ", ".join(("SVB", "S2MPN", "MVB", "M2MPN", "MVD", "force", "pressure", "error"))
     told = f"{frames} frames; {nets}; surfaces {' and '.join(network_sizes.SURFACES)}; contact sheet"
     seconds = part["start"] + part["ms"] * frames / 1e3
     return [Part("networks", verb, told, seconds, part["mb"], part["kb"] * frames / 1e3)]

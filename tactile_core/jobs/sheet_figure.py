@@ -22,6 +22,7 @@ LOW_CONFIDENCE = 0.5  # assumed: numbers of less are marked, and a sheet that ha
 DPI = 100
 WIDTH, LEFT, RIGHT, GAP = 16.0, 0.95, 1.05, 0.12
 TITLE, WARNING_LINE, NUMBERS, ELECTRODES, TIME_AXIS, HEADING, Z_AXIS = 0.62, 0.21, 0.16, 1.4, 0.45, 0.26, 0.36
+PRESSURE = 0.75
 CAPTION, FOOT = 0.75, 0.25
 
 UNROLLED_X, UNROLLED_Z = (-24e-3, 8e-3), (-11.2e-3, 11.2e-3)  # m, what the unrolled rows show
@@ -34,7 +35,7 @@ MARK = "#c03028"
 class SheetFigure:
     """A figure that is filled from the top; rows and columns lie as the camera sees the gel, fingertip up."""
 
-    def __init__(self, columns: int, camera: Camera, warnings: list[str], truth: bool) -> None:
+    def __init__(self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, pressure: bool) -> None:
         from matplotlib.figure import Figure
 
         self.columns, self.camera, self.warnings = columns, camera, warnings
@@ -42,6 +43,7 @@ class SheetFigure:
         rows = (2 if truth else 1) * self._row_height(UNROLLED_X, UNROLLED_Z) + self._row_height(GEL_X, GEL_Z)
         rows += self.column_width * camera.height / camera.width + (2 if truth else 1) * GAP + Z_AXIS
         head = TITLE + WARNING_LINE * len(warnings) + NUMBERS + ELECTRODES + TIME_AXIS + HEADING
+        head += (PRESSURE + TIME_AXIS) * pressure
         self.height = head + rows + CAPTION + FOOT
         self.figure: Figure = Figure(figsize=(WIDTH, self.height), dpi=DPI, facecolor="white")
         self.top = 0.0  # inches from the upper edge to what is still free
@@ -91,7 +93,22 @@ class SheetFigure:
                     handlelength=0.9, columnspacing=0.7, handletextpad=0.4, labelspacing=0.25,
                     borderaxespad=0)  # fmt: skip
         self.top += ELECTRODES + TIME_AXIS
-        for k, at in enumerate(time[frames]):
+
+    def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray | None) -> None:
+        """Lines of the fluid's pressure (T,) Pa over (T,) s, as translated and, where there is one, as measured."""
+        axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, PRESSURE)
+        if measured is not None and np.isfinite(measured).any():
+            axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")
+        axes.plot(time, 1e-3 * pressure, color=MARK, linewidth=0.9, label="translated")
+        axes.margins(x=0.005)
+        axes.set_xlabel("time, s", labelpad=1)
+        axes.set_ylabel("fluid, kPa")
+        axes.legend(loc="center left", bbox_to_anchor=(1.003, 0.5), fontsize=6.5, frameon=False, borderaxespad=0)
+        self.top += PRESSURE + TIME_AXIS
+
+    def headings(self, seconds: np.ndarray) -> None:
+        """Number and time (k,) s of each column."""
+        for k, at in enumerate(seconds):
             self._text(self._middle(k), 0.17, f"{k + 1}:  {at:.2f} s", size=10, weight="bold", ha="center", va="center")
         self.top += HEADING
 

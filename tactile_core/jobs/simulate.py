@@ -15,6 +15,7 @@ import msgspec
 
 from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
+from ..mechanics.electrodes.law import SHEET
 from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
 from ..simulation.recording import ALL, check_places, recording_of
 from ..simulation.scene import Scene
@@ -54,11 +55,17 @@ def simulate_grid(
 
 
 def plan(
-    scene_path: str | os.PathLike, grid: Sequence[str], out: str | os.PathLike, seed: int = 0, keep: Sequence[str] = ALL
+    scene_path: str | os.PathLike,
+    grid: Sequence[str],
+    out: str | os.PathLike,
+    seed: int = 0,
+    keep: Sequence[str] = ALL,
+    electrodes: str = SHEET,
 ) -> Job:
     """The job: the [recording] of a scene for each combination of the values in ``grid`` (``scene_grid``).
 
     seed : of the first recording, each has one more than that before it; keep : words of ``recording.OUTPUTS``
+    electrodes : the law of their counts, of ``law.LAWS``
     Raises TactileError for a bad scene, grid or place, before any work.
     """
     values = combinations(grid)
@@ -66,7 +73,7 @@ def plan(
     for one in values:
         check_places(scene_path, recording_of(with_values(scene, one, str(scene_path)), scene_path))
     atomic.claim(out)
-    return jobs.make(inputs, Simulate(seed, values, files, list(keep)), None)
+    return jobs.make(inputs, Simulate(seed, values, files, list(keep), electrodes), None)
 
 
 def _put_together(folder: Path, job: Job, out: Path) -> None:
@@ -104,7 +111,8 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     scene = with_values(scene, values, one.path)
     with tempfile.TemporaryDirectory() as name:
         out, seed = Path(name) / f"{one.name}.h5", job.recipe.seed + index
-        simulate_recording(one.path, out, seed, keep=job.recipe.keep, loaded=(scene, to_toml(told)))
+        electrodes, loaded = job.recipe.electrodes, (scene, to_toml(told))
+        simulate_recording(one.path, out, seed, keep=job.recipe.keep, loaded=loaded, electrodes=electrodes)
         array_pack.write_files(file, Path(name))
     return True
 

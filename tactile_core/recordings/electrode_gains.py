@@ -15,6 +15,7 @@ from msgspec import Meta
 from ..errors import TactileError
 from ..files import atomic
 from ..files.text_file import read_toml_text
+from ..sensors import divider
 from .fingers import FINGERS
 from .recording import ELECTRODES, Recording
 from .signals import PrepareOptions, Rest, Signals, prepare
@@ -91,13 +92,15 @@ def prepare_unit(recording: Recording, options: PrepareOptions | None, unit: Ele
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
-    """Signals as the simulated sensor would give them: (change - offset) / gain; the report says so.
+    """Signals as the simulated sensor would give them: (change - offset) / gain, in counts of a typical unit.
 
-    A rectified change has lost its offset with its sign: it is only divided by the gain.
+    The report says so. A rectified change has lost its offset with its sign: it is only divided by the gain.
     """
     offset = np.zeros(ELECTRODES) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     told = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
-    change = (signals.change - offset) / np.array(sensor.gain)
+    change = (signals.typical - offset) / np.array(sensor.gain)
+    if signals.kind == "raw":
+        change = divider.of_unit(change, signals.rest)
     return dataclasses.replace(signals, change=change, report={**signals.report, "sensor": told})
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
+from ..sensors import divider
 from .electrode_faults import dead, saturated
 from .flags import Flag
 from .polarity import AUTO, FALLS, POLARITIES, Polarity, polarity_of
@@ -107,6 +108,14 @@ class Signals:
     pdc: np.ndarray
     warnings: tuple[str, ...]
     report: dict[str, Any]
+
+    @property
+    def typical(self) -> np.ndarray:
+        """(T, 19) counts, the change as a unit that rests at ``sensors.REST_COUNT`` has it: what the networks know.
+
+        Only raw readings tell where their unit rests; other changes are taken as they are.
+        """
+        return divider.typical(self.change, self.rest) if self.kind == "raw" else self.change
 
 
 def prepare(recording: Recording, options: PrepareOptions | None = None) -> Signals:

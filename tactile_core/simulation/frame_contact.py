@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..geometry.indenters import Indenter
+from ..mechanics.electrodes.law import signal_of
 from ..mechanics.fast.compliance import compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.finite_strain.press import FullPress
@@ -39,13 +40,10 @@ class FrameContact:
         solved = self._solved
         return solved.corrected.displacement if isinstance(solved, FastContact) else solved.displacement
 
-    @functools.cached_property
-    def gaps(self) -> np.ndarray:
-        """Film (19,) m over the BioTac's electrodes."""
+    def signal(self, law: str) -> np.ndarray:
+        """Change (19,) counts of the BioTac's electrodes, by a law of ``law.LAWS``."""
         solved = self._solved
-        if isinstance(solved, FastContact):
-            return solved.linear.electrode_gaps
-        return solved.gaps
+        return signal_of(solved.linear if isinstance(solved, FastContact) else solved, law)
 
     @functools.cached_property
     def centre(self) -> np.ndarray:

@@ -14,10 +14,11 @@ import numpy as np
 
 from ..errors import TactileError
 from ..geometry.indenters import Box, Indenter, Pose, Ring
-from ..mechanics.electrodes.gap_law import signal_of_gaps
+from ..mechanics.electrodes.law import signal_of
 from ..mechanics.fast.compliance import compliance_of
 from ..mechanics.fast.press import CorrectedPress
 from ..mechanics.finite_strain.press import FullContact, FullPress
+from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, pose_at
 from ..mechanics.thickness import DEPTH_LIMIT, depth_at
 from .pair_sampling import beyond_digit, draw_place
@@ -31,6 +32,7 @@ _SLIDE_MOST = 1e-3  # m, likewise of slides (issue 4)
 _SLIDING = 4, 11  # of twelve presses, those that end with a slide: one in the whole gel, one in the region
 # Of eight presses: the box's and the ring's, of which one is in the region; all others share the rest in turn.
 _BOX, _RING, _OTHERS = (0, 5), (2, 7), (1, 3, 4, 6)
+_TRIES = 12  # steps down to a depth that both sensors bear: to a fourteenth
 _SPARE = 1.1  # of the depth guessed for the DIGIT, on which its mesh is fine
 
 
@@ -67,7 +69,29 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
     heading, length = random.uniform(0, 2 * np.pi), random.uniform(0, _SLIDE_MOST)
     slide = length * np.array([np.cos(heading), np.sin(heading)]) if number % 12 in _SLIDING else None
     thick = depth_at(DEPTH_LIMIT, "biotac", indenter, pose_at("biotac", indenter, place))
-    return TestPress(number, which, indenter, place, min(drawn, thick), slide)
+    depth = _borne(indenter, place, min(drawn, thick), scene.pairs.friction)
+    return TestPress(number, which, indenter, place, depth, slide)
+
+
+def _borne(indenter: Indenter, place: Placement, depth: float, friction: float) -> float:
+    """The depth, m, on the BioTac, or less, in steps of a fifth, until the DIGIT bears its force by the fast tier."""
+    for _ in range(_TRIES):
+        biotac, digit = (_fast(sensor, indenter, place, friction) for sensor in ("biotac", "digit"))
+        try:
+            force = biotac.at_depth(depth).axial_force
+            if force <= 0 or digit.at_force(force) is not None:
+                break
+        except PenetrationError:
+            pass  # it bears it with an edge between its nodes: no contact that the full tier follows either
+        depth *= 0.8
+    return depth
+
+
+def _fast(sensor: str, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
+    pose = pose_at(sensor, indenter, place)
+    return CorrectedPress(
+        compliance_of(sensor), indenter, pose, depth_at(DEPTH_LIMIT, sensor, indenter, pose), friction
+    )
 
 
 def _turn(scene: Scene, number: int) -> int:
@@ -150,8 +174,7 @@ def _guesses(
     press: TestPress, pose: Pose, forces: list[float], slides: list[np.ndarray], friction: float
 ) -> list[float]:
     """Depths, m, at which the fast tier finds the DIGIT to bear forces, N, as far as it does."""
-    limit = depth_at(DEPTH_LIMIT, "digit", press.indenter, pose)
-    fast = CorrectedPress(compliance_of("digit"), press.indenter, pose, limit, friction)
+    fast = _fast("digit", press.indenter, press.place, friction)
     depths = []
     for force, slide in zip(forces, slides, strict=True):
         contact = fast.at_force(force, pose.slid(*slide))
@@ -165,8 +188,8 @@ def _row(biotac: FullContact, digit: FullContact) -> dict[str, np.ndarray]:
     return {
         "displacement_biotac": quantise(biotac.displacement),
         "displacement_digit": quantise(digit.displacement),
-        "signal": signal_of_gaps(biotac.gaps).astype(np.float32),
-        "gap": biotac.gaps.astype(np.float32),
+        "signal": signal_of(biotac).astype(np.float32),
+        "gap": biotac.electrode_gaps.astype(np.float32),
         "force": biotac.force.astype(np.float32),
         "force_digit": digit.force.astype(np.float32),
         "pressure": np.float32(biotac.pressure),

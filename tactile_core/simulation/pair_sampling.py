@@ -9,10 +9,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.gap_law import signal_of_gaps
+from ..mechanics.electrodes.law import SHEET, signal_of
 from ..mechanics.fast.compliance import biotac_compliance, compliance_of, digit_compliance
 from ..mechanics.fast.contact_state import Contact
 from ..mechanics.fast.press import CorrectedPress, FastContact
+from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, on_gel, pose_at
 from ..mechanics.thickness import depth_at
 from ..sensors import digit as digit_shape
@@ -24,12 +25,12 @@ _SLIDE_FROM, _SLIDE_TO = 2, 10  # steps of a path's force at which a slide may b
 _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping ones (assumed)
 
 
-def press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray]]:
+def press_rows(scene: Scene, seed: int, press: int, electrodes: str = SHEET) -> list[dict[str, np.ndarray]]:
     """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
 
     Forces begin log-uniformly within one ratio, so over many presses they are log-uniform. A press that slides ends
     with its slide, at the force it had reached, by the same way on both sensors. A scene with ``depth_steps`` pairs
-    contacts of the same depth in place of those of the same force.
+    contacts of the same depth in place of those of the same force. electrodes : their law, of ``law.LAWS``
     """
     spec = scene.pairs
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
@@ -48,7 +49,7 @@ def press_rows(scene: Scene, seed: int, press: int) -> list[dict[str, np.ndarray
             "slide": slide.astype(np.float32),
             "place": stood,
         }
-        rows.append({**named, **pair_row(biotac, digit)})
+        rows.append({**named, **pair_row(biotac, digit, electrodes)})
     return rows
 
 
@@ -58,9 +59,13 @@ _OnBoth = tuple[FastContact | None, FastContact | None]
 def _by_force(
     random: np.random.Generator, spec: PairSpec, on_both: list[CorrectedPress]
 ) -> Iterator[tuple[_OnBoth, np.ndarray]]:
-    """Contacts of the same force on both sensors, None where there is none, and slide (2,), m."""
+    """Contacts of the same force on both sensors, None where there is none, and slide (2,), m, while both follow."""
     for force, slide in _path(random, spec):
-        yield tuple(on_one.at_force(force, on_one.pose.slid(*slide)) for on_one in on_both), slide
+        try:
+            found = tuple(on_one.at_force(force, on_one.pose.slid(*slide)) for on_one in on_both)
+        except PenetrationError:  # an edge sinks in between the surface's nodes: there the fast tier ends
+            return
+        yield found, slide
 
 
 def _by_depth(
@@ -109,15 +114,14 @@ def draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
     return Placement(x, z, float(lean), float(random.uniform(0, 2 * np.pi)))
 
 
-def pair_row(biotac: FastContact, digit: FastContact) -> dict[str, np.ndarray]:
-    """What one paired contact stores; arrays as in the file, see ``DATASETS``. Electrode gaps are not corrected."""
+def pair_row(biotac: FastContact, digit: FastContact, electrodes: str = SHEET) -> dict[str, np.ndarray]:
+    """What one paired contact stores; arrays as in the file, see ``DATASETS``. Electrodes' films are not corrected."""
     skin, gel = biotac_compliance(), digit_compliance()
-    gaps = biotac.linear.electrode_gaps
     return {
         "displacement_biotac": quantise(biotac.corrected.displacement),
         "displacement_digit": quantise(digit.corrected.displacement),
-        "signal": signal_of_gaps(gaps).astype(np.float32),
-        "gap": gaps.astype(np.float32),
+        "signal": signal_of(biotac.linear, electrodes).astype(np.float32),
+        "gap": biotac.linear.electrode_gaps.astype(np.float32),
         "force": biotac.force.astype(np.float32),
         "force_digit": digit.force.astype(np.float32),
         "pressure": np.float32(biotac.pressure),

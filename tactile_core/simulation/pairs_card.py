@@ -23,7 +23,7 @@ def card(path: str | os.PathLike) -> dict:
     with h5py.File(path) as file:
         values = {name: file[name][()] for name in _READ}
         names = json.loads(file.attrs["indenters"])
-        attributes = {name: _plain(file.attrs[name]) for name in ("scene", "seed", "version")}
+        attributes = {name: _plain(file.attrs[name]) for name in ("scene", "seed", "version", "electrodes")}
     force = np.linalg.norm(values["force"], axis=1)
     x, z, tilt, _ = values["place"].T
     places, _, _ = np.histogram2d(1e3 * x, 1e3 * z, bins=(_X_MM, _Z_MM))

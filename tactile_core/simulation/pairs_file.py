@@ -16,12 +16,15 @@ from ..errors import TactileError
 from ..files import array_pack, atomic
 from ..files.hdf5_checked import declared, open_checked
 from ..files.hdf5_writer import Disk
+from ..mechanics.electrodes.law import LAWS, SHEET
 from ..recordings.polarity import FALLS
 
 FORMAT = "tactile-pairs-1"
 ELECTRODES = 19
 ADVICE = "Make the file again with `tactile pairs`"
-ATTRIBUTES = ("biotac_nodes_sha256", "digit_nodes_sha256", "indenters", "polarity", "scene", "seed", "version")
+ATTRIBUTES = (
+    "biotac_nodes_sha256", "digit_nodes_sha256", "electrodes", "indenters", "polarity", "scene", "seed", "version"
+)  # fmt: skip
 MIN_PRESSES = 5  # at least three to train on, one to validate, one to test
 # dataset -> trailing shape and kind of numbers (i whole, f real, b yes or no); None: as many nodes as the surface has
 DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
@@ -29,6 +32,7 @@ DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
     "displacement_digit": ((None, 3), "i"),
     "signal": ((ELECTRODES,), "f"),
     "force": ((3,), "f"),
+    "pressure": ((), "f"),
     "contact_center": ((2,), "f"),
     "contact_patch_digit": ((None,), "b"),
     "depth_biotac": ((), "f"),
@@ -58,6 +62,7 @@ class Pairs:
     displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
     scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change against rest
     force : (C, 3) float32 N                         contact_center : (C, 2) float32 m, (x, z) on the DIGIT
+    pressure : (C,) float32 Pa, rise of the fluid's
     depth_biotac, depth_digit : (C,) float32 m       press : (C,) int32
     contact_patch_digit : (C, M) bool                place : (C, 4) float32, (x, z) m, tilt and heading rad
     slide : (C, 2) float32 m
@@ -71,6 +76,7 @@ class Pairs:
     scale_digit: float
     signal: np.ndarray
     force: np.ndarray
+    pressure: np.ndarray
     contact_center: np.ndarray
     contact_patch_digit: np.ndarray
     depth_biotac: np.ndarray
@@ -118,6 +124,10 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
             if attributes["polarity"] != FALLS:
                 expected = f"{FALLS!r}, as raw counts do where a film thins"
                 raise TactileError(f"{os.fspath(path)}, polarity", repr(attributes["polarity"]), expected, ADVICE)
+            if attributes["electrodes"] not in LAWS:
+                raise TactileError(
+                    f"{os.fspath(path)}, electrodes", repr(attributes["electrodes"]), ", ".join(LAWS), ADVICE
+                )
             arrays = {name: _dataset(file, name, path) for name in DATASETS}
             scales = {name: _scale(file[name], f"{os.fspath(path)}, {name}") for name in SCALED}
     except TactileError:
@@ -215,15 +225,18 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
     return Split(*(np.flatnonzero(np.isin(press, group)) for group in groups))
 
 
-def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, text: str, seed: int, names: list[str]) -> None:
+def merge(
+    files: list[pathlib.Path], count: int, out: pathlib.Path, text: str, seed: int, names: list[str],
+    electrodes: str = SHEET,
+) -> None:  # fmt: skip
     """One HDF5 file from the blocks in order, cut to ``count`` contacts; written beside and renamed."""
     try:
-        _write_merged(files, count, out, text, seed, names)
+        _write_merged(files, count, out, text, seed, names, electrodes)
     except (OSError, RuntimeError) as error:  # h5py reports a full disk as either
         raise no_room(out, error) from error
 
 
-def _write_merged(files, count, out, text, seed, names) -> None:  # noqa: ANN001
+def _write_merged(files, count, out, text, seed, names, electrodes) -> None:  # noqa: ANN001
     import h5py
 
     with atomic.new_file(out) as partial, Disk(partial) as disk, h5py.File(disk, "w") as file:
@@ -231,6 +244,7 @@ def _write_merged(files, count, out, text, seed, names) -> None:  # noqa: ANN001
             "format": FORMAT, "scene": text, "seed": seed, "version": __version__, "indenters": json.dumps(names),
             "biotac_nodes_sha256": sensors.biotac_surface().sha256,
             "digit_nodes_sha256": sensors.digit_surface().sha256, "polarity": FALLS,
+            "electrodes": electrodes,
         })  # fmt: skip
         done = 0
         for path in files:

@@ -11,7 +11,8 @@ from .. import __version__, sensors
 from ..errors import TactileError
 from ..files import atomic
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.gap_law import Wiring, readings, signal_of_gaps
+from ..mechanics.electrodes.law import SHEET
+from ..mechanics.electrodes.wiring import Wiring, readings
 from ..mechanics.placement import Placement, on_gel
 from ..recordings import Truth, write_simulated
 from .frame_contact import FrameContact, frame_contact
@@ -37,6 +38,7 @@ def simulate_recording(
     keep: Collection[str] = ALL,
     tiers: Mapping[str, str] | None = None,
     loaded: tuple[Scene, str] | None = None,
+    electrodes: str = SHEET,
 ) -> None:
     """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
 
@@ -44,6 +46,7 @@ def simulate_recording(
     friction here. progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
     keep : words of OUTPUTS; a sensor that none of them needs is not solved. tiers : of each sensor, fast by default.
     loaded : a scene and its text in place of the file's, which is then named in messages alone.
+    electrodes : the law of their counts, of ``law.LAWS``.
     Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked, or
     tared wiring: this kind of file holds raw counts.
     """
@@ -66,9 +69,9 @@ def simulate_recording(
     told, counts = "", {}
     if "electrodes" in keep:
         pressure, still = _pressure(frames), np.full(len(time), _STILL_COUNT, np.int16)
-        counts = {"electrodes": readings(_signals(frames), time, wiring, seed), "pdc": pdc_counts(pressure)}
+        counts = {"electrodes": readings(_signals(frames, electrodes), time, wiring, seed), "pdc": pdc_counts(pressure)}
         counts |= {"tac": still, "tdc": still}
-        told = " " + _told(pressure)
+        told = " " + _told(pressure, electrodes)
     write_simulated(
         out, time=time, **counts, truth=_truth(frames, keep), scene=text, seed=seed,
         made_by=f"tactile {__version__}, mechanics.recording{_tiers_told(tiers)}",
@@ -130,8 +133,8 @@ def _solve(
     return found
 
 
-def _signals(frames: list[Solved]) -> np.ndarray:
-    return np.stack([signal_of_gaps(found["biotac"].gaps) if found else np.zeros(19) for found in frames])
+def _signals(frames: list[Solved], law: str) -> np.ndarray:
+    return np.stack([found["biotac"].signal(law) if found else np.zeros(19) for found in frames])
 
 
 def _pressure(frames: list[Solved]) -> np.ndarray:
@@ -144,10 +147,11 @@ def pdc_counts(pressure: np.ndarray) -> np.ndarray:
     return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
 
 
-def _told(pressure: np.ndarray) -> str:
-    """The fluid's pressure in words for the file."""
+def _told(pressure: np.ndarray, electrodes: str) -> str:
+    """The fluid's pressure and the electrodes' law in words for the file."""
     low, high = pressure.min() / 1e3, pressure.max() / 1e3
-    return f"Fluid pressure {low:.2f} to {high:.2f} kPa; PDC counts {sensors.PRESSURE_PER_COUNT:g} Pa each."
+    told = f"Fluid pressure {low:.2f} to {high:.2f} kPa; PDC counts {sensors.PRESSURE_PER_COUNT:g} Pa each."
+    return f"{told} Electrodes by the {electrodes} law."
 
 
 def _wiring(spec: RecordingSpec) -> Wiring:

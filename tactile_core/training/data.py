@@ -23,6 +23,7 @@ class Batch:
 
     rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) what SVB reads
     biotac, digit : (B, K) what the mesh encoders read           force : (B, 3) N
+    pressure : (B, 1) Pa
     signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places
     """
 
@@ -32,6 +33,7 @@ class Batch:
     biotac: Tensor
     digit: Tensor
     force: Tensor
+    pressure: Tensor
 
 
 class Contacts:
@@ -78,7 +80,8 @@ class Contacts:
         force = self.pairs.force[at]
         force[turned] = across(force[turned])
         load = torch.from_numpy(force) * touching(rows)
-        read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load
+        pressure = torch.from_numpy(self.pairs.pressure[at])[:, None] * touching(rows)
+        read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load, pressure
         signed = np.where(signal[:, ELECTRODES] > 0, SILENT, rows)
         return Batch(rows, signed, *(each.to(self.device) for each in read))
 

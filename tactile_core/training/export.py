@@ -28,6 +28,7 @@ RESIDUAL_FLOOR = 0.01  # compressed units, 0.15 counts: below the rounding of th
 UNITS = {
     "change": "counts, reading minus rest",
     "displacement": "m",
+    "pressure": "Pa, rise of the fluid's",
     "force": "N, exerted by the object, sensor frame",
 }
 
@@ -97,6 +98,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
         "D2BPN": {"inputs": digit + PLACE, "outputs": biotac, **common},
         "B2SPN": {"inputs": biotac + PLACE, "outputs": signal, **common},
         "force": {"inputs": biotac, "outputs": 3, **head},
+        "pressure": {"inputs": ELECTRODES + 1, "outputs": 1, **head},
         "error": {"inputs": signal + ERROR_FEATURES, "outputs": len(SURFACES), **head},
     }
 
@@ -160,5 +162,6 @@ def pairs_entry(contacts: Contacts) -> dict[str, object]:
         "sha256": pairs.sha256,
         "contacts": {name: len(rows) for name, rows in parts.items()},
         "presses": {name: len(np.unique(pairs.press[rows])) for name, rows in parts.items()},
-        **{name: pairs.attributes[name] for name in ("scene", "seed", "version", "indenters")},
+        "largest_pressure_Pa": float(f"{pairs.pressure[split.train].max():.6g}"),
+        **{name: pairs.attributes[name] for name in ("scene", "seed", "version", "indenters", "electrodes")},
     }

@@ -69,7 +69,7 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
     if len(used) < FEWEST:
         found = f"{len(used)} usable frames in contact ({', '.join(dropped) or f'force above {TOUCH} N'})"
         raise TactileError(path, found, f"at least {FEWEST}", "Give a longer recording")
-    change = signals.change[used].astype(np.float32)
+    change = signals.typical[used].astype(np.float32)
     rectified = signals.kind == "rectified"
     split = split_presses(_presses(used), seed, path)
     labels = place.astype(np.float32), force[used].astype(np.float32)

@@ -37,7 +37,7 @@ class Options:
     checkpoint_seconds : least time between two checkpoints; does not change the result
     """
 
-    latent_signal: int = 8
+    latent_signal: int = 16
     latent_biotac: int = 128
     latent_digit: int = 128
     wide_biotac: int = 80
@@ -77,6 +77,7 @@ class Options:
     chain_epochs: int = 13
     direct_epochs: int = 13
     force_epochs: int = 6
+    pressure_epochs: int = 6
     error_epochs: int = 2
     back_epochs: int = 5
     checkpoint_seconds: float = 30.0

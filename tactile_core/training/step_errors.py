@@ -91,6 +91,10 @@ def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bo
         load = accuracy.lengths(pairs.force[rows])
         error = accuracy.lengths(nets.force(latent) - pairs.force[rows])
         found[f"{name}_percent"] = np.where(load > FORCE_FROM, 100 * error / load, np.nan)
+    pressure = pairs.pressure[rows]
+    with np.errstate(divide="ignore"):
+        share = 100 * np.abs(nets.pressure(change) / pressure - 1)
+    found["pressure_percent"] = np.where(pressure > PRESSURE_FROM, share, np.nan)
     return found
 
 
@@ -117,6 +121,7 @@ def error_columns(
 
 
 FORCE_FROM = 0.2  # N: below, the share of an error says nothing (issue 4)
+PRESSURE_FROM = 550.0  # Pa: below, a real finger may not touch (data README)
 PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 

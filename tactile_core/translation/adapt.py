@@ -133,7 +133,7 @@ def _listed(names: list[str]) -> str:
 
 def _contacts(signals: Signals) -> np.ndarray:
     """(n, 19) counts of the frames in contact, absolute where the recording is."""
-    change = np.abs(signals.change) if signals.kind == "rectified" else signals.change
+    change = np.abs(signals.typical) if signals.kind == "rectified" else signals.typical
     return change[reference_signals.touching(change) & ~signals.quiet]
 
 

@@ -13,7 +13,7 @@ SIGNAL_HIDDEN = (256, 128, 64)  # SVB of the authors' later code (sensors.md)
 PLACE = 2  # numbers of a mesh's latent that are the place of its dent
 SURFACES = ("biotac", "digit")
 ERROR_FEATURES = 3  # beside the latent: what SVB leaves, how large the signal is, whether it is rectified
-NETS = ("SVB", "MVB", "S2MPN", "R2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "error")
+NETS = ("SVB", "MVB", "S2MPN", "R2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "pressure", "error")
 MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small enough to refuse a damaged number
 
 
@@ -74,6 +74,8 @@ def check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
         ("error", "outputs", len(SURFACES)),
         ("force", "inputs", sizes["MVB"]["latent"]),
         ("force", "outputs", 3),
+        ("pressure", "inputs", ELECTRODES + 1),
+        ("pressure", "outputs", 1),
     ]
     for net, size, expected in links:
         if sizes[net][size] != expected:

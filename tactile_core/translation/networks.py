@@ -5,7 +5,7 @@ SVB  signal autoencoder       MVB  BioTac mesh autoencoder       MVD  DIGIT mesh
 S2MPN  signal latent -> BioTac latent       M2MPN  BioTac latent -> DIGIT latent
 R2MPN  as S2MPN, for rectified signals: what makes it cope with unknown units would make S2MPN worse
 D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
-force and error  heads: force from the BioTac's latent, expected error from the signal
+force  head, from the BioTac's latent       pressure and error  heads, from the signal
 
 Results are computed in blocks of `BLOCK` frames, padded with zeros, so that a frame gives the same numbers whatever
 part of a recording it is asked for with: the matrix products then have the same shape (equal bits with OpenBLAS as
@@ -34,10 +34,11 @@ BLOCK = 64  # frames a block: enough for matrix products at full speed
 COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
 FORCE_SCALE = 0.1  # N: the force is 0.1 N sinh(head), which spans light touches and firm presses alike (assumed)
 COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
+PRESSURE_SCALE = 300.0  # Pa: the pressure is 300 Pa sinh(head), likewise (assumed)
 ERROR_UNIT = 10e-6  # m, of the error head's logarithm
 WEIGHTS_FOLDER = shipped("weights")
 # The card names the hash of every file of weights; this names the card that ships.
-SHIPPED_CARD_SHA256 = "b10f364ddb9ce12ceb6096912cb7bcbc44594daceb9c01e7af8c5691134e0840"
+SHIPPED_CARD_SHA256 = "eff78f7636a4c016a3f03b3dc19b421f1fa05bf97591c28880e30126715d55ce"
 
 
 @dataclass(frozen=True)
@@ -93,16 +94,16 @@ class Networks:
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """change (T, 19) counts against rest, that fall (`sensors.COUNT_SIGN`), rectified (T,) or one ->
-        latent_signal (T, 8), SVB's mean."""
+        latent_signal (T, K), SVB's mean."""
         return self._blocks(self._encode_signal, *_signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
-        """latent_signal (T, 8) -> change (T, 19) counts as SVB understood them."""
+        """latent_signal (T, K) -> change (T, 19) counts as SVB understood them."""
         size = self.sizes["SVB"]["latent"]
         return self._blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
 
     def s2m(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """latent_signal (T, 8), rectified (T,) or one -> latent_biotac (T, L)."""
+        """latent_signal (T, K), rectified (T,) or one -> latent_biotac (T, L)."""
         which = np.broadcast_to(np.asarray(rectified, bool), len(latent_signal))
         if which.all() and len(which):
             return self._map("R2MPN", latent_signal)
@@ -120,7 +121,7 @@ class Networks:
         return self._map_placed("D2BPN", "MVD", latent_digit)
 
     def m2s(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """latent_biotac (T, L) -> latent_signal (T, 8)."""
+        """latent_biotac (T, L) -> latent_signal (T, K)."""
         return self._map_placed("B2SPN", "MVB", latent_biotac)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
@@ -146,6 +147,10 @@ class Networks:
     def force(self, latent_biotac: np.ndarray) -> np.ndarray:
         """latent_biotac (T, L) -> force (T, 3) N exerted by the object, sensor frame."""
         return self._blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
+
+    def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """change (T, 19) counts, rectified (T,) or one -> (T,) Pa, by which the fluid's pressure has risen."""
+        return self._blocks(self._pressure, *_signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
         """change (T, 19) counts, rectified (T,) or one -> how far each frame lies from the training signals."""
@@ -178,6 +183,11 @@ class Networks:
     def _force(self, latent: np.ndarray) -> np.ndarray:
         head = residual(latent, self.tensors["force"], "map", self.sizes["force"]["blocks"])
         return np.float32(FORCE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
+
+    def _pressure(self, signal: np.ndarray) -> np.ndarray:
+        seen = np.concatenate([compress(signal[:, :ELECTRODES]), signal[:, ELECTRODES:]], -1)
+        head = residual(seen, self.tensors["pressure"], "map", self.sizes["pressure"]["blocks"])
+        return np.float32(PRESSURE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
     def _map(self, net: str, latent: np.ndarray) -> np.ndarray:
         tensors, sizes = self.tensors[net], self.sizes[net]

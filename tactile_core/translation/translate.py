@@ -32,9 +32,10 @@ IN_RANGE = 0.99
 class Translation:
     """What a recording becomes; T frames first, float32, SI units.
 
-    latent_signal (T, 8), latent_biotac, latent_digit : means of the networks' latents
+    latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents
     displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
     force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, but for rectified signals
+    pressure : (T,) Pa, by which the fluid's has risen, told from the electrodes alone; zero as the force is
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
     confidence : (T,), 1 as in training, 0 far from it
     expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
@@ -48,6 +49,7 @@ class Translation:
     displacement_biotac: np.ndarray
     displacement_digit: np.ndarray
     force: np.ndarray
+    pressure: np.ndarray
     contact_center: np.ndarray
     confidence: np.ndarray
     expected_error_biotac: np.ndarray
@@ -80,7 +82,7 @@ class Translator:
         """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours."""
         nets = self.nets
         rectified = (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
-        change = np.asarray(signals.change, np.float32)
+        change = np.asarray(signals.typical, np.float32)
         latent_signal = nets.encode_signal(change, rectified)
         latent_biotac = nets.s2m(latent_signal, rectified)
         latent_digit = nets.m2m(latent_biotac)
@@ -95,6 +97,7 @@ class Translator:
         return Translation(
             latent_signal, latent_biotac, latent_digit, biotac, digit,
             force=np.where(silent[:, None], np.float32(0), nets.force(latent_biotac)),
+            pressure=np.where(silent, np.float32(0), nets.pressure(change, rectified)),
             contact_center=center,
             confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
         )  # fmt: skip

@@ -220,7 +220,7 @@ def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
     said = told_by_child(prepare, tmp_path / "a.h5")
     assert said.startswith("told: "), said
     with h5py.File(tmp_path / "b.h5", "w") as file:
-        words = dict.fromkeys(pairs_file.ATTRIBUTES, "x") | {"polarity": "falls"}
+        words = dict.fromkeys(pairs_file.ATTRIBUTES, "x") | {"polarity": "falls", "electrodes": "sheet"}
         file.attrs.update(words, format=pairs_file.FORMAT)
         file.create_dataset("displacement_biotac", (10**6, 5000, 3), "i2", chunks=(1, 5000, 3))
         for name in set(pairs_file.DATASETS) - {"displacement_biotac"}:

@@ -8,8 +8,9 @@ import functools
 import numpy as np
 
 from tactile_core import accuracy
-from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
+from tactile_core.mechanics.electrodes.law import signal_of
 from tactile_core.recordings.flags import Flag
+from tactile_core.sensors import REST_COUNT
 
 from .case import TRANSLATION, Found, case
 from .contacts import press
@@ -26,11 +27,12 @@ def _translated(name: str, share: float) -> Found:
     digit = press("digit", indenter, place, friction).at_force(biotac.axial_force)
     if digit is None:
         return Found(1.0, "said", 1.0, at_least=True, words="the fast tier says that it finds no contact of this force")
-    change = signal_of_gaps(biotac.linear.electrode_gaps)[None]
+    change = signal_of(biotac.linear)[None]
     signals = dataclasses.replace(
         prepared()[1],
         change=change,
-        electrodes=3300 + change,
+        rest=np.full(19, REST_COUNT),
+        electrodes=REST_COUNT + change,
         quiet=np.zeros(1, bool),
         flags=np.zeros(1, np.uint16),
         pdc=np.zeros(1),

@@ -117,15 +117,17 @@ def test_the_film_is_that_of_the_linear_model_for_a_small_force():
     linear = ContactProblem(compliance, BALL, pose, 0.1e-3).at_depth(0.1e-3)
     rest = electrode_feet().gap
     per_newton = [
-        (full.gaps - rest) / full.axial_force,
+        (full.electrode_gaps - rest) / full.axial_force,
         (linear.electrode_gaps - rest) / linear.axial_force,
     ]
     assert np.linalg.norm(per_newton[0] - per_newton[1]) < 0.12 * np.linalg.norm(per_newton[0])
 
 
-def test_the_signal_is_that_of_the_film(solved):
+def test_the_signal_grows_with_the_press_and_is_like_the_cheap_law(solved):
     for row in solved[0]:
-        np.testing.assert_allclose(row["signal"], signal_of_gaps(row["gap"].astype(float)), atol=1e-3)
+        cheap = signal_of_gaps(row["gap"].astype(float))
+        like = row["signal"] @ cheap / (np.linalg.norm(row["signal"]) * np.linalg.norm(cheap))
+        assert like > 0.8  # over 240 contacts the laws correlate by .94 (docs/mechanics.md)
     sizes = [np.abs(row["signal"]).max() for row in solved[0][:3]]
     assert 0 < sizes[0] < sizes[1] < sizes[2]
 
@@ -149,7 +151,7 @@ def test_a_contact_at_a_force_is_the_one_at_its_depth():
 
 def test_what_the_gel_cannot_bear_ends_the_press(monkeypatch, smooth, ball_press):
     depth_at = full_pairs.depth_at
-    monkeypatch.setattr(full_pairs, "depth_at", lambda share, *rest: depth_at(share / 40, *rest))
+    monkeypatch.setattr(full_pairs, "depth_at", lambda share, *rest: depth_at(share / 15, *rest))
     monkeypatch.setattr(full_pairs, "SHARES", (0.25, 1.0))
     rows, told = full_rows(smooth, dataclasses.replace(ball_press, slide=None))
     assert len(rows) == 1 and told["wanted"] == 2

@@ -8,7 +8,7 @@ from ball_scene import ball_scene
 
 from tactile_core import recordings, sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.electrodes.gap_law import Wiring
+from tactile_core.mechanics.electrodes.wiring import Wiring
 from tactile_core.recordings import info
 from tactile_core.recordings.simulated import read_truth
 from tactile_core.sensors import PRESSURE_PER_COUNT

@@ -38,9 +38,9 @@ def test_bad_words_are_told(words):
 def test_the_motion_is_scaled_and_moved(scene):
     before, changed = (
         scene.recording.points,
-        with_values(scene, {"force_n": 1.0, "x_mm": -7.0}, "here").recording.points,
+        with_values(scene, {"force_n": 2.0, "x_mm": -7.0}, "here").recording.points,
     )
-    assert [p.force_n for p in changed] == pytest.approx([2 * p.force_n for p in before])  # the hardest is 0.5 N
+    assert [p.force_n for p in changed] == pytest.approx([2 * p.force_n for p in before])  # the hardest is 1 N
     assert [p.x_mm for p in changed] == pytest.approx([p.x_mm + 1 for p in before])  # which is at -8 mm
     assert [p.z_mm for p in changed] == [p.z_mm for p in before]
 

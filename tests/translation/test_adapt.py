@@ -122,9 +122,7 @@ def test_too_little_contact_is_refused(typical):
 def test_typical_signals_come_back_from_their_file(typical, tmp_path):
     entry = reference_signals.write(tmp_path, typical)
     assert entry == reference_signals.write(tmp_path, reference_signals.make(contacts(6000, seed=0)))  # the same bytes
-    (tmp_path / "card.json").write_bytes(
-        weights.card_bytes(CARD | {"signals": entry})
-    )
+    (tmp_path / "card.json").write_bytes(weights.card_bytes(CARD | {"signals": entry}))
     again = reference_signals.read(tmp_path)
     np.testing.assert_array_equal(again.typical, typical.typical)
     for rectified in (False, True):
@@ -139,9 +137,7 @@ def test_typical_signals_come_back_from_their_file(typical, tmp_path):
 
 @pytest.mark.parametrize("entry", [None, 7, {}, {"sha256": "0"}, {"sha256": "0", "count": -1}])
 def test_a_card_without_typical_signals_is_told(entry, tmp_path):
-    (tmp_path / "card.json").write_bytes(
-        weights.card_bytes(CARD | {"signals": entry})
-    )
+    (tmp_path / "card.json").write_bytes(weights.card_bytes(CARD | {"signals": entry}))
     with pytest.raises(TactileError, match="no typical signals"):
         reference_signals.read(tmp_path)
 
@@ -165,9 +161,7 @@ def trained(typical, tmp_path_factory):
     """A weights folder as far as `tactile adapt` looks into it."""
     folder = tmp_path_factory.mktemp("weights")
     entry = reference_signals.write(folder, typical)
-    (folder / "card.json").write_bytes(
-        weights.card_bytes(CARD | {"signals": entry})
-    )
+    (folder / "card.json").write_bytes(weights.card_bytes(CARD | {"signals": entry}))
     return folder
 
 

@@ -23,6 +23,7 @@ SIZES = {
     "D2BPN": {"inputs": 9, "outputs": 6, **MLP},
     "B2SPN": {"inputs": 8, "outputs": 8, **MLP},
     "force": {"inputs": 6, "outputs": 3, "width": 8, "blocks": 1},
+    "pressure": {"inputs": 20, "outputs": 1, "width": 8, "blocks": 1},
     "error": {"inputs": 11, "outputs": 2, "width": 8, "blocks": 1},
 }
 
@@ -84,6 +85,7 @@ def calls(nets, count):
         "m2m_back": (nets.m2m_back, latents[7], (6,)),
         "m2s": (nets.m2s, latents[6], (8,)),
         "force": (nets.force, latents[6], (3,)),
+        "pressure": (nets.pressure, change, ()),
         "expected_error": (nets.expected_error, change, (2,)),
     }
 

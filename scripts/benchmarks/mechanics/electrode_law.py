@@ -10,7 +10,13 @@ import numpy as np
 from tactile_core import sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.geometry.indenters import Cylinder, Indenter, Sphere
-from tactile_core.mechanics.electrodes.biotac_sheet import CONDUCTIVITY, BiotacSheet, biotac_sheet, divider_counts
+from tactile_core.mechanics.electrodes.biotac_sheet import (
+    CONDUCTIVITY,
+    BiotacSheet,
+    biotac_sheet,
+    growth,
+    watched_films,
+)
 from tactile_core.mechanics.electrodes.gap_law import FILM_CONSTANT, signal_of_gaps
 from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
 from tactile_core.mechanics.electrodes.thin_sheet import ThinSheet, resistances
@@ -22,7 +28,7 @@ from tactile_core.mechanics.solids.fluid_cavity import FluidCavity
 from tactile_core.mechanics.solids.hex_mesh import inner_faces, skin_mesh
 from tactile_core.mechanics.solids.sparse_cholesky import factor
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
-from tactile_core.sensors import digit
+from tactile_core.sensors import digit, divider
 
 DEPTHS = (0.15e-3, 0.4e-3, 0.7e-3, 1.0e-3, 1.2e-3)  # m, of every press
 INDENTERS = (Sphere(2e-3), Sphere(3.5e-3), Sphere(6e-3), Cylinder(3e-3, 0.5e-3))
@@ -57,7 +63,7 @@ def electrode_rows(contacts: int = 240, *, each: bool = True) -> Iterator[Row]:
             yield row(f"{name}_largest_fall", change.min(), "percent", null=0.0, of=f"7 mm ball, {of}")
         found = np.stack([sheet.resistances(sheet.films(moved)) for moved in skin])
         yield from _law_rows(found - rest, gaps, of, each=each)
-        divided = divider_counts(found, rest) - divider_counts(rest, rest)
+        divided = divider.reading(growth(found, rest), sensors.REST_COUNT) - sensors.REST_COUNT
         yield from _law_rows(divided, gaps, f"{of}, through a divider", each=False)
 
 
@@ -95,7 +101,7 @@ def _grid_rows(sheet: BiotacSheet, skin: list[np.ndarray]) -> Iterator[Row]:
 
 def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) -> Iterator[Row]:
     """The sheet on few fields: its time and error a contact, and with films that a contact of the fast tier watches."""
-    reduced, watched = reduced_sheet(), watched_films(touches)
+    reduced, watched = reduced_sheet(), [watched_films(contact) for contact in touches]
     films = [sheet.films(moved) for moved in skin]
     started = time.perf_counter()
     exact = np.stack([sheet.resistances(each) for each in films])
@@ -111,13 +117,6 @@ def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) 
         ("reduced_sheet_error_of_watched_films", np.stack([reduced.resistances(each) for each in watched])),
     ):
         yield row(name, _rms(100 * (answer / rest - 1) - change), "percent of rest", null=_rms(change), of=of)
-
-
-def watched_films(contacts: list[Contact]) -> list[np.ndarray]:
-    """Films (k,) m of the sheet in contacts of the fast tier, from the inner nodes that it watches."""
-    skin = biotac_compliance()
-    changes = (contact.watched_gaps - skin.watch_gap for contact in contacts)
-    return [biotac_sheet().films_of(change[skin.feet :]) for change in changes]
 
 
 def _inner_skin() -> Callable[[Contact], np.ndarray]:

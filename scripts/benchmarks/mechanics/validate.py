@@ -35,7 +35,7 @@ from benchmarks.mechanics import (
     work,
 )
 from benchmarks.mechanics.report import write
-from benchmarks.translation import rest_impedance, simulated_patterns
+from benchmarks.translation import rest_impedance, simulated_patterns, skin_stiffness
 from tactile_core.accuracy import HEADER, Row, failed, line
 from tactile_core.accuracy import row as make_row
 from tactile_core.files import atomic
@@ -67,6 +67,10 @@ CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
     "simulated_patterns": (
         lambda quick: simulated_patterns.rows(quick, DATA),
         "Real grips and slides against the nearest simulated contact, by the electrodes' law (needs the outside data)",
+    ),
+    "skin_stiffness": (
+        lambda quick: skin_stiffness.rows(quick, DATA),
+        "Pressure in real fingers over that of the simulated contacts most like them (needs the outside data)",
     ),
     "public_mesh": (
         lambda quick: public_mesh.rows(quick, DATA),

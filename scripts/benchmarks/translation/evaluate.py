@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.translation import grips, prints, recordings, slide_set, test_set
+from benchmarks.translation import fluid_pressure, grips, prints, recordings, slide_set, test_set
 from benchmarks.translation.model_card import write_model_card
 from tactile_core.accuracy import HEADER, Row, failed, line
 from tactile_core.errors import TactileError
@@ -75,10 +75,12 @@ def on_recordings(network: translate.Translator, options: argparse.Namespace) ->
     """Rows of real recordings: grips of the PHAC set, or slides."""
     folder, file = Path(options.recordings), options.sensor
     if grips.find(folder):
-        return grips.rows(folder, network)
+        return grips.rows(folder, network, read_pairs(options.test_set))
     sensor = None if file is None else electrode_gains.read(file).of(folder, None, file)
     most = QUICK if options.quick else None
-    return [*recordings.rows(folder, network, options.out, most, sensor), *_slide_prints(folder, network, most, sensor)]
+    found = recordings.rows(folder, network, options.out, most, sensor)
+    found += _slide_prints(folder, network, most, sensor)
+    return [*found, *fluid_pressure.slide_rows(folder, network, most, sensor)]
 
 
 def _slide_prints(

@@ -19,12 +19,14 @@ from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile, 
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.readers import each_finger
 from tactile_core.recordings.signals import FRAMEWISE
-from tactile_core.sensors import electrodes
+from tactile_core.sensors import digit, digit_surface, electrodes
+from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation import adapt, networks, reference_signals
-from tactile_core.translation.translate import Translator
+from tactile_core.translation.translate import Translator, contact_center
 from tactile_core.translation.unit_rest import find_rest
 
-from . import prints
+from . import fluid_pressure, prints
+from .noise import as_read
 
 PATTERN = "*_HOLD.mat"  # <object>_<number>_<trial>_HOLD.mat
 HARD = ("acrylic", "steel_vase")
@@ -32,6 +34,8 @@ SOFT = "found in the soft objects"
 CHOOSING, REPORTING = ("01", "02", "03"), ("04", "05")
 SQUEEZED = np.array([6, 7, 8, 9, 16])  # E7 to E10 and E17 lie under a flat object (data README)
 MARGIN, LARGEST_Z = 1.5e-3, 3e-3  # m, round the squeezed electrodes
+DEEP = 0.3e-3  # m on the BioTac: lighter simulated contacts than grips are
+SEED = 7  # of the simulated readings' noise
 EVERY = 20  # frames between two that are judged: a grip hardly changes
 
 
@@ -45,13 +49,21 @@ def soft_to_choose_by(files: list[Path]) -> list[Path]:
     return [path for path in files if _trial(path) in CHOOSING and not path.name.startswith(HARD)]
 
 
+def hard_to_choose_by(files: list[Path]) -> list[Path]:
+    """Grips of hard flat objects in the trials that may be looked at."""
+    return [path for path in files if _trial(path) in CHOOSING and path.name.startswith(HARD)]
+
+
 def hard_to_report(files: list[Path]) -> list[Path]:
     """Grips of hard flat objects in the trials that nothing was chosen by."""
     return [path for path in files if _trial(path) in REPORTING and path.name.startswith(HARD)]
 
 
-def rows(folder: Path, network: Translator) -> list[Row]:
-    """Rows of a folder. Raises TactileError where trials to choose or to report by are missing."""
+def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
+    """Rows of a folder, and the place in simulated contacts, so that a constant does not pass.
+
+    Raises TactileError where trials to choose or to report by are missing.
+    """
     files = find(folder)
     soft = soft_to_choose_by(files)
     hard = hard_to_report(files)
@@ -59,8 +71,12 @@ def rows(folder: Path, network: Translator) -> list[Row]:
         raise TactileError(folder, f"{len(soft)} soft and {len(hard)} hard grips", "some of each, by their trials")
     sensor, _ = adapt.adapt_hand(soft, reference_signals.read(networks.WEIGHTS_FOLDER))
     held = [(one, finger) for path in hard for finger, one in enumerate(each_finger(path))]
-    prepared = (prepare_unit(recordings.read(one), None, sensor.of(one, finger, SOFT)) for one, finger in held)
-    return [*_place_rows(hard, network, sensor), *prints.rows("grip", prepared, network), *_rest_rows(files)]
+    prepared = [prepare_unit(recordings.read(one), None, sensor.of(one, finger, SOFT)) for one, finger in held]
+    every = [prepare_unit(recordings.read(one), None, sensor.of(one, finger, SOFT)) for path in files
+             if _trial(path) in REPORTING for finger, one in enumerate(each_finger(path))]  # fmt: skip
+    told = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
+    told += prints.rows("grip", prepared, network)
+    return [*told, fluid_pressure.grip_row(every, network), *_rest_rows(files)]
 
 
 def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> list[Row]:
@@ -81,13 +97,28 @@ def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> li
     ]
 
 
+def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
+    """Where simulated contacts are found, read with the noise of real ones; null: always at their middle place."""
+    nets = network.nets
+    deep = (pairs.depth_biotac > DEEP) & ~pairs.slide.any(axis=1) & (pairs.place[:, 0] > digit.X_TIP)
+    gel = nets.decode_digit(nets.m2m(nets.s2m(nets.encode_signal(as_read(pairs.signal[deep], SEED)))))
+    found = contact_center(gel, digit_surface().rest, network.silent("digit_m"))
+    scale = np.float32(pairs.scale_digit)
+    true = contact_center(pairs.displacement_digit[deep] * scale, digit_surface().rest, 0.0)
+    away, nothing = (1e3 * np.linalg.norm(each - true, axis=1) for each in (found, np.median(true, axis=0)))
+    of = f"{deep.sum()} test contacts deeper than {1e3 * DEEP:g} mm, {np.isnan(away).sum()} lost; null: their middle"
+    away[np.isnan(away)] = np.inf  # a contact that is not found is not near
+    return row("simulated_place_error", float(np.median(away)), "mm", 0.6, null=float(np.median(nothing)), of=of)
+
+
 def _judged(
     recording: Recording, unit: ElectrodeGains, network: Translator, order: np.ndarray | slice = slice(None)
 ) -> tuple[float, float, float]:
     """Whether the median place lies in the box; shares of frames with a place, and of those out of range."""
     signals = prepare_unit(recording, None, unit)
     some = {name: getattr(signals, name)[::EVERY] for name in FRAMEWISE}
-    found = network(dataclasses.replace(signals, **(some | {"change": some["change"][:, order]})))
+    some |= {"change": some["change"][:, order], "rest": signals.rest[order]}
+    found = network(dataclasses.replace(signals, **some))
     known = np.isfinite(found.contact_center[:, 0])
     within = known.any() and in_box(np.median(found.contact_center[known], axis=0))
     return float(within), float(known.mean()), float((found.flags & Flag.OUT_OF_RANGE > 0).mean())

@@ -2,9 +2,8 @@
 
 Grips are those of hard flat objects in the PHAC set (outside data), trials 04 and 05; rest is found in the soft ones'
 trials 01 to 03. Slides are recordings without sample 7 of each material: they hold sizes without signs, and counts at
-rest that nobody knows, so the sensors' typical one stands for them. The sheet's resistances become counts of the very
-unit: each electrode's impedance Z grows by the factor of its resistance, and a divider reads E = 4095 / (1 + Z / load)
-(SynTouch, BioTac SP manual), so that rest counts alone tell the change, whatever load and conductivity are. Nothing is
+rest that nobody knows, so the sensors' typical one stands for them. Each law's
+changes are those of the very unit, by its counts at rest (``sensors.divider``). Nothing is
 fitted to these recordings.
 """
 
@@ -17,7 +16,7 @@ import numpy as np
 
 from tactile_core import recordings
 from tactile_core.accuracy import Row, row
-from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet
+from tactile_core.mechanics.electrodes.biotac_sheet import watched_films
 from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
 from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
 from tactile_core.mechanics.fast.compliance import biotac_compliance
@@ -25,12 +24,11 @@ from tactile_core.mechanics.fast.contact import Contact, ContactProblem
 from tactile_core.mechanics.placement import pose_at
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
 from tactile_core.recordings.readers import each_finger
-from tactile_core.sensors import COUNT_MAX, REST_COUNT
+from tactile_core.sensors import REST_COUNT, divider
 from tactile_core.simulation.pair_sampling import draw_place
 from tactile_core.simulation.scene import load_scene
 from tactile_core.translation.unit_rest import find_rest
 
-from ..mechanics.electrode_law import watched_films
 from . import grips, slide_set
 from .slide_metrics import CONTACT
 
@@ -58,12 +56,11 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
 def _laws(contacts: list[Contact]) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     """Name -> what gives the changes (n, 19) of contacts on a unit that rests at counts (19,)."""
     gap = signal_of_gaps(np.stack([contact.electrode_gaps for contact in contacts]))
-    growth = np.stack([reduced_sheet().resistances(films) for films in watched_films(contacts)])
-    growth /= reduced_sheet().resistances(biotac_sheet().film)
+    growth = np.stack([reduced_sheet().growth(watched_films(contact)) for contact in contacts])
     return {
         "wrong_sign": lambda at_rest: -gap,
         "gap": lambda at_rest: gap,
-        "sheet": lambda at_rest: COUNT_MAX / (1 + (COUNT_MAX / at_rest - 1) * growth) - at_rest,
+        "sheet": lambda at_rest: divider.reading(growth, at_rest) - at_rest,
     }
 
 

@@ -52,6 +52,17 @@ def polarity_argument(verb: argparse.ArgumentParser) -> None:
     )
 
 
+def electrodes_argument(verb: argparse.ArgumentParser) -> None:
+    """``--electrodes``."""
+    verb.add_argument(
+        "--electrodes",
+        choices=("sheet", "gap"),
+        default="sheet",
+        help="how the fluid's film becomes counts: as a conducting sheet, 3 ms a contact, or one over the gap under"
+        " each electrode, at no cost and less like real fingers (default: sheet)",
+    )
+
+
 def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
     """``--error``; what : the units that mean something here, in words."""
     verb.add_argument("--error", metavar="BOUND", help=f"the largest error that the toolkit itself may add: {what}")

@@ -7,7 +7,7 @@ import argparse
 from ...files.threads import one_thread
 from ..terminal import bar, tell
 from . import engine
-from .common import RESUMES, check_seed, progress_argument, seed_argument
+from .common import RESUMES, check_seed, electrodes_argument, progress_argument, seed_argument
 
 BRIEF = "simulate paired contacts"
 TEXT = "Simulate contacts of a scene's indenters with both sensors: same force, angle and place."
@@ -30,6 +30,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json, what is in it, goes beside"
     )
+    electrodes_argument(verb)
     engine.parts_arguments(verb)
     progress_argument(verb)
 
@@ -43,11 +44,14 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs.engine import result_parts
 
     if options.plan:
-        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out)
+        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes)
         tell(str(result_parts.write(options.out, job)))
         return 0
     place = engine.place_or_none(options)
     with bar("pairs", "block", options.progress) as shown:
-        pairs.make_pairs(options.scene, options.count, options.seed, options.out, progress=shown, place=place)
+        pairs.make_pairs(
+            options.scene, options.count, options.seed, options.out, progress=shown, place=place,
+            electrodes=options.electrodes,
+        )  # fmt: skip
     tell(options.out)
     return 0

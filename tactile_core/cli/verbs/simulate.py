@@ -7,7 +7,7 @@ import argparse
 from ...errors import TactileError
 from ..terminal import bar, say, tell
 from . import engine
-from .common import NOTHING, check_seed, error_argument, progress_argument, seed_argument
+from .common import NOTHING, check_seed, electrodes_argument, error_argument, progress_argument, seed_argument
 
 BRIEF = "simulate a recording"
 TEXT = """\
@@ -43,6 +43,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         metavar="WORDS",
         help="what the file holds, out of electrodes,displacement_biotac,displacement_digit (default: all)",
     )
+    electrodes_argument(verb)
     error_argument(verb, "um of the surface, such as 50um")
     verb.add_argument(
         "--isaac-like",
@@ -96,7 +97,9 @@ def run(options: argparse.Namespace) -> int:
 
             keep = results.parse_words(options.keep, ALL)
             tiers = {} if bound is None else _tiers(options.scene, keep, bound)
-            simulate_recording(options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers)
+            simulate_recording(
+                options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers, electrodes=options.electrodes
+            )
     tell(options.out)
     return 0
 
@@ -129,7 +132,7 @@ def _run_grid(options: argparse.Namespace) -> int:
     from ...simulation.recording import ALL
 
     keep = results.parse_words(options.keep, ALL)
-    job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep)
+    job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep, options.electrodes)
     if options.plan:
         tell(str(result_parts.write(options.out, job)))
         return 0

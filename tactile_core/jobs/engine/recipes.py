@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -51,12 +51,16 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
 
 
 class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to paired contacts. surfaces : sha256 of the BioTac's and the DIGIT's nodes; files : of the meshes."""
+    """A scene to paired contacts. surfaces : sha256 of the BioTac's and the DIGIT's nodes; files : of the meshes.
+
+    electrodes : the law of their counts
+    """
 
     count: Annotated[int, Meta(ge=1)]
     seed: int
     surfaces: list[str]
     files: list[str]
+    electrodes: Literal["sheet", "gap"] = "sheet"
     version: str = __version__
 
 
@@ -71,6 +75,7 @@ class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_
     values: list[dict[str, float | str]]
     files: list[str]
     keep: list[str]
+    electrodes: Literal["sheet", "gap"] = "sheet"
     version: str = __version__
 
 

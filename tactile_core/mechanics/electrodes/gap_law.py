@@ -1,51 +1,21 @@
 """The electrode forward model: raw counts from the thickness of the fluid film over each electrode.
 
-The gap law stands in for the thin-sheet solve of ``biotac_sheet``; ``benchmarks.mechanics.electrode_law`` holds the
-one against the other.
+The cheap law, 1 / gap, beside that of the thin sheet (``law``); ``benchmarks.mechanics.electrode_law`` holds the one
+against the other.
 """
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from ... import sensors
-from ...errors import TactileError
 from ..fast.sensing_points import electrode_feet
 
 FILM_FLOOR = 20e-6  # m, thinnest film the law knows (networks.md: s = 1 / max(gap, 0.02 mm))
 # counts m: assumed. No gap law is published (mechanics.md); this one puts the 95th percentile of the largest change a
 # press makes near 150 counts, the size that networks.md works with. One constant for all electrodes: against the thin
-# sheet it leaves 8 counts rms of 20 over 240 presses, a constant for each electrode 7 (``electrode_law``).
+# sheet it leaves 9 counts rms of 20 over 240 contacts, a constant for each electrode 7 (``electrode_law``).
 FILM_CONSTANT = 0.1
-
-
-@dataclasses.dataclass(frozen=True)
-class Wiring:
-    """What lies between the film over an electrode and the number in a file; raises TactileError out of range.
-
-    rest_spread : counts; each electrode rests at ``sensors.REST_COUNT`` and up to this much more or less (assumed)
-    gain_error : 1, standard deviation of the logarithm of each electrode's gain (assumed none)
-    drift : counts/s; each electrode drifts evenly at up to this rate (Ruppel: 88 counts in an hour, sensors.md)
-    noise : counts, standard deviation in each frame (0.7 to 1.5 in real recordings, data README)
-    tared : whether the count at rest is taken off, as in files that keep changes alone
-    """
-
-    rest_spread: float = 150.0
-    gain_error: float = 0.0
-    drift: float = 88 / 3600
-    noise: float = 1.0
-    tared: bool = False
-
-    def __post_init__(self) -> None:
-        room = min(sensors.REST_COUNT, sensors.COUNT_MAX - sensors.REST_COUNT)
-        limits = {"rest_spread": room, "gain_error": 1.0, "drift": np.inf, "noise": np.inf}
-        for name, largest in limits.items():
-            value = getattr(self, name)
-            if not (0 <= value <= largest and np.isfinite(value)):
-                expected = "a finite number from 0" + (f" to {largest:g}" if np.isfinite(largest) else "")
-                raise TactileError(f"wiring, {name}", repr(value), expected)
 
 
 def signal_of_gaps(gaps: np.ndarray) -> np.ndarray:
@@ -55,21 +25,3 @@ def signal_of_gaps(gaps: np.ndarray) -> np.ndarray:
     """
     rest = electrode_feet().gap
     return sensors.COUNT_SIGN * FILM_CONSTANT * (1 / np.maximum(gaps, FILM_FLOOR) - 1 / rest)
-
-
-def readings(change: np.ndarray, time: np.ndarray, wiring: Wiring, seed: int) -> np.ndarray:
-    """What the 12-bit converter delivers, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
-
-    Rounded and held within 0..4095, then less the count at rest where ``wiring.tared``. Rest, gain, drift and noise are
-    drawn from streams of their own: a recording goes on as it began when it is made longer, and one defect changes
-    without the others.
-    """
-    streams = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
-    electrodes = change.shape[1]
-    rest = sensors.REST_COUNT + np.round(streams[0].uniform(-wiring.rest_spread, wiring.rest_spread, electrodes))
-    gain = np.exp(wiring.gain_error * streams[1].standard_normal(electrodes))
-    drift = streams[2].uniform(-wiring.drift, wiring.drift, electrodes)
-    noise = wiring.noise * streams[3].standard_normal(change.shape)
-    counts = rest + gain * change + drift * (time - time[0])[:, None] + noise
-    counts = np.clip(np.round(counts), 0, sensors.COUNT_MAX)
-    return (counts - rest if wiring.tared else counts).astype(np.int16)

@@ -11,11 +11,11 @@ import functools
 import numpy as np
 
 from ..solids.sparse_cholesky import factor
-from .biotac_sheet import CONDUCTIVITY, BiotacSheet, biotac_sheet
+from .biotac_sheet import CONDUCTIVITY, BiotacSheet, biotac_sheet, growth
 from .gap_law import FILM_FLOOR
 from .thin_sheet import resistances
 
-# 60 fields of 60 dents leave 0.24 % rms of rest where contacts change resistances by 9.7 % (docs/mechanics.md); in
+# 60 fields of 60 dents leave 0.28 % rms of rest where contacts change resistances by 9.3 % (docs/mechanics.md); in
 # trials by hand 20 fields left 0.7 %, and 150 dents were no better. Dents as wide and deep as contacts make them, and
 # sides that bulge (assumed ranges, m).
 _DENTS, _FIELDS = 60, 60
@@ -29,6 +29,7 @@ class ReducedSheet:
     def __init__(self, sheet: BiotacSheet, fields: np.ndarray) -> None:
         self.sheet, self.fields = sheet, fields
         self._patches = fields.T @ sheet.sheet.patches[1:]
+        self._at_rest = self.resistances(sheet.film)
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
         """Resistance (19,) ohm of each electrode to the excitation for films (k,) m at the sheet's nodes."""
@@ -36,6 +37,10 @@ class ReducedSheet:
         reduced = self.fields.T @ (stiffness @ self.fields)
         potentials = self._patches.T @ np.linalg.solve(reduced, self._patches)
         return resistances(potentials + np.diag(self.sheet.near(films)), 19)
+
+    def growth(self, films: np.ndarray) -> np.ndarray:
+        """Factor (19,) by which each electrode's impedance has grown since rest, for films (k,) m."""
+        return growth(self.resistances(films), self._at_rest)
 
 
 @functools.cache

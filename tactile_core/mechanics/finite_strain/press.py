@@ -11,6 +11,7 @@ from ... import sensors
 from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
 from ...sensors import biotac
+from ..electrodes.biotac_sheet import biotac_sheet
 from ..fast.sensing_points import electrode_feet
 from ..first_touch import fall
 from ..pose_path import same_line
@@ -38,7 +39,7 @@ class FullContact:
     displacement : (n, 3), of the surface lattice; patch : (n,) bool, nodes that carry force
     force : (3,); axial_force : along the motion; depth : from the press's own pose
     pressure : rise of the fluid's; centre : (2,) = (x, z), of pressure, on the resting surface
-    gaps : (19,), film over the electrodes; (0,) on the DIGIT
+    electrode_gaps : (19,), film over the electrodes; films : (k,), at the nodes of the sheet; (0,) on the DIGIT
     """
 
     displacement: np.ndarray
@@ -48,7 +49,8 @@ class FullContact:
     depth: float
     pressure: float
     centre: np.ndarray
-    gaps: np.ndarray
+    electrode_gaps: np.ndarray
+    films: np.ndarray
 
 
 class FullPress:
@@ -111,19 +113,19 @@ def full_contact(body: Body, touch: ContactState) -> FullContact:
     mesh = body.solid.mesh
     weight = np.linalg.norm(touch.outer.forces, axis=1)
     centre = weight @ mesh.nodes[touch.nodes][:, [0, 2]] / max(weight.sum(), 1e-30)
-    gaps = film(body, touch) if len(mesh.inner) else np.empty(0)
+    gaps, films = film(body, touch) if len(mesh.inner) else (np.empty(0), np.empty(0))
     return FullContact(
         body.displacement(touch), body.contact_patch(touch), touch.force, _axial(touch), touch.depth, touch.fluid,
-        centre, gaps,
+        centre, gaps, films,
     )  # fmt: skip
 
 
-def film(body: Body, touch: ContactState) -> np.ndarray:
-    """Film (19,) m over each electrode: as ``Contact.electrode_gaps`` has it, from the inner skin's own shape."""
+def film(body: Body, touch: ContactState) -> tuple[np.ndarray, np.ndarray]:
+    """Film over each electrode (19,) m, as ``Contact.electrode_gaps`` has it, and at the nodes of the sheet (k,) m."""
     feet, inner = electrode_feet(), biotac.skin_surface("inner")
     moved = body.graded.on_lattice(touch.state.displacement[body.solid.mesh.inner])
     at_feet = np.einsum("ek,ekj->ej", feet.weights, moved[inner.faces[feet.face]])
-    return feet.gap + np.einsum("ej,ej->e", at_feet, feet.outward)
+    return feet.gap + np.einsum("ej,ej->e", at_feet, feet.outward), biotac_sheet().films(moved)
 
 
 def on_line(first: FullContact, second: FullContact, force: float) -> FullContact:
@@ -135,7 +137,7 @@ def on_line(first: FullContact, second: FullContact, force: float) -> FullContac
     share = (goal - r0) / (r1 - r0)
     joined = {
         name: (1 - share) * getattr(first, name) + share * getattr(second, name)
-        for name in ("displacement", "depth", "pressure", "gaps")
+        for name in ("displacement", "depth", "pressure", "electrode_gaps", "films")
     }
     scaled = second.force * force / second.axial_force
     return dataclasses.replace(second, **joined, force=scaled, axial_force=force)

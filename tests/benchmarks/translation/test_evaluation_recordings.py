@@ -59,7 +59,7 @@ def network(signals: Signals) -> Translation:
     codes = np.repeat(strength[:, None], 4, axis=1)
     errors = [1e-6 * strength] * 4
     flags = np.zeros(count, np.uint16)
-    return Translation(codes, codes, codes, skin, moved, force, center, np.ones(count), *errors, flags)
+    return Translation(codes, codes, codes, skin, moved, force, 50 * strength, center, np.ones(count), *errors, flags)
 
 
 def by_name(rows: list[dict]) -> dict[str, dict]:

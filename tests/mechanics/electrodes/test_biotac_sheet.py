@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, divider_counts, excitation_electrodes
+from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, excitation_electrodes, growth
 from tactile_core.mechanics.electrodes.gap_law import FILM_FLOOR
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.sensors import biotac
@@ -82,12 +82,11 @@ def test_excitation_stands_on_both_sides_of_the_core():
     places = excitation_electrodes()
     np.testing.assert_allclose(places[:2] * [1, 1, -1], places[[3, 2]])
     apart = np.linalg.norm(places[:, None] - sensors.electrodes(), axis=2)
-    assert apart.min() > 1.2e-3  # two electrodes of 0.6 mm and as much between them
+    assert apart.min() > 1.2e-3  # two electrodes of 0.6 mm radius: none overlap
 
 
-def test_the_divider_rests_where_sensors_do_and_never_leaves_its_bits():
+def test_the_interface_hides_a_part_of_the_film():
     rest = biotac_sheet().resistances(biotac_sheet().film)
-    assert np.median(divider_counts(rest, rest)) == pytest.approx(sensors.REST_COUNT)
-    assert (np.diff(divider_counts(np.outer([0.1, 1, 10, 1e6], rest), rest), axis=0) < 0).all()
-    assert divider_counts(1e9 * rest, rest).min() >= 0
-    assert divider_counts(1e-9 * rest, rest).max() <= sensors.COUNT_MAX
+    np.testing.assert_array_equal(growth(rest, rest), 1)
+    assert (growth(2 * rest, rest) < 2).all() and (growth(2 * rest, rest) > 1.3).all()
+    assert (growth(0 * rest, rest) > 0).all()

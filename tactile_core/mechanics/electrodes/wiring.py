@@ -1,0 +1,57 @@
+"""What lies between the electrodes and the numbers in a file: rest, gains, drift, noise, the converter."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ... import sensors
+from ...errors import TactileError
+from ...sensors import divider
+
+
+@dataclasses.dataclass(frozen=True)
+class Wiring:
+    """What lies between the film over an electrode and the number in a file; raises TactileError out of range.
+
+    rest_spread : counts; each electrode rests at ``sensors.REST_COUNT`` and up to this much more or less (assumed)
+    gain_error : 1, standard deviation of the logarithm of each electrode's gain (assumed none)
+    drift : counts/s; each electrode drifts evenly at up to this rate (Ruppel: 88 counts in an hour, sensors.md)
+    noise : counts, standard deviation in each frame (0.7 to 1.5 in real recordings, data README)
+    tared : whether the count at rest is taken off, as in files that keep changes alone
+    """
+
+    rest_spread: float = 150.0
+    gain_error: float = 0.0
+    drift: float = 88 / 3600
+    noise: float = 1.0
+    tared: bool = False
+
+    def __post_init__(self) -> None:
+        room = min(sensors.REST_COUNT, sensors.COUNT_MAX - sensors.REST_COUNT)
+        limits = {"rest_spread": room, "gain_error": 1.0, "drift": np.inf, "noise": np.inf}
+        for name, largest in limits.items():
+            value = getattr(self, name)
+            if not (0 <= value <= largest and np.isfinite(value)):
+                expected = "a finite number from 0" + (f" to {largest:g}" if np.isfinite(largest) else "")
+                raise TactileError(f"wiring, {name}", repr(value), expected)
+
+
+def readings(change: np.ndarray, time: np.ndarray, wiring: Wiring, seed: int) -> np.ndarray:
+    """What the 12-bit converter delivers, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
+
+    Changes are those of a unit that rests at ``sensors.REST_COUNT``; this one reads them by its own rest, as its
+    divider does. Rounded and held within 0..4095, then less the count at rest where ``wiring.tared``. Rest, gain, drift
+    and noise are drawn from streams of their own: a recording goes on as it began when it is made longer, and one
+    defect changes without the others.
+    """
+    streams = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
+    electrodes = change.shape[1]
+    rest = sensors.REST_COUNT + np.round(streams[0].uniform(-wiring.rest_spread, wiring.rest_spread, electrodes))
+    gain = np.exp(wiring.gain_error * streams[1].standard_normal(electrodes))
+    drift = streams[2].uniform(-wiring.drift, wiring.drift, electrodes)
+    noise = wiring.noise * streams[3].standard_normal(change.shape)
+    counts = rest + gain * divider.of_unit(change, rest) + drift * (time - time[0])[:, None] + noise
+    counts = np.clip(np.round(counts), 0, sensors.COUNT_MAX)
+    return (counts - rest if wiring.tared else counts).astype(np.int16)

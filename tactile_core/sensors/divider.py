@@ -1,0 +1,43 @@
+"""How an electrode's impedance becomes counts, and how the changes of one unit become those of another.
+
+Each electrode shares a voltage with a load, over which is read, so that counts fall as its film thins (SynTouch, BioTac
+SP manual): E = COUNT_MAX / (1 + Z / load). With the impedance grown by a factor g since rest that is
+COUNT_MAX / (1 + (COUNT_MAX / E_rest - 1) g): neither load nor conductivity matters, only the counts at rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import COUNT_MAX, REST_COUNT
+
+_ENDS = 0.4, COUNT_MAX - 0.4  # counts, which round to the converter's ends: there nothing is known of the impedance
+# Counts that an electrode may rest at; real ones rest at 3,010 to 3,670 (two units, PHAC). One that is dead or
+# saturated rests elsewhere, and its noise would be blown up without end.
+_RESTS = 500.0, 3900.0
+
+
+def reading(growth: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
+    """Counts (..., 19), not rounded, where impedances have grown by factors (..., 19) since counts at rest (19,)."""
+    return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
+
+
+def growth(counts: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
+    """Factors (..., 19) by which impedances have grown since counts at rest (19,); inverse of ``reading``."""
+    now, before = np.clip(counts, *_ENDS), np.clip(rest, *_ENDS)
+    return (COUNT_MAX / now - 1) / (COUNT_MAX / before - 1)
+
+
+def typical(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Changes (..., 19) counts of a unit that rests at counts (..., 19) as one that rests at ``REST_COUNT`` has them.
+
+    A unit at 3,500 counts answers a contact with four fifths, one at 2,800 with seven fifths of what that one does.
+    """
+    rest = np.clip(rest, *_RESTS)
+    return reading(growth(rest + change, rest), REST_COUNT) - REST_COUNT
+
+
+def of_unit(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Inverse of ``typical``: changes of a unit at rest counts (19,) for those of one that rests at ``REST_COUNT``."""
+    rest = np.clip(rest, *_RESTS)
+    return reading(growth(REST_COUNT + change, REST_COUNT), rest) - rest

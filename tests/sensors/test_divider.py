@@ -1,0 +1,32 @@
+"""Counts of a divider: what a unit's rest makes of a change, both ways."""
+
+import numpy as np
+
+from tactile_core.sensors import COUNT_MAX, REST_COUNT, divider
+
+REST = np.linspace(3000.0, 3700.0, 19)
+
+
+def test_counts_fall_as_impedance_grows_and_never_leave_the_converter():
+    counts = divider.reading(np.array([1e-9, 0.5, 1.0, 2.0, 1e9])[:, None], REST)
+    assert (np.diff(counts, axis=0) < 0).all() and counts.min() >= 0 and counts.max() <= COUNT_MAX
+    np.testing.assert_allclose(counts[2], REST)
+
+
+def test_growth_is_the_inverse_of_reading():
+    growth = np.linspace(0.8, 5, 7)[:, None] * np.ones(19)
+    np.testing.assert_allclose(divider.growth(divider.reading(growth, REST), REST), growth)
+
+
+def test_units_turn_into_the_typical_one_and_back():
+    change = np.random.default_rng(0).uniform(-800, 80, (20, 19))
+    np.testing.assert_allclose(divider.typical(divider.of_unit(change, REST), REST), change, atol=1e-6)
+    np.testing.assert_allclose(divider.typical(change, np.full(19, REST_COUNT)), change, atol=1e-6)
+    small = divider.typical(np.full((1, 19), -1.0), REST)[0]  # near rest: by E (1 - E / 4095)
+    slope = REST * (1 - REST / COUNT_MAX)
+    np.testing.assert_allclose(small, -REST_COUNT * (1 - REST_COUNT / COUNT_MAX) / slope, rtol=2e-3)
+
+
+def test_noise_of_dead_and_saturated_electrodes_is_not_blown_up():
+    for rest in (0.0, 1.0, 4094.0, 4095.0):
+        assert np.abs(divider.typical(np.array([[-1.0, 0.0, 1.0]]), np.full(3, rest))).max() < 5
