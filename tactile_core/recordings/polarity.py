@@ -24,9 +24,11 @@ TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; belo
 SWING = 15.0
 FEWEST = 20  # frames; of fewer no slope is taken (assumed)
 MOST = 500  # frames looked at, evenly spread
-# By how much the likeness of the one sign must exceed the other's: simulated contacts differ by .34 in the median and,
-# with noise of 1.5 counts and gains 10 % apart, 5 of 100 by less than .03; means over recordings by more (assumed).
-MARGIN = 0.15
+# By how much the likeness of the one sign must exceed the other's; or how much less of the change it must leave over,
+# as a share of what the other leaves: simulated contacts, with noise of 1.5 counts and gains 10 % apart, leave .41 of
+# it in the median, and 1 of 100 more than .7. A light touch that makes the skin bulge is like a firm one upside down,
+# by a likeness of .9; that the right sign has .98 tells them apart.
+MARGIN, LEFT = 0.15, 0.7
 LIKE = 0.6  # likeness that is one: 95 of 100 random changes reach .62, changes with real pressure .66 to .87
 SCALE = 15.0  # counts, of the arcsinh that the networks see changes through
 
@@ -89,7 +91,12 @@ def _decided(changes: np.ndarray, what: str) -> Polarity:
     falls, rises = likeness(changes), likeness(-changes)
     name = FALLS if falls >= rises else RISES
     told = f"{what} is like simulated contacts by {falls:.2f} if counts fall, by {rises:.2f} if they rise"
-    return Polarity(name, told, abs(falls - rises) >= MARGIN and max(falls, rises) >= LIKE)
+    return Polarity(name, told, max(falls, rises) >= LIKE and _apart(min(falls, rises), max(falls, rises)))
+
+
+def _apart(less: float, more: float) -> bool:
+    """Whether the likeness of one sign is clearly more than the other's."""
+    return more - less >= MARGIN or np.sqrt((1 - more**2) / max(1 - less**2, 1e-12)) <= LEFT
 
 
 def likeness(changes: np.ndarray) -> float:

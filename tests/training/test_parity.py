@@ -89,7 +89,7 @@ def signals():
 def test_svb(model, nets):
     change, rectified, both = signals()
     same(nets.encode_signal(change, rectified), model.SVB.mean(modules.compress(both)))
-    same(compress(nets.decode_signal(latent(8))), model.SVB.decoder(torch.from_numpy(latent(8))))
+    same(compress(nets.decode_signal(latent(16))), model.SVB.decoder(torch.from_numpy(latent(16))))
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -112,10 +112,10 @@ def test_mesh_autoencoders(model, nets, contacts, name):
 
 def test_maps(model, nets):
     biotac, digit = (torch.from_numpy(latent(nets.sizes[net]["latent"])) for net in ("MVB", "MVD"))
-    rectified = np.arange(len(latent(8))) % 3 == 0
-    signed, folded = (net(torch.from_numpy(latent(8))) for net in (model.S2MPN, model.R2MPN))
-    same(nets.s2m(latent(8)), signed)
-    same(nets.s2m(latent(8), rectified), torch.where(torch.from_numpy(rectified)[:, None], folded, signed))
+    rectified = np.arange(len(latent(16))) % 3 == 0
+    signed, folded = (net(torch.from_numpy(latent(16))) for net in (model.S2MPN, model.R2MPN))
+    same(nets.s2m(latent(16)), signed)
+    same(nets.s2m(latent(16), rectified), torch.where(torch.from_numpy(rectified)[:, None], folded, signed))
     same(nets.m2m(biotac.numpy()), model.across(biotac))
     same(nets.m2m_back(digit.numpy()), model.back(digit))
     same(compress(nets.decode_signal(nets.m2s(biotac.numpy()))), model.to_signal(biotac))

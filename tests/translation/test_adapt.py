@@ -197,7 +197,7 @@ def test_signals_are_corrected_and_say_so(tmp_path):
         signals = prepare(read(tmp_path / f"{kind}.csv"))
         found = electrode_gains.apply(signals, sensor)
         offset = 0 if kind == "rectified" else 3  # folded away with the sign
-        np.testing.assert_allclose(found.change, (signals.change - offset) / 2)
+        np.testing.assert_allclose(found.typical, (signals.typical - offset) / 2, atol=1e-6)
         assert found.report["sensor"]["gain"] == [2.0] * 19 and "sensor" not in signals.report
         assert found.report["sensor"]["offset_counts"] == [offset] * 19
         assert (found.electrodes == signals.electrodes).all() and (found.flags == signals.flags).all()

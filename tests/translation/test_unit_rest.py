@@ -94,7 +94,7 @@ def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
                 part = dataclasses.replace(signals, **(some | {"change": some["change"][:, order]}))
                 centres[name].append(np.nanmedian(1e3 * translator(part).contact_center, axis=0))
     within = {name: in_box(np.array(places)).mean() for name, places in centres.items()}
-    assert within["as read"] >= 0.95 and within["shuffled"] <= 0.2
+    assert within["as read"] >= 0.9 and within["shuffled"] <= 0.2
 
 
 def in_box(places: np.ndarray) -> np.ndarray:

@@ -52,6 +52,9 @@ class Answers:
     def force(self, rows):
         return self.share * self.pairs.force[rows]
 
+    def pressure(self, change, rectified=False):
+        return self.share * self.pairs.pressure[: len(change)]
+
     def expected_error(self, change, rectified=False):
         return np.full((len(change), 2), 1e-5)
 

@@ -1,5 +1,7 @@
 """Rows of the fluid's pressure, on recordings made for them: exact answers have no error, a wrong scale is found."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from benchmarks.translation import fluid_pressure, slide_set
@@ -7,10 +9,7 @@ from benchmarks.translation import fluid_pressure, slide_set
 PRESSURE = np.linspace(600.0, 4000.0, 50)
 
 
-class Network:
-    """A translation whose card knows a largest pressure."""
-
-    card = {"pairs": {"largest_pressure_Pa": 3000.0}}
+NETWORK = SimpleNamespace(card={"pairs": {"largest_pressure_Pa": 3000.0}})
 
 
 @pytest.fixture
@@ -22,7 +21,7 @@ def told(monkeypatch, tmp_path):
         monkeypatch.setattr(slide_set, "find", lambda folder: names)
         frames = np.column_stack([PRESSURE, factor * PRESSURE, np.sqrt(PRESSURE)])
         monkeypatch.setattr(fluid_pressure, "_frames", lambda path, network, sensor: frames)
-        return {row["name"]: row for row in fluid_pressure.slide_rows(tmp_path, Network(), None, None)}
+        return {row["name"]: row for row in fluid_pressure.slide_rows(tmp_path, NETWORK, None, None)}
 
     return rows
 
