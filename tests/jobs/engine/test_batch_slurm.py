@@ -25,7 +25,8 @@ SBATCH = """#!{python}
 import os, re, subprocess, sys
 words = sys.argv[1:]
 array = next((re.fullmatch(r"--array=(\\d+)-(\\d+)", word) for word in words if word.startswith("--array")), None)
-command = words[words.index("--wrap") + 1] if "--wrap" in words else "exec bash " + words[-1]
+# The script is read at once, as the real one does: it is removed as soon as this returns.
+command = words[words.index("--wrap") + 1] if "--wrap" in words else open(words[-1]).read()
 ids = range(int(array[1]), int(array[2]) + 1) if array else [0]
 log = open(os.environ["FAKE_LOG"], "a")
 started = []
