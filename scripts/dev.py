@@ -35,9 +35,18 @@ STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
 # Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
 SIZES_MB = {"": "50", "dev": "430", "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)"}
-NETWORK_SIGNS = ("NewConnectionError", "NameResolutionError", "ConnectTimeoutError", "ReadTimeoutError", "ProxyError",
-                 "Max retries exceeded", "Failed to establish", "Temporary failure", "SSLError",
-                 "(from versions: none)")
+NETWORK_SIGNS = (
+    "NewConnectionError",
+    "NameResolutionError",
+    "ConnectTimeoutError",
+    "ReadTimeoutError",
+    "ProxyError",
+    "Max retries exceeded",
+    "Failed to establish",
+    "Temporary failure",
+    "SSLError",
+    "(from versions: none)",
+)
 
 
 class SetupError(Exception):
@@ -263,10 +272,17 @@ def run_pip(python: Path, folder: Path, what: list[str], numpy: str | None) -> s
         constraints.write_text(text, encoding="utf-8")
     command = [str(python), "-m", "pip", "install", "--no-input", "--constraint", str(constraints)]
     log = folder / LOG
-    with subprocess.Popen(
-        [*command, *what], cwd=str(ROOT), env=environment(),
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-    ) as process, open(str(log), "w", encoding="utf-8") as record:
+    with (
+        subprocess.Popen(
+            [*command, *what],
+            cwd=str(ROOT),
+            env=environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+        ) as process,
+        open(str(log), "w", encoding="utf-8") as record,
+    ):
         for raw in process.stdout:
             line = raw.decode(errors="replace")
             record.write(line)

@@ -37,9 +37,7 @@ def translator() -> translate.Translator:
     return translate.load_translator()
 
 
-def load(
-    path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str = AUTO
-) -> Translated:
+def load(path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str = AUTO) -> Translated:
     """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there."""
     try:
         changed = os.stat(path).st_mtime_ns
@@ -56,9 +54,7 @@ def load(
 _KEPT: dict[tuple, Translated] = {}  # the last one: importing and translating ask for the same
 
 
-def _translated(
-    path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str
-) -> Translated:
+def _translated(path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str) -> Translated:
     recording = recording_reader.read(path)
     chosen = frame_range.select(frame_range.parse_frames(frames), len(recording))
     options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)

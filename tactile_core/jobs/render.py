@@ -45,6 +45,7 @@ Progress = Callable[[int, int], None]
 def _silent(text: str) -> None:
     """For callers that do not ask what was picked."""
 
+
 MAKER = "tactile render"  # in the note
 
 

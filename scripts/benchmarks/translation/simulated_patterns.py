@@ -2,9 +2,8 @@
 
 Grips are those of hard flat objects in the PHAC set (outside data), trials 04 and 05; rest is found in the soft ones'
 trials 01 to 03. Slides are recordings without sample 7 of each material: they hold sizes without signs, and counts at
-rest that nobody knows, so the sensors' typical one stands for them. Each law's
-changes are those of the very unit, by its counts at rest (``sensors.divider``). Nothing is
-fitted to these recordings.
+rest that nobody knows, so the sensors' typical one stands for them. Each law's changes are those of the very unit, by
+its counts at rest (``sensors.divider``). Nothing is fitted to these recordings.
 """
 
 from __future__ import annotations
@@ -44,8 +43,9 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
         return
     contacts = _training_contacts(200 if quick else 2000)
     laws = _laws(contacts)
-    grip, rest = _grips(grips.find(folders[0]))
-    slide = _slides(slide_set.reporting(folders[1]))
+    files = grips.find(folders[0])
+    grip, rest = grip_changes(files, grips.hard_to_report(files))
+    slide, _ = slide_changes(slide_set.reporting(folders[1]))
     typical = np.full(slide.shape, float(REST_COUNT))
     of = f"{len(contacts)} simulated contacts; null: electrodes shuffled"
     yield from _cosines("grip", grip, rest, laws, (0.92, 0.88), f"{len(grip)} grips, {of}")
@@ -87,24 +87,23 @@ def nearest(change: np.ndarray, simulated: np.ndarray) -> tuple[float, float]:
     return float(cosine.max()), float(cosine[alike].max(initial=0.0))
 
 
-def _grips(files: list[Path]) -> tuple[np.ndarray, np.ndarray]:
-    """Change (n, 19) of the hard objects' grips, a finger each, and the unit's rest (n, 19), counts."""
+def grip_changes(files: list[Path], held: list[Path]) -> tuple[np.ndarray, np.ndarray]:
+    """Change and rest (n, 19) counts of the grips ``held``, a finger each; rest is found in the soft of ``files``."""
     soft = grips.soft_to_choose_by(files)
     rest = [find_rest([recordings.read(f"{path}#{finger}") for path in soft]).counts for finger in (0, 1)]
-    held = [(finger, recordings.read(one)) for path in grips.hard_to_report(files)
-            for finger, one in enumerate(each_finger(path))]  # fmt: skip
-    at_rest = np.stack([rest[finger] for finger, _ in held])
-    return np.stack([np.median(one.electrodes, axis=0) for _, one in held]) - at_rest, at_rest
+    fingers = [(finger, recordings.read(one)) for path in held for finger, one in enumerate(each_finger(path))]
+    at_rest = np.stack([rest[finger] for finger, _ in fingers])
+    return np.stack([np.median(one.electrodes, axis=0) for _, one in fingers]) - at_rest, at_rest
 
 
-def _slides(paths: list[Path]) -> np.ndarray:
-    """Sizes (n, 19), counts, of the frames surely in contact, every half second."""
-    found = []
-    for path in filter(slide_set.is_whole, paths):
-        slide = slide_set.load(path)
+def slide_changes(paths: list[Path]) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes (n, 19) counts and PDC (n,) counts of the frames surely in contact, every half second."""
+    sizes, pdc = [], []
+    for slide in (slide_set.load(path) for path in filter(slide_set.is_whole, paths)):
         touches = np.flatnonzero(slide.pressure > CONTACT)[::EVERY]
-        found.append(np.abs(slide.electrodes[touches]))
-    return np.concatenate(found)
+        sizes.append(np.abs(slide.electrodes[touches]))
+        pdc.append(slide.pressure[touches])
+    return np.concatenate(sizes), np.concatenate(pdc)
 
 
 def _training_contacts(count: int) -> list[Contact]:

@@ -27,11 +27,9 @@ from tactile_core.recordings.readers import each_finger
 from tactile_core.sensors import PRESSURE_PER_COUNT, REST_COUNT, divider
 from tactile_core.simulation.pair_sampling import draw_place
 from tactile_core.simulation.scene import load_scene
-from tactile_core.translation.unit_rest import find_rest
 
 from . import grips, slide_set
-from .simulated_patterns import EVERY, SCENE
-from .slide_metrics import CONTACT
+from .simulated_patterns import SCENE, grip_changes, slide_changes
 
 LOWEST = "flour_sack"  # the softest of the objects that are held
 SIZE, ALIKE = 0.25, 10  # contacts may differ in size by this share; of as many, the most alike, the median is taken
@@ -85,29 +83,23 @@ def _simulated(presses: int) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([signal for signal, _ in found]), np.array([pressure for _, pressure in found])
 
 
-_Real = tuple[list[np.ndarray], list[np.ndarray], list[float]]  # changes and rests (19,) counts, pressures Pa
+_Real = tuple[np.ndarray, np.ndarray, np.ndarray]  # changes and rests (n, 19) counts, pressures (n,) Pa
 
 
 def _grips(folder: Path) -> _Real:
     files = grips.find(folder)
-    soft = [grips.soft_to_choose_by(files), [path for path in grips.soft_to_choose_by(files) if LOWEST in path.name]]
-    rest = [find_rest([recordings.read(f"{path}#{finger}") for path in soft[0]]).counts for finger in (0, 1)]
-    zero = [np.median([np.median(recordings.read(f"{path}#{finger}").pdc) for path in soft[1]]) for finger in (0, 1)]
-    changes, rests, measured = [], [], []
-    for path in grips.hard_to_choose_by(files):
-        for finger, one in enumerate(each_finger(path)):
-            recording = recordings.read(one)
-            changes.append(np.median(recording.electrodes, axis=0) - rest[finger])
-            rests.append(rest[finger])
-            measured.append(PRESSURE_PER_COUNT * float(np.median(recording.pdc) - zero[finger]))
-    return changes, rests, measured
+    lowest = [path for path in grips.soft_to_choose_by(files) if LOWEST in path.name]
+    held = grips.hard_to_choose_by(files)
+    zero = np.median([_pdc(path) for path in lowest], axis=0)
+    measured = PRESSURE_PER_COUNT * np.concatenate([_pdc(path) - zero for path in held])
+    return *grip_changes(files, held), measured
+
+
+def _pdc(path: Path) -> list[float]:
+    """Counts of each finger."""
+    return [float(np.median(recordings.read(one).pdc)) for one in each_finger(path)]
 
 
 def _slides(folder: Path) -> _Real:
-    changes, measured = [], []
-    paths = [path for path in slide_set.find(folder) if path not in slide_set.reporting(folder)]
-    for slide in (slide_set.load(path) for path in paths if slide_set.is_whole(path)):
-        touches = np.flatnonzero(slide.pressure > CONTACT)[::EVERY]
-        changes += list(slide.electrodes[touches])
-        measured += list(PRESSURE_PER_COUNT * slide.pressure[touches])
-    return changes, [np.full(19, REST_COUNT)] * len(changes), measured
+    sizes, pdc = slide_changes([path for path in slide_set.find(folder) if path not in slide_set.reporting(folder)])
+    return sizes, np.full(sizes.shape, REST_COUNT), PRESSURE_PER_COUNT * pdc

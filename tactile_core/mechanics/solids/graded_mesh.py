@@ -97,9 +97,7 @@ def graded_gel(footprint: Footprint) -> GradedMesh:
     marks = [(0, part.start, part.stop - 1, size - 1) for part, size in zip(window, plan.shape[:2], strict=True)]
     rows, columns = (_lines(marks[k], footprint, k, _WIDEST["digit"]) for k in range(2))
     place = _bilinear(plan, rows, columns)
-    top = np.stack(
-        [place[..., 0], digit.BACK_Y - digit.dome_height(*np.moveaxis(place, -1, 0)), place[..., 1]], -1
-    )
+    top = np.stack([place[..., 0], digit.BACK_Y - digit.dome_height(*np.moveaxis(place, -1, 0)), place[..., 1]], -1)
     mesh = gel_solid(top, _divided(_gel_layers(footprint.spacing), 2 * footprint.refine))
     pattern, factor = _pattern(mesh, "digit", len(rows), len(columns))
     to_rows, to_columns = _spline(rows, plan.shape[0]), _spline(columns, plan.shape[1])
