@@ -11,6 +11,7 @@ from torch import Tensor
 from ..simulation.pairs_file import Pairs, Split
 from ..translation.contact_frame import ContactFrame
 from ..translation.network_sizes import ELECTRODES
+from ..translation.networks import DEPTH_SCALE, FORCE_SCALE
 from .mirror_augmentation import across, image_of_electrodes
 from .noise_model import measured
 from .options import Options
@@ -23,7 +24,7 @@ class Batch:
 
     rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) what SVB reads
     biotac, digit : (B, K) what the mesh encoders read           force : (B, 3) N
-    pressure : (B, 1) Pa
+    pressure : (B, 1) Pa                                         state : (B, STATE) of the contact, 0 without one
     signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places
     """
 
@@ -34,6 +35,7 @@ class Batch:
     digit: Tensor
     force: Tensor
     pressure: Tensor
+    state: Tensor
 
 
 class Contacts:
@@ -48,6 +50,7 @@ class Contacts:
     ) -> None:  # fmt: skip
         self.pairs, self.split, self.options = pairs, split, options
         self.device = device or torch.device("cpu")
+        self.depth = _depth(pairs)
         self.biotac, self.digit = (
             SurfaceCodec(
                 getattr(pairs, f"displacement_{name}"), getattr(pairs, f"scale_{name}"), split.train, frames[name],
@@ -67,12 +70,12 @@ class Contacts:
         turned = (rng.random(len(rows)) < self.options.mirrored) & (rows != SILENT)
         return rows + turned * len(self.pairs.press)
 
-    def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0) -> np.ndarray:
+    def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
         """(B, 20) the signals of the contacts as a sensor would give them: see `noise_model.measured`."""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes()]
-        return measured(true, rng, self.options, rectified)
+        return measured(true, rng, self.options, rectified, unit)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
         """The contacts of these rows with these signals."""
@@ -81,7 +84,10 @@ class Contacts:
         force[turned] = across(force[turned])
         load = torch.from_numpy(force) * touching(rows)
         pressure = torch.from_numpy(self.pairs.pressure[at])[:, None] * touching(rows)
-        read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load, pressure
+        scaled = np.stack([np.linalg.norm(force, axis=-1) / FORCE_SCALE, self.depth[at] / DEPTH_SCALE], -1)
+        strength = torch.from_numpy(np.arcsinh(scaled).astype(np.float32)) * touching(rows)
+        state = torch.cat([self.biotac.true_place(rows), strength], -1)
+        read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load, pressure, state
         signed = np.where(signal[:, ELECTRODES] > 0, SILENT, rows)
         return Batch(rows, signed, *(each.to(self.device) for each in read))
 
@@ -89,3 +95,8 @@ class Contacts:
         """Rows (B,) of the pairs, 0 for silent ones, and which (B,) are seen in a mirror."""
         contacts = len(self.pairs.press)
         return np.maximum(rows, 0) % contacts, rows >= contacts
+
+
+def _depth(pairs: Pairs) -> np.ndarray:
+    """(C,) float32 m, how deep each contact's deepest node of the gel lies."""
+    return pairs.displacement_digit[:, :, 1].max(1) * np.float32(pairs.scale_digit)

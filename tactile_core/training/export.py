@@ -11,7 +11,7 @@ import torch
 from .. import __version__
 from ..recordings.polarity import FALLS
 from ..translation import reference_signals
-from ..translation.network_sizes import ELECTRODES, ERROR_FEATURES, NETS, PLACE, SURFACES
+from ..translation.network_sizes import ELECTRODES, ERROR_FEATURES, NETS, PLACE, POSTERIORS, SURFACES
 from ..translation.networks import Networks, load
 from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
@@ -73,7 +73,7 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
 def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndarray]:
     """The tensors of one network under the names of `networks.py`, in float16; scales and turns in float32."""
     state = {name: tensor.numpy().astype(np.float16) for name, tensor in getattr(model, net).state_dict().items()}
-    if net == "SVB":
+    if net == "SVB" or net in POSTERIORS:
         return state
     if net in ("MVB", "MVD"):
         surface = getattr(model, net).surface
@@ -92,8 +92,8 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
         "SVB": {"latent": signal},
         "MVB": {"latent": biotac, **surface_sizes(contacts.biotac), **common},
         "MVD": {"latent": digit, **surface_sizes(contacts.digit), **common},
-        "S2MPN": {"inputs": signal, "outputs": biotac, **common},
-        "R2MPN": {"inputs": signal, "outputs": biotac, **common},
+        "S2MPN": {"inputs": signal, "outputs": biotac, "components": options.components, **common},
+        "R2MPN": {"inputs": signal, "outputs": biotac, "components": options.components, **common},
         "M2MPN": {"inputs": biotac + PLACE, "outputs": digit, **common},
         "D2BPN": {"inputs": digit + PLACE, "outputs": biotac, **common},
         "B2SPN": {"inputs": biotac + PLACE, "outputs": signal, **common},
@@ -115,10 +115,10 @@ def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, 
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)
-    share = contacts.options.rectified
+    shares = contacts.options.rectified, contacts.options.unit
     with torch.no_grad():
-        latent = model.SVB.mean(compress(torch.from_numpy(contacts.read(rows, rng, share)))).double().numpy()
-        signal = compress(torch.from_numpy(contacts.read(left, rng, share)))
+        latent = model.SVB.mean(compress(torch.from_numpy(contacts.read(rows, rng, *shares)))).double().numpy()
+        signal = compress(torch.from_numpy(contacts.read(left, rng, *shares)))
         error = model.SVB.decoder(model.SVB.mean(signal)) - signal[:, :ELECTRODES]
         residual = error.double().square().mean(0).sqrt().numpy()
     variances, axes = np.linalg.eigh(np.atleast_2d(np.cov(latent.T)))

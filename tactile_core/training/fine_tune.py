@@ -1,9 +1,8 @@
 """Fine-tuning of S2MPN on a real sensor's recording that says where and how hard it was touched.
 
-Only S2MPN changes, or R2MPN where the recording is rectified. A label fixes the place of the dent, two numbers of the
-BioTac's latent, and, through the frozen force head, the force; it says nothing of the dent's shape, for which the
-latent is held near what it was, on the recording's own signals and on the typical simulated signals that ship with the
-weights.
+Only S2MPN changes, or R2MPN where the recording is rectified. A label fixes the place of the dent and the force, three
+numbers of the contact's state; it says nothing of the dent's shape, for which the latent is held near what it was, on
+the recording's own signals and on the typical simulated signals that ship with the weights.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ from ..accuracy import Row, row
 from ..translation import networks, reference_signals
 from ..translation.contact_frame import PLACE_UNIT, ContactFrame
 from ..translation.network_sizes import NETS, PLACE
-from ..translation.networks import FORCE_SCALE, Networks
+from ..translation.networks import COMPRESSED_LIMIT, FORCE_SCALE, Networks
 from ..translation.weights import CARD_NAME, card_bytes, read_bytes, sha256, to_safetensors, write_bytes
 from .export import versions
 from .labelled_recording import LabelledRecording, read_labelled
-from .modules import Residual
+from .modules import ContactPosterior
 from .stages import FORCE_FLOOR
 from .train import deterministic, prepare_folder
 
@@ -86,7 +85,7 @@ def _train(
     nets: Networks, net: str, data: LabelledRecording, typical: np.ndarray, seed: int, progress: Progress
 ) -> dict[str, np.ndarray]:
     """The network's tensors, rounded as they are written, at the epoch that was best on the validation presses."""
-    module, head = _module(nets, net), _module(nets, "force").requires_grad_(False)
+    module = _module(nets, net)
     latent = torch.from_numpy(nets.encode_signal(data.change, data.rectified))
     rehearsed = torch.from_numpy(nets.encode_signal(np.abs(typical) if data.rectified else typical, data.rectified))
     place, force = torch.from_numpy(data.place), torch.from_numpy(data.force)
@@ -95,9 +94,10 @@ def _train(
         spread = kept.std(0).clamp(min=1e-3)
 
     def loss(rows: Tensor) -> Tensor:
-        found = module(latent[rows])
-        miss = (found[:, :PLACE] - place[rows]).square().sum(-1).add(PLACE_FLOOR**2).sqrt().mean()
-        load = _force(head, found)
+        state = module.contact(latent[rows])
+        found = module.given(latent[rows], state)
+        miss = (state[:, :PLACE] - place[rows]).square().sum(-1).add(PLACE_FLOOR**2).sqrt().mean()
+        load = FORCE_SCALE * torch.sinh(state[:, PLACE].clamp(0.0, COMPRESSED_LIMIT))
         share = ((load - force[rows]).abs() / (force[rows] + FORCE_FLOOR)).mean()
         shape = ((found - held[rows]) / spread)[:, PLACE:].square().mean()
         return miss + share + HOLD * shape
@@ -118,32 +118,27 @@ def _train(
             optimiser.zero_grad()
             (loss(rows) + HOLD * rehearsal).backward()
             optimiser.step()
-    return {f"map.{name}": tensor.numpy().astype(np.float16) for name, tensor in state.items()}
+    return {name: tensor.numpy().astype(np.float16) for name, tensor in state.items()}
 
 
-def _module(nets: Networks, net: str) -> Residual:
-    """A network of the weights as torch's module."""
+def _module(nets: Networks, net: str) -> ContactPosterior:
+    """S2MPN or R2MPN of the weights as torch's module."""
     sizes = nets.sizes[net]
-    module = Residual(sizes["inputs"], sizes["outputs"], sizes["width"], sizes["blocks"])
-    module.load_state_dict(
-        {name.removeprefix("map."): torch.from_numpy(array.copy()) for name, array in nets.tensors[net].items()}
-    )
+    module = ContactPosterior(*(sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components")))
+    module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in nets.tensors[net].items()})
     return module
-
-
-def _force(head: Residual, latent: Tensor) -> Tensor:
-    """(B,) N, magnitude."""
-    return (FORCE_SCALE * torch.sinh(head(latent).clamp(-8.0, 8.0))).square().sum(-1).add(1e-12).sqrt()
 
 
 def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
     """Median miss of place and force on the presses kept for it; null: always the training's median."""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVB"]
-    latent = nets.s2m(nets.encode_signal(data.change[test], data.rectified), data.rectified)
+    latent = nets.encode_signal(data.change[test], data.rectified)
+    state = nets.contact(latent, data.rectified)
     true, middle = on_skin(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
-    miss, null = (accuracy.lengths(on_skin(frame, each) - true) for each in (latent[:, :PLACE], middle))
-    load, usual = accuracy.lengths(nets.force(latent)), np.median(data.force[train])
+    miss, null = (accuracy.lengths(on_skin(frame, each) - true) for each in (state[:, :PLACE], middle))
+    told = nets.force_in(state, nets.given(latent, state, data.rectified))
+    load, usual = accuracy.lengths(told), np.median(data.force[train])
     share, nothing = (100 * np.abs(each - data.force[test]) / data.force[test] for each in (load, usual))
     of = f"kept presses, {when}"
     return [

@@ -9,9 +9,9 @@ import torch
 from torch import Tensor, nn
 
 from ..translation.layers import NORM_EPSILON
-from ..translation.network_sizes import ELECTRODES, PLACE, SIGNAL_HIDDEN
-from ..translation.networks import COUNT_SCALE
-from .surface_codec import ROOT_FLOOR, SurfaceCodec
+from ..translation.network_sizes import ELECTRODES, PLACE, SIGNAL_HIDDEN, STATE
+from ..translation.networks import COUNT_SCALE, LEAST_SPREAD, SPREAD_LIMITS
+from .surface_codec import SurfaceCodec
 
 
 class Plain(nn.ModuleList):
@@ -58,6 +58,46 @@ class Residual(nn.Module):
         for block in self.blocks:
             hidden = block(hidden)
         return self.last(self.norm(hidden)) + self.skip(x)
+
+
+class ContactPosterior(nn.Module):
+    """S2MPN or R2MPN: what a signal's latent leaves open about the contact, and the BioTac's latent once it is known.
+
+    A mixture of Gaussians over the contact's state (a mixture density network, Bishop 1994) and a network that tells
+    the code of the dent's shape from the signal and a state. A shape thus is never averaged over places and depths.
+    """
+
+    def __init__(self, inputs: int, outputs: int, width: int, blocks: int, components: int) -> None:
+        super().__init__()
+        self.posterior = Residual(inputs, components * (1 + 2 * STATE), width, blocks)
+        self.code = Residual(inputs + STATE, outputs - PLACE, width, blocks)
+        self.components = components
+
+    def mixture(self, latent: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """latent_signal (B, K) -> logarithm of the weights (B, C), means and spreads (B, C, STATE)."""
+        raw = self.posterior(latent)
+        weight, rest = raw[:, : self.components], raw[:, self.components :].view(len(raw), 2, self.components, STATE)
+        return weight.log_softmax(-1), rest[:, 0], LEAST_SPREAD + rest[:, 1].clamp(*SPREAD_LIMITS).exp()
+
+    def surprise(self, latent: Tensor, state: Tensor) -> Tensor:
+        """(B,) nats, negative logarithm of the density that the mixture gives to the true state (B, STATE)."""
+        weight, mean, spread = self.mixture(latent)
+        away = (state[:, None] - mean) / spread
+        density = -0.5 * away.square().sum(-1) - spread.log().sum(-1)
+        return -(weight + density).logsumexp(-1)
+
+    def given(self, latent: Tensor, state: Tensor) -> Tensor:
+        """latent_signal (B, K) and a state (B, STATE) -> latent_biotac (B, L)."""
+        return torch.cat([state[:, :PLACE], self.code(torch.cat([latent, state], -1))], -1)
+
+    def forward(self, latent: Tensor) -> Tensor:
+        """latent_signal (B, K) -> latent_biotac (B, L) of the most plausible contact."""
+        return self.given(latent, self.contact(latent))
+
+    def contact(self, latent: Tensor) -> Tensor:
+        """latent_signal (B, K) -> state (B, STATE), mean of the heaviest component."""
+        weight, mean, _ = self.mixture(latent)
+        return mean[torch.arange(len(mean)), weight.argmax(-1)]
 
 
 class Vae(nn.Module):
@@ -114,10 +154,14 @@ class MeshVae(Vae):
         """Latent (B, L) -> (B, L + 2), with what the whole cell leaves of the place."""
         return torch.cat([latent, self.surface.cells(latent[:, :PLACE])[1]], -1)
 
-    def loss(self, latent: Tensor, rows: np.ndarray, floor: Tensor | float = ROOT_FLOOR) -> Tensor:
+    def loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
         """Error of what the latent (B, L) decodes to against the contacts of these rows: see `Surface.loss`."""
         cell, left = self.surface.cells(latent[:, :PLACE])
-        return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows, floor)
+        return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
+
+    def shape_loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
+        """As `loss`, of the code (B, L - 2) at the contacts' true places."""
+        return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
         """How far, in cells, the places of latents (B, L) are from the contacts': see `Surface.astray`."""

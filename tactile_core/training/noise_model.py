@@ -8,13 +8,16 @@ from ..sensors import COUNT_MAX, COUNT_SIGN, REST_COUNT
 from .options import Options
 
 
-def measured(change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0) -> np.ndarray:
+def measured(
+    change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0, unit: float = 0.0
+) -> np.ndarray:
     """True changes (B, 19) counts -> as read, (B, 20): changes in counts, and whether they are rectified.
 
     Rectified changes are given with the sign of a thinning film, as the networks read them.
 
     Gain error a channel, noise, whole counts, the ends of the 12 bits. The rest lies near 3,300 counts (sensors.md) and
     between whole counts, as the mean of many readings does.
+    unit : share of frames read as a real unit is known: its gains spread more, its rest is off
     rectified : share of frames that lose their sign. They stand for recordings of unknown units, whose tare cannot be
         mended once folded: gains spread more, rest is off, channels may be missing, and the skin bulges more or less
     """
@@ -22,6 +25,10 @@ def measured(change: np.ndarray, rng: np.random.Generator, options: Options, rec
     gain = 1.0 + options.gain * rng.standard_normal(change.shape)
     rest = REST_COUNT + rng.random(change.shape)
     noise = options.noise * rng.standard_normal(change.shape)
+    if unit:
+        real = rng.random((len(change), 1)) < unit
+        gain = np.where(real, np.exp(options.unit_gain * rng.standard_normal(change.shape)), gain)
+        noise += real * options.unit_offset * rng.standard_normal(change.shape)
     if rectified:
         strange = np.exp(options.rectified_gain * rng.standard_normal(change.shape))
         strange *= rng.random(change.shape) >= options.rectified_missing

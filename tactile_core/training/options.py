@@ -14,25 +14,25 @@ class Options:
     latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
     half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
+    components : Gaussians of S2MPN's posterior over contacts (five: networks.md's mixture)
     epochs : stage -> passes over the training contacts; `effort` multiplies all of them. More make
         simulated contacts better, not real recordings (docs/train.md)
     beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: networks.md)
-    astray : weight of a translated place's distance from the true one, in cells, against the same loss. Without it
-        places leave the dent by ten cells and more: windows that meet it at their edge are a way to a smaller loss from
-        which none leads on (10,000 pairs: 30 um with places astray, 20 without, from mesh to mesh; docs/train.md).
-        Rectified samples are left out of it: without its sign a signal fits several places
+    astray : weight of a translated place's distance on the DIGIT from the true one, in cells, against the same loss
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (networks.md)
+    unit : share of training samples that keep their sign and are read as a real unit is known, its rest found from
+        recordings that never touch nothing: unit_gain, standard deviation of the logarithm of a channel's gain,
+        unit_offset, counts, of its rest (10 to 60 counts between two halves of a unit's recordings; docs/convert.md)
     rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
         rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
         from the simulated ones by), rectified_bulge, the same of all falling signals of a sample together,
-        rectified_floor, m, an error below which counts squared (assumed),
         rectified_offset, counts, of the tare before the fold, rectified_missing, share of channels that read nothing.
         Each was chosen among a few values as it let strength follow fluid pressure better on the sample recordings
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
     mirrored : share of training samples that are seen in a mirror, both sensors being even in z
     without : names of indenters that are kept from the training; without_below_x : m, as much of the pad beyond x
     left_out : stages that are not run; their networks stay as they were drawn
-    weight_decay : of AdamW; signal_decay, rectified_decay : of SVB, of R2MPN (rectified signals are over-fitted else)
+    weight_decay : of AdamW; rectified_decay : of R2MPN (rectified signals are over-fitted else)
     rate : largest learning rate
     checkpoint_seconds : least time between two checkpoints; does not change the result
     """
@@ -48,21 +48,23 @@ class Options:
     half_digit: int = 16
     width: int = 256
     blocks: int = 2
+    components: int = 5
     batch: int = 128
     rate: float = 1.5e-3
     weight_decay: float = 1e-2
-    signal_decay: float = 0.2
     rectified_decay: float = 0.2
     beta: float = 1e-4
-    astray: float = 0.05
+    astray: float = 0.2
     noise: float = 1.5
     gain: float = 0.1
+    unit: float = 0.3
+    unit_gain: float = 0.3
+    unit_offset: float = 25.0
     rectified: float = 0.25
     rectified_gain: float = 0.5
     rectified_bulge: float = 0.5
     rectified_offset: float = 3.0
     rectified_missing: float = 0.2
-    rectified_floor: float = 20e-6
     silence: float = 0.05
     mirrored: float = 0.5
     without: tuple[str, ...] = ()
@@ -72,7 +74,7 @@ class Options:
     svb_epochs: int = 6
     mvb_epochs: int = 6
     mvd_epochs: int = 9
-    s2mpn_epochs: int = 3
+    s2mpn_epochs: int = 24
     m2mpn_epochs: int = 3
     chain_epochs: int = 13
     direct_epochs: int = 13
@@ -90,7 +92,7 @@ class Options:
 
     def decay(self, net: str) -> float:
         """Weight decay of a network."""
-        return {"SVB": self.signal_decay, "R2MPN": self.rectified_decay}.get(net, self.weight_decay)
+        return self.rectified_decay if net.startswith("R2MPN") else self.weight_decay
 
     def settings(self) -> dict[str, object]:
         """All options that change the result, as JSON gives them back."""

@@ -90,11 +90,13 @@ def signal_rows(measure: Measure) -> list[Row]:
 def silence(measure: Measure) -> dict[str, np.ndarray]:
     """What signals of noise alone are translated to, frame by frame: largest displacements (m) and the force (N)."""
     nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
-    biotac = nets.s2m(nets.encode_signal(change))
+    signal = nets.encode_signal(change)
+    state = nets.contact(signal)
+    biotac = nets.given(signal, state)
     return {
         "biotac_m": accuracy.lengths(nets.decode_biotac(biotac)).max(-1),
         "digit_m": accuracy.lengths(nets.decode_digit(nets.m2m(biotac))).max(-1),
-        "force_N": accuracy.lengths(nets.force(biotac)),
+        "force_N": accuracy.lengths(nets.force_in(state, biotac)),
     }
 
 
@@ -123,7 +125,9 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
     """
     contacts, found = measure.contacts, {}
     for kind, share in SHARES.items():
-        signal = contacts.read(contacts.split.validation, np.random.default_rng([measure.seed, 5]), share)
+        signal = contacts.read(
+            contacts.split.validation, np.random.default_rng([measure.seed, 5]), share, contacts.options.unit
+        )
         distance = measure.networks.signal_distance(signal[:, :-1], bool(share))
         found[kind] = {name: quantiles(getattr(distance, name)) for name in DISTANCES}
     return found
@@ -134,7 +138,7 @@ def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():
-        signal = contacts.read(rows, np.random.default_rng([measure.seed, 6]), share)
+        signal = contacts.read(rows, np.random.default_rng([measure.seed, 6]), share, contacts.options.unit)
         columns = joined(
             error_columns(nets, contacts.pairs, rows[part], signal[part, :-1], measure.bodies, silent, bool(share))
             for part in parts(len(rows))

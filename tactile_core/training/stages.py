@@ -12,9 +12,8 @@ from torch import Tensor, nn
 from ..translation.network_sizes import ELECTRODES, ERROR_FEATURES, PLACE, SURFACES
 from ..translation.networks import ERROR_UNIT, FORCE_SCALE, PRESSURE_SCALE
 from .data import Batch, Contacts
-from .modules import MeshVae, Residual, compress, initialise, signal_vae
+from .modules import ContactPosterior, MeshVae, Residual, compress, initialise, signal_vae
 from .options import Options
-from .surface_codec import ROOT_FLOOR
 
 FORCE_WIDTH, FORCE_BLOCKS = 64, 1  # small heads: three numbers out of a latent, one or two out of a signal
 FORCE_FLOOR = 0.1  # N: an error counts against the force plus this, so that light touches do not rule (assumed)
@@ -33,8 +32,8 @@ class Model(nn.Module):
         self.SVB = signal_vae(signal)
         self.MVB = MeshVae(contacts.biotac, biotac, width, blocks)
         self.MVD = MeshVae(contacts.digit, digit, width, blocks)
-        self.S2MPN = Residual(signal, biotac, width, blocks)
-        self.R2MPN = Residual(signal, biotac, width, blocks)
+        self.S2MPN = ContactPosterior(signal, biotac, width, blocks, options.components)
+        self.R2MPN = ContactPosterior(signal, biotac, width, blocks, options.components)
         self.M2MPN = Residual(biotac + PLACE, digit, width, blocks)
         self.force = Residual(biotac, 3, FORCE_WIDTH, FORCE_BLOCKS)
         self.pressure = Residual(ELECTRODES + 1, 1, FORCE_WIDTH, FORCE_BLOCKS)
@@ -49,6 +48,13 @@ class Model(nn.Module):
         """signal (B, 20) -> latent_biotac."""
         latent = self.SVB.mean(compress(signal))
         return torch.where(signal[:, ELECTRODES:] > 0, self.R2MPN(latent), self.S2MPN(latent))
+
+    def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """signal (B, 20) and its contact's state (B, STATE) -> latent_biotac, and the surprise (B,) at the state."""
+        latent, rectified = self.SVB.mean(compress(signal)), signal[:, ELECTRODES:] > 0
+        biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
+        surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))
+        return biotac, torch.where(rectified[:, 0], *surprises)
 
     def across(self, latent_biotac: Tensor) -> Tensor:
         """latent_biotac -> latent_digit."""
@@ -81,7 +87,7 @@ Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage: the networks it changes and its loss."""
+    """One stage: the networks it changes, or parts of them, and its loss."""
 
     name: str
     nets: tuple[str, ...]
@@ -110,10 +116,15 @@ def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Latent of the signal -> latent of the BioTac, both means of frozen autoencoders."""
+    """Surprise at the contact, in nats, code of a frozen autoencoder given the contact, and the signal itself.
+
+    By likelihood alone a contact is never told fainter than it may be. SVB learns along: what it keeps of a signal is
+    then what tells contacts apart.
+    """
     with torch.no_grad():
         target = model.MVB.mean(batch.biotac)
-    return latent_loss(model.from_signal(batch.signal), target)
+    found, surprise = model.given(batch.signal, batch.state)
+    return surprise.mean() + latent_loss(found, target) + svb_loss(model, contacts, batch, options, generator)
 
 
 def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
@@ -136,27 +147,26 @@ def latent_loss(found: Tensor, target: Tensor) -> Tensor:
 def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Everything together: a frozen chain is 23-26 % worse than signal -> DIGIT directly (networks.md).
 
-    The autoencoders' own losses stay in at a quarter, so that latents keep their meaning and meshes can be encoded.
+    Shapes are held against the truth where the contact truly is, places by themselves: a dent that is told beside its
+    place would be paid for with being faint. The autoencoders' own losses stay in at half, so that latents keep their
+    meaning and meshes can be encoded. What the signal says of the contact is learned before and stays as it is.
     """
-    biotac = model.from_signal(batch.signal)
+    biotac, _ = model.given(batch.signal, batch.state)
     digit, across = model.across(biotac), model.across(model.MVB.mean(batch.biotac))
     given = (model, contacts, batch, options, generator)
-    floor = torch.where(batch.signal[:, ELECTRODES] > 0, options.rectified_floor, ROOT_FLOOR)
     return (
-        model.MVB.loss(biotac, batch.rows, floor)
-        + model.MVD.loss(digit, batch.rows, floor)
-        + model.MVD.loss(across, batch.rows)
-        + options.astray * (model.MVB.astray(biotac, batch.signed) + model.MVD.astray(digit, batch.signed))
-        + options.astray * model.MVD.astray(across, batch.rows)
-        + 0.25 * svb_loss(*given)
+        model.MVB.shape_loss(biotac, batch.rows)
+        + model.MVD.shape_loss(digit, batch.rows)
+        + model.MVD.shape_loss(across, batch.rows)
+        + options.astray * (model.MVD.astray(digit, batch.rows) + model.MVD.astray(across, batch.rows))
         + 0.5 * (mvb_loss(*given) + mvd_loss(*given))
     )
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Force from the BioTac's latent, be it encoded from a mesh or translated from a signal."""
+    """Force from the BioTac's latent, be it encoded from a mesh or told from a signal and its contact's state."""
     with torch.no_grad():
-        latent = torch.cat([model.MVB.mean(batch.biotac), model.from_signal(batch.signal)])
+        latent = torch.cat([model.MVB.mean(batch.biotac), model.given(batch.signal, batch.state)[0]])
     true = batch.force.repeat(2, 1)
     error = FORCE_SCALE * torch.sinh(model.force(latent).clamp(-8.0, 8.0)) - true
     return (length(error) / (length(true) + FORCE_FLOOR)).mean()
@@ -202,7 +212,7 @@ def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, 
     error = ((model.to_signal(biotac) - change).square() * signed).mean()
     found = model.back(digit)
     return (
-        model.MVB.loss(found, batch.rows)
+        model.MVB.shape_loss(found, batch.rows)
         + options.astray * model.MVB.astray(found, batch.rows)
         + error / (change.square() * signed).mean()
     )
@@ -218,9 +228,9 @@ STAGES = (
     Stage("SVB", ("SVB",), svb_loss),
     Stage("MVB", ("MVB",), mvb_loss),
     Stage("MVD", ("MVD",), mvd_loss),
-    Stage("S2MPN", ("S2MPN", "R2MPN"), s2mpn_loss),
+    Stage("S2MPN", ("SVB", "S2MPN", "R2MPN"), s2mpn_loss),
     Stage("M2MPN", ("M2MPN",), m2mpn_loss),
-    Stage("chain", ("SVB", "MVB", "MVD", "S2MPN", "R2MPN", "M2MPN"), chain_loss),
+    Stage("chain", ("MVB", "MVD", "S2MPN.code", "R2MPN.code", "M2MPN"), chain_loss),
     Stage("force", ("force",), force_loss),
     Stage("pressure", ("pressure",), pressure_loss),
     Stage("error", ("error",), error_loss),

@@ -69,7 +69,9 @@ def joined(columns: Iterator[Columns]) -> Columns:
 def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
     skin, gel = (true_displacement(pairs, sensor, rows) for sensor in ("biotac", "digit"))
     patch = pairs.contact_patch_digit[rows]
-    mesh, signal = nets.encode_biotac(skin), nets.s2m(nets.encode_signal(change))
+    mesh, read = nets.encode_biotac(skin), nets.encode_signal(change)
+    state = nets.contact(read)
+    signal = nets.given(read, state)
     found = {
         **mesh_columns("null_biotac", np.zeros_like(skin), skin, accuracy.lengths),
         **mesh_columns("null_digit", np.zeros_like(gel), gel),
@@ -87,9 +89,9 @@ def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bo
         found[f"{name}_counts"] = _rms(nets.decode_signal(nets.m2s(latent)) - pairs.signal[rows])
     found["null_counts"] = _rms(pairs.signal[rows])
     found |= digit_columns("true_mesh", gel, patch, bodies)
-    for name, latent in (("force_from_mesh", mesh), ("force", signal)):
+    for name, force in (("force_from_mesh", nets.force(mesh)), ("force", nets.force_in(state, signal))):
         load = accuracy.lengths(pairs.force[rows])
-        error = accuracy.lengths(nets.force(latent) - pairs.force[rows])
+        error = accuracy.lengths(force - pairs.force[rows])
         found[f"{name}_percent"] = np.where(load > FORCE_FROM, 100 * error / load, np.nan)
     pressure = pairs.pressure[rows]
     with np.errstate(divide="ignore"):

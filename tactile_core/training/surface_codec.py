@@ -102,13 +102,16 @@ class SurfaceCodec:
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
+    def true_place(self, rows: np.ndarray) -> Tensor:
+        """(B, 2) of the contacts' dents; 0 for silent ones."""
+        return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
+
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
         """Mean distance, in cells, of places (B, 2) from those of the contacts; silent ones have none."""
-        true, touched = torch.from_numpy(self.place[np.maximum(rows, 0)]), touching(rows)
-        away = PLACE_UNIT * (place - true.to(place.device)) * touched.to(place.device)
+        away = PLACE_UNIT * (place - self.true_place(rows).to(place.device)) * touching(rows).to(place.device)
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 
-    def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray, floor: Tensor | float = ROOT_FLOOR) -> Tensor:
+    def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
         """Mean over contacts of the rms error over moving nodes, for coefficients (B, K + K') round cells (B, 2).
 
         1 for no displacement. The root is taken contact by contact, as in the figure we report: deep contacts do not
@@ -121,7 +124,7 @@ class SurfaceCodec:
             true = self._at_cells(at, cell) * touched
             beyond = (self.total[at] - true.square().sum(-1)).clamp(min=0.0) * touched[:, 0]
         squares = (modes * self.scale.to(device) - true.to(device)).square().sum(-1) + beyond.to(device)
-        return (squares / self.moving[at].to(device) + floor**2).sqrt().mean() / self.null
+        return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.null
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
         """Coefficients (B, K + K') round cells (B, 2) -> displacement (B, n, 3) m in the nodes' own frames, in the

@@ -157,7 +157,8 @@ def run_stage(
     """Train the networks of one stage for its epochs."""
     options = contacts.options
     groups = [
-        {"params": list(getattr(model, net).parameters()), "weight_decay": options.decay(net)} for net in stage.nets
+        {"params": list(model.get_submodule(net).parameters()), "weight_decay": options.decay(net)}
+        for net in stage.nets
     ]
     optimiser = torch.optim.AdamW(groups, lr=options.rate, fused=True)
     checkpoint.restore_optimiser(state, optimiser)
@@ -189,7 +190,7 @@ def epoch_losses(
     rng = np.random.default_rng([seed, index, epoch])
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     rows = contacts.drawn(rng)
-    signal = contacts.read(rows, rng, options.rectified)
+    signal = contacts.read(rows, rng, options.rectified, options.unit)
 
     def loss(step: int) -> torch.Tensor:
         part = slice(step * options.batch, (step + 1) * options.batch)

@@ -11,9 +11,11 @@ from .weights import ADVICE
 ELECTRODES = 19
 SIGNAL_HIDDEN = (256, 128, 64)  # SVB of the authors' later code (sensors.md)
 PLACE = 2  # numbers of a mesh's latent that are the place of its dent
+STATE = PLACE + 2  # numbers of a contact's state: the place of its dent, and on asinh scales its force and depth
 SURFACES = ("biotac", "digit")
 ERROR_FEATURES = 3  # beside the latent: what SVB leaves, how large the signal is, whether it is rectified
 NETS = ("SVB", "MVB", "S2MPN", "R2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "pressure", "error")
+POSTERIORS = ("S2MPN", "R2MPN")
 MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small enough to refuse a damaged number
 
 
@@ -26,6 +28,9 @@ def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]
         shapes |= {"distance.mean": (latent,), "distance.whitening": (latent, latent)}
         return shapes | {"distance.residual": (ELECTRODES,)}
     width, blocks = sizes["width"], sizes["blocks"]
+    if net in POSTERIORS:
+        shapes = residual_shapes("posterior", sizes["inputs"], sizes["components"] * (1 + 2 * STATE), width, blocks)
+        return shapes | residual_shapes("code", sizes["inputs"] + STATE, sizes["outputs"] - PLACE, width, blocks)
     if net in ("MVB", "MVD"):
         wide, near, latent, window = sizes["wide"], sizes["near"], sizes["latent"], (2 * sizes["half"] + 1) ** 2
         shapes = residual_shapes("encoder", wide + near + 2 * PLACE, 2 * (latent - PLACE), width, blocks)
@@ -37,7 +42,8 @@ def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]
 
 _MESH = ("blocks", "columns", "half", "latent", "near", "nodes", "rows", "wide", "width")
 _MAP = ("blocks", "inputs", "outputs", "width")
-SIZE_NAMES = {net: {"SVB": ("latent",), "MVB": _MESH, "MVD": _MESH}.get(net, _MAP) for net in NETS}
+_OWN = {"SVB": ("latent",), "MVB": _MESH, "MVD": _MESH} | dict.fromkeys(POSTERIORS, ("components", *_MAP))
+SIZE_NAMES = {net: _OWN.get(net, _MAP) for net in NETS}
 
 
 def card_entry(card: dict, net: str, path: Path) -> dict:
@@ -64,6 +70,7 @@ def check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
         ("S2MPN", "outputs", sizes["MVB"]["latent"]),
         ("R2MPN", "inputs", sizes["SVB"]["latent"]),
         ("R2MPN", "outputs", sizes["MVB"]["latent"]),
+        ("R2MPN", "components", sizes["S2MPN"]["components"]),
         ("M2MPN", "inputs", sizes["MVB"]["latent"] + PLACE),
         ("M2MPN", "outputs", sizes["MVD"]["latent"]),
         ("D2BPN", "inputs", sizes["MVD"]["latent"] + PLACE),

@@ -2,7 +2,8 @@
 
 Every network of `training/modules.py` has its forward pass here, with the same tensor names; float32 throughout.
 SVB  signal autoencoder       MVB  BioTac mesh autoencoder       MVD  DIGIT mesh autoencoder
-S2MPN  signal latent -> BioTac latent       M2MPN  BioTac latent -> DIGIT latent
+S2MPN  signal latent -> which contacts it may come from (`Posterior`), and with one of them -> BioTac latent
+M2MPN  BioTac latent -> DIGIT latent
 R2MPN  as S2MPN, for rectified signals: what makes it cope with unknown units would make S2MPN worse
 D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
 force  head, from the BioTac's latent       pressure and error  heads, from the signal
@@ -26,7 +27,7 @@ from ..errors import TactileError
 from ..files.shipped import shipped
 from .contact_frame import ContactFrame
 from .layers import Tensors, plain, residual
-from .network_sizes import ELECTRODES, NETS, PLACE, SIGNAL_HIDDEN, card_entry, check_chain, tensor_shapes
+from .network_sizes import ELECTRODES, NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, tensor_shapes
 from .weights import ADVICE, CARD_NAME, read_card, read_verified
 
 Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network
@@ -34,11 +35,15 @@ BLOCK = 64  # frames a block: enough for matrix products at full speed
 COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
 FORCE_SCALE = 0.1  # N: the force is 0.1 N sinh(head), which spans light touches and firm presses alike (assumed)
 COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
+DEPTH_SCALE = 20e-6  # m, likewise, of the depth in a contact's state (assumed)
+# Of a posterior's components, in units of the state: no place is known to .2 cells, no force to 2 % (assumed).
+LEAST_SPREAD = 0.02
+SPREAD_LIMITS = -8.0, 2.0  # of the logarithm of what a network adds to it
 PRESSURE_SCALE = 300.0  # Pa: the pressure is 300 Pa sinh(head), likewise (assumed)
 ERROR_UNIT = 10e-6  # m, of the error head's logarithm
 WEIGHTS_FOLDER = shipped("weights")
 # The card names the hash of every file of weights; this names the card that ships.
-SHIPPED_CARD_SHA256 = "eff78f7636a4c016a3f03b3dc19b421f1fa05bf97591c28880e30126715d55ce"
+SHIPPED_CARD_SHA256 = "2b04339e9480eb21fd730dba8061d5bf40c53390535182d59ff0561afeb92818"
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,25 @@ def expand(compressed: np.ndarray) -> np.ndarray:
     return np.sinh(np.clip(compressed, -COMPRESSED_LIMIT, COMPRESSED_LIMIT)) * np.float32(COUNT_SCALE)
 
 
+@dataclass(frozen=True)
+class Posterior:
+    """What signals say of contacts: a mixture of Gaussians over their state.
+
+    A state (STATE,) is the place of the BioTac's dent, as in its latent, asinh(force / 0.1 N) and asinh(depth of the
+    gel's dent / 20 um); all zero without contact.
+    weight : (T, C), their sum one; mean, spread : (T, C, STATE)
+    """
+
+    weight: np.ndarray
+    mean: np.ndarray
+    spread: np.ndarray
+
+    @property
+    def heaviest(self) -> np.ndarray:
+        """(T, STATE), mean of the component that weighs most: one contact, not the average of all."""
+        return self.mean[np.arange(len(self.mean)), self.weight.argmax(-1)]
+
+
 class Networks:
     """The trained networks. Arrays are float32, T first; displacements in metres, forces in newtons, changes in counts.
 
@@ -103,14 +127,26 @@ class Networks:
         return self._blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
 
     def s2m(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """latent_signal (T, K), rectified (T,) or one -> latent_biotac (T, L)."""
-        which = np.broadcast_to(np.asarray(rectified, bool), len(latent_signal))
-        if which.all() and len(which):
-            return self._map("R2MPN", latent_signal)
-        found = self._map("S2MPN", latent_signal)
-        if which.any():
-            found[which] = self._map("R2MPN", latent_signal)[which]
-        return found
+        """latent_signal (T, K), rectified (T,) or one -> latent_biotac (T, L) of the most plausible contact."""
+        return self.given(latent_signal, self.contact(latent_signal, rectified), rectified)
+
+    def contact(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """latent_signal (T, K), rectified (T,) or one -> state (T, STATE) of the most plausible contact."""
+        return self.posterior(latent_signal, rectified).heaviest
+
+    def posterior(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> Posterior:
+        """latent_signal (T, K), rectified (T,) or one -> what signals say of contacts."""
+        raw = self._either("posterior", latent_signal, rectified)
+        count = self.sizes["S2MPN"]["components"]
+        weight = raw[:, :count] - raw[:, :count].max(-1, keepdims=True)
+        mean, spread = np.moveaxis(raw[:, count:].reshape(len(raw), 2, count, STATE), 1, 0)
+        spread = np.float32(LEAST_SPREAD) + np.exp(np.clip(spread, *SPREAD_LIMITS))
+        return Posterior(np.exp(weight) / np.exp(weight).sum(-1, keepdims=True), mean, spread)
+
+    def given(self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """latent_signal (T, K), states of contacts (T, STATE), rectified (T,) or one -> latent_biotac (T, L)."""
+        code = self._either("code", np.concatenate([latent_signal, state], -1), rectified)
+        return np.concatenate([state[:, :PLACE], code], -1)
 
     def m2m(self, latent_biotac: np.ndarray) -> np.ndarray:
         """latent_biotac (T, L) -> latent_digit (T, L')."""
@@ -147,6 +183,13 @@ class Networks:
     def force(self, latent_biotac: np.ndarray) -> np.ndarray:
         """latent_biotac (T, L) -> force (T, 3) N exerted by the object, sensor frame."""
         return self._blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
+
+    def force_in(self, state: np.ndarray, latent_biotac: np.ndarray) -> np.ndarray:
+        """states (T, STATE) and their latent_biotac (T, L) -> force (T, 3) N, as large as the states say."""
+        told = self.force(latent_biotac)
+        length = np.sqrt(np.square(told).sum(-1))
+        size = np.float32(FORCE_SCALE) * np.sinh(np.clip(state[:, PLACE], 0, COMPRESSED_LIMIT))
+        return told * (size / np.where(length > 0, length, 1))[:, None]
 
     def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """change (T, 19) counts, rectified (T,) or one -> (T,) Pa, by which the fluid's pressure has risen."""
@@ -189,9 +232,20 @@ class Networks:
         head = residual(seen, self.tensors["pressure"], "map", self.sizes["pressure"]["blocks"])
         return np.float32(PRESSURE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
-    def _map(self, net: str, latent: np.ndarray) -> np.ndarray:
-        tensors, sizes = self.tensors[net], self.sizes[net]
-        return self._blocks(lambda z: residual(z, tensors, "map", sizes["blocks"]), latent, (sizes["inputs"],), net)
+    def _either(self, part: str, seen: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
+        """A part of S2MPN, for rectified frames of R2MPN."""
+        which = np.broadcast_to(np.asarray(rectified, bool), len(seen))
+        if which.all() and len(which):
+            return self._map("R2MPN", seen, part)
+        found = self._map("S2MPN", seen, part)
+        if which.any():
+            found[which] = self._map("R2MPN", seen, part)[which]
+        return found
+
+    def _map(self, net: str, latent: np.ndarray, part: str = "map") -> np.ndarray:
+        tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
+        size = tensors[f"{part}.first.weight"].shape[1]
+        return self._blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)
 
     def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
         """Through a map that is told, beside the latent, what the whole cell leaves of its place."""

@@ -84,7 +84,8 @@ class Translator:
         rectified = (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
         change = np.asarray(signals.typical, np.float32)
         latent_signal = nets.encode_signal(change, rectified)
-        latent_biotac = nets.s2m(latent_signal, rectified)
+        state = nets.contact(latent_signal, rectified)
+        latent_biotac = nets.given(latent_signal, state, rectified)
         latent_digit = nets.m2m(latent_biotac)
         biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
         center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m"))
@@ -96,7 +97,7 @@ class Translator:
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
         return Translation(
             latent_signal, latent_biotac, latent_digit, biotac, digit,
-            force=np.where(silent[:, None], np.float32(0), nets.force(latent_biotac)),
+            force=np.where(silent[:, None], np.float32(0), nets.force_in(state, latent_biotac)),
             pressure=np.where(silent, np.float32(0), nets.pressure(change, rectified)),
             contact_center=center,
             confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,

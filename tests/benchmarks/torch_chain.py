@@ -18,7 +18,7 @@ class TorchChain:
     def __init__(self, nets: Networks) -> None:
         self.latent = nets.sizes["SVB"]["latent"]
         self.encoder = _filled(modules.signal_vae(self.latent).encoder, nets, "SVB", "encoder.")
-        self.s2m, self.m2m = (_residual(nets, net, "map.", "inputs", "outputs") for net in ("S2MPN", "M2MPN"))
+        self.s2m, self.m2m = _posterior(nets, "S2MPN"), _residual(nets, "M2MPN", "map.", "inputs", "outputs")
         self.skin, self.gel = _Decoder(nets, "MVB"), _Decoder(nets, "MVD")
 
     @torch.inference_mode()
@@ -62,6 +62,12 @@ class _Decoder:
         along, inward, around = local.unbind(-1)
         turned = self.cosine * inward + self.sine * around, self.cosine * around - self.sine * inward
         return torch.stack([along, *turned], -1)
+
+
+def _posterior(nets: Networks, net: str) -> torch.nn.Module:
+    sizes = nets.sizes[net]
+    made = modules.ContactPosterior(*(sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components")))
+    return _filled(made, nets, net, "")
 
 
 def _residual(nets: Networks, net: str, prefix: str, inputs: str, outputs: str) -> torch.nn.Module:

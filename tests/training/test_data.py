@@ -65,6 +65,13 @@ def test_readings_have_the_errors_they_should():
     assert readings(true - 9000, 2).min() >= -3301
 
 
+def test_a_real_unit_s_rest_is_off_and_its_gains_spread():
+    true = np.zeros((4000, 19), np.float32)
+    read = [measured(true + size, np.random.default_rng(0), OPTIONS, 0.0, 1.0)[:, :-1] for size in (0, 400)]
+    assert read[0].std() == pytest.approx(np.hypot(OPTIONS.unit_offset, OPTIONS.noise), rel=0.02)  # 76,000 draws
+    assert np.log((read[1] - read[0]) / 400).std() == pytest.approx(OPTIONS.unit_gain, rel=0.02)
+
+
 def test_rectified_readings_lose_their_sign_and_some_channels():
     true = np.full((4000, 19), 120, np.float32)  # a bulge; six times the offset's noise, a sixth of what the bits hold
     read = measured(true, np.random.default_rng(0), OPTIONS, 0.5)
@@ -77,6 +84,17 @@ def test_rectified_readings_lose_their_sign_and_some_channels():
     # a frame's bulge and a channel's gain, independent; five standard errors of 2,000 frames' bulges
     expected = np.hypot(OPTIONS.rectified_gain, OPTIONS.rectified_bulge)
     assert size.std() == pytest.approx(expected, abs=0.04)
+
+
+def test_a_batch_tells_the_state_of_each_contact(contacts):
+    rows = np.array([0, 3, -1])
+    state = contacts.batch(rows, contacts.read(rows, np.random.default_rng(0))).state.numpy()
+    pairs = contacts.pairs
+    np.testing.assert_array_equal(state[:2, :2], contacts.biotac.place[rows[:2]])
+    force = np.linalg.norm(pairs.force[rows[:2]], axis=-1)
+    deepest = (pairs.displacement_digit[rows[:2]].astype(float) * pairs.scale_digit)[..., 1].max(-1)
+    np.testing.assert_allclose(np.sinh(state[:2, 2:]).T, [force / 0.1, deepest / 20e-6], rtol=1e-5)
+    assert not state[2].any()  # no contact
 
 
 def test_silence_is_no_displacement_and_noise_alone(contacts):

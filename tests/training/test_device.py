@@ -49,7 +49,7 @@ def test_no_loss_mixes_devices(elsewhere, stage, monkeypatch):
     loss = stage.loss(model, contacts, batch, OPTIONS, torch.Generator())
     assert loss.device == ELSEWHERE and loss.shape == ()
     loss.backward()
-    nets = [getattr(model, net) for net in stage.nets]
+    nets = [model.get_submodule(net) for net in stage.nets]
     assert any(parameter.grad is not None for net in nets for parameter in net.parameters())
 
 

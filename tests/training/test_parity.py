@@ -119,7 +119,37 @@ def test_maps(model, nets):
     same(nets.m2m(biotac.numpy()), model.across(biotac))
     same(nets.m2m_back(digit.numpy()), model.back(digit))
     same(compress(nets.decode_signal(nets.m2s(biotac.numpy()))), model.to_signal(biotac))
+    state = np.abs(latent(4))
+    size = np.linalg.norm(nets.force_in(state, biotac.numpy()[:40]), axis=-1)
+    np.testing.assert_allclose(size, FORCE_SCALE * np.sinh(state[:, 2]), rtol=1e-5)
     same(nets.force(biotac.numpy()), FORCE_SCALE * torch.sinh(model.force(biotac)))
+
+
+def test_the_surprise_is_that_of_a_mixture_of_gaussians(model):
+    z, state = (torch.from_numpy(latent(size)) for size in (16, 4))
+    weight, mean, spread = model.S2MPN.mixture(z)
+    parts = torch.distributions.Independent(torch.distributions.Normal(mean, spread), 1)
+    mixture = torch.distributions.MixtureSameFamily(torch.distributions.Categorical(logits=weight), parts)
+    constant = 2 * np.log(2 * np.pi)  # of four numbers, which the surprise leaves out
+    torch.testing.assert_close(model.S2MPN.surprise(z, state), -mixture.log_prob(state) - constant)
+
+
+def test_the_answer_is_the_heaviest_component(model):
+    z = torch.from_numpy(latent(16))
+    weight, mean, _ = model.S2MPN.mixture(z)
+    heaviest = mean[range(len(z)), weight.argmax(-1)]
+    torch.testing.assert_close(model.S2MPN(z)[:, :2], heaviest[:, :2], rtol=0, atol=0)
+    assert torch.equal(model.S2MPN(z), model.S2MPN.given(z, heaviest))
+
+
+def test_posterior(model, nets):
+    z, rectified = latent(16), np.arange(len(latent(16))) % 3 == 0
+    found = nets.posterior(z, rectified)
+    for net, which in ((model.S2MPN, ~rectified), (model.R2MPN, rectified)):
+        weight, mean, spread = net.mixture(torch.from_numpy(z[which]))
+        same(found.weight[which], weight.exp())
+        same(found.mean[which], mean)
+        same(found.spread[which], spread)
 
 
 def test_expected_error(model, nets):

@@ -40,6 +40,12 @@ def residual(nets, net):
     return filled(modules.Residual(*size), nets, net, "map.")
 
 
+def posterior(nets, net):
+    sizes = nets.sizes[net]
+    size = (sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components"))
+    return filled(modules.ContactPosterior(*size), nets, net)
+
+
 def decoder(nets, net):
     """The decoder of a mesh autoencoder, without its frame."""
     sizes = nets.sizes[net]
@@ -66,7 +72,7 @@ def test_the_chain(nets, change, rectified):
     latent = nets.encode_signal(change, rectified)
     same(latent, svb.mean(modules.compress(torch.from_numpy(np.concatenate([change, told], -1)))))
     biotac = nets.s2m(latent, rectified)
-    same(biotac, residual(nets, "R2MPN" if rectified else "S2MPN")(torch.from_numpy(latent)))
+    same(biotac, posterior(nets, "R2MPN" if rectified else "S2MPN")(torch.from_numpy(latent)))
     digit = nets.m2m(biotac)
     same(digit, residual(nets, "M2MPN")(placed(nets, "MVB", biotac)))
     for net, z, decode in (("MVB", biotac, nets.decode_biotac), ("MVD", digit, nets.decode_digit)):

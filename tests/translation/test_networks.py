@@ -16,8 +16,8 @@ MLP = {"width": 16, "blocks": 2}
 SIZES = {
     "SVB": {"latent": 8},
     "MVB": {"latent": 6, "wide": 5, "near": 7, "nodes": NODES["biotac"], "rows": 7, "columns": 4, "half": 1, **MLP},
-    "S2MPN": {"inputs": 8, "outputs": 6, **MLP},
-    "R2MPN": {"inputs": 8, "outputs": 6, **MLP},
+    "S2MPN": {"inputs": 8, "outputs": 6, "components": 3, **MLP},
+    "R2MPN": {"inputs": 8, "outputs": 6, "components": 3, **MLP},
     "MVD": {"latent": 7, "wide": 4, "near": 9, "nodes": NODES["digit"], "rows": 6, "columns": 4, "half": 2, **MLP},
     "M2MPN": {"inputs": 8, "outputs": 7, **MLP},
     "D2BPN": {"inputs": 9, "outputs": 6, **MLP},
@@ -77,6 +77,7 @@ def calls(nets, count):
         "encode_signal": (nets.encode_signal, change, (8,)),
         "decode_signal": (nets.decode_signal, latents[8], (19,)),
         "s2m": (nets.s2m, latents[8], (6,)),
+        "contact": (nets.contact, latents[8], (4,)),
         "m2m": (nets.m2m, latents[6], (7,)),
         "decode_biotac": (nets.decode_biotac, latents[6], (NODES["biotac"], 3)),
         "decode_digit": (nets.decode_digit, latents[7], (NODES["digit"], 3)),
