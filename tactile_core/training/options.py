@@ -59,7 +59,7 @@ class Options:
     gain: float = 0.1
     unit: float = 0.3
     unit_gain: float = 0.3
-    unit_offset: float = 25.0
+    unit_offset: float = 15.0
     rectified: float = 0.25
     rectified_gain: float = 0.5
     rectified_bulge: float = 0.5
@@ -74,7 +74,7 @@ class Options:
     svb_epochs: int = 6
     mvb_epochs: int = 6
     mvd_epochs: int = 9
-    s2mpn_epochs: int = 24
+    s2mpn_epochs: int = 18
     m2mpn_epochs: int = 3
     chain_epochs: int = 13
     direct_epochs: int = 13

@@ -22,7 +22,6 @@ from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
 UNTRAINED_CONFIDENCE = 0.2  # assumed
-FAR = 2.0  # times validation's outermost quantile: there confidence is gone (assumed)
 # Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
 # (scripts/evaluate_translation.py --kept-apart) it flags half of that part's frames, and most of those it should.
 IN_RANGE = 0.99
@@ -128,9 +127,9 @@ class Translator:
         """(T,), 1 for signals like those of the training, 0 far from them.
 
         Each distance to the training signals counts against its quantiles in validation: all is well up to the 95 %
-        quantile, nothing at ``FAR`` times the outermost. Not a calibrated probability: that is what bounds are for.
+        quantile, nothing at the outermost. Not a calibrated probability: that is what bounds are for.
         """
-        usual, far = self._quantile(0.95, rectified), FAR * self._quantile(1.0, rectified)
+        usual, far = self._quantile(0.95, rectified), self._quantile(1.0, rectified)
         confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
         confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
