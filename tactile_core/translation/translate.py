@@ -16,12 +16,14 @@ from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
 from . import error_bounds, networks
 from .error_bounds import KINDS
-from .network_sizes import SURFACES
-from .networks import Networks
+from .network_sizes import PLACE, SURFACES
+from .networks import FORCE_SCALE, Networks
 from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
 UNTRAINED_CONFIDENCE = 0.2  # assumed
+# Of a contact's state, below which nothing touches: half the force of the lightest contact that training knows, 0.06 N.
+LEAST_FORCE = float(np.arcsinh(0.03 / FORCE_SCALE))
 # Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
 # (scripts/evaluate_translation.py --kept-apart) it flags half of that part's frames, and most of those it should.
 IN_RANGE = 0.99
@@ -33,7 +35,7 @@ class Translation:
 
     latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents
     displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
-    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, but for rectified signals
+    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, as displacements are
     pressure : (T,) Pa, by which the fluid's has risen, told from the electrodes alone; zero as the force is
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
     confidence : (T,), 1 as in training, 0 far from it
@@ -86,10 +88,10 @@ class Translator:
         state = nets.contact(latent_signal, rectified)
         latent_biotac = nets.given(latent_signal, state, rectified)
         latent_digit = nets.m2m(latent_biotac)
-        biotac, digit = nets.decode_biotac(latent_biotac), nets.decode_digit(latent_digit)
+        touched = (state[:, PLACE] > LEAST_FORCE)[:, None, None]
+        biotac, digit = nets.decode_biotac(latent_biotac) * touched, nets.decode_digit(latent_digit) * touched
         center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m"))
-        # Without its sign a weak signal leaves the dent undecided, but not the force: strength would stutter.
-        silent = np.isnan(center[:, 0]) & ~rectified
+        silent = np.isnan(center[:, 0])
         confidence = self._confidence(change, signals.flags, rectified)
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)

@@ -80,8 +80,11 @@ def test_force_and_place_follow_the_truth(shipped, translation):
 def test_silence_stays_silent(shipped, translation):
     quiet = np.linalg.norm(shipped.truth.force, axis=1) == 0
     assert np.isnan(translation.contact_center[quiet, 0]).mean() > 0.9
-    loud = np.abs(translation.displacement_digit[~quiet]).max()
-    assert np.median(np.abs(translation.displacement_digit[quiet]).max(axis=(1, 2))) < 0.1 * loud
+    untouched = np.isnan(translation.contact_center[:, 0])
+    still = ~translation.displacement_digit.any((1, 2))
+    assert still[quiet].mean() > 0.9 and not still[touched(shipped)].any()
+    for values in (translation.displacement_biotac, translation.force, translation.pressure):
+        assert not values[still & untouched].any()
 
 
 def test_a_frame_does_not_depend_on_its_neighbours(translator, signals, translation):
