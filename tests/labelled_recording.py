@@ -17,7 +17,7 @@ MM = 1e3
 
 def labelled_arrays() -> dict[str, np.ndarray]:
     """Readings of a sensor whose gains differ by 40 %, with places (mm, SynTouch's frame) and forces."""
-    from tactile_core.training.fine_tune import on_skin  # needs torch
+    from tactile_core.translation.contact_frame import on_skin
 
     pairs = read_pairs(PAIRS)
     pairs = pairs.some(np.flatnonzero(pairs.press < BALANCED))

@@ -17,10 +17,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from .. import accuracy, sensors
+from .. import accuracy
 from ..accuracy import Row, row
 from ..translation import networks, reference_signals
-from ..translation.contact_frame import PLACE_UNIT, ContactFrame
+from ..translation.contact_frame import on_skin
 from ..translation.network_sizes import NETS, PLACE
 from ..translation.networks import COMPRESSED_LIMIT, FORCE_SCALE, Networks
 from ..translation.weights import CARD_NAME, card_bytes, read_bytes, sha256, to_safetensors, write_bytes
@@ -145,17 +145,6 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
         row("real_position_mm", 1e3 * float(np.median(miss)), "mm", null=1e3 * float(np.median(null)), of=of),
         row("real_force_percent", float(np.median(share)), "%", null=float(np.median(nothing)), of=of),
     ]
-
-
-def on_skin(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
-    """(F, 3) m on the resting skin of places (F, 2) on its lattice, between nodes by bilinear interpolation."""
-    rest = sensors.biotac_surface().rest[: frame.rows * frame.columns].reshape(frame.rows, frame.columns, 3)
-    size = np.array([frame.rows, frame.columns])
-    at = np.clip(place * PLACE_UNIT + (size - 1) / 2, 0, size - 1)
-    cell = np.minimum(at.astype(int), size - 2)
-    (i, j), (t, s) = cell.T, (at - cell).T[:, :, None]
-    before, behind = ((1 - s) * rest[row, j] + s * rest[row, j + 1] for row in (i, i + 1))
-    return (1 - t) * before + t * behind
 
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:

@@ -12,9 +12,10 @@ h5py = pytest.importorskip("h5py")
 from tactile_core import sensors  # noqa: E402
 from tactile_core.cli.main import main  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.training.fine_tune import fine_tune, on_skin  # noqa: E402
+from tactile_core.training.fine_tune import fine_tune  # noqa: E402
 from tactile_core.training.labelled_recording import read_labelled  # noqa: E402
 from tactile_core.translation import networks  # noqa: E402
+from tactile_core.translation.contact_frame import on_skin  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ import numpy as np
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.simulation.pairs_file import Pairs
-from tactile_core.training.fine_tune import on_skin
 from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, parts, true_displacement
+from tactile_core.translation.contact_frame import on_skin
 from tactile_core.translation.network_sizes import PLACE
 from tactile_core.translation.networks import FORCE_SCALE, Networks, Posterior
 
