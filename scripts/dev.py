@@ -272,17 +272,15 @@ def run_pip(python: Path, folder: Path, what: list[str], numpy: str | None) -> s
         constraints.write_text(text, encoding="utf-8")
     command = [str(python), "-m", "pip", "install", "--no-input", "--constraint", str(constraints)]
     log = folder / LOG
-    with (
-        subprocess.Popen(
-            [*command, *what],
-            cwd=str(ROOT),
-            env=environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
-        ) as process,
-        open(str(log), "w", encoding="utf-8") as record,
-    ):
+    started = subprocess.Popen(
+        [*command, *what],
+        cwd=str(ROOT),
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL,
+    )
+    with started as process, open(str(log), "w", encoding="utf-8") as record:
         for raw in process.stdout:
             line = raw.decode(errors="replace")
             record.write(line)
