@@ -15,6 +15,8 @@ from ...tactile_core.recordings import PrepareOptions, Recording, Signals
 from ...tactile_core.recordings.polarity import AUTO
 from ...tactile_core.recordings.signals import FRAMEWISE
 from ...tactile_core.translation import translate
+from ...tactile_core.translation.contact_track import Tracked
+from ...tactile_core.translation.networks import Posterior
 from ...tactile_core.translation.translate import Translation
 from ..process import recording_reader
 
@@ -59,14 +61,18 @@ def _translated(path: str, tare: str, frames: str, progress: Callable[[float], N
     chosen = frame_range.select(frame_range.parse_frames(frames), len(recording))
     options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)
     signals = recordings.prepare(recording, options)
-    signals = _part(signals, chosen)
-    parts = []
+
+    def told(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
+        return recording.time[start:stop], translator().posterior(_part(signals, np.arange(start, stop)))
+
+    tracked, parts = Tracked(told, len(recording)), []
     for start in range(0, len(chosen), CHUNK):
-        parts.append(translator()(_part(signals, np.arange(start, min(start + CHUNK, len(chosen))))))
+        frames = chosen[start : start + CHUNK]
+        parts.append(translator()(_part(signals, frames), tracked(frames)))
         progress(min(1.0, (start + CHUNK) / len(chosen)))
     names = [field.name for field in dataclasses.fields(Translation)]
     whole = Translation(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
-    return Translated(recording, chosen, signals, whole)
+    return Translated(recording, chosen, _part(signals, chosen), whole)
 
 
 def _part(signals: Signals, frames: np.ndarray) -> Signals:

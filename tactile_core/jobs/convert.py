@@ -44,10 +44,13 @@ def load_tools(
     calibration: str | os.PathLike | None = None,
     preset: str = "fast",
     variant: str | None = None,
+    *,
+    frames_apart: bool = False,
 ) -> Tools:
     """The shipped weights, or those in a folder, and the camera and lights of a DIGIT: the shipped unit's, or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
+    frames_apart : translate each frame alone, instead of following contacts through time
     Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
     ``renderer.Renderer`` raises.
     """
@@ -63,7 +66,8 @@ def load_tools(
         from ..pictures.renderer import Renderer
 
         shade = Renderer(unit, preset, variant)
-    return Tools(translator, translator.card, translator.sha256, mapper, shade, preset, unit.camera)
+    posterior = None if frames_apart else translator.posterior
+    return Tools(translator, translator.card, translator.sha256, mapper, shade, preset, unit.camera, posterior)
 
 
 def within(tools: Tools, levels: float) -> tuple[Tools, str]:
@@ -161,7 +165,8 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
             "about": recording.about,
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
-                    "error": None if options.error is None else str(options.error), "preset": tools.preset},
+                    "error": None if options.error is None else str(options.error), "preset": tools.preset,
+                    "frames_apart": tools.posterior is None},
         "frames_converted": len(made.frames),
         "prepared": made.signals.report,
         "warnings": list(made.warnings()),

@@ -16,6 +16,7 @@ from ..recordings import flags
 from ..recordings.signals import FRAMEWISE
 from ..sensors import PRESSURE_PER_COUNT
 from ..sensors.camera import Camera
+from ..translation.contact_track import Tracked
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet
 from .frames_file import FramesFile
@@ -23,6 +24,7 @@ from .sampling_error import depth_share
 
 if TYPE_CHECKING:
     from ..recordings import Recording, Signals
+    from ..translation.networks import Posterior
     from ..translation.translate import Translation
 
 CHUNK = 64  # frames in memory at a time: about 5 MB of displacements and 20 MB of heights
@@ -45,20 +47,34 @@ class Tools:
     translate : Signals -> Translation; card, sha256 : of its weights
     height_map : (T, M, 3) m -> (T, H, W) m; shade : (H, W) m -> (H, W, 3) uint8, by a preset of ``pictures.presets``
     camera : of the DIGIT that is drawn, by which contacts beside its picture are flagged; None: none are
+    posterior : Signals -> Posterior, by which contacts are followed through time; None: each frame is translated alone
     """
 
-    translate: Callable[[Signals], Translation]
+    translate: Callable[..., Translation]
     card: dict[str, Any]
     sha256: str
     height_map: Callable[[np.ndarray], np.ndarray]
     shade: Callable[[np.ndarray], np.ndarray]
     preset: str = "fast"
     camera: Camera | None = None
+    posterior: Callable[[Signals], Posterior] | None = None
+
+    def tracked(self, read: Callable[[int, int], tuple[np.ndarray, Signals]], count: int) -> Tracked | None:
+        """States of the contact in a recording of `count` frames, of which `read` gives some, with their times, s."""
+        if self.posterior is None:
+            return None
+
+        def told(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
+            """Times and posteriors of these frames."""
+            time, signals = read(start, stop)
+            return time, self.posterior(signals)
+
+        return Tracked(told, count)
 
 
-def translated(signals: Signals, tools: Tools) -> dict[str, np.ndarray]:
-    """What a translation makes of all frames of `signals`, T first, by the names of frames.h5."""
-    translation = tools.translate(signals)
+def translated(signals: Signals, tools: Tools, tracked: Tracked | None, frames: np.ndarray) -> dict[str, np.ndarray]:
+    """What a translation makes of `signals`, T first, by the names of frames.h5; frames : (T,) in the recording."""
+    translation = tools.translate(signals) if tracked is None else tools.translate(signals, tracked(frames))
     arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
     arrays |= {"electrodes": signals.electrodes, "pressure_measured": PRESSURE_PER_COUNT * signals.pdc}
     return arrays | {"flags": arrays["flags"] | signals.flags | _beyond_picture(arrays["contact_center"], tools.camera)}
@@ -87,6 +103,7 @@ class FramePass:
         """frames : (T,) indices into the recording, in order; keep : words of results.KEEPABLE."""
         self.recording, self.signals, self.frames, self.keep = recording, signals, frames, keep
         self.tools, self.clock = tools, clock
+        self._tracked = tools.tracked(self._read, len(recording))
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._errors: list[np.ndarray] = []
         self._pressure: list[np.ndarray] = []
@@ -144,10 +161,16 @@ class FramePass:
 
     def _translate(self, frames: np.ndarray) -> dict[str, np.ndarray]:
         """All arrays of some frames, T first, by the names of frames.h5."""
-        part = {name: getattr(self.signals, name)[frames] for name in FRAMEWISE}
         with self.clock.stage("translate"):
-            arrays = translated(dataclasses.replace(self.signals, **part), self.tools)
+            arrays = translated(self._signals(frames), self.tools, self._tracked, frames)
         return arrays | {"frame": frames.astype(np.int32), "time": self.recording.time[frames]}
+
+    def _read(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
+        return self.recording.time[start:stop], self._signals(np.arange(start, stop))
+
+    def _signals(self, frames: np.ndarray) -> Signals:
+        part = {name: getattr(self.signals, name)[frames] for name in FRAMEWISE}
+        return dataclasses.replace(self.signals, **part)
 
     def _draw(self, folder: Path, frames: np.ndarray, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Heights, as far as they are kept; pictures go to their files. Frames that nobody looks at are passed over."""

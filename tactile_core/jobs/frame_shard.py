@@ -22,6 +22,7 @@ from .prepared_signals import Prepared
 
 if TYPE_CHECKING:
     from ..recordings import Signals
+    from ..translation.contact_track import Tracked
     from .engine.job import Job
 
 
@@ -44,6 +45,7 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
     start = number * job.recipe.shard_frames
     stop = min(start + job.recipe.shard_frames, frames)
     time, signals = prepared.rows(start, stop)
+    tracked = tools.tracked(prepared.rows, frames)
     attributes = {
         "recording": about["recording"].encode(errors="replace").decode(),
         "simulated": about["simulated"], **_identity(job, index, number, frames),
@@ -53,7 +55,7 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
         with FramesFile(partial, stop - start, keep, attributes, room=checksummed.ROOM) as out:
             for first in range(0, stop - start, CHUNK):
                 rows = slice(first, first + CHUNK)
-                out.write(first, _arrays(signals, time, rows, start, keep, tools))
+                out.write(first, _arrays(signals, time, rows, start, keep, tools, tracked))
             out.annotate("time", start_time=about["start_time"])
             out.annotate("electrodes", rest=signals.rest, kind=signals.kind)
         checksummed.write_checksum(partial)
@@ -80,12 +82,18 @@ def _identity(job: Job, index: int, number: int, frames: int) -> dict[str, str |
 
 
 def _arrays(
-    signals: Signals, time: np.ndarray, rows: slice, start: int, keep: tuple[str, ...], tools: Tools
+    signals: Signals,
+    time: np.ndarray,
+    rows: slice,
+    start: int,
+    keep: tuple[str, ...],
+    tools: Tools,
+    tracked: Tracked | None,
 ) -> dict[str, np.ndarray]:
     """All arrays of some rows of a shard that begins at frame `start`."""
     part = {name: getattr(signals, name)[rows] for name in FRAMEWISE}
-    arrays = translated(dataclasses.replace(signals, **part), tools)
     frames = np.arange(len(time), dtype=np.int32)[rows] + np.int32(start)
+    arrays = translated(dataclasses.replace(signals, **part), tools, tracked, frames)
     arrays |= {"frame": frames, "time": time[rows]}
     if "height" in keep or "image" in keep:
         arrays["height_map"] = tools.height_map(arrays["displacement_digit"])

@@ -28,7 +28,7 @@ def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
     """Translate some frames."""
     recipe = job.recipe
-    unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant)
+    unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant, recipe.frames_apart)
     return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit))
 
 
@@ -44,13 +44,19 @@ def seen(folder: Path, job: Job, index: int) -> Seen | None:
 
 @functools.lru_cache(maxsize=2)
 def _tools(
-    weights: str | None, sha256: str, calibration: str | None, unit_sha256: str, preset: str, variant: str
+    weights: str | None,
+    sha256: str,
+    calibration: str | None,
+    unit_sha256: str,
+    preset: str,
+    variant: str,
+    frames_apart: bool,
 ) -> Tools:
     """The networks and the unit, once a process. Raises TactileError where they are not those of the job."""
     from .convert import load_tools
 
     check_unit(calibration, unit_sha256)
-    tools = load_tools(weights, calibration, preset, variant or None)
+    tools = load_tools(weights, calibration, preset, variant or None, frames_apart=frames_apart)
     if tools.sha256 != sha256:
         found, advice = f"sha256 {tools.sha256[:12]}...", "Use the weights that the job was made with"
         raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)

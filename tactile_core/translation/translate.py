@@ -15,15 +15,14 @@ from ..recordings.flags import Flag
 from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
 from . import error_bounds, networks
+from .contact_track import LEAST_FORCE, track
 from .error_bounds import KINDS
 from .network_sizes import PLACE, SURFACES
-from .networks import FORCE_SCALE, Networks
+from .networks import Networks, Posterior
 from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
 UNTRAINED_CONFIDENCE = 0.2  # assumed
-# Of a contact's state, below which nothing touches: half the force of the lightest contact that training knows, 0.06 N.
-LEAST_FORCE = float(np.arcsinh(0.03 / FORCE_SCALE))
 # Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
 # (scripts/evaluate_translation.py --kept-apart) it flags half of that part's frames, and most of those it should.
 IN_RANGE = 0.99
@@ -60,6 +59,10 @@ class Translation:
     flags: np.ndarray
 
 
+def _rectified(signals: Signals) -> np.ndarray:
+    return (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
+
+
 def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
     """The most that 99 of 100 frames of noise without contact make of a quantity of a card's ``silence``."""
     return float(np.interp(0.99, silence["levels"], silence[quantity]))
@@ -79,13 +82,26 @@ class Translator:
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
         self._unrolled = surface.unrolled_nodes()
 
-    def __call__(self, signals: Signals) -> Translation:
-        """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours."""
+    def posterior(self, signals: Signals) -> Posterior:
+        """What each frame's signals say of its contact, each frame alone; ``contact_track`` follows it through time."""
+        rectified = _rectified(signals)
+        return self.nets.posterior(self.nets.encode_signal(signals.typical, rectified), rectified)
+
+    def followed(self, signals: Signals, time: np.ndarray) -> Translation:
+        """Translate a recording in one piece: frames at times (T,) s, each decided by its neighbours too."""
+        return self(signals, track(self.posterior(signals), time))
+
+    def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
+        """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours.
+
+        state : (T, STATE) of the contacts, found by more than a frame each; None: the most plausible of each frame
+        """
         nets = self.nets
-        rectified = (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
+        rectified = _rectified(signals)
         change = np.asarray(signals.typical, np.float32)
         latent_signal = nets.encode_signal(change, rectified)
-        state = nets.contact(latent_signal, rectified)
+        if state is None:
+            state = nets.contact(latent_signal, rectified)
         latent_biotac = nets.given(latent_signal, state, rectified)
         latent_digit = nets.m2m(latent_biotac)
         touched = (state[:, PLACE] > LEAST_FORCE)[:, None, None]

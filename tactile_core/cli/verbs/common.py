@@ -63,6 +63,15 @@ def electrodes_argument(verb: argparse.ArgumentParser) -> None:
     )
 
 
+def frames_apart_argument(verb: argparse.ArgumentParser) -> None:
+    """``--frames-apart``."""
+    verb.add_argument(
+        "--frames-apart",
+        action="store_true",
+        help="translate each frame alone, instead of following the contact through the frames before and after",
+    )
+
+
 def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
     """``--error``; what : the units that mean something here, in words."""
     verb.add_argument("--error", metavar="BOUND", help=f"the largest error that the toolkit itself may add: {what}")

@@ -37,6 +37,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames a shard
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
+    frames_apart : whether each frame is translated alone
     """
 
     keep: list[str]
@@ -47,6 +48,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     calibration: str = ""
     preset: str = "fast"
     variant: str = ""
+    frames_apart: bool = False
     version: str = __version__
 
 

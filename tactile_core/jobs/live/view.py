@@ -11,6 +11,9 @@ import numpy as np
 from ...pictures.height_map import folds_counted
 from ...recordings.polarity import AUTO, Polarity
 from ...recordings.recording import Recording
+from ...recordings.signals import Signals
+from ...translation.contact_track import Follower
+from ...translation.translate import Translation
 from ..frame_pass import Tools
 from .growing_file import newest
 from .signals import LiveSignals
@@ -34,7 +37,8 @@ class View:
 
     def __init__(self, tools: Tools, rate: float, polarity: str = AUTO) -> None:
         """rate : Hz of the recording; polarity : as of ``PrepareOptions``."""
-        self._tools, self._signals = tools, LiveSignals(rate, polarity)
+        self._tools, self._signals, self._rate = tools, LiveSignals(rate, polarity), rate
+        self._follow = Follower()
         self.frames, self.passed = 0, 0
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
@@ -55,7 +59,7 @@ class View:
         if not self._signals.learn(rows.electrodes, rows.pdc, rows.about.get("polarity", AUTO)):
             return None
         self.passed += len(rows) - 1
-        translation = self._tools.translate(self._signals.signals(newest(rows)[None]))
+        translation = self._translation(self._signals.signals(newest(rows)[None]))
         with folds_counted():  # a line for each such picture would hide the latencies
             heights = self._tools.height_map(translation.displacement_digit)
         picture = self._tools.shade(heights[0])
@@ -64,6 +68,13 @@ class View:
         shown = Shown(self.frames - 1, picture, force, latency, work)
         self.latencies.append((latency, work))
         return shown
+
+    def _translation(self, signals: Signals) -> Translation:
+        """Of the newest frame, decided by those before it too, without delay."""
+        if self._tools.posterior is None:
+            return self._tools.translate(signals)
+        state = self._follow(self._tools.posterior(signals), self.frames / self._rate)
+        return self._tools.translate(signals, state)
 
     def told(self) -> str:
         """The latencies of the last pictures in words."""

@@ -1,0 +1,177 @@
+"""A contact followed through time: of what each frame's signals say, the course that all of them together say.
+
+A finger's contact moves little in 10 ms, so a frame whose signals leave two places open is decided by its neighbours.
+Each frame's posterior is a mixture; first the likeliest course through its components is found (Viterbi 1967), then
+what that course measures is smoothed both ways (Kalman filter; Rauch, Tung and Striebel 1965). `Follower` does the
+filter alone, frame by frame, for what is being recorded.
+
+A course is free to jump where nothing touches, where frames are missing, and, at a price, anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .network_sizes import PLACE
+from .networks import FORCE_SCALE, Posterior
+
+# Standard deviation of what a state changes by in 10 ms. Places are in tens of cells: 0.3 cells, so 30 mm/s; asinh of
+# force and depth 0.6, which a tap that is over in 50 ms still reaches (chosen on the shipped recording with gains off).
+STEP = np.array([0.03, 0.03, 0.1, 0.1])
+FRAME = 0.01  # s
+GAP = 0.1  # s without a frame: nothing is known of what happened meanwhile (assumed)
+ANYWHERE = 2.0  # tens of cells: the standard deviation of a place that may be anywhere on a sensor
+UNKNOWN = 10.0  # the same of asinh of a force or depth
+# Of a contact's state, below which nothing touches: half the force of the lightest contact that training knows, 0.06 N.
+LEAST_FORCE = float(np.arcsinh(0.03 / FORCE_SCALE))
+JUMP = -8.0  # log-likelihood of a jump in mid-contact, as of a step of four standard deviations (assumed)
+BLOCK, MARGIN = 256, 64  # frames smoothed at once, and how many more are read on either side (a course forgets sooner)
+
+Read = Callable[[int, int], tuple[np.ndarray, Posterior]]
+
+
+class _Course(NamedTuple):
+    """What the likeliest course measures. mean, variance : (T, STATE); free : (T,), whether it begins anew there."""
+
+    mean: np.ndarray
+    variance: np.ndarray
+    free: np.ndarray
+
+
+def track(posterior: Posterior, time: np.ndarray) -> np.ndarray:
+    """Posterior of T frames at times (T,) s -> (T, STATE) float32, the state of the contact in each, both ways."""
+    if len(time) == 0:
+        return np.zeros(posterior.mean.shape[::2], np.float32)
+    course, steps = _likeliest(posterior, time), _steps(time)
+    steps = np.where(course.free[:, None], _free(), steps)
+    return _smoothed(course, steps).astype(np.float32)
+
+
+class Tracked:
+    """States of the contact in a whole recording, worked out where they are asked for."""
+
+    def __init__(self, read: Read, count: int) -> None:
+        """read(start, stop) gives the times and the posterior of these frames; count : frames in all."""
+        self._read, self._count = read, count
+        self._kept: tuple[int, np.ndarray] | None = None
+
+    def __call__(self, frames: np.ndarray) -> np.ndarray:
+        """States (n, STATE) of frames (n,), in rising order; a frame's is the same whichever others are asked for."""
+        blocks = frames // BLOCK
+        parts = [self._block(int(block))[frames[blocks == block] - block * BLOCK] for block in np.unique(blocks)]
+        return np.concatenate(parts)
+
+    def _block(self, block: int) -> np.ndarray:
+        if self._kept is None or self._kept[0] != block:
+            first = block * BLOCK
+            start, stop = max(first - MARGIN, 0), min(first + BLOCK + MARGIN, self._count)
+            time, posterior = self._read(start, stop)
+            self._kept = block, track(posterior, time)[first - start :][:BLOCK]
+        return self._kept[1]
+
+
+class Follower:
+    """The filter alone: one frame after another, no later one needed."""
+
+    def __init__(self) -> None:
+        self._score: np.ndarray | None = None
+
+    def __call__(self, posterior: Posterior, time: float) -> np.ndarray:
+        """Posterior of one frame at `time` s -> (1, STATE) float32, the state of its contact."""
+        now = _Frame(*(each[0] for each in _components(posterior)))
+        score, best = now.weight, int(now.weight.argmax())
+        mean, variance = now.mean[best], now.spread[best] ** 2
+        if self._score is not None and 0 <= time - self._time < GAP:
+            step = _step(time - self._time)
+            moves, free = _moves(self._frame, now, step)
+            total = self._score[:, None] + moves
+            score = total.max(axis=0) + now.weight
+            best = int(score.argmax())
+            came = int(total[:, best].argmax())
+            if not free[came, best]:
+                before = self._variance + step
+                gain = before / (before + now.spread[best] ** 2)
+                mean = self._mean + gain * (now.mean[best] - self._mean)
+                variance = (1 - gain) * before
+        self._score, self._frame, self._time = score - score.max(), now, time
+        self._mean, self._variance = mean, variance
+        return mean[None].astype(np.float32)
+
+
+class _Frame(NamedTuple):
+    """Components of frames: weight (..., C), a logarithm; mean, spread (..., C, STATE)."""
+
+    weight: np.ndarray
+    mean: np.ndarray
+    spread: np.ndarray
+
+
+def _components(posterior: Posterior) -> _Frame:
+    weight = np.log(np.maximum(posterior.weight, np.finfo(np.float32).tiny))
+    return _Frame(*(np.asarray(each, np.float64) for each in (weight, posterior.mean, posterior.spread)))
+
+
+def _step(seconds: np.ndarray | float) -> np.ndarray:
+    """Variance (..., STATE) of what a state changes by meanwhile."""
+    return np.square(STEP) * np.asarray(seconds)[..., None] / FRAME
+
+
+def _steps(time: np.ndarray) -> np.ndarray:
+    """The same from each frame's one before (T, STATE); free at the first and after gaps."""
+    seconds = np.diff(time, prepend=-np.inf)
+    close = (seconds >= 0) & (seconds < GAP)  # a clock that runs backwards tells nothing
+    return np.where(close[:, None], _step(np.where(close, seconds, 0)), _free())
+
+
+def _free() -> np.ndarray:
+    return np.square([ANYWHERE] * PLACE + [UNKNOWN] * (len(STEP) - PLACE))
+
+
+def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Log-likelihood (..., C, C) of going from each component of one frame to each of the next, and which are jumps."""
+    far = now.mean[..., None, :, :] - before.mean[..., :, None, :]
+    known = np.square(now.spread[..., None, :, :]) + np.square(before.spread[..., :, None, :])
+    lightest = np.minimum(now.mean[..., None, :, PLACE], before.mean[..., :, None, PLACE])
+    untouched = lightest < LEAST_FORCE
+    place = np.arange(len(STEP)) < PLACE
+    variance = known + np.where(untouched[..., None] & place, _free(), step[..., None, None, :])
+    gauss = -0.5 * (np.square(far) / variance + np.log(variance)).sum(axis=-1)
+    return np.maximum(gauss, JUMP), untouched | (gauss < JUMP)
+
+
+def _likeliest(posterior: Posterior, time: np.ndarray) -> _Course:
+    """The likeliest course through the components of each frame."""
+    all_frames = _components(posterior)
+    before, now = (_Frame(*(each[part] for each in all_frames)) for part in (slice(None, -1), slice(1, None)))
+    moves, free = _moves(before, now, _steps(time)[1:])
+    score, came = all_frames.weight[0], np.zeros(posterior.weight.shape, int)
+    for frame in range(1, len(time)):
+        total = score[:, None] + moves[frame - 1]
+        came[frame] = total.argmax(axis=0)
+        score = total.max(axis=0) + all_frames.weight[frame]
+    path = np.empty(len(time), int)
+    path[-1] = score.argmax()
+    for frame in range(len(time) - 1, 0, -1):
+        path[frame - 1] = came[frame, path[frame]]
+    each = np.arange(len(time))
+    begins = np.concatenate([[True], free[each[:-1], path[:-1], path[1:]]])
+    return _Course(all_frames.mean[each, path], np.square(all_frames.spread[each, path]), begins)
+
+
+def _smoothed(course: _Course, steps: np.ndarray) -> np.ndarray:
+    """Means (T, STATE) of a random walk that was measured, given all measurements."""
+    mean, variance, expected = (np.empty_like(course.mean) for _ in range(3))
+    now, spread = course.mean[0], np.zeros(len(STEP))
+    for frame, step in enumerate(steps):
+        expected[frame] = spread + step
+        gain = expected[frame] / (expected[frame] + course.variance[frame])
+        now = now + gain * (course.mean[frame] - now)
+        spread = (1 - gain) * expected[frame]
+        mean[frame], variance[frame] = now, spread
+    for frame in range(len(steps) - 2, -1, -1):
+        back = variance[frame] / expected[frame + 1]
+        mean[frame] += back * (mean[frame + 1] - mean[frame])
+    return mean

@@ -1,0 +1,122 @@
+"""Contacts followed through time: what is decided by neighbours, and what must not be smeared over them."""
+
+import numpy as np
+import pytest
+
+from tactile_core.translation import contact_track
+from tactile_core.translation.contact_track import Follower, Tracked, track
+from tactile_core.translation.networks import Posterior
+
+SPREAD = np.float32([0.1, 0.1, 0.1, 0.1])  # a cell, and 10 % of a force
+OTHER = np.float32([0.8, -0.6, 0, 0])  # where another contact would answer for the same signals
+STATE = np.float32([1.0, 0.5, 2.5, 2.0])
+
+
+def posterior(states, rng, right=0.9):
+    """Two components a frame: the truth, measured with noise, and another place; in 1 - `right` that weighs more."""
+    means = states + SPREAD * rng.standard_normal(states.shape).astype(np.float32)
+    weight = np.where(rng.random(len(states)) < right, 0.6, 0.4).astype(np.float32)
+    mean = np.stack([means, means + OTHER], axis=1)
+    return Posterior(np.stack([weight, 1 - weight], axis=1), mean, np.broadcast_to(SPREAD, mean.shape))
+
+
+def part(whole, start, stop):
+    return Posterior(whole.weight[start:stop], whole.mean[start:stop], whole.spread[start:stop])
+
+
+def follow(whole, time):
+    follower = Follower()
+    return np.concatenate([follower(part(whole, at, at + 1), time[at]) for at in range(len(time))])
+
+
+def place_error(states, truth):
+    return np.hypot(*(states - truth)[:, :2].T)
+
+
+@pytest.fixture
+def sliding():
+    """Three seconds of a contact that moves by 2 cells, and what each frame says of it."""
+    truth = np.tile(STATE, (300, 1))
+    truth[:, 0] += np.linspace(0, 0.2, 300, dtype=np.float32)
+    return truth, posterior(truth, np.random.default_rng(5)), np.arange(300) / 100
+
+
+def test_neighbours_decide_between_two_places(sliding):
+    truth, told, time = sliding
+    alone, both, causal = (place_error(each, truth) for each in (told.heaviest, track(told, time), follow(told, time)))
+    assert np.mean(alone > 0.5) > 0.05  # what there is to decide
+    assert both.max() < 0.5
+    assert np.median(both) < 0.5 * np.median(alone)
+    assert np.mean(causal > 0.5) < 0.02
+    assert np.median(causal) < 0.7 * np.median(alone)
+
+
+@pytest.mark.parametrize("frames", [3, 5])
+def test_a_tap_keeps_its_frames_and_its_force(frames):
+    """50 ms and less: what is not touched stays so, and no force is lost to the neighbours."""
+    truth = np.zeros((60, 4), np.float32)
+    truth[30 : 30 + frames] = STATE
+    told, time = posterior(truth, np.random.default_rng(2), right=1.0), np.arange(60) / 100
+    for found in (track(told, time), follow(told, time)):
+        touched = found[:, 2] > contact_track.LEAST_FORCE
+        assert np.array_equal(np.flatnonzero(touched), np.arange(30, 30 + frames))
+        assert np.abs(found[touched, 2] - STATE[2]).max() < 3 * SPREAD[2]
+
+
+def test_a_contact_that_comes_elsewhere_is_not_drawn_there():
+    """Two places, with three frames without contact between them."""
+    truth = np.tile(STATE, (43, 1))
+    truth[20:23] = 0
+    truth[23:, :2] = -STATE[:2]
+    told = posterior(truth, np.random.default_rng(3), right=1.0)
+    found = track(told, np.arange(43) / 100)
+    assert place_error(found, truth)[np.r_[:20, 23:43]].max() < 3 * SPREAD[0]
+
+
+def test_nothing_is_smoothed_over_a_gap():
+    truth = np.tile(STATE, (40, 1))
+    truth[20:, :2] += 0.3
+    told = posterior(truth, np.random.default_rng(4), right=1.0)
+    time = np.arange(40) / 100
+    time[20:] += 10
+    found = track(told, time)
+    apart = [track(part(told, *rows), time[slice(*rows)]) for rows in ((0, 20), (20, 40))]
+    assert np.allclose(found, np.concatenate(apart), atol=2e-3)  # what an all but free step still ties
+    clock = np.concatenate([time[20:], time[:20]])  # one that was set back
+    assert np.isfinite(track(told, clock)).all()
+
+
+def test_no_lag_in_a_ramp(sliding):
+    """A force that grows within 0.2 s is not answered late: no frame's force is that of one before or after."""
+    ramp = np.concatenate([np.zeros(20), np.linspace(0, 3, 20), np.full(20, 3.0), np.linspace(3, 0, 20), np.zeros(20)])
+    truth = np.tile(STATE, (100, 1)) * (ramp > 0)[:, None]
+    truth[:, 2:] = ramp[:, None]
+    told = posterior(truth.astype(np.float32), np.random.default_rng(6), right=1.0)
+    found = track(told, np.arange(100) / 100)[:, 2]
+    off = [np.abs(np.roll(found, -lag) - ramp)[5:95].mean() for lag in (-1, 0, 1)]
+    assert np.argmin(off) == 1
+    assert off[1] < 0.1
+
+
+def test_a_frame_depends_on_no_choice_of_frames():
+    rng = np.random.default_rng(7)
+    truth = np.cumsum(rng.normal(scale=0.02, size=(1000, 4)), axis=0).astype(np.float32) + STATE
+    told, time = posterior(truth, rng), np.arange(1000) / 100
+
+    def read(start, stop):
+        return time[start:stop], part(told, start, stop)
+
+    whole = Tracked(read, 1000)(np.arange(1000))
+    for frames in (np.arange(0, 1000, 7), np.arange(250, 262), np.array([999])):
+        assert np.array_equal(Tracked(read, 1000)(frames), whole[frames])
+    steps = Tracked(read, 1000)
+    assert np.array_equal(np.concatenate([steps(np.arange(at, at + 50)) for at in range(0, 1000, 50)]), whole)
+    # The margin is as good as the whole recording, but for what a choice between components carries further.
+    assert np.mean(np.abs(whole - track(told, time)) > 0.02) < 0.01
+
+
+def test_no_frame_and_one_frame():
+    told = posterior(STATE[None], np.random.default_rng(8), right=1.0)
+    assert track(part(told, 0, 0), np.empty(0)).shape == (0, 4)
+    assert np.allclose(track(told, np.zeros(1)), told.heaviest, atol=2e-3)
+    assert np.array_equal(follow(told, np.zeros(1)), told.heaviest)
