@@ -23,7 +23,8 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.repair import fill
 from tactile_core.recordings.signals import FRAMEWISE
 from tactile_core.sensors import unrolling
-from tactile_core.translation.translate import Translation
+from tactile_core.translation.contact_track import track
+from tactile_core.translation.translate import Translation, Translator
 
 from . import slide_set
 from .slide_metrics import CONTACT, Figures, figures, largest_step
@@ -63,7 +64,9 @@ def translate(
     """Translate one recording as `tactile convert` does. Raises TactileError for a file that cannot be read."""
     recording = read(path)
     signals = prepare_unit(recording, options, sensor)
-    parts = [_translate(part, network) for part in _chunks(signals)]
+    tracked = isinstance(network, Translator)  # a null answers by itself
+    state = track(network.posterior(signals), recording.time) if tracked else [None] * len(recording)
+    parts = [_translate(_part(signals, rows), network, state[rows]) for rows in _chunks(len(recording))]
     force, volume, centre, latent = (np.concatenate([part[k] for part in parts]) for k in range(4))
     missed = ~np.isfinite(centre).all(axis=1)
     return Translated(
@@ -75,17 +78,19 @@ def translate(
     )  # fmt: skip
 
 
-def _chunks(signals: Signals) -> list[Signals]:
-    starts = range(0, len(signals.change), CHUNK)
-    return [
-        dataclasses.replace(signals, **{name: getattr(signals, name)[start : start + CHUNK] for name in FRAMEWISE})
-        for start in starts
-    ]
+def _chunks(count: int) -> list[slice]:
+    return [slice(start, start + CHUNK) for start in range(0, count, CHUNK)]
 
 
-def _translate(signals: Signals, network: Translate) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
+def _part(signals: Signals, rows: slice) -> Signals:
+    return dataclasses.replace(signals, **{name: getattr(signals, name)[rows] for name in FRAMEWISE})
+
+
+def _translate(
+    signals: Signals, network: Translate, state: np.ndarray | list[None]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
     """force N, volume mm3, centre mm, latent, count of numbers that are none."""
-    found = network(signals)
+    found = network(signals, state) if isinstance(state, np.ndarray) else network(signals)
     arrays = (found.force, found.displacement_biotac, found.displacement_digit, found.latent_digit, found.confidence)
     not_finite = sum(int(np.count_nonzero(~np.isfinite(array))) for array in arrays)
     volume = 1e9 * displaced_volume(found.displacement_digit)
