@@ -2,8 +2,9 @@
 
 A finger's contact moves little in 10 ms, so a frame whose signals leave two places open is decided by its neighbours.
 Each frame's posterior is a mixture; first the best course through its components is found, by their weights less the
-price of each step (Viterbi 1967), then what it measures is smoothed both ways (Kalman filter; Rauch, Tung and Striebel
-1965). `Follower` does the filter alone, frame by frame, for what is being recorded.
+price of each step (Viterbi 1967), then the places on it are smoothed both ways (Kalman filter; Rauch, Tung and Striebel
+1965). Force and depth may change within a frame, so they are not smoothed: they are what the frame's own signals say,
+given its place. `Follower` does the filter alone, frame by frame, for what is being recorded.
 
 A course is free to jump where nothing touches, where frames are missing, and, at a price, anywhere.
 """
@@ -24,7 +25,6 @@ STEP = np.array([0.03, 0.03, 0.6, 0.6])
 FRAME = 0.01  # s
 GAP = 0.1  # s without a frame: nothing is known of what happened meanwhile (assumed)
 ANYWHERE = 2.0  # tens of cells: the standard deviation of a place that may be anywhere on a sensor
-UNKNOWN = 10.0  # the same of asinh of a force or depth
 # Of a contact's state, below which nothing touches: half the force of the lightest contact that training knows, 0.06 N.
 LEAST_FORCE = float(np.arcsinh(0.03 / FORCE_SCALE))
 JUMP = 8.0  # price of a jump in mid-contact: that of a step of four standard deviations (assumed)
@@ -34,7 +34,7 @@ Read = Callable[[int, int], tuple[np.ndarray, Posterior]]
 
 
 class _Course(NamedTuple):
-    """What the best course measures. mean, variance : (T, STATE); free : (T,), whether it begins anew there."""
+    """The places on the best course. mean, variance : (T, PLACE); free : (T,), whether it begins anew there."""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -45,9 +45,9 @@ def track(posterior: Posterior, time: np.ndarray) -> np.ndarray:
     """Posterior of T frames at times (T,) s -> (T, STATE) float32, the state of the contact in each, both ways."""
     if len(time) == 0:
         return np.zeros(posterior.mean.shape[::2], np.float32)
-    course, steps = _best_course(posterior, time), _steps(time)
-    steps = np.where(course.free[:, None], _free(), steps)
-    return _smoothed(course, steps).astype(np.float32)
+    course = _best_course(posterior, time)
+    steps = np.where(course.free[:, None], ANYWHERE**2, _steps(time)[:, :PLACE])
+    return _given(_smoothed(course, steps), _components(posterior)).astype(np.float32)
 
 
 class Tracked:
@@ -78,27 +78,26 @@ class Follower:
 
     def __init__(self) -> None:
         self._score: np.ndarray | None = None
+        self._place = np.zeros(PLACE)
 
     def __call__(self, posterior: Posterior, time: float) -> np.ndarray:
         """Posterior of one frame at `time` s -> (1, STATE) float32, the state of its contact."""
         now = _Frame(*(each[0] for each in _components(posterior)))
-        score, best = now.weight, int(now.weight.argmax())
-        mean, variance = now.mean[best], now.spread[best] ** 2
+        score, before = now.weight, np.full(PLACE, ANYWHERE**2)
         if self._score is not None and 0 <= time - self._time < GAP:
             step = _step(time - self._time)
             moves, free = _moves(self._frame, now, step)
             total = self._score[:, None] + moves
             score = total.max(axis=0) + now.weight
-            best = int(score.argmax())
-            came = int(total[:, best].argmax())
-            if not free[came, best]:
-                before = self._variance + step
-                gain = before / (before + now.spread[best] ** 2)
-                mean = self._mean + gain * (now.mean[best] - self._mean)
-                variance = (1 - gain) * before
+            if not free[total[:, score.argmax()].argmax(), score.argmax()]:
+                before = self._variance + step[:PLACE]
+        best = int(score.argmax())
+        gain = before / (before + now.spread[best, :PLACE] ** 2)
+        place = self._place + gain * (now.mean[best, :PLACE] - self._place)
+        variance = (1 - gain) * before
         self._score, self._frame, self._time = score - score.max(), now, time
-        self._mean, self._variance = mean, variance
-        return mean[None].astype(np.float32)
+        self._place, self._variance = place, variance
+        return _given(place[None], _Frame(*(each[None] for each in now))).astype(np.float32)
 
 
 class _Frame(NamedTuple):
@@ -123,11 +122,7 @@ def _steps(time: np.ndarray) -> np.ndarray:
     """The same from each frame's one before (T, STATE); free at the first and after gaps."""
     seconds = np.diff(time, prepend=-np.inf)
     close = (seconds >= 0) & (seconds < GAP)  # a clock that runs backwards tells nothing
-    return np.where(close[:, None], _step(np.where(close, seconds, 0)), _free())
-
-
-def _free() -> np.ndarray:
-    return np.square([ANYWHERE] * PLACE + [UNKNOWN] * (len(STEP) - PLACE))
+    return np.where(close[:, None], _step(np.where(close, seconds, 0)), ANYWHERE**2)
 
 
 def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -163,13 +158,23 @@ def _best_course(posterior: Posterior, time: np.ndarray) -> _Course:
         path[frame - 1] = came[frame, path[frame]]
     each = np.arange(len(time))
     begins = np.concatenate([[True], free[each[:-1], path[:-1], path[1:]]])
-    return _Course(all_frames.mean[each, path], np.square(all_frames.spread[each, path]), begins)
+    mean, spread = (values[each, path, :PLACE] for values in all_frames[1:])
+    return _Course(mean, np.square(spread), begins)
+
+
+def _given(place: np.ndarray, components: _Frame) -> np.ndarray:
+    """States (T, STATE) at places (T, PLACE): force and depth are the components' mean, as far as they lie there."""
+    far = (place[:, None] - components.mean[..., :PLACE]) / components.spread[..., :PLACE]
+    share = components.weight - (0.5 * np.square(far) + np.log(components.spread[..., :PLACE])).sum(axis=-1)
+    share = np.exp(share - share.max(axis=-1, keepdims=True))
+    share /= share.sum(axis=-1, keepdims=True)
+    return np.concatenate([place, (share[..., None] * components.mean[..., PLACE:]).sum(axis=1)], axis=-1)
 
 
 def _smoothed(course: _Course, steps: np.ndarray) -> np.ndarray:
-    """Means (T, STATE) of a random walk that was measured, given all measurements."""
+    """Means (T, PLACE) of a random walk that was measured, given all measurements."""
     mean, variance, expected = (np.empty_like(course.mean) for _ in range(3))
-    now, spread = course.mean[0], np.zeros(len(STEP))
+    now, spread = course.mean[0], np.zeros(PLACE)
     for frame, step in enumerate(steps):
         expected[frame] = spread + step
         gain = expected[frame] / (expected[frame] + course.variance[frame])

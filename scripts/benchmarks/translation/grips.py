@@ -22,6 +22,7 @@ from tactile_core.recordings.signals import FRAMEWISE
 from tactile_core.sensors import digit, digit_surface, electrodes
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation import adapt, networks, reference_signals
+from tactile_core.translation.contact_track import track
 from tactile_core.translation.translate import Translator, contact_center
 from tactile_core.translation.unit_rest import find_rest
 
@@ -116,9 +117,10 @@ def _judged(
 ) -> tuple[float, float, float]:
     """Whether the median place lies in the box; shares of frames with a place, and of those out of range."""
     signals = prepare_unit(recording, None, unit)
+    signals = dataclasses.replace(signals, change=signals.change[:, order], rest=signals.rest[order])
+    state = track(network.posterior(signals), recording.time)[::EVERY]
     some = {name: getattr(signals, name)[::EVERY] for name in FRAMEWISE}
-    some |= {"change": some["change"][:, order], "rest": signals.rest[order]}
-    found = network(dataclasses.replace(signals, **some))
+    found = network(dataclasses.replace(signals, **some), state)
     known = np.isfinite(found.contact_center[:, 0])
     within = known.any() and in_box(np.median(found.contact_center[known], axis=0))
     return float(within), float(known.mean()), float((found.flags & Flag.OUT_OF_RANGE > 0).mean())

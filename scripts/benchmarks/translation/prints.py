@@ -7,7 +7,7 @@ pictures stay empty.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from tactile_core.pictures.renderer import Renderer
 from tactile_core.recordings import Signals
 from tactile_core.recordings.signals import FRAMEWISE
 from tactile_core.sensors import PRESSURE_PER_COUNT
+from tactile_core.translation.contact_track import FRAME, track
 from tactile_core.translation.translate import Translator
 
 WINDOW = 32  # px
@@ -55,18 +56,17 @@ def _over(figure: Callable[[np.ndarray], float], values: np.ndarray) -> float | 
 
 def _frames(signals: Signals, network: Translator) -> np.ndarray:
     """(T, 3) of every 20th frame: pressure Pa, whether the contact lies in the picture, levels of `strongest`."""
-    render = Renderer(preset="fast")
-    return np.concatenate([_drawn(part, network, render) for part in _chunks(signals)])
+    render, state = Renderer(preset="fast"), track(network.posterior(signals), np.arange(len(signals.change)) * FRAME)
+    return np.concatenate([_drawn(signals, network, state, render, rows) for rows in _chunks(len(signals.change))])
 
 
-def _chunks(signals: Signals) -> Iterator[Signals]:
-    for start in range(0, len(signals.change), EVERY * CHUNK):
-        some = slice(start, start + EVERY * CHUNK, EVERY)
-        yield dataclasses.replace(signals, **{name: getattr(signals, name)[some] for name in FRAMEWISE})
+def _chunks(count: int) -> list[slice]:
+    return [slice(start, start + EVERY * CHUNK, EVERY) for start in range(0, count, EVERY * CHUNK)]
 
 
-def _drawn(signals: Signals, network: Translator, render: Renderer) -> np.ndarray:
-    found = network(signals)
+def _drawn(signals: Signals, network: Translator, state: np.ndarray, render: Renderer, rows: slice) -> np.ndarray:
+    signals = dataclasses.replace(signals, **{name: getattr(signals, name)[rows] for name in FRAMEWISE})
+    found = network(signals, state[rows])
     place = found.contact_center
     seen = np.isfinite(place[:, 0]) & render.camera.sees(*place.T)
     rest = render.background.astype(float)
