@@ -72,5 +72,5 @@ if __name__ == "__main__":
     from tactile_core.cli.main import main
     from tactile_core.jobs import convert
 
-    convert.load_tools = lambda weights=None, frames_apart=False: tools()
+    convert.load_tools = lambda weights=None, answer=None: tools()
     sys.exit(main())

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.stopwatch import Stopwatch
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from ..accuracy import Budget
     from ..recordings import PrepareOptions, Recording
     from ..recordings.electrode_gains import SensorFile
+    from ..translation.answer import Answer
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,13 +47,12 @@ def load_tools(
     calibration: str | os.PathLike | None = None,
     preset: str = "fast",
     variant: str | None = None,
-    *,
-    frames_apart: bool = False,
+    answer: Answer | None = None,
 ) -> Tools:
     """The shipped weights, or those in a folder, and the camera and lights of a DIGIT: the shipped unit's, or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
-    frames_apart : translate each frame alone, instead of following contacts through time
+    answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``
     Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
     ``renderer.Renderer`` raises.
     """
@@ -58,7 +60,7 @@ def load_tools(
     from ..sensors.calibration_file import load_calibration
     from ..translation import translate
 
-    translator, unit = translate.load_translator(weights), load_calibration(calibration)
+    translator, unit = translate.load_translator(weights, answer), load_calibration(calibration)
     mapper = height_map.digit_mapper(unit.camera)
     if preset == "fast":
         shade = shading.Shader(unit)
@@ -66,8 +68,11 @@ def load_tools(
         from ..pictures.renderer import Renderer
 
         shade = Renderer(unit, preset, variant)
-    posterior = None if frames_apart else translator.posterior
-    return Tools(translator, translator.card, translator.sha256, mapper, shade, preset, unit.camera, posterior)
+    asked = translator.answer
+    posterior = translator.posterior if asked.follows else None
+    drawn = translator.plausible if asked.samples else None
+    named = translator.card, translator.sha256
+    return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked)
 
 
 def within(tools: Tools, levels: float) -> tuple[Tools, str]:
@@ -166,7 +171,7 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
                     "error": None if options.error is None else str(options.error), "preset": tools.preset,
-                    "frames_apart": tools.posterior is None},
+                    "answer": msgspec.to_builtins(tools.answer)},
         "frames_converted": len(made.frames),
         "prepared": made.signals.report,
         "warnings": list(made.warnings()),

@@ -16,10 +16,11 @@ from ..recordings import flags
 from ..recordings.signals import FRAMEWISE
 from ..sensors import PRESSURE_PER_COUNT
 from ..sensors.camera import Camera
+from ..translation.answer import Answer
 from ..translation.contact_track import Tracked
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet
-from .frames_file import FramesFile
+from .frames_file import FramesFile, kept
 from .sampling_error import depth_share
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ class Tools:
     height_map : (T, M, 3) m -> (T, H, W) m; shade : (H, W) m -> (H, W, 3) uint8, by a preset of ``pictures.presets``
     camera : of the DIGIT that is drawn, by which contacts beside its picture are flagged; None: none are
     posterior : Signals -> Posterior, by which contacts are followed through time; None: each frame is translated alone
+    plausible : Signals and frames (T,) -> contacts drawn for each, by ``plausible.NAMES``; None: none are
+    answer : what the translator was asked for
     """
 
     translate: Callable[..., Translation]
@@ -58,6 +61,8 @@ class Tools:
     preset: str = "fast"
     camera: Camera | None = None
     posterior: Callable[[Signals], Posterior] | None = None
+    plausible: Callable[[Signals, np.ndarray], dict[str, np.ndarray]] | None = None
+    answer: Answer = dataclasses.field(default_factory=Answer)
 
     def tracked(self, read: Callable[[int, int], tuple[np.ndarray, Signals]], count: int) -> Tracked | None:
         """States of the contact in a recording of `count` frames, of which `read` gives some, with their times, s."""
@@ -76,6 +81,8 @@ def translated(signals: Signals, tools: Tools, tracked: Tracked | None, frames: 
     """What a translation makes of `signals`, T first, by the names of frames.h5; frames : (T,) in the recording."""
     translation = tools.translate(signals) if tracked is None else tools.translate(signals, tracked(frames))
     arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
+    if tools.plausible is not None:
+        arrays |= tools.plausible(signals, frames)
     arrays |= {"electrodes": signals.electrodes, "pressure_measured": PRESSURE_PER_COUNT * signals.pdc}
     return arrays | {"flags": arrays["flags"] | signals.flags | _beyond_picture(arrays["contact_center"], tools.camera)}
 
@@ -118,7 +125,7 @@ class FramePass:
             (folder / results.IMAGES).mkdir()
         name = self.recording.name.encode(errors="replace").decode()  # HDF5 text is UTF-8, file names need not be
         about = {"recording": name, "simulated": self.recording.simulated}
-        with FramesFile(folder / results.FRAMES, len(self.frames), self.keep, about) as file:
+        with FramesFile(folder / results.FRAMES, len(self.frames), kept(self.keep, self.tools.answer), about) as file:
             for start in range(0, len(self.frames), CHUNK):
                 frames = self.frames[start : start + CHUNK]
                 arrays = self._translate(frames)
@@ -134,7 +141,7 @@ class FramePass:
 
     def warnings(self) -> tuple[str, ...]:
         """What the user should know: of the recording, and of what became of its frames."""
-        found = list(self.signals.warnings)
+        found = [*self.signals.warnings, *self.tools.answer.told()]
         for name, meaning in REMARKABLE.items():
             if self.flagged[name]:
                 found.append(f"{self.flagged[name]} of {len(self.frames)} frames: {meaning} (flag {name})")

@@ -17,7 +17,7 @@ from ..files.hdf5_checked import check_before_opening
 from ..recordings.signals import FRAMEWISE
 from .engine import job as jobs
 from .frame_pass import CHUNK, Tools, translated
-from .frames_file import FramesFile
+from .frames_file import FramesFile, kept
 from .prepared_signals import Prepared
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
     }  # fmt: skip
     with atomic.new_file(file, shared=True) as partial:
         keep = tuple(job.recipe.keep)
-        with FramesFile(partial, stop - start, keep, attributes, room=checksummed.ROOM) as out:
+        with FramesFile(partial, stop - start, kept(keep, tools.answer), attributes, room=checksummed.ROOM) as out:
             for first in range(0, stop - start, CHUNK):
                 rows = slice(first, first + CHUNK)
                 out.write(first, _arrays(signals, time, rows, start, keep, tools, tracked))

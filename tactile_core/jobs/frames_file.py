@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,8 @@ from ..recordings import flags
 if TYPE_CHECKING:
     import h5py
     import numpy as np
+
+    from ..translation.answer import Answer
 
 FORMAT = "tactile-frames-1"
 
@@ -34,6 +36,7 @@ ALWAYS = {
     "pressure_measured": ("Pa", "the fluid's, by PDC, over its level at rest; NaN where the recording has no PDC"),
     "flags": ("bits", "what is remarkable about a frame; attribute names: JSON, name -> bit"),
 }
+SAMPLES = "samples"  # what --samples asks for, no word of --keep
 KEPT = {
     "latent": {
         "latent_signal": ("1", "(T, K) code of the electrodes (SVB)"),
@@ -46,6 +49,10 @@ KEPT = {
     },
     "height": {"height_map": ("m", "(T, 320, 240) of the gel seen by the camera; see pictures.height_map")},
     "image": {},
+    SAMPLES: {
+        "sample_center": ("m", "(T, S, 2) = (x, z) on the DIGIT of contacts that the frame may be as well; NaN: none"),
+        "sample_force": ("N", "(T, S) of these contacts; 0 without contact"),
+    },
 }
 PICTURES = {"image": ("1", "(T, 320, 240, 3) sRGB pictures of the DIGIT")}  # in shards; elsewhere they are PNG files
 # Displacements and codes are stored plain: measured on smooth dents, gzip saves 21 % of the bytes for 1.5 ms a frame
@@ -55,6 +62,11 @@ PACKED = {
     "image": {"compression": "gzip", "compression_opts": 4},
 }
 LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk of its own
+
+
+def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
+    """Words of KEPT for words of results.KEEPABLE: contacts that are drawn are kept as well."""
+    return (*keep, SAMPLES) if answer.samples else tuple(keep)
 
 
 def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:

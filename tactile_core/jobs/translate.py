@@ -14,6 +14,7 @@ from .engine.kinds import Seen
 from .frame_pass import Tools
 
 if TYPE_CHECKING:
+    from ..translation.answer import Answer
     from .engine.job import Job
 
 GROWS = False
@@ -28,7 +29,7 @@ def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
     """Translate some frames."""
     recipe = job.recipe
-    unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant, recipe.frames_apart)
+    unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant, recipe.answer)
     return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit))
 
 
@@ -50,13 +51,13 @@ def _tools(
     unit_sha256: str,
     preset: str,
     variant: str,
-    frames_apart: bool,
+    answer: Answer,
 ) -> Tools:
     """The networks and the unit, once a process. Raises TactileError where they are not those of the job."""
     from .convert import load_tools
 
     check_unit(calibration, unit_sha256)
-    tools = load_tools(weights, calibration, preset, variant or None, frames_apart=frames_apart)
+    tools = load_tools(weights, calibration, preset, variant or None, answer)
     if tools.sha256 != sha256:
         found, advice = f"sha256 {tools.sha256[:12]}...", "Use the weights that the job was made with"
         raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)

@@ -134,9 +134,14 @@ def frame_of(sensor: str, half: int) -> ContactFrame:
 def on_skin(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
     """(F, 3) m on the resting skin of places (F, 2) on its lattice, between nodes by bilinear interpolation."""
     rest = sensors.biotac_surface().rest[: frame.rows * frame.columns].reshape(frame.rows, frame.columns, 3)
-    size = np.array([frame.rows, frame.columns])
+    return between_nodes(rest, place)
+
+
+def between_nodes(grid: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """(F, k), bilinear interpolation of what is known at a lattice's nodes (rows, columns, k), at places (F, 2)."""
+    size = np.array(grid.shape[:2])
     at = np.clip(place * PLACE_UNIT + (size - 1) / 2, 0, size - 1)
     cell = np.minimum(at.astype(int), size - 2)
     (i, j), (t, s) = cell.T, (at - cell).T[:, :, None]
-    before, behind = ((1 - s) * rest[row, j] + s * rest[row, j + 1] for row in (i, i + 1))
+    before, behind = ((1 - s) * grid[row, j] + s * grid[row, j + 1] for row in (i, i + 1))
     return (1 - t) * before + t * behind

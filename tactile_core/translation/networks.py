@@ -95,6 +95,11 @@ class Posterior:
         """(T, STATE), mean of the component that weighs most: one contact, not the average of all."""
         return self.mean[np.arange(len(self.mean)), self.weight.argmax(-1)]
 
+    @property
+    def average(self) -> np.ndarray:
+        """(T, STATE), mean over all components: the least squares, where there is one component."""
+        return (self.weight[..., None] * self.mean).sum(1)
+
 
 class Networks:
     """The trained networks. Arrays are float32, T first; displacements in metres, forces in newtons, changes in counts.

@@ -14,7 +14,8 @@ from ..recordings import Signals
 from ..recordings.flags import Flag
 from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
-from . import error_bounds, networks
+from . import error_bounds, gel_place, networks, plausible
+from .answer import MEAN, Answer
 from .contact_track import LEAST_FORCE, track
 from .error_bounds import KINDS
 from .network_sizes import PLACE, SURFACES
@@ -32,7 +33,7 @@ IN_RANGE = 0.99
 class Translation:
     """What a recording becomes; T frames first, float32, SI units.
 
-    latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents
+    latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents, before a mount's shift
     displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
     force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, as displacements are
     pressure : (T,) Pa, by which the fluid's has risen, told from the electrodes alone; zero as the force is
@@ -78,34 +79,48 @@ def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) ->
 class Translator:
     """Verified networks, ready to translate. card : what they are; sha256 : of the card, which names all weights."""
 
-    def __init__(self, nets: Networks) -> None:
+    def __init__(self, nets: Networks, answer: Answer | None = None) -> None:
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
+        self.answer = answer or Answer()
+        moved = self.answer.mount_shift
+        self._shift = gel_place.Shift(nets.frames["MVD"], moved) if moved.any() else None
         self._unrolled = surface.unrolled_nodes()
 
     def posterior(self, signals: Signals) -> Posterior:
         """What each frame's signals say of its contact, each frame alone; ``contact_track`` follows it through time."""
-        rectified = _rectified(signals)
-        return self.nets.posterior(self.nets.encode_signal(signals.typical, rectified), rectified)
+        return self.nets.posterior(self._latent_signal(signals), _rectified(signals))
 
     def followed(self, signals: Signals, time: np.ndarray) -> Translation:
         """Translate a recording in one piece: frames at times (T,) s, each decided by its neighbours too."""
-        return self(signals, track(self.posterior(signals), time))
+        return self(signals, track(self.posterior(signals), time) if self.answer.follows else None)
+
+    def plausible(self, signals: Signals, frames: np.ndarray) -> dict[str, np.ndarray]:
+        """Contacts drawn for each frame, as many as the answer asks for, by ``plausible.NAMES``; frames : (T,)."""
+        rectified, latent = _rectified(signals), self._latent_signal(signals)
+        states = plausible.draw(self.nets.posterior(latent, rectified), frames, self.answer.samples)
+        return plausible.contacts(self.nets, latent, states, rectified, self.answer.mount_shift)
+
+    def _latent_signal(self, signals: Signals) -> np.ndarray:
+        return self.nets.encode_signal(np.asarray(signals.typical, np.float32), _rectified(signals))
 
     def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
         """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours.
 
-        state : (T, STATE) of the contacts, found by more than a frame each; None: the most plausible of each frame
+        state : (T, STATE) of the contacts, found by more than a frame each; None: as ``answer`` says, of each frame
         """
         nets = self.nets
         rectified = _rectified(signals)
         change = np.asarray(signals.typical, np.float32)
         latent_signal = nets.encode_signal(change, rectified)
         if state is None:
-            state = nets.contact(latent_signal, rectified)
+            posterior = nets.posterior(latent_signal, rectified)
+            state = posterior.average if self.answer.kind == MEAN else posterior.heaviest
         latent_biotac = nets.given(latent_signal, state, rectified)
         latent_digit = nets.m2m(latent_biotac)
         touched = (state[:, PLACE] > LEAST_FORCE)[:, None, None]
         biotac, digit = nets.decode_biotac(latent_biotac) * touched, nets.decode_digit(latent_digit) * touched
+        if self._shift is not None:
+            digit = self._shift(digit)
         center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m"))
         silent = np.isnan(center[:, 0])
         confidence = self._confidence(change, signals.flags, rectified)
@@ -175,6 +190,7 @@ class Translator:
         weight = np.where(core & np.isfinite(self._unrolled[:, 0]), moved, 0)
         total = weight.sum(axis=1)
         center = weight @ np.nan_to_num(self._unrolled) / np.where(total > 0, total, 1)[:, None]
+        center += self.answer.mount_shift
         outside = digit_shape.outline_distance(center[:, 0], center[:, 1]) <= 0
         return core.any(axis=1) & (outside | (total == 0))
 
@@ -202,8 +218,8 @@ def _grows(values: object) -> bool:
     return numbers and all(0 <= v <= sys.float_info.max for v in values) and values == sorted(values)
 
 
-def load_translator(folder: str | os.PathLike | None = None) -> Translator:
-    """The networks of a weights folder, the shipped ones by default.
+def load_translator(folder: str | os.PathLike | None = None, answer: Answer | None = None) -> Translator:
+    """The networks of a weights folder, the shipped ones by default, and how they answer.
 
     Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces.
     """
@@ -220,4 +236,4 @@ def load_translator(folder: str | os.PathLike | None = None) -> Translator:
                 f"{card_file}, {key}", f"{str(nets.card.get(key))[:12]}...",
                 f"{here[:12]}..., the surface of this version", "Use weights trained with this version of the sensors",
             )  # fmt: skip
-    return Translator(nets)
+    return Translator(nets, answer)

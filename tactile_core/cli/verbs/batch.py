@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ..terminal import bar, complain, say, tell
 from . import engine
-from .common import PRESETS, RESUMES, frames_apart_argument, prepare_arguments, prepare_words, progress_argument
+from .common import (
+    PRESETS,
+    RESUMES,
+    answer_arguments,
+    answer_words,
+    prepare_arguments,
+    prepare_words,
+    progress_argument,
+)
 
 if TYPE_CHECKING:
     from ...jobs.engine.job import Job
@@ -37,7 +45,8 @@ LEAVES = RESUMES
 RECIPE = (  # option, its value where it is not given
     *((name, None) for name in ("keep", "shard_frames", "weights", "sensor", "calibration", "preset")),
     *((name, None) for name in ("kind", "counts_per_unit", "smooth")),
-    *(("tare", "auto"), ("no_drift", False), ("polarity", "auto"), ("frames_apart", False)),
+    *(("tare", "auto"), ("no_drift", False), ("polarity", "auto")),
+    *(("frames_apart", False), ("answer", "likely"), ("mount_shift", None), ("samples", 0)),
 )
 
 
@@ -49,7 +58,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         "--keep", metavar="WORDS", help="out of latent,displacement,height,image (default: latent,displacement)"
     )
     verb.add_argument("--shard-frames", type=int, metavar="N", help="frames a shard (default: 1000)")
-    frames_apart_argument(verb)
+    answer_arguments(verb)
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
     verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--calibration", metavar="FILE", help="the DIGIT whose pictures to make (`tactile calibrate`)")
@@ -140,7 +149,7 @@ def _recipe(options: argparse.Namespace) -> Translate:
     if options.preset is not None and "image" not in keep:
         raise TactileError("--preset", preset, "--keep image", "Keep the pictures that it makes")
     return Translate(
-        list(keep), sha256, frames, prepare, sensor, unit, preset, variant_for(preset), options.frames_apart
+        list(keep), sha256, frames, prepare, sensor, unit, preset, variant_for(preset), answer_words(options)
     )
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...errors import TactileError
+
+if TYPE_CHECKING:
+    from ...translation.answer import Answer
 
 # What a stopped verb leaves.
 NOTHING = "no half file is left"
@@ -63,13 +66,43 @@ def electrodes_argument(verb: argparse.ArgumentParser) -> None:
     )
 
 
-def frames_apart_argument(verb: argparse.ArgumentParser) -> None:
-    """``--frames-apart``."""
+def answer_arguments(verb: argparse.ArgumentParser) -> None:
+    """What a frame is answered by; see ``translation.answer``."""
+    verb.add_argument(
+        "--answer",
+        choices=("likely", "mean"),
+        default="likely",
+        help="by the most plausible contact, sharp; or by the mean of all that are plausible, each frame alone, which"
+        " blurs where signals leave two places open (default: likely)",
+    )
     verb.add_argument(
         "--frames-apart",
         action="store_true",
         help="translate each frame alone, instead of following the contact through the frames before and after",
     )
+    verb.add_argument(
+        "--mount-shift",
+        metavar="X,Z",
+        help="lay the BioTac elsewhere on the DIGIT: move all contacts by so many mm along and across the gel, so that"
+        " those at the tip come into the picture; +x leads from the tip to the base",
+    )
+    verb.add_argument(
+        "--samples",
+        type=int,
+        default=0,
+        metavar="N",
+        help="draw N contacts for each frame from what its signals say, as sample_center and sample_force in frames.h5",
+    )
+
+
+def answer_words(options: argparse.Namespace) -> Answer:
+    """The `Answer` that the arguments of `answer_arguments` say."""
+    from ...translation.answer import MOST_SAMPLES, Answer, parse_shift
+
+    if not 0 <= options.samples <= MOST_SAMPLES:
+        raise TactileError("--samples", str(options.samples), f"0 to {MOST_SAMPLES}")
+    shift = (0.0, 0.0) if options.mount_shift is None else parse_shift(options.mount_shift)
+    return Answer(options.answer, options.frames_apart, shift, options.samples)
 
 
 def error_argument(verb: argparse.ArgumentParser, what: str) -> None:

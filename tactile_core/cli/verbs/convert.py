@@ -7,7 +7,15 @@ import argparse
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import bar, complain, say, tell
-from .common import NOTHING, error_argument, frames_apart_argument, prepare_arguments, prepare_words, progress_argument
+from .common import (
+    NOTHING,
+    answer_arguments,
+    answer_words,
+    error_argument,
+    prepare_arguments,
+    prepare_words,
+    progress_argument,
+)
 
 BRIEF = "recordings to DIGIT pictures"
 TEXT = """\
@@ -61,7 +69,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     prepare_arguments(verb)
     verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
-    frames_apart_argument(verb)
+    answer_arguments(verb)
     error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
     progress_argument(verb)
 
@@ -80,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget)
     paths, failed = _fingers(options.recordings), 0
     folders = results.result_folders(paths, options.out, options.overwrite)
-    tools = convert.load_tools(options.weights, frames_apart=options.frames_apart)
+    tools = convert.load_tools(options.weights, answer=answer_words(options))
     if budget is not None and budget.levels is not None:
         tools, why = convert.within(tools, budget.levels)
         say(why)

@@ -10,6 +10,7 @@ from msgspec import Meta
 from ... import __version__
 from ...recordings import PrepareOptions
 from ...recordings.electrode_gains import SensorFile
+from ...translation.answer import Answer
 
 SHARD_FRAMES = 1000
 MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
@@ -37,7 +38,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames a shard
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
-    frames_apart : whether each frame is translated alone
+    answer : which contact a frame is answered by
     """
 
     keep: list[str]
@@ -48,7 +49,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     calibration: str = ""
     preset: str = "fast"
     variant: str = ""
-    frames_apart: bool = False
+    answer: Answer = Answer()
     version: str = __version__
 
 

@@ -17,7 +17,7 @@ from .. import frame_shard
 from ..engine import job as jobs
 from ..engine import manifest
 from ..engine.recipes import Translate
-from ..frames_file import arrays_of
+from ..frames_file import arrays_of, kept
 from ..prepared_signals import Prepared
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
     if not frame_shard.is_of(path, job, index, number, frames):
         raise TactileError(path, "another shard under this name", f"shard {number} of {job.inputs[index].name}", ADVICE)
     rows = min(job.recipe.shard_frames, frames - number * job.recipe.shard_frames)
-    expected = set(arrays_of(job.recipe.keep, shard=True))
+    expected = set(arrays_of(kept(job.recipe.keep, job.recipe.answer), shard=True))
     with damage_told(str(path), "shard"), open_checked(path) as file:
         if set(file) != expected:
             raise TactileError(path, f"arrays {', '.join(sorted(file))}", ", ".join(sorted(expected)), ADVICE)

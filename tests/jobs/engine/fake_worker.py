@@ -45,7 +45,7 @@ def killing(make):
 
 
 if __name__ == "__main__":
-    convert.load_tools = lambda *words, frames_apart=False: fake_tools.tools()
+    convert.load_tools = lambda *words, answer=None: fake_tools.tools()
     translate.load_translator = lambda weights=None: SimpleNamespace(sha256="0" * 64)
     frame_shard.make = killing(frame_shard.make)
     local.WORKER_COMMAND = COMMAND

@@ -26,7 +26,7 @@ distributed = pytest.importorskip("distributed", reason="distributed is absent: 
 
 @pytest.fixture(autouse=True)
 def tools(monkeypatch):
-    monkeypatch.setattr(convert, "load_tools", lambda *words, frames_apart=False: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *words, answer=None: fake_tools.tools())
 
 
 def run_on(folder, job, address):

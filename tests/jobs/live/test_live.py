@@ -93,7 +93,7 @@ def test_another_file_of_the_same_name_is_told(slide_csv, tmp_path):
 
 
 def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, frames_apart=False: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
     electrodes = recordings.read(slide_csv(frames=40)).electrodes
     np.savez(tmp_path / "gap.npz", electrodes=electrodes, time=np.r_[0.0, 1e6 + np.arange(39) / 100])
     monkeypatch.setattr(watch, "time", clock := Clock())
@@ -121,7 +121,7 @@ def test_without_a_quiet_part_rest_is_guessed_in_the_end():
 
 
 def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, frames_apart=False: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
     monkeypatch.setattr(watch, "time", Clock())
     for more in (["--idle", "0.2"], ["--play"], ["--play", "--speed", "4"], ["--play", "--speed", "0"]):
         out = tmp_path / "now.png"
@@ -137,7 +137,7 @@ def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path,
 
 
 def test_watch_without_a_display_says_what_to_do(slide_csv, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, frames_apart=False: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
     monkeypatch.setenv("MPLBACKEND", "agg")
     import matplotlib
 
@@ -150,7 +150,7 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
     pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
     import bags
 
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, frames_apart=False: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
     electrodes = 3000 + np.random.default_rng(2).normal(0, 1, (60, 19))
     still = np.full(60, 2000.0)
     press = SimpleNamespace(time=np.arange(60) / 100, electrodes=electrodes, pdc=still, tac=still, tdc=still)

@@ -1,0 +1,64 @@
+"""How signals are to be answered, of which a posterior knows more than one contact."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from ..errors import TactileError
+
+MOST_SAMPLES = 100  # contacts a frame; 50 bytes each (assumed: more tell nothing new)
+FARTHEST = 25.0  # mm, the gel's length: beyond, no contact of the BioTac lies on it
+LIKELY, MEAN = "likely", "mean"
+KINDS = (LIKELY, MEAN)
+
+Millimetres = Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST)]
+
+
+class Answer(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """How each frame is answered.
+
+    kind : by the most plausible contact, or by the mean of all that are plausible, which no contact need be like
+    frames_apart : each frame by its own signals; the contact is followed through all frames otherwise
+    mount_shift_mm : (x, z), by which contacts are moved on the DIGIT's gel: how the BioTac lies on it
+    samples : contacts drawn for each frame from what its signals say
+    """
+
+    kind: Literal["likely", "mean"] = LIKELY
+    frames_apart: bool = False
+    mount_shift_mm: tuple[Millimetres, Millimetres] = (0.0, 0.0)
+    samples: Annotated[int, Meta(ge=0, le=MOST_SAMPLES)] = 0
+
+    @property
+    def follows(self) -> bool:
+        """Whether contacts are followed through the frames."""
+        return self.kind == LIKELY and not self.frames_apart
+
+    @property
+    def mount_shift(self) -> np.ndarray:
+        """(2,) m."""
+        return 1e-3 * np.array(self.mount_shift_mm)
+
+    def told(self) -> tuple[str, ...]:
+        """What the user of a result should know of it."""
+        if not any(self.mount_shift_mm):
+            return ()
+        x, z = self.mount_shift_mm
+        return (f"contacts lie {x:g} mm along x and {z:g} mm along z from their place on the DIGIT (--mount-shift)",)
+
+
+def parse_shift(text: str) -> tuple[float, float]:
+    """``"4,-1.5"`` -> (4.0, -1.5) mm; raises TactileError for anything else, or a shift longer than the gel."""
+    number = r"\s*([+-]?\d{1,3}(?:\.\d{0,6})?)\s*"
+    found = re.fullmatch(f"{number},{number}", text)
+    shift = tuple(float(part) for part in found.groups()) if found else ()
+    if not found or max(map(abs, shift)) > FARTHEST:
+        expected = f"X,Z in mm, each from -{FARTHEST:g} to {FARTHEST:g}, such as 4,-1.5"
+        raise TactileError(
+            "--mount-shift", repr(text), expected, "Give it that way; for a negative X --mount-shift=-4,0"
+        )
+    return shift

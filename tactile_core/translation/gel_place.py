@@ -1,0 +1,63 @@
+"""Where on the DIGIT's gel a place of its latent lies, and back: so that contacts can be laid elsewhere."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from .. import sensors
+from .contact_frame import PLACE_UNIT, ContactFrame, between_nodes
+from .network_sizes import PLACE
+
+STEPS = 8  # of Newton's method; it ends in three on our lattice, whose cells are nearly squares
+RIM = 0.05e-3  # m, by which a point may lie beside the gel's outermost nodes (assumed; a cell is 0.15 to 0.6 mm)
+SMALL = 1e-3  # cells, over which a slope is taken
+
+
+def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
+    """(T, 2) = (x, z) m on the resting gel of places (T, 2) of a latent, between nodes by bilinear interpolation."""
+    return between_nodes(_grid(frame.rows, frame.columns), place)
+
+
+def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
+    """(T, 2), inverse of `on_gel`; points (T, 2) m beside the gel have places at its rim."""
+    grid = _grid(frame.rows, frame.columns)
+    size = np.array(grid.shape[:2])
+    apart = np.square(grid.reshape(-1, 2)[None] - point[:, None]).sum(axis=-1).argmin(axis=1)
+    nearest = np.stack(np.unravel_index(apart, grid.shape[:2]), axis=-1)
+    place, limit = (nearest - (size - 1) / 2) / PLACE_UNIT, (size - 1) / 2 / PLACE_UNIT
+    small = SMALL / PLACE_UNIT * np.eye(PLACE)
+    for _ in range(STEPS):
+        slope = np.stack(
+            [between_nodes(grid, place + one) - between_nodes(grid, place - one) for one in small], axis=-1
+        )
+        missing = (point - between_nodes(grid, place))[..., None]
+        step = np.linalg.pinv(slope) @ missing * (2 * SMALL / PLACE_UNIT)  # at a corner one slope may be none
+        place = np.clip(place + step[..., 0], -limit, limit)
+    return place
+
+
+class Shift:
+    """What is known at the gel's nodes, moved over it: the gel is thought to be as thick wherever the BioTac lies."""
+
+    def __init__(self, frame: ContactFrame, shift: np.ndarray) -> None:
+        """shift : (2,) = (x, z) m, by which contacts move."""
+        came = _grid(frame.rows, frame.columns).reshape(-1, 2) - shift
+        place = place_on(frame, came)
+        self._frame, self._place = frame, place
+        # A point that lies beside the gel has no place whose point it is: from there comes nothing.
+        self._inside = np.abs(on_gel(frame, place) - came).max(axis=1) < RIM
+
+    def __call__(self, displacement: np.ndarray) -> np.ndarray:
+        """(T, n, 3) m -> the same, moved; 0 where the gel ended."""
+        rows, columns, count = self._frame.rows, self._frame.columns, len(displacement)
+        grid = np.moveaxis(displacement, 0, 1).reshape(rows, columns, count * 3)
+        found = between_nodes(grid, self._place) * self._inside[:, None]
+        return np.moveaxis(found.reshape(-1, count, 3), 1, 0).astype(displacement.dtype)
+
+
+@functools.cache
+def _grid(rows: int, columns: int) -> np.ndarray:
+    """(rows, columns, 2) m, (x, z) of the gel's nodes at rest."""
+    return sensors.digit_surface().rest[: rows * columns, [0, 2]].reshape(rows, columns, 2)
