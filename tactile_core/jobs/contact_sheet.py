@@ -30,7 +30,7 @@ class Contents:
     frames : (k,) which of the T frames are the columns
     displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
     force : (k, 3) N; confidence : (k,) 0..1; expected_error_digit : (k,) m, of the largest node
-    contact_center : (k, 2) m = (x, z), NaN without contact
+    contact_center : (k, 2) m = (x, z) on the DIGIT, NaN without contact; mount_shift : (2,) m, of a mount in it
     true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
     """
 
@@ -49,6 +49,7 @@ class Contents:
     pressure_measured: np.ndarray | None = None
     true_displacement_biotac: np.ndarray | None = None
     simulated: bool = False
+    mount_shift: np.ndarray | float = 0.0
     warnings: Sequence[str] = ()
 
     def __post_init__(self) -> None:
@@ -120,7 +121,8 @@ def _drawn(shown: Contents, camera: Camera) -> SheetFigure:
     figure.headings(shown.time[shown.frames])
     largest = scale(displacement, truth)
     label = "BioTac, unrolled\n" + ("translated" if shown.simulated else "displacement")
-    figure.biotac_row(label, displacement, largest, shown.contact_center)
+    center = None if shown.contact_center is None else shown.contact_center - shown.mount_shift
+    figure.biotac_row(label, displacement, largest, center)
     if truth is not None:
         figure.biotac_row("BioTac, unrolled\ntrue (simulated)", truth, largest, None)
     figure.digit_row("DIGIT gel\ndisplacement", shown.displacement_digit, shown.contact_center)

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import msgspec
-
 from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.stopwatch import Stopwatch
@@ -171,7 +169,7 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
                     "error": None if options.error is None else str(options.error), "preset": tools.preset,
-                    "answer": msgspec.to_builtins(tools.answer)},
+                    "answer": dataclasses.asdict(tools.answer)},
         "frames_converted": len(made.frames),
         "prepared": made.signals.report,
         "warnings": list(made.warnings()),

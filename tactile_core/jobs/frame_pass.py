@@ -224,6 +224,7 @@ class FramePass:
             frames=np.searchsorted(self.frames, shown),
             true_displacement_biotac=None if skin is None else skin[shown],
             simulated=self.recording.simulated,
+            mount_shift=self.tools.answer.mount_shift,
             pressure=np.concatenate(self._pressure),
             pressure_measured=PRESSURE_PER_COUNT * self.signals.pdc[self.frames],
             warnings=self.warnings(),

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
-from typing import Annotated, Literal
+from typing import Literal
 
-import msgspec
 import numpy as np
-from msgspec import Meta
 
 from ..errors import TactileError
 
 MOST_SAMPLES = 100  # contacts a frame; 50 bytes each (assumed: more tell nothing new)
 FARTHEST = 25.0  # mm, the gel's length: beyond, no contact of the BioTac lies on it
 LIKELY, MEAN = "likely", "mean"
-KINDS = (LIKELY, MEAN)
-
-Millimetres = Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST)]
 
 
-class Answer(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+@dataclasses.dataclass(frozen=True)
+class Answer:
     """How each frame is answered.
 
     kind : by the most plausible contact, or by the mean of all that are plausible, which no contact need be like
@@ -30,8 +27,15 @@ class Answer(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     kind: Literal["likely", "mean"] = LIKELY
     frames_apart: bool = False
-    mount_shift_mm: tuple[Millimetres, Millimetres] = (0.0, 0.0)
-    samples: Annotated[int, Meta(ge=0, le=MOST_SAMPLES)] = 0
+    mount_shift_mm: tuple[float, float] = (0.0, 0.0)
+    samples: int = 0
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a shift longer than the gel, or for more samples than there can be."""
+        if not all(abs(one) <= FARTHEST for one in self.mount_shift_mm):
+            raise ValueError(f"mount_shift_mm {self.mount_shift_mm}: within {FARTHEST:g} mm")
+        if not 0 <= self.samples <= MOST_SAMPLES:
+            raise ValueError(f"samples {self.samples}: 0 to {MOST_SAMPLES}")
 
     @property
     def follows(self) -> bool:

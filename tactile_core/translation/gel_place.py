@@ -11,7 +11,7 @@ from .contact_frame import PLACE_UNIT, ContactFrame, between_nodes
 from .network_sizes import PLACE
 
 STEPS = 8  # of Newton's method; it ends in three on our lattice, whose cells are nearly squares
-RIM = 0.05e-3  # m, by which a point may lie beside the gel's outermost nodes (assumed; a cell is 0.15 to 0.6 mm)
+FADE = 5e-3  # m beside the gel, over which a moved field fades out (assumed: a step at its rim would show in pictures)
 SMALL = 1e-3  # cells, over which a slope is taken
 
 
@@ -46,14 +46,15 @@ class Shift:
         came = _grid(frame.rows, frame.columns).reshape(-1, 2) - shift
         place = place_on(frame, came)
         self._frame, self._place = frame, place
-        # A point that lies beside the gel has no place whose point it is: from there comes nothing.
-        self._inside = np.abs(on_gel(frame, place) - came).max(axis=1) < RIM
+        # Beside the gel there is nothing to move here: what moved at its rim fades out.
+        beside = np.linalg.norm(on_gel(frame, place) - came, axis=1)
+        self._share = np.maximum(1 - beside / FADE, 0)[:, None].astype(np.float32)
 
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
-        """(T, n, 3) m -> the same, moved; 0 where the gel ended."""
+        """(T, n, 3) m -> the same, moved; fading out where the gel ended."""
         rows, columns, count = self._frame.rows, self._frame.columns, len(displacement)
         grid = np.moveaxis(displacement, 0, 1).reshape(rows, columns, count * 3)
-        found = between_nodes(grid, self._place) * self._inside[:, None]
+        found = between_nodes(grid, self._place) * self._share
         return np.moveaxis(found.reshape(-1, count, 3), 1, 0).astype(displacement.dtype)
 
 

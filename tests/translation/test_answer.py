@@ -58,7 +58,7 @@ def test_what_is_shifted_off_the_gel_is_flagged(touched):
     signals, _ = touched
     found = load_translator(answer=Answer(mount_shift_mm=(-20.0, 0.0)))(signals)
     assert (found.flags & recordings.flags.Flag.BEYOND_DIGIT > 0).all()
-    assert accuracy.lengths(found.displacement_digit).max() < accuracy.lengths(found.displacement_biotac).max()
+    assert accuracy.lengths(found.displacement_digit).max() < 0.1 * accuracy.lengths(found.displacement_biotac).max()
 
 
 def test_the_mean_is_another_answer(touched):
