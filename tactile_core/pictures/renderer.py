@@ -9,6 +9,7 @@ import numpy as np
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from .background import background_picture
+from .camera_noise import camera_noise
 from .height_map import of_unit, rest_height_map
 from .mitsuba.direct_light import Hits, direct_light
 from .mitsuba.gel_mesh import GelMesh
@@ -87,7 +88,7 @@ class Renderer:
         levels = self.in_levels(radiance - self.rest_radiance)
         levels += self.background
         if noise is not None:
-            levels += noise.standard_normal(levels.shape, np.float32) * np.asarray(self.calibration.noise, np.float32)
+            levels += camera_noise(self.calibration, noise)
         np.rint(levels, out=levels)
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
 

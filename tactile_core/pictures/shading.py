@@ -17,9 +17,6 @@ from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .height_map import of_unit, rest_height_map
 from .perspective import Perspective, slopes
 
-# px at 240 wide: on real pictures noise correlates by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px, along and across; means
-# over squares of 4 px by 0.75, 0.5, 0.25, 0.
-GRAIN = 4
 # A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
 # differences that slopes are made of.
 TANGENT, TANGENT_MARGIN = 1.1, 2  # of the radius, px
@@ -56,11 +53,8 @@ class Shader:
         self._lamps = [Lamp(camera, led) for led in calibration.leds]
         self._rest_radiance = self._seen_radiance(self.rest)
 
-    def __call__(self, height_map: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
-        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.
-
-        noise : makes the camera's noise, as measured on the unit; None for none
-        """
+    def __call__(self, height_map: np.ndarray) -> np.ndarray:
+        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
         change = self._radiance(height_map)
         change -= self._rest_radiance
         picture = np.empty((*self.camera.shape, 3), np.uint8)
@@ -68,8 +62,6 @@ class Shader:
             level = self._levels[channel].copy()
             for gain, light in zip(self._gain[channel], change, strict=True):
                 level += gain * light
-            if noise is not None:
-                level += np.float32(self.calibration.noise[channel]) * grain(self.camera, noise)
             np.rint(level, out=level)
             picture[..., channel] = np.clip(level, 0, LARGEST_LEVEL, out=level)
         return picture
@@ -162,15 +154,6 @@ class Lamp:
         share *= facing
         share += moment
         return np.maximum(share, 0, out=share)
-
-
-def grain(camera: Camera, random: np.random.Generator) -> np.ndarray:
-    """Camera noise (H, W) float32 of standard deviation 1: white noise, averaged over squares of GRAIN px."""
-    width = max(GRAIN * camera.width // 240, 1)
-    white = random.standard_normal((camera.height + width, camera.width + width), np.float32)
-    total = white.cumsum(0, dtype=np.float64).cumsum(1)
-    across = total[:, width:] - total[:, :-width]
-    return ((across[width:] - across[:-width]) / width).astype(np.float32)
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:

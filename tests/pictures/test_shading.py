@@ -208,13 +208,3 @@ def test_press_at_a_corner_changes_the_picture_there_alone(corner: tuple[int, in
     assert change[corner] > 20
     away = np.hypot(RIGHT - RIGHT[corner], DOWN - DOWN[corner]) > 1.5e-3  # a needle of 0.3 mm, lights at 20 degrees
     assert not change[away].any()
-
-
-def test_noise_is_the_unit_s_and_made_again_by_the_same_seed() -> None:
-    shader = Shader(plain_unit(noise=(1.0, 2.0, 4.0)), rest=FLAT, background=GREY)
-    one, again = (shader(FLAT, np.random.default_rng(7)).astype(float) - 128 for _ in range(2))
-    np.testing.assert_array_equal(one, again)
-    # Whole levels add a variance of 1/12; 4,800 independent squares leave 1 % of a standard deviation.
-    np.testing.assert_allclose(one.std((0, 1)), np.sqrt(np.array([1, 4, 16]) + 1 / 12), rtol=0.05)
-    neighbours = (one[:, 1:, 2] * one[:, :-1, 2]).mean() / one[..., 2].var()
-    assert neighbours == pytest.approx(0.75, abs=0.05)
