@@ -9,7 +9,7 @@ from PIL import Image
 
 from tactile_core.pictures.calibrate.ball_print import print_on
 from tactile_core.pictures.height_map import rest_height_map
-from tactile_core.pictures.shading import Shader
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Calibration
 
 BALL = 3e-3  # m, radius
@@ -23,7 +23,13 @@ def photograph(
     rest = rest_height_map(unit.camera)
     right, down = np.meshgrid(unit.camera.right, unit.camera.down)
     at_right, at_down, depth = (1e-3 * value for value in place)
-    return Shader(unit)(print_on(rest, right, down, (at_right, at_down, depth, BALL)), noise)
+    return drawn(unit, print_on(rest, right, down, (at_right, at_down, depth, BALL)), noise)
+
+
+def drawn(unit: Calibration, heights: np.ndarray, noise: np.random.Generator | None) -> np.ndarray:
+    """Fast picture (H, W, 3) uint8 of heights (H, W) m."""
+    renderer = Renderer(unit, "fast")
+    return renderer.picture(renderer.radiance(heights), noise)
 
 
 def write_photographs(folder: Path, unit: Calibration, places: tuple = PLACES) -> Path:
@@ -32,6 +38,6 @@ def write_photographs(folder: Path, unit: Calibration, places: tuple = PLACES) -
     noise = np.random.default_rng(0)
     for k, place in enumerate(places):
         Image.fromarray(photograph(unit, place, noise)).save(folder / f"press_{k}.png")
-    untouched = Shader(unit)(rest_height_map(unit.camera), noise)
+    untouched = drawn(unit, rest_height_map(unit.camera), noise)
     Image.fromarray(untouched).save(folder.parent / "untouched.png")
     return folder

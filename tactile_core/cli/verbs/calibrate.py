@@ -91,19 +91,24 @@ def _sheet_beside(out: str) -> Path:
 
 def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     from ...pictures.calibrate.fit import calibrate
+    from ...pictures.calibrate.kept_apart import check_orientation, check_worth, tried_apart
     from ...pictures.calibrate.report import rows_of, write_sheet
     from ...sensors.calibration_file import load_calibration, write_calibration
 
-    start = load_calibration(options.start)
+    start, diameter = load_calibration(options.start), 1e-3 * options.ball_diameter
+    check_orientation(photographs, diameter, start)
+    with bar("trial on presses kept apart", "third", options.progress) as progress:
+        apart = tried_apart(photographs, diameter, start, progress)
     with bar("calibrate", "step", options.progress) as progress:
         name = options.unit or Path(options.out).stem
-        done = calibrate(photographs, 1e-3 * options.ball_diameter, start, unit=name, progress=progress)
+        done = calibrate(photographs, diameter, start, unit=name, progress=progress)
     for warning in done.warnings:
         say(f"warning: {warning}")
+    check_worth(apart or done.tried)
     say(f"these photographs tell too little of: {', '.join(done.calibration.fit.not_identified)}")
     write_calibration(options.out, done.calibration)
     write_sheet(_sheet_beside(options.out), done.tried)
-    _tell_rows(rows_of(done.tried, "presses it was fitted on"))
+    _tell_rows(rows_of(done.tried, "presses it was fitted on") + rows_of(apart, "presses kept apart, by thirds"))
     tell(options.out)
     return 0
 

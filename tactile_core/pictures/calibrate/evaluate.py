@@ -82,8 +82,9 @@ def _try_press(
 ) -> Evaluation:
     sight = Sight(press)
     ball, _ = fit_ball(working, sight, radius)
-    picture = np.rint(background + whole.change(ball.numbers)).clip(0, LARGEST_LEVEL).astype(np.uint8)
-    rounded = np.rint(background).astype(np.uint8)
+    untouched = background + press.drift  # the null knows how the light drifted as well
+    picture = np.rint(untouched + whole.change(ball.numbers)).clip(0, LARGEST_LEVEL).astype(np.uint8)
+    rounded = np.rint(untouched).clip(0, LARGEST_LEVEL).astype(np.uint8)
     ours = figures(picture, press.picture, background, press.region)
     null = figures(rounded, press.picture, background, press.region)
     free = float("nan")

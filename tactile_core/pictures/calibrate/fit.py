@@ -14,11 +14,10 @@ from .ball_pictures import BallPictures, working_factor
 from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_figures
 from .levenberg_marquardt import minimise
 from .parameters import FIRST_LED, NAMES, SPREAD, parameters_of
-from .photographs import Photographs
-from .press_fit import Sight
+from .photographs import Photographs, Press
+from .press_fit import Sight, fit_ball
 from .residuals import GAIN_SPREAD, MODEL_ERROR, UnitResiduals
 
-FIRST_DEPTH = 1.0  # mm, from which presses start
 PLACING_STEPS, STEPS, TOLERANCE = 6, 14, 1e-3  # of the search; a step that gains less than 0.1 % of the cost is noise
 UNEXPLAINED = 0.5  # share of a photograph's squares that is left: more, and it does not show this ball
 IDENTIFIED = 0.5  # of the assumed spread of units; a number whose standard error is larger stays called unknown
@@ -59,11 +58,14 @@ def calibrate(
     whole = fitted_size(start, photographs)
     factor = working_factor(whole.camera.width, whole.camera.height)
     working = whole.at_size(whole.camera.width // factor, whole.camera.height // factor)
-    total = PLACING_STEPS + 2 * STEPS + 1
+    total = PLACING_STEPS + 3 * STEPS + 1
     search = _Search(working, photographs, ball_diameter / 2, lambda done: progress(done, total))
+    lights = np.arange(len(NAMES)) >= FIRST_LED
     search.place()
-    dropped = search.drop_unexplained()
-    search.fit(np.arange(len(NAMES)) >= FIRST_LED)
+    search.put_aside()
+    search.fit(lights)
+    if search.readmit():
+        search.fit(lights)
     search.fit(np.ones(len(NAMES), bool))
     fitted = search.calibration().at_size(whole.camera.width, whole.camera.height)
     used = dataclasses.replace(photographs, presses=tuple(search.presses))
@@ -80,7 +82,7 @@ def calibrate(
         noise=photographs.noise,
         fit=Fit(note, names, ball_diameter, figures, errors, (*unknown, *NEVER_IDENTIFIED)),
     )
-    return Calibrated(calibration, tried, _warnings(photographs, tried, dropped))
+    return Calibrated(calibration, tried, _warnings(photographs, tried, search.aside))
 
 
 class _Search:
@@ -92,31 +94,57 @@ class _Search:
         self.start, self.radius = start, radius
         self.presses = list(photographs.presses)
         self._sights = [Sight(press) for press in self.presses]
+        self.aside: dict[str, float] = {}
         self._progress, self._done = progress, 0
         self._none = np.zeros(len(NAMES), bool)
 
     def place(self) -> None:
         """Presses and gain alone, the unit's numbers as in the start."""
         bench = BallPictures(self.start)
-        balls = [(*(1e3 * np.array(sight.guess(bench))), FIRST_DEPTH) for sight in self._sights]
+        balls = [1e3 * np.array(fit_ball(bench, sight, self.radius)[0].numbers[:3]) for sight in self._sights]
         self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
         self._minimise(np.concatenate(balls), PLACING_STEPS)
 
-    def drop_unexplained(self) -> list[str]:
-        """Leave out photographs that show no such ball; returns their names. Raises TactileError if none is left."""
+    def put_aside(self) -> None:
+        """Leave out photographs that show no such ball. Raises TactileError if none is left."""
         left = self._problem.unexplained()
         good = [k for k, share in enumerate(left) if share < UNEXPLAINED]
         if not good:
             found = f"no photograph looks like a ball of {2e3 * self.radius:g} mm"
             advice = "Check --ball-diameter, --background and the way the pictures lie (fingertip up)"
             raise TactileError("presses", found, "photographs of that ball", advice)
-        dropped = [press.name for k, press in enumerate(self.presses) if k not in good]
-        if dropped:
-            balls = self._problem.balls(self._x)[good]
-            self.presses, self._sights = ([values[k] for k in good] for values in (self.presses, self._sights))
-            self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
-            self._minimise(balls.ravel(), PLACING_STEPS)
-        return dropped
+        self.aside = {press.name: float(left[k]) for k, press in enumerate(self.presses) if k not in good}
+        if self.aside:
+            self._all = list(self.presses)
+            self._take([self.presses[k] for k in good], self.start, self._problem.balls(self._x)[good])
+            self._minimise(self._x, PLACING_STEPS)
+
+    def readmit(self) -> bool:
+        """Take photographs back that show the ball under this unit's own lights; whether there are any."""
+        if not self.aside:
+            return False
+        bench, balls, taken = BallPictures(self.calibration()), self._problem.balls(self._x).tolist(), []
+        placed = {press.name: ball for press, ball in zip(self.presses, balls, strict=True)}
+        for press in self._all:
+            if press.name in self.aside:
+                sight = Sight(press)
+                ball, left = fit_ball(bench, sight, self.radius)
+                self.aside[press.name] = unexplained_share(sight, left)
+                if self.aside[press.name] < UNEXPLAINED:
+                    placed[press.name] = (1e3 * np.array(ball.numbers[:3])).tolist()
+                    taken.append(press.name)
+        for name in taken:
+            del self.aside[name]
+        kept = [press for press in self._all if press.name in placed]
+        self._take(kept, self.calibration(), np.array([placed[press.name] for press in kept]))
+        return bool(taken)
+
+    def _take(self, presses: list[Press], unit: Calibration, balls: np.ndarray) -> None:
+        """Go on with these presses; balls : (n, 3) mm, where they stand; unit : with whose numbers."""
+        self.presses, self._sights = presses, [Sight(press) for press in presses]
+        self._problem = UnitResiduals(unit, self._sights, self.radius, self._none)
+        self._x = balls.ravel()
+        self._problem.cost(self._x)
 
     def fit(self, free: np.ndarray) -> None:
         """Go on from where the search stands with some of the unit's numbers free."""
@@ -157,12 +185,20 @@ class _Search:
         return named, tuple(unknown)
 
 
-def _warnings(photographs: Photographs, tried: list[Evaluation], dropped: list[str]) -> tuple[str, ...]:
+def unexplained_share(sight: Sight, left: float) -> float:
+    """Share of a photograph's squares that a fit leaves; left : mean square, grey levels squared."""
+    return left / max(float(np.square(sight.change[sight.counts]).mean()), 1e-9)
+
+
+def _warnings(photographs: Photographs, tried: list[Evaluation], aside: dict[str, float]) -> tuple[str, ...]:
     found = []
     if photographs.estimated:
         found.append("the background is the median of the photographs; a photograph of the untouched gel is better")
     if photographs.untouched:
         found.append(f"no press in {', '.join(photographs.untouched)}")
-    found += [f"{name}: does not look like the ball, left out" for name in dropped]
+    found += [
+        f"{name}: does not look like the ball ({100 * share:.0f} % of it unexplained), left out"
+        for name, share in aside.items()
+    ]
     found += [f"{each.press.name}: {flag}" for each in tried for flag in each.flags]
     return tuple(found)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ..background import read_photograph
+from .lighting_drift import lighting_drift
 from .photo_metrics import windowed
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -27,21 +28,24 @@ NOISE_LIMIT = 15  # grey levels; more is dust or the rim of a press
 class Press:
     """One photograph of a press.
 
-    picture : (H, W, 3) uint8; change : (H, W, 3) float32, grey levels, picture less background
-    region : (H, W) bool, its region of interest
+    picture : (H, W, 3) uint8; drift : (H, W, 3) float32, grey levels, by which the light had drifted
+    change : (H, W, 3) float32, grey levels, picture less background and drift; touched : (H, W) bool, near large ones
+    region : (H, W) bool, the region of interest, which knows nothing of drift
     flags : what is wrong with it, in words; empty for nothing
     """
 
     name: str
     picture: np.ndarray
+    drift: np.ndarray
     change: np.ndarray
+    touched: np.ndarray
     region: np.ndarray
     flags: tuple[str, ...]
 
     @property
     def middle(self) -> tuple[float, float]:
         """(row, column) of the change's centre of mass."""
-        weight = np.abs(self.change).max(-1) * self.region
+        weight = np.abs(self.change).max(-1) * self.touched
         rows, columns = np.indices(weight.shape)
         return float((weight * rows).sum() / weight.sum()), float((weight * columns).sum() / weight.sum())
 
@@ -110,6 +114,13 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
     return dataclasses.replace(photographs, presses=tuple(by_name[name] for name in names))
 
 
+def turned(press: Press, rows: bool, columns: bool) -> Press:
+    """A press whose picture has its rows, its columns or both reversed."""
+    way = slice(None, None, -1 if rows else 1), slice(None, None, -1 if columns else 1)
+    arrays = ("picture", "drift", "change", "touched", "region")
+    return dataclasses.replace(press, **{name: getattr(press, name)[way] for name in arrays})
+
+
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
     """Untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3), where presses cover less than half of them.
 
@@ -130,7 +141,7 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
     window = NOISE_WINDOW * background.shape[1] // 240 | 1
     found = []
     for press in presses:
-        quiet = ~dilated(press.region, window // 4)
+        quiet = ~dilated(press.touched, window // 4)
         if quiet.any():
             rest = press.change - windowed(press.change.astype(float), window)
             found.append([channel[np.abs(channel) < NOISE_LIMIT].std() for channel in rest[quiet].T])
@@ -171,16 +182,18 @@ def _files(folder: Path) -> list[Path]:
 
 def _press(name: str, picture: np.ndarray, background: np.ndarray) -> Press | None:
     """The press that a photograph shows; None where it shows none."""
-    change = picture.astype(np.float32) - background
+    difference = picture.astype(np.float32) - background
+    drift = lighting_drift(difference)
+    change = difference - drift
     changed = np.abs(change).max(-1) > CHANGE
     scale = changed.size / (240 * 320)
     # Dust and drift change single pixels here and there: only what is changed all around counts.
     if (~dilated(~changed, 2)).sum() < SMALLEST_PRESS * scale:
         return None
-    region = dilated(changed, DILATION)
+    touched, region = dilated(changed, DILATION), region_of_interest(picture, background)
     flags = []
-    if (picture[region].max(-1) == 255).mean() > OVER_EXPOSED:
+    if (picture[touched].max(-1) == 255).mean() > OVER_EXPOSED:
         flags.append("over-exposed")
-    if changed.mean() > LARGEST_SHARE:
+    if (np.abs(difference).max(-1) > CHANGE).mean() > LARGEST_SHARE:
         flags.append("changed nearly all over: another lighting than the background's")
-    return Press(name, picture, change, region, tuple(flags))
+    return Press(name, picture, drift, change, touched, region, tuple(flags))

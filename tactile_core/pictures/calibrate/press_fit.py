@@ -8,9 +8,11 @@ import numpy as np
 
 from .ball_pictures import BallPictures, smaller, working_factor
 from .levenberg_marquardt import minimise
+from .photo_metrics import windowed
 from .photographs import Press, dilated
 
-DEPTHS = (0.5e-3, 1.2e-3)  # m, from which a fit starts; the better end is taken
+DEPTHS = (0.5e-3, 1.2e-3)  # m, from which a fit starts; the best end is taken
+PRINT = 3e-3  # m, about the width of a print (assumed)
 SHALLOWEST, DEEPEST = 0.03e-3, 2.2e-3  # m, of the table of prints
 SMALLEST_BALL, LARGEST_BALL = 1e-3, 8e-3  # m, radius
 MARGIN = 3  # working px round the region that count too: a print must not shade what the photograph shows untouched
@@ -40,14 +42,17 @@ class Sight:
         factor = working_factor(press.picture.shape[1], press.picture.shape[0])
         self.change = smaller(press.change, factor)
         spoilt = smaller((press.picture.max(-1) == 255).astype(np.float32), factor) > 0
-        self.region = smaller(press.region.astype(np.float32), factor) > 0.25
+        self.region = smaller(press.touched.astype(np.float32), factor) > 0.25
         self.counts = dilated(self.region, MARGIN) & ~spoilt
 
-    def guess(self, bench: BallPictures) -> tuple[float, float]:
-        """Right and down, m, of the change's middle."""
+    def guesses(self, bench: BallPictures) -> list[tuple[float, float]]:
+        """Right and down, m, of the change's middle, and of where it is largest over about a ball's print."""
         weight = np.abs(self.change).max(-1) * self.region
+        width = round(PRINT / bench.camera.pixel_size[0]) | 1
+        largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)
         weight /= weight.sum()
-        return float((weight * bench.right).sum()), float((weight * bench.down).sum())
+        middle = float((weight * bench.right).sum()), float((weight * bench.down).sum())
+        return [middle, (float(bench.right[largest]), float(bench.down[largest]))]
 
 
 def fit_ball(bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False) -> tuple[Ball, float]:
@@ -56,7 +61,11 @@ def fit_ball(bench: BallPictures, sight: Sight, radius: float, *, free_radius: b
     bench : in working pixels; radius : m, the ball's, or where its search starts
     """
     problem = _PressProblem(bench, sight, radius)
-    starts = [np.array([*sight.guess(bench), depth, radius][: 4 if free_radius else 3]) for depth in DEPTHS]
+    starts = [
+        np.array([*place, depth, radius][: 4 if free_radius else 3])
+        for place in sight.guesses(bench)
+        for depth in DEPTHS
+    ]
     x, cost = min(
         (minimise(problem, start, most=STEPS, tolerance=TOLERANCE) for start in starts), key=lambda end: end[1]
     )

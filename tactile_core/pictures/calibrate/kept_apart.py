@@ -1,0 +1,73 @@
+"""What a calibration is worth on presses that it was not fitted on, and how photographs lie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...errors import TactileError
+from ...sensors.calibration import Calibration
+from .ball_pictures import BallPictures, working_factor
+from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_figures
+from .fit import calibrate, unexplained_share
+from .photographs import Photographs, Press, chosen, turned
+from .press_fit import Sight, fit_ball
+
+FOLDS = 3
+WORTH = 0.8  # of the null's L1: a calibration that leaves more of a press is worth nothing (issue LIGHT)
+# What a picture that keeps its shape may be turned by: rows, columns reversed.
+WAYS = {(True, True): "turned by 180 degrees", (False, True): "mirrored left to right", (True, False): "mirrored"}
+LOOKED_AT = 4  # presses, the plainest, by which the way they lie is told
+CLEARLY = 0.8  # of what is unexplained as they are given, that another way may leave (assumed)
+
+
+def check_orientation(photographs: Photographs, ball_diameter: float, start: Calibration) -> None:
+    """Raises TactileError for photographs that another way of laying them explains clearly better; ball_diameter : m.
+
+    The other four of the eight ways change the pictures' shape, and are told by that.
+    """
+    plain = sorted(photographs.presses, key=lambda press: -float(np.square(press.change).sum()))[:LOOKED_AT]
+    unit = fitted_size(start, photographs)
+    factor = working_factor(unit.camera.width, unit.camera.height)
+    bench = BallPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
+    given = _left(plain, bench, ball_diameter / 2)
+    for (rows, columns), name in WAYS.items():
+        left = _left([turned(press, rows, columns) for press in plain], bench, ball_diameter / 2)
+        if left < CLEARLY * given:
+            found = f"{name}: {100 * left:.0f} % of the presses is unexplained so, {100 * given:.0f} % as they are"
+            raise TactileError(photographs.folder, found, "fingertip up, as the camera sees the gel", "Turn them")
+
+
+def _left(presses: list[Press], bench: BallPictures, radius: float) -> float:
+    """Median share of presses' squares that balls of a radius, m, leave."""
+    sights = [Sight(press) for press in presses]
+    return float(np.median([unexplained_share(sight, fit_ball(bench, sight, radius)[1]) for sight in sights]))
+
+
+def tried_apart(
+    photographs: Photographs,
+    ball_diameter: float,
+    start: Calibration,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Evaluation]:
+    """Each press under a calibration fitted on the others, by thirds; none for a single press. ball_diameter : m."""
+    names = [press.name for press in photographs.presses]
+    folds = min(FOLDS, len(names))
+    tried = []
+    for fold in range(folds if folds > 1 else 0):
+        apart = names[fold::folds]
+        others = chosen(photographs, [name for name in names if name not in apart])
+        done = calibrate(others, ball_diameter, start, unit="others").calibration
+        tried += evaluate_unit(done, chosen(photographs, apart), ball_diameter / 2)
+        progress(fold + 1, folds)
+    return tried
+
+
+def check_worth(tried: list[Evaluation]) -> None:
+    """Raises TactileError for a calibration that explains its presses no better than the background."""
+    ours, null = mean_figures(tried)
+    if not ours["roi_l1"] <= WORTH * null["roi_l1"]:
+        found = f"{ours['roi_l1']:.1f} levels off in the region of the press, the background alone {null['roi_l1']:.1f}"
+        advice = "Check --ball-diameter, --background, the light, and that the pictures lie fingertip up"
+        raise TactileError("calibration, tried on presses kept apart", found, f"at most {WORTH:g} of that", advice)

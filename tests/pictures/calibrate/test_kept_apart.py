@@ -1,0 +1,48 @@
+"""No calibration is written that explains nothing, and the way photographs lie is told."""
+
+import numpy as np
+import pytest
+from PIL import Image
+from plain_unit import plain_unit
+from pressed_unit import PLACES, write_photographs
+
+from tactile_core.cli.main import main
+from tactile_core.sensors.calibration_file import write_calibration
+
+
+@pytest.fixture
+def start(tmp_path):
+    write_calibration(tmp_path / "start.toml", plain_unit())
+    return str(tmp_path / "start.toml")
+
+
+def fit(folder, tmp_path, start):
+    words = ["--background", str(tmp_path / "untouched.png"), "--start", start, "--ball-diameter", "6"]
+    return main(["calibrate", str(folder), *words, "--out", str(tmp_path / "unit.toml")])
+
+
+@pytest.mark.parametrize(("turn", "told"), [((True, True), "180 degrees"), ((False, True), "left to right")])
+def test_turned_photographs_are_told(turn, told, tmp_path, start, capsys):
+    folder = write_photographs(tmp_path / "presses", plain_unit(), PLACES[:3])
+    way = tuple(slice(None, None, -1 if reverse else 1) for reverse in turn)
+    for file in [*folder.iterdir(), tmp_path / "untouched.png"]:
+        Image.fromarray(np.asarray(Image.open(file))[way]).save(file)
+    assert fit(folder, tmp_path, start) == 2
+    said = capsys.readouterr().err
+    assert told in said and "fingertip up" in said
+    assert not (tmp_path / "unit.toml").exists()
+
+
+def test_what_is_no_ball_makes_no_file(tmp_path, start, capsys):
+    """Bars of a colour that changes from picture to picture: balls explain some of each, and nothing of the next."""
+    folder = write_photographs(tmp_path / "presses", plain_unit(), ())
+    untouched = np.asarray(Image.open(tmp_path / "untouched.png")).astype(int)
+    random = np.random.default_rng(1)
+    for number in range(4):
+        picture = untouched.copy()
+        row, column = random.integers(60, 200, 2)
+        picture[row : row + 60, column - 40 : column] += random.integers(-60, 60, 3)
+        Image.fromarray(picture.clip(0, 255).astype(np.uint8)).save(folder / f"bar_{number}.png")
+    assert fit(folder, tmp_path, start) == 2
+    assert "tactile: error" in capsys.readouterr().err
+    assert not (tmp_path / "unit.toml").exists()
