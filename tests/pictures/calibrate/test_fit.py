@@ -146,6 +146,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     assert main(words) == 0
     told = capsys.readouterr()
     assert "roi_psnr" in told.out and str(out) in told.out and "tell too little of" in told.err
+    assert all(f"press_{number}.png: used; " in told.err for number in (0, 3))
     assert Image.open(tmp_path / "unit.png").size[0] > 3 * 240
     assert load_calibration(out).unit == "unit"
     rows, sheet = tmp_path / "rows.json", tmp_path / "trial.png"
