@@ -107,9 +107,8 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     for each in done.tried:
         right, down, depth = (1e3 * value for value in each.ball.numbers[:3])
         off = f"{each.figures['roi_l1']:.1f} levels off, the background {each.null['roi_l1']:.1f}"
-        say(
-            f"{each.press.name}: used; {depth:.2f} mm deep, {right:.1f} mm right and {down:.1f} down of the middle; {off}"
-        )
+        place = f"{depth:.2f} mm deep, {right:.1f} mm right and {down:.1f} down of the middle"
+        say(f"{each.press.name}: used; {place}; {off}")
     check_worth(apart or done.tried)
     say(f"these photographs tell too little of: {', '.join(done.calibration.fit.not_identified)}")
     write_calibration(options.out, done.calibration)
