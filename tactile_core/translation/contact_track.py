@@ -34,10 +34,14 @@ Read = Callable[[int, int], tuple[np.ndarray, Posterior]]
 
 
 class _Course(NamedTuple):
-    """The places on the best course. mean, variance : (T, PLACE); free : (T,), whether it begins anew there."""
+    """The places on the best course.
+
+    mean, variance : (T, PLACE); touched : (T,), whether something does; free : (T,), whether it begins anew there
+    """
 
     mean: np.ndarray
     variance: np.ndarray
+    touched: np.ndarray
     free: np.ndarray
 
 
@@ -47,7 +51,7 @@ def track(posterior: Posterior, time: np.ndarray) -> np.ndarray:
         return np.zeros(posterior.mean.shape[::2], np.float32)
     course = _best_course(posterior, time)
     steps = np.where(course.free[:, None], ANYWHERE**2, _steps(time)[:, :PLACE])
-    return _given(_smoothed(course, steps), _components(posterior)).astype(np.float32)
+    return _given(_smoothed(course, steps), course.touched, _components(posterior)).astype(np.float32)
 
 
 class Tracked:
@@ -97,7 +101,8 @@ class Follower:
         variance = (1 - gain) * before
         self._score, self._frame, self._time = score - score.max(), now, time
         self._place, self._variance = place, variance
-        return _given(place[None], _Frame(*(each[None] for each in now))).astype(np.float32)
+        frame = _Frame(*(each[None] for each in now))
+        return _given(place[None], _touched(now.mean[best])[None], frame).astype(np.float32)
 
 
 class _Frame(NamedTuple):
@@ -159,13 +164,21 @@ def _best_course(posterior: Posterior, time: np.ndarray) -> _Course:
     each = np.arange(len(time))
     begins = np.concatenate([[True], free[each[:-1], path[:-1], path[1:]]])
     mean, spread = (values[each, path, :PLACE] for values in all_frames[1:])
-    return _Course(mean, np.square(spread), begins)
+    return _Course(mean, np.square(spread), _touched(all_frames.mean[each, path]), begins)
 
 
-def _given(place: np.ndarray, components: _Frame) -> np.ndarray:
-    """States (T, STATE) at places (T, PLACE): force and depth are the components' mean, as far as they lie there."""
+def _touched(mean: np.ndarray) -> np.ndarray:
+    return mean[..., PLACE] >= LEAST_FORCE
+
+
+def _given(place: np.ndarray, touched: np.ndarray, components: _Frame) -> np.ndarray:
+    """States (T, STATE) at places (T, PLACE): force and depth are the components' mean, as far as they lie there.
+
+    touched : (T,), which components count: without contact the place told is the middle one, where contacts lie too
+    """
     far = (place[:, None] - components.mean[..., :PLACE]) / components.spread[..., :PLACE]
     share = components.weight - (0.5 * np.square(far) + np.log(components.spread[..., :PLACE])).sum(axis=-1)
+    share = np.where(_touched(components.mean) == touched[:, None], share, -np.inf)
     share = np.exp(share - share.max(axis=-1, keepdims=True))
     share /= share.sum(axis=-1, keepdims=True)
     return np.concatenate([place, (share[..., None] * components.mean[..., PLACE:]).sum(axis=1)], axis=-1)

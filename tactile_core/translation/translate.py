@@ -16,6 +16,7 @@ from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
 from . import error_bounds, gel_place, networks, plausible
 from .answer import MEAN, Answer
+from .contact_frame import STILL
 from .contact_track import LEAST_FORCE, track
 from .error_bounds import KINDS
 from .network_sizes import PLACE, SURFACES
@@ -112,7 +113,8 @@ class Translator:
         rectified = _rectified(signals)
         change = np.asarray(signals.typical, np.float32)
         latent_signal = nets.encode_signal(change, rectified)
-        if state is None:
+        alone = state is None
+        if alone:
             posterior = nets.posterior(latent_signal, rectified)
             state = posterior.average if self.answer.kind == MEAN else posterior.heaviest
         latent_biotac = nets.given(latent_signal, state, rectified)
@@ -121,7 +123,8 @@ class Translator:
         biotac, digit = nets.decode_biotac(latent_biotac) * touched, nets.decode_digit(latent_digit) * touched
         if self._shift is not None:
             digit = self._shift(digit)
-        center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m"))
+        # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
+        center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m") if alone else STILL)
         silent = np.isnan(center[:, 0])
         confidence = self._confidence(change, signals.flags, rectified)
         flags = signals.flags.copy()
