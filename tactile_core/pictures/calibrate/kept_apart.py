@@ -17,7 +17,11 @@ from .press_fit import Sight, fit_ball
 FOLDS = 3
 WORTH = 0.8  # of the null's L1: a calibration that leaves more of a press is worth nothing (issue LIGHT)
 # What a picture that keeps its shape may be turned by: rows, columns reversed.
-WAYS = {(True, True): "turned by 180 degrees", (False, True): "mirrored left to right", (True, False): "mirrored"}
+WAYS = {
+    (True, True): "turned by 180 degrees",
+    (False, True): "mirrored left to right",
+    (True, False): "mirrored top to bottom",
+}
 LOOKED_AT = 4  # presses, the plainest, by which the way they lie is told
 CLEARLY = 0.8  # of what is unexplained as they are given, that another way may leave (assumed)
 
