@@ -42,10 +42,11 @@ class Press:
 
 
 def with_leds(unit, **change):
-    """The unit with a change of each of its LEDs."""
-    return dataclasses.replace(unit, leds=tuple(dataclasses.replace(led, **change) for led in unit.leds))
+    """The unit with a change of each of its LEDs, which light the gel as brightly."""
+    leds = tuple(dataclasses.replace(led, **change) for led in unit.leds)
+    return dataclasses.replace(unit, leds=leds).with_gain(unit.gain)
 
 
 def levels(unit, radiance) -> np.ndarray:
-    """Radiance (H, W, 3) or a difference of it in grey levels, as the unit's gain makes it."""
-    return np.einsum("hwcl,hwl->hwc", unit.gain.matrices(unit.camera), radiance)
+    """Radiance (H, W, 3) or a difference of it in the picture's grey levels."""
+    return np.einsum("hwcl,hwl->hwc", unit.response.matrices(unit.camera), radiance)

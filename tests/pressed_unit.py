@@ -13,6 +13,7 @@ from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Calibration
 
 BALL = 3e-3  # m, radius
+GREY = 128  # level of the untouched gel
 PLACES = ((0.0, 0.0, 0.9), (-3.0, -4.0, 1.0), (3.2, -3.5, 0.8), (-3.1, 4.2, 1.1), (2.8, 3.9, 1.0))  # mm
 
 
@@ -28,7 +29,7 @@ def photograph(
 
 def drawn(unit: Calibration, heights: np.ndarray, noise: np.random.Generator | None) -> np.ndarray:
     """Fast picture (H, W, 3) uint8 of heights (H, W) m."""
-    renderer = Renderer(unit, "fast")
+    renderer = Renderer(unit, "fast", background=np.full((*unit.camera.shape, 3), GREY))
     return renderer.picture(renderer.radiance(heights), noise)
 
 

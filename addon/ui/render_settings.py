@@ -67,16 +67,17 @@ def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) 
     path = bpy.path.abspath(settings.calibration) if settings.calibration else None
     unit = calibration_file.load_calibration(path)
     unit = unit if size is None else unit.at_size(*size)
-    gain = unit.gain
-    scaled = {
-        field.name: tuple(
-            tuple(value * light for value, light in zip(row, settings.lights, strict=True))
-            for row in getattr(gain, field.name)
-        )
-        for field in dataclasses.fields(gain)
-    }
-    albedo = unit.albedo if settings.albedo < 0 else settings.albedo
-    return dataclasses.replace(unit, gain=dataclasses.replace(gain, **scaled), albedo=albedo)
+    leds = tuple(
+        dataclasses.replace(led, radiance=led.radiance * share)
+        for led, share in zip(unit.leds, settings.lights, strict=True)
+    )
+    coating = unit.coating
+    if settings.albedo >= 0:
+        coating = dataclasses.replace(coating, albedo=(settings.albedo,) * 3)
+    changed = (leds, coating) != (unit.leds, unit.coating)
+    # A photograph shows the unit's own lights and coating: with others the picture at rest is the model's.
+    photograph = "" if changed else unit.photograph
+    return dataclasses.replace(unit, leds=leds, coating=coating, photograph=photograph)
 
 
 def register() -> None:

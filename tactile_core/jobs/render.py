@@ -1,9 +1,9 @@
 """The job of ``tactile render``: an input becomes a folder of pictures, as PNG and OpenEXR, with a note.
 
 DIR/images/%05d.png  pictures, numbered as the input's frames are
-DIR/exr/%05d.exr     radiance in float32, where asked for: R, G, B as the camera's channels count it (grey levels,
-                     C times L), basis.red, basis.green, basis.blue as each LED gives it (L, the calibration's unit)
-DIR/rest.exr         the same of the undeformed gel: a picture is background + RGB - RGB at rest
+DIR/exr/%05d.exr     where asked for: linear radiance of the coating in float32, R, G, B the light of each LED
+DIR/rest.exr         the same of the undeformed gel
+DIR/camera.exr       what the camera makes of it: response.R.red ... and ambient.R ..., see UNITS
 DIR/note.json        input, calibration, preset, versions; same input, same bytes
 DIR/timings.json     ms a frame of each stage on this machine; differs from run to run
 """
@@ -33,10 +33,11 @@ from . import results, sampling_error
 from .frame_range import frames_text, select
 from .gel_frames import is_scene, read_frames
 
-EXR, EXR_NAME, REST = "exr", "{:05d}.exr", "rest.exr"
+EXR, EXR_NAME, REST, CAMERA = "exr", "{:05d}.exr", "rest.exr", "camera.exr"
 UNITS = (
-    "R G B: grey levels of 8 bits, C times L, without background. basis.*: L, in units of what the LED gives to a "
-    "coating that faces it, as far from it as the picture's centre at height zero."
+    "Linear radiance of the coating: R, G, B the light of the red, green and blue LED, in grey levels of that channel "
+    "in the picture's middle. Channel R of the picture, 8-bit levels: response.R.red R + response.R.green G + "
+    "response.R.blue B + ambient.R of camera.exr; so G and B."
 )
 
 Progress = Callable[[int, int], None]
@@ -193,6 +194,7 @@ class Pictures:
         """The undeformed gel, where OpenEXR is asked for."""
         if self.exr:
             self._write_exr(folder / REST, self.renderer.rest_radiance, self.about)
+            self._write_camera(folder / CAMERA)
 
     def write_frame(self, folder: Path, number: int, values: np.ndarray) -> None:
         """values : displacement (M, 3) m or heights (H, W) m."""
@@ -213,10 +215,19 @@ class Pictures:
     def _write_exr(self, path: Path, radiance: np.ndarray, about: dict[str, str]) -> None:
         from ..files.exr import write_exr
 
-        levels = self.renderer.in_levels(radiance)
-        channels = {name: levels[..., k] for k, name in enumerate("RGB")}
-        channels |= {f"basis.{colour}": radiance[..., k] for k, colour in enumerate(COLOURS)}
-        write_exr(path, channels, about)
+        write_exr(path, {name: radiance[..., k] for k, name in enumerate("RGB")}, about)
+
+    def _write_camera(self, path: Path) -> None:
+        """The response to each LED's light, and what is left of the picture at rest."""
+        from ..files.exr import write_exr
+
+        renderer = self.renderer
+        response = renderer.calibration.response.matrices(renderer.camera).astype(np.float32)
+        ambient = renderer.background - renderer.in_levels(renderer.rest_radiance)
+        planes = {f"ambient.{name}": ambient[..., k] for k, name in enumerate("RGB")}
+        for k, name in enumerate("RGB"):
+            planes |= {f"response.{name}.{led}": response[..., k, j] for j, led in enumerate(COLOURS)}
+        write_exr(path, planes, self.about)
 
 
 def pictures(

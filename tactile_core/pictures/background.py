@@ -1,4 +1,8 @@
-"""The picture of an untouched DIGIT: a calibration's smooth polynomial, or the user's own photograph."""
+"""The picture of an untouched DIGIT: its LEDs' light on the coating and ambient light, or the user's own photograph.
+
+About half of what a real unit shows at rest is light that gel and acrylic hold: it lights the coating from all sides.
+Each LED has its own share of it, a smooth polynomial, that goes with the LED's power and the coating's albedo.
+"""
 
 from __future__ import annotations
 
@@ -8,43 +12,51 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors.calibration import BACKGROUND_DEGREE, BACKGROUND_UNIT, LARGEST_LEVEL, Calibration
+from ..sensors.calibration import AMBIENT_DEGREE, AMBIENT_UNIT, Calibration
 from ..sensors.camera import Camera
 
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF")  # of photographs; for others the library may start programs (EPS: Ghostscript)
 MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 million
 
 
-def background_picture(calibration: Calibration) -> np.ndarray:
-    """Background (H, W, 3) float32, grey levels; whole numbers of 8 bits.
+def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
+    """Picture (H, W, 3) float32, grey levels, of the untouched gel, whose coating shows radiance (H, W, 3).
 
-    Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures.
+    Of the calibration's photograph where it has one. Raises TactileError for a photograph that cannot be read or has
+    another size than the camera's pictures.
     """
-    if calibration.background.photograph:
-        return read_photograph(calibration.background.photograph, calibration.camera).astype(np.float32)
-    return polynomial_background(calibration.background.polynomial, calibration.camera)
+    if unit.photograph:
+        return read_photograph(unit.photograph, unit.camera).astype(np.float32)
+    return by_led(unit, radiance).sum(-1)
 
 
-def polynomial_background(coefficients: tuple[tuple[float, ...], ...], camera: Camera) -> np.ndarray:
-    """(H, W, 3) float32 of a polynomial (3, 21) in the order of ``terms``, in whole grey levels of 8 bits."""
-    down, right = camera.down / BACKGROUND_UNIT, camera.right / BACKGROUND_UNIT
-    picture = np.zeros((*camera.shape, 3))
-    for (i, j), levels in zip(terms(), np.asarray(coefficients).T, strict=True):
-        picture += (down[:, None] ** j * right**i)[..., None] * levels
-    return np.rint(picture).clip(0, LARGEST_LEVEL).astype(np.float32)
+def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
+    """Levels (H, W, 3, 3), channel by LED, of radiance (H, W, 3) at rest and ambient light."""
+    right, down = unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT
+    ambient = np.zeros((*unit.camera.shape, 3))
+    for (i, j), share in zip(terms(), np.asarray(unit.ambient).T, strict=True):
+        ambient += (down[:, None] ** j * right**i)[..., None] * share
+    levels = unit.response.matrices(unit.camera) * radiance[..., None, :]
+    levels += np.asarray(unit.response.centre) * (ambient * unit.ambient_unit)[..., None, :]
+    return levels.astype(np.float32)
 
 
-def fit_polynomial(picture: np.ndarray, camera: Camera) -> tuple[tuple[float, ...], ...]:
-    """Coefficients (3, 21), least squares, of a picture (H, W, 3) in grey levels."""
-    down, right = np.meshgrid(camera.down / BACKGROUND_UNIT, camera.right / BACKGROUND_UNIT, indexing="ij")
+def fit_ambient(picture: np.ndarray, unit: Calibration, radiance: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """Ambient light (3, 21) with which the unit's picture at rest is nearest one (H, W, 3), least squares.
+
+    radiance : (H, W, 3) of the coating at rest
+    """
+    right, down = np.meshgrid(unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT)
     basis = np.stack([(right**i * down**j).ravel() for i, j in terms()], -1)
-    found = np.linalg.lstsq(basis, picture.reshape(-1, 3).astype(float), rcond=None)[0]
-    return tuple(tuple(row) for row in found.T.tolist())
+    left = picture - np.einsum("hwcl,hwl->hwc", unit.response.matrices(unit.camera), radiance)
+    found = np.linalg.lstsq(basis, left.reshape(-1, 3), rcond=None)[0]
+    bands = np.linalg.solve(np.asarray(unit.response.centre), found.T) / unit.ambient_unit[:, None]
+    return tuple(tuple(row) for row in bands.tolist())
 
 
 def terms() -> Iterator[tuple[int, int]]:
     """Powers (i, j) of right and down, by i + j, then by j."""
-    for degree in range(BACKGROUND_DEGREE + 1):
+    for degree in range(AMBIENT_DEGREE + 1):
         for j in range(degree + 1):
             yield degree - j, j
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
-from .background import background_picture
+from .background import resting_picture
 from .camera_noise import camera_noise
 from .height_map import of_unit, rest_height_map
 from .mitsuba.direct_light import Hits, direct_light
@@ -40,7 +40,7 @@ class Renderer:
 
     calibration : None for the one that ships; preset : one of ``presets.NAMES``
     variant : of Mitsuba, "llvm_ad_rgb" or "scalar_rgb"; None for the faster one that works here. Not asked by ``fast``
-    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the calibration's
+    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for what the calibration makes
     rest : (H, W) heights of the undeformed gel, m; None for the calibration's, whose dome heights then get too
     seed : of the reference's random places and points; the others have none
     Raises TactileError for an unknown preset, arrays of another shape, values that are not finite, and a gel that
@@ -61,27 +61,29 @@ class Renderer:
         self._domed = rest is None and calibration.dome_scale != 1
         own = rest_height_map(self.camera) if rest is None else rest
         resting = self._heights(own, "rest height map")
-        background = background_picture(calibration) if background is None else background
-        self.background = camera_array(background, (*self.camera.shape, 3), "background")
-        self._gain = np.ascontiguousarray(calibration.gain.matrices(self.camera).transpose(2, 3, 0, 1), np.float32)
+        self._response = np.ascontiguousarray(
+            calibration.response.matrices(self.camera).transpose(2, 3, 0, 1), np.float32
+        )
         if preset == FAST:
             self.variant = None
-            self._light: Light = Shader(calibration, background, resting)
+            self._light: Light = Shader(calibration, rest=resting)
         else:
             self.variant = choose_variant(variant).name
             self._light = MitsubaLight(calibration, preset_named(preset), self.variant, resting, seed)
         self.rest_radiance = self._light.radiance(resting)
+        background = resting_picture(calibration, self.rest_radiance) if background is None else background
+        self.background = camera_array(background, (*self.camera.shape, 3), "background")
 
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
         return self.picture(self.radiance(height_map))
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3) float32 that each LED gives to what pixels see, in the unit of ``calibration``."""
+        """Radiance (H, W, 3) float32, levels of its band, that each LED gives to what pixels see."""
         return self._light.radiance(self._heights(height_map, "height map"))
 
     def picture(self, radiance: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
-        """Picture (H, W, 3) uint8: background + C (radiance - radiance at rest).
+        """Picture (H, W, 3) uint8: background + response (radiance - radiance at rest).
 
         noise : makes the camera's noise, as measured on the unit; None for none
         """
@@ -100,10 +102,10 @@ class Renderer:
         return heights
 
     def in_levels(self, radiance: np.ndarray) -> np.ndarray:
-        """C times radiance (H, W, 3), grey levels float32: what the camera's channels make of it."""
+        """Response times radiance (H, W, 3), grey levels float32: what the camera's channels make of it."""
         levels = np.empty_like(radiance)
-        for channel, gains in enumerate(self._gain):
-            levels[..., channel] = sum(gain * radiance[..., led] for led, gain in enumerate(gains))
+        for channel, row in enumerate(self._response):
+            levels[..., channel] = sum(part * radiance[..., led] for led, part in enumerate(row))
         return levels
 
 
@@ -116,7 +118,7 @@ class MitsubaLight:
         self._start = np.random.default_rng(seed).random(4)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3) float32 of heights (H, W) m, in the unit of ``calibration``."""
+        """Radiance (H, W, 3) float32, levels, of heights (H, W) m."""
         height = np.asarray(height_map, np.float32)
         return self.completed(height, *self.direct(height))
 
@@ -132,7 +134,7 @@ class MitsubaLight:
     def completed(self, height: np.ndarray, direct: np.ndarray, hits: Hits) -> np.ndarray:
         """Direct light with what else the preset has: the gel's own light, and the window."""
         radiance, preset = direct, self.preset
-        if preset.gather and self.unit.albedo:
+        if preset.gather and any(self.unit.coating.albedo):
             radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)
         return through_window(radiance, hits.height, self.unit.camera) if preset.window else radiance
 
@@ -147,4 +149,4 @@ class MitsubaLight:
             points = [sphere_points(led, count, turn, depth) for led in leds]
         place, seen = self._tracer.trace(np.concatenate(points), shift)
         hits = Hits.on_map(place, tilt, self.unit.camera)
-        return direct_light(hits, seen, points, leds, soften=self.preset.passes == 1), hits
+        return direct_light(hits, seen, points, self.unit, soften=self.preset.passes == 1), hits

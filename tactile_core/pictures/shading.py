@@ -1,7 +1,7 @@
 """Fast picture of the gel: three coloured LEDs on a white, matte coating, with soft cast shadows; numpy alone.
 
-Radiance is counted per LED in the unit of ``calibration``: Lambert's cosine times the inverse square of distance, in
-which a flat, level coating has sin(elevation), about 0.4. What light the gel throws on itself is left out.
+Radiance is Lambert's cosine times the inverse square of distance. What light the gel throws on itself, the coating's
+gloss and the window are left out.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from ..errors import TactileError
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import COLOURS, Camera, Led
-from .background import background_picture
+from .background import resting_picture
 from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .height_map import of_unit, rest_height_map
 from .perspective import Perspective, slopes
@@ -26,7 +26,7 @@ class Shader:
     """Pictures of height maps; what only the resting gel decides is computed once.
 
     calibration : None for the one that ships
-    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for the calibration's
+    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for what the calibration makes
     rest : (H, W) heights of the undeformed gel, m, that height maps rise from; None for the DIGIT's
     Raises TactileError for arrays of another shape, values that are not finite, LEDs over the picture, or a gel that
     reaches an LED or the camera.
@@ -42,16 +42,17 @@ class Shader:
         camera = self.camera = calibration.camera
         self._dome = rest is None  # heights have the public mesh's dome, which the unit's own takes the place of
         rest = of_unit(rest_height_map(camera), calibration) if rest is None else rest
-        background = background_picture(calibration) if background is None else background
         rest = camera_array(rest, camera.shape, "rest height map")
-        self.background = camera_array(background, (*camera.shape, 3), "background")
-        self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
-        self._gain = np.ascontiguousarray(calibration.gain.matrices(camera).transpose(2, 3, 0, 1), np.float32)
+        self._response = np.ascontiguousarray(calibration.response.matrices(camera).transpose(2, 3, 0, 1), np.float32)
         self._view = Perspective(camera, rest)
         check_reach(rest, calibration, "rest height map")
         self.rest = self._view(rest)
         self._lamps = [Lamp(camera, led) for led in calibration.leds]
         self._rest_radiance = self._seen_radiance(self.rest)
+        if background is None:
+            background = resting_picture(calibration, np.moveaxis(self._rest_radiance, 0, -1))
+        self.background = camera_array(background, (*camera.shape, 3), "background")
+        self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
 
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
@@ -60,14 +61,14 @@ class Shader:
         picture = np.empty((*self.camera.shape, 3), np.uint8)
         for channel in range(len(COLOURS)):
             level = self._levels[channel].copy()
-            for gain, light in zip(self._gain[channel], change, strict=True):
-                level += gain * light
+            for response, light in zip(self._response[channel], change, strict=True):
+                level += response * light
             np.rint(level, out=level)
             picture[..., channel] = np.clip(level, 0, LARGEST_LEVEL, out=level)
         return picture
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3) float32 of the coating that each pixel sees, by LED; height_map : (H, W) m."""
+        """Radiance (H, W, 3) float32, levels, of the coating that each pixel sees, by LED; height_map : (H, W) m."""
         return np.moveaxis(self._radiance(height_map), 0, -1)
 
     def _radiance(self, height_map: np.ndarray) -> np.ndarray:
@@ -79,7 +80,8 @@ class Shader:
     def _seen_radiance(self, seen: np.ndarray) -> np.ndarray:
         """Radiance (3, H, W) of heights (H, W) that the pixels see."""
         surface = SeenSurface(self._view, seen)
-        return np.stack([lamp.radiance(surface) for lamp in self._lamps])
+        scale = self.calibration.facing.astype(np.float32)
+        return np.stack([lamp.radiance(surface) * level for lamp, level in zip(self._lamps, scale, strict=True)])
 
 
 class SeenSurface:
@@ -117,7 +119,7 @@ class Lamp:
         self._over_picture = camera.right.astype(np.float32) * right + (camera.down.astype(np.float32) * down)[:, None]
 
     def radiance(self, surface: SeenSurface) -> np.ndarray:
-        """Radiance (H, W) float32."""
+        """Radiance (H, W) float32, in what the LED gives on a coating that faces it from the picture's middle."""
         right, down, up = np.asarray(self.led.position, np.float32)
         distance = self._over_picture * surface.near
         distance += up * surface.height

@@ -1,8 +1,8 @@
 """What a DIGIT unit's pictures depend on: camera, lights, colours, gel and background, as one frozen set of numbers.
 
-A picture is ``background + C(right, down) (L_contact - L_flat)`` in raw 8-bit values, where L is the radiance of the
-three LEDs on the coating. Radiance is counted in units of what an LED gives on a coating that faces it at the distance
-from the LED to the picture's centre at height zero. The fast picture (``shading``) and Mitsuba's share it.
+A picture is ``response(right, down) L + ambient(right, down)`` in raw 8-bit values, where L is the radiance that the
+coating shows of each LED's light. Each LED's light is a band of its own, and radiance in it is counted in grey levels
+of the channel of that colour in the picture's middle. The fast picture (``shading``) and Mitsuba's share all numbers.
 """
 
 from __future__ import annotations
@@ -15,19 +15,25 @@ import numpy as np
 
 from ..errors import TactileError
 from .camera import COLOURS, Camera, Led
+from .coating import Coating
 
-BACKGROUND_DEGREE = 5
-BACKGROUND_TERMS = (BACKGROUND_DEGREE + 1) * (BACKGROUND_DEGREE + 2) // 2
-BACKGROUND_UNIT = 10e-3  # m; image coordinates are divided by it in a background's polynomial
+AMBIENT_DEGREE = 5
+AMBIENT_TERMS = (AMBIENT_DEGREE + 1) * (AMBIENT_DEGREE + 2) // 2
+AMBIENT_UNIT = 10e-3  # m; image coordinates are divided by it in the ambient light's polynomial
+# m: ambient light is counted in what a LED gives on a coating that faces it from there, so that it goes with the LED's
+# power alone, not with its place.
+AMBIENT_DISTANCE = 20e-3
+GEL_INDEX = 1.41  # of clear silicone rubbers (assumed)
+MOST_INDEX = 4.0  # germanium's: no clear solid has more
 LARGEST_LEVEL = 255.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Gain:
-    """The matrix C (channel, led) of grey levels a unit of radiance, linear over the picture.
+class Response:
+    """The matrix (channel, led) of what the camera makes of radiance, linear over the picture.
 
-    centre : (3, 3) grey levels in the picture's middle, a row a channel of the picture, a column an LED's colour
-    along_right, along_down : (3, 3) grey levels a metre of the plane of height zero
+    centre : (3, 3) levels a level in the picture's middle, a row a channel of the picture, a column an LED's colour
+    along_right, along_down : (3, 3) levels a level and metre of the plane of height zero
     """
 
     centre: tuple[tuple[float, ...], ...]
@@ -38,34 +44,21 @@ class Gain:
         for field in dataclasses.fields(self):
             matrix = np.asarray(getattr(self, field.name), float)
             if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-                raise TactileError(f"gain, {field.name}", f"shape {matrix.shape}", "3 rows of 3 finite numbers")
+                raise TactileError(f"response, {field.name}", f"shape {matrix.shape}", "3 rows of 3 finite numbers")
         for channel, colour in enumerate(COLOURS):
             if not self.centre[channel][channel] > 0:
                 found = f"{self.centre[channel][channel]:g} levels of {colour} by the {colour} LED"
-                raise TactileError("gain, centre", found, "more than 0: light brightens its own colour")
+                raise TactileError("response, centre", found, "more than 0: light brightens its own colour")
 
     def matrices(self, camera: Camera) -> np.ndarray:
-        """C (H, W, 3, 3) of each pixel."""
+        """The matrix (H, W, 3, 3) of each pixel."""
         centre, right, down = (np.asarray(matrix) for matrix in (self.centre, self.along_right, self.along_down))
         return centre + camera.right[None, :, None, None] * right + camera.down[:, None, None, None] * down
 
-
-@dataclasses.dataclass(frozen=True)
-class Background:
-    """The picture of the untouched gel: a smooth polynomial, or the user's own photograph.
-
-    polynomial : (3, 21) grey levels, a row a channel: of right^i down^j / (10 mm)^(i + j), ordered by i + j, then by j
-    photograph : path of the photograph that takes the polynomial's place; "" for none
-    """
-
-    polynomial: tuple[tuple[float, ...], ...]
-    photograph: str = ""
-
-    def __post_init__(self) -> None:
-        table = np.asarray(self.polynomial, float)
-        if table.shape != (3, BACKGROUND_TERMS) or not np.isfinite(table).all():
-            expected = f"3 rows of {BACKGROUND_TERMS} finite numbers"
-            raise TactileError("background, polynomial", f"shape {table.shape}", expected)
+    def times(self, led: np.ndarray) -> Response:
+        """The matrix with each LED's column times led (3,)."""
+        parts = (np.asarray(getattr(self, field.name)) * led for field in dataclasses.fields(self))
+        return Response(*(tuple(map(tuple, part.tolist())) for part in parts))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,31 +86,79 @@ class Calibration:
 
     unit : its name, free text
     leds : red, green, blue
+    response : of the camera to each LED's light
+    ambient : (3, 21) a row a LED: of its light that gel and acrylic hold, in what it gives on a coating that faces it
+        from ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i + j, then by j
+    coating : the paint on the gel
+    gel_index : refractive index of gel and acrylic, taken as one
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
-    albedo : 0..1 share of light that the coating scatters back, for interreflection; 0 leaves it out
+    photograph : path of a photograph of the untouched gel, which then is the picture at rest; "" for none
     noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for it
     """
 
     unit: str
     camera: Camera
     leds: tuple[Led, Led, Led]
-    gain: Gain
+    response: Response
+    ambient: tuple[tuple[float, ...], ...]
+    coating: Coating
+    gel_index: float
     dome_scale: float
-    albedo: float
-    background: Background
+    photograph: str
     noise: tuple[float, float, float]
     fit: Fit
 
     def __post_init__(self) -> None:
         if tuple(led.colour for led in self.leds) != COLOURS:
             raise TactileError("leds", repr([led.colour for led in self.leds]), f"one each of {', '.join(COLOURS)}")
+        for led in self.leds:
+            if led.position[2] <= led.radius:
+                found = f"{1e3 * led.position[2]:g} mm high, radius {1e3 * led.radius:g} mm"
+                raise TactileError(f"leds, {led.colour}", found, "a sphere above the gel, whose height is 0")
         _check_range("gel, dome_scale", self.dome_scale, 0.0, 5.0)
-        _check_range("gel, albedo", self.albedo, 0.0, 1.0)
+        _check_range("gel, index", self.gel_index, 1.0, MOST_INDEX)
+        table = np.asarray(self.ambient, float)
+        if table.shape != (3, AMBIENT_TERMS) or not np.isfinite(table).all():
+            raise TactileError("ambient", f"shape {table.shape}", f"3 rows of {AMBIENT_TERMS} finite numbers")
         if len(self.noise) != 3:
             raise TactileError("noise, levels", repr(self.noise), "three numbers")
         for level in self.noise:
             _check_range("noise, levels", level, 0.0, LARGEST_LEVEL)
         _check_range("fit, ball_diameter_mm", self.fit.ball_diameter, 0.0, 0.1)
+
+    @property
+    def facing(self) -> np.ndarray:
+        """Radiance (3,) that each LED's light has on a coating that faces it, levels.
+
+        At the distance from the LED to the picture's centre: a matte coating of albedo a shows a radiance r^2 / d^2 of
+        a sphere of even brightness (Lambert's law).
+        """
+        return self._lit([float(np.square(led.position).sum()) for led in self.leds])
+
+    @property
+    def ambient_unit(self) -> np.ndarray:
+        """Radiance (3,) that the ambient light's polynomials count in, levels."""
+        return self._lit([AMBIENT_DISTANCE**2] * 3)
+
+    def _lit(self, squares: list[float]) -> np.ndarray:
+        parts = zip(self.leds, self.coating.albedo, squares, strict=True)
+        return np.array([led.radiance * albedo * led.radius**2 / square for led, albedo, square in parts])
+
+    @property
+    def gain(self) -> Response:
+        """Levels a unit of ``facing``: what the three LEDs' radiance times the response comes to."""
+        return self.response.times(self.facing)
+
+    def with_gain(self, gain: Response) -> Calibration:
+        """The unit whose LEDs shine so that its ``gain`` is that; each LED's own channel responds 1 in the middle."""
+        if not min(self.coating.albedo) > 0:
+            raise TactileError("coating, albedo", "0", "more than 0, or no LED's light is seen")
+        own = np.diag(gain.centre)
+        leds = tuple(
+            dataclasses.replace(led, radiance=float(level * np.square(led.position).sum() / (albedo * led.radius**2)))
+            for led, level, albedo in zip(self.leds, own, self.coating.albedo, strict=True)
+        )
+        return dataclasses.replace(self, leds=leds, response=gain.times(1 / own))
 
     def at_size(self, width: int, height: int) -> Calibration:
         """The same view in other pixels: px/mm grow with the picture. Raises TactileError for another aspect ratio."""

@@ -16,22 +16,25 @@ from ..errors import TactileError
 from ..files import atomic
 from ..files.shipped import shipped
 from ..files.text_file import read_toml_text
-from .calibration import BACKGROUND_TERMS, Background, Calibration, Fit, Gain
+from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
 from .camera import COLOURS, Camera, Led
+from .coating import Coating
 
-FORMAT = "tactile-calibration-1"
+FORMAT, FORMER = "tactile-calibration-2", "tactile-calibration-1"
 SHIPPED = shipped("calibrations/default.toml")
-LARGEST = 1e6  # of a unit's numbers: none that means something comes near (assumed); a fit's errors may be larger
+LARGEST = 1e8  # of a unit's numbers, as the radiance of a spot of 0.05 mm; a fit's errors may be larger
 ADVICE = "Make it again with `tactile calibrate`"
 
 _TABLES = {
-    "": ("format", "unit", "camera", "leds", "gain", "gel", "background", "noise", "fit"),
+    "": ("format", "unit", "camera", "leds", "response", "ambient", "coating", "gel", "background", "noise", "fit"),
     "camera": ("width_px", "height_px", "px_per_mm_x", "px_per_mm_y", "centre_x_mm", "centre_z_mm",
                "apparent_height_mm", "right_z", "down_x"),
     "leds": COLOURS,
-    "gain": ("centre", "along_right_per_mm", "along_down_per_mm"),
-    "gel": ("dome_scale", "albedo"),
-    "background": ("photograph", *COLOURS),
+    "response": ("centre", "along_right_per_mm", "along_down_per_mm"),
+    "ambient": COLOURS,
+    "coating": ("bsdf", "albedo", "roughness", "gloss", "metallic"),
+    "gel": ("dome_scale", "index"),
+    "background": ("photograph",),
     "noise": ("levels",),
     "fit": ("note", "photographs", "ball_diameter_mm", "errors", "standard_errors", "not_identified"),
 }  # fmt: skip
@@ -81,6 +84,9 @@ class _Reader:
 
     def __init__(self, content: dict[str, Any]) -> None:
         self._content = content
+        if content.get("format") == FORMER:
+            expected = f"{FORMAT!r}, in which LEDs and coating make the picture at rest too"
+            raise TactileError("format", f"{FORMER!r}, of an older version", expected)
         for table, names in _TABLES.items():
             self._check_names(table or "top level", self._content if not table else self._table(table), names)
 
@@ -104,10 +110,12 @@ class _Reader:
             unit=_text("unit", self._content["unit"]),
             camera=self._camera(),
             leds=tuple(self._led(colour) for colour in COLOURS),
-            gain=self._gain(),
+            response=self._response(),
+            ambient=tuple(_numbers(f"ambient, {led}", self._content["ambient"][led], AMBIENT_TERMS) for led in COLOURS),
+            coating=self._coating(),
+            gel_index=_number("gel, index", self._content["gel"]["index"]),
             dome_scale=_number("gel, dome_scale", self._content["gel"]["dome_scale"]),
-            albedo=_number("gel, albedo", self._content["gel"]["albedo"]),
-            background=self._background(folder),
+            photograph=self._photograph(folder),
             noise=_numbers("noise, levels", self._content["noise"]["levels"], 3),
             fit=self._fit(),
         )
@@ -131,26 +139,31 @@ class _Reader:
         where, table = f"leds, {colour}", self._content["leds"][colour]
         if not isinstance(table, dict):
             raise TactileError(where, repr(table), "a table")
-        self._check_names(where, table, ("position_mm", "radius_mm"))
+        self._check_names(where, table, ("position_mm", "radius_mm", "radiance"))
         position = _numbers(f"{where}, position_mm", table["position_mm"], 3)
         radius = _number(f"{where}, radius_mm", table["radius_mm"])
-        return Led(colour, tuple(1e-3 * value for value in position), 1e-3 * radius)
+        radiance = _number(f"{where}, radiance", table["radiance"])
+        return Led(colour, tuple(1e-3 * value for value in position), 1e-3 * radius, radiance)
 
-    def _gain(self) -> Gain:
-        table = {name: _rows(f"gain, {name}", self._content["gain"][name]) for name in _TABLES["gain"]}
+    def _response(self) -> Response:
+        table = {name: _rows(f"response, {name}", self._content["response"][name]) for name in _TABLES["response"]}
         along_right, along_down = (
             tuple(tuple(1e3 * value for value in row) for row in table[name])
             for name in ("along_right_per_mm", "along_down_per_mm")
         )
-        return Gain(table["centre"], along_right, along_down)
+        return Response(table["centre"], along_right, along_down)
 
-    def _background(self, folder: Path) -> Background:
-        table = self._content["background"]
-        rows = tuple(_numbers(f"background, {colour}", table[colour], BACKGROUND_TERMS) for colour in COLOURS)
-        name = _text("background, photograph", table["photograph"])
+    def _coating(self) -> Coating:
+        table = self._content["coating"]
+        numbers = {name: _number(f"coating, {name}", table[name]) for name in ("roughness", "gloss", "metallic")}
+        albedo = _numbers("coating, albedo", table["albedo"], 3)
+        return Coating(_text("coating, bsdf", table["bsdf"]), albedo, **numbers)
+
+    def _photograph(self, folder: Path) -> str:
+        name = _text("background, photograph", self._content["background"]["photograph"])
         if name and Path(name).name != name:
             raise TactileError("background, photograph", repr(name), "the name of a file beside the calibration")
-        return Background(rows, str(folder / name) if name else "")
+        return str(folder / name) if name else ""
 
     def _fit(self) -> Fit:
         table = self._content["fit"]
@@ -216,9 +229,10 @@ def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None
 
 
 def _as_text(calibration: Calibration) -> str:
-    camera, gain, fit = calibration.camera, calibration.gain, calibration.fit
+    camera, response, coating = calibration.camera, calibration.response, calibration.coating
+    fit = calibration.fit
     lines = [
-        "# A DIGIT unit: picture = background + C(right, down) (radiance in contact - radiance at rest), 8-bit values.",
+        "# A DIGIT unit: picture = response(right, down) x radiance of the coating + ambient light, 8-bit values.",
         "# Image frame: right, down, toward the camera; origin in the picture's middle on the plane of height zero.",
         f"format = {_quoted(FORMAT)}",
         f"unit = {_quoted(calibration.unit)}",
@@ -234,27 +248,34 @@ def _as_text(calibration: Calibration) -> str:
         f"right_z = {camera.right_z}  # the way z goes to the right",
         f"down_x = {camera.down_x}  # the way x goes down",
         "",
-        "[leds]  # spheres, right, down, toward the camera",
+        "[leds]  # spheres: right, down, toward the camera; radiance of their surface in levels of their own channel",
     ]
     for led in calibration.leds:
         position = [1e3 * value for value in led.position]
-        lines.append(f"{led.colour} = {{ position_mm = {_list(position)}, radius_mm = {_digits(1e3 * led.radius)} }}")
-    lines += ["", "[gain]  # C, grey levels a unit of radiance: a row a channel of the picture, a column an LED"]
-    lines.append(f"centre = {_matrix(gain.centre)}")
-    for name, matrix in (("right", gain.along_right), ("down", gain.along_down)):
+        place = f"position_mm = {_list(position)}, radius_mm = {_digits(1e3 * led.radius)}"
+        lines.append(f"{led.colour} = {{ {place}, radiance = {_digits(led.radiance)} }}")
+    lines += ["", "[response]  # of the camera, levels a level: a row a channel of the picture, a column an LED"]
+    lines.append(f"centre = {_matrix(response.centre)}")
+    for name, matrix in (("right", response.along_right), ("down", response.along_down)):
         per_mm = [[1e-3 * value for value in row] for row in matrix]
         lines.append(f"along_{name}_per_mm = {_matrix(per_mm)}")
     lines += [
         "",
+        "[ambient]  # of each LED, held in gel and acrylic, of right^i down^j / (10 mm)^(i + j), by i + j, then j",
+        *[f"{led} = {_list(row)}" for led, row in zip(COLOURS, calibration.ambient, strict=True)],
+        "",
+        "[coating]  # diffuse, roughplastic or principled; albedo of each LED's light",
+        f"bsdf = {_quoted(coating.bsdf)}",
+        f"albedo = {_list(coating.albedo)}",
+        *[f"{name} = {_digits(getattr(coating, name))}" for name in ("roughness", "gloss", "metallic")],
+        "",
         "[gel]",
         f"dome_scale = {_digits(calibration.dome_scale)}  # of the public mesh's dome",
-        f"albedo = {_digits(calibration.albedo)}  # of the coating, for interreflection",
+        f"index = {_digits(calibration.gel_index)}  # of gel and acrylic",
         "",
-        "[background]  # grey levels of right^i down^j / (10 mm)^(i + j), by i + j, then j; a photograph goes first",
-        f"photograph = {_quoted(Path(calibration.background.photograph).name)}",
+        "[background]  # a photograph of the untouched gel, beside this file, is then the picture at rest",
+        f"photograph = {_quoted(Path(calibration.photograph).name)}",
     ]
-    for colour, row in zip(COLOURS, calibration.background.polynomial, strict=True):
-        lines.append(f"{colour} = {_list(row)}")
     lines += [
         "",
         "[noise]  # standard deviation, grey levels, red, green, blue; used when asked for",

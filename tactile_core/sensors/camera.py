@@ -132,14 +132,16 @@ class Camera:
 class Led:
     """One light of one colour: a sphere, equally bright from all sides.
 
-    colour : "red", "green" or "blue"; its light is a channel of radiance of its own
+    colour : "red", "green" or "blue"; its light is a band of radiance of its own
     position : (right, down, toward the camera), m, image frame
     radius : m, its apparent size, which makes shadows soft
+    radiance : of its surface, grey levels of its own channel in the picture's middle; 0 is off
     """
 
     colour: str
     position: tuple[float, float, float]
     radius: float
+    radiance: float
 
     def __post_init__(self) -> None:
         if self.colour not in COLOURS:
@@ -148,6 +150,8 @@ class Led:
             raise TactileError(f"led {self.colour}, position", repr(self.position), "three metres, the third above 0")
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise TactileError(f"led {self.colour}, radius", repr(self.radius), "metres above 0")
+        if not (math.isfinite(self.radiance) and self.radiance >= 0):
+            raise TactileError(f"led {self.colour}, radiance", repr(self.radiance), "grey levels, 0 or more")
 
     @property
     def channel(self) -> int:

@@ -27,7 +27,8 @@ from tactile_core.jobs import prepared_signals
 from tactile_core.jobs.engine import dask_cluster, inputs
 from tactile_core.jobs.gel_frames import read_frames
 from tactile_core.mechanics.isaac import tet_file
-from tactile_core.pictures.background import background_picture, read_photograph
+from tactile_core.pictures.background import read_photograph
+from tactile_core.pictures.shading import Shader
 from tactile_core.recordings import chunks, electrode_gains
 from tactile_core.sensors.calibration_file import SHIPPED, load_calibration
 from tactile_core.simulation import pairs_file, scene
@@ -389,7 +390,7 @@ def test_a_calibrations_photograph_is_bounded(tmp_path):
         for name in ("../bomb.png", "bomb.png"):
             text = SHIPPED.read_text().replace('photograph = ""', f'photograph = "{name}"')
             (tmp_path / "a.toml").write_text(text)
-            refused(lambda path: background_picture(load_calibration(path)), tmp_path / "a.toml", "bomb.png")
+            refused(lambda path: Shader(load_calibration(path)), tmp_path / "a.toml", "bomb.png")
 
 
 def plain_png(width: int, height: int) -> bytes:

@@ -112,16 +112,21 @@ def test_exr_holds_radiance_and_the_picture_follows_from_it(render, heights, tmp
     assert render(heights, "--exr")[0] == 0
     planes, about = read_exr(tmp_path / "out" / "exr" / "00002.exr")
     rest, _ = read_exr(tmp_path / "out" / "rest.exr")
-    assert set(planes) == {"R", "G", "B", "basis.red", "basis.green", "basis.blue"}
+    camera, _ = read_exr(tmp_path / "out" / "camera.exr")
+    assert set(planes) == set(rest) == {"R", "G", "B"}
     assert all(values.dtype == np.float32 for values in planes.values())
     assert (about["calibration"], about["preset"], about["frame"]) == (small.unit, "fast", "2")
     assert "levels" in about["units"]
-    change = np.stack([planes[name] - rest[name] for name in "RGB"], -1)
-    levels = np.clip(np.rint(Renderer(small, "fast").background + change), 0, 255)
+    bands = dict(zip(("red", "green", "blue"), "RGB", strict=True))
+    drawn = [
+        camera[f"ambient.{name}"] + sum(camera[f"response.{name}.{led}"] * planes[band] for led, band in bands.items())
+        for name in "RGB"
+    ]
+    levels = np.clip(np.rint(np.stack(drawn, -1)), 0, 255)
     shown = picture(tmp_path / "out" / "images" / "00002.png")
     assert np.abs(levels - shown).max() <= 1  # the sum in another order may round otherwise
     assert np.mean(levels != shown) < 1e-3
-    basis = np.stack([planes[f"basis.{colour}"] for colour in ("red", "green", "blue")], -1)
+    basis = np.stack([planes[name] for name in "RGB"], -1)
     np.testing.assert_array_equal(basis, Renderer(small, "fast").radiance(np.load(heights)["height_map"][2]))
 
 

@@ -91,7 +91,7 @@ def test_shadows_against_brute_force(depth: float, right: float, down: float, al
     near = np.hypot(RIGHT - right, DOWN - down) < np.sqrt(2 * press.ball * depth) + 3e-3
     near[np.indices(near.shape).sum(0) % 7 != 0] = False  # every seventh pixel is enough
     for led in DIGIT_LEDS:
-        error = LEVELS * (fast[near][:, led.channel] - brute_force(press, RIGHT[near], DOWN[near], led))
+        error = fast[near][:, led.channel] - LEVELS * brute_force(press, RIGHT[near], DOWN[near], led)
         assert np.sqrt(np.mean(error**2)) < allowed
 
 
@@ -121,20 +121,20 @@ def test_undeformed_gel_that_shadows_itself_is_bit_equal_too() -> None:
     np.testing.assert_array_equal(shader(ridge), GREY)
     # The ridge is there: without it the far side of the picture is brighter.
     free = Shader(plain_unit(leds=low), rest=FLAT, background=GREY).radiance(FLAT)
-    assert (free - shader.radiance(ridge))[..., 0].max() > 0.05
+    assert (free - shader.radiance(ridge))[..., 0].max() > 0.05 * LEVELS
 
 
 def test_point_light_over_a_plane_is_lambert() -> None:
-    led = Led("green", (9e-3, -3e-3, 6e-3), 1e-7)
+    led = Led("green", (9e-3, -3e-3, 6e-3), 1e-7, 1.0)
     unit = plain_unit(leds=(LEDS[0], led, LEDS[2]))
     radiance = Shader(unit, rest=FLAT, background=GREY).radiance(FLAT)
     square = (RIGHT - 9e-3) ** 2 + (DOWN + 3e-3) ** 2 + (6e-3) ** 2
     expected = (81 + 9 + 36) * 1e-6 * 6e-3 / square**1.5
-    np.testing.assert_allclose(radiance[..., 1], expected, rtol=1e-5)  # float32
+    np.testing.assert_allclose(radiance[..., 1], LEVELS * expected, rtol=1e-5)  # float32
 
 
 def test_tilted_plane_is_lambert() -> None:
-    led = Led("red", (9e-3, -3e-3, 9e-3), 1e-7)
+    led = Led("red", (9e-3, -3e-3, 9e-3), 1e-7, 1.0)
     plane = 0.2 * RIGHT - 0.1 * DOWN
     unit = plain_unit(leds=(led, *LEDS[1:]))
     radiance = Shader(unit, rest=FLAT, background=GREY).radiance(plane)
@@ -145,7 +145,7 @@ def test_tilted_plane_is_lambert() -> None:
     expected = 171e-6 * cosine / np.linalg.norm(to_light, axis=-1) ** 3
     inside = (np.abs(RIGHT * near) < 0.98 * RIGHT.max()) & (np.abs(DOWN * near) < 0.98 * DOWN.max())  # of the map
     # Slopes of float32 heights over 0.1 mm.
-    np.testing.assert_allclose(radiance[..., 0][inside], expected[inside], rtol=5e-4)
+    np.testing.assert_allclose(radiance[..., 0][inside], LEVELS * expected[inside], rtol=5e-4)
 
 
 def test_mirrored_scene_makes_the_mirrored_picture() -> None:
@@ -192,7 +192,7 @@ def test_bad_heights_are_refused(height: np.ndarray) -> None:
 
 @pytest.mark.parametrize(
     ("options", "where"),
-    [({"calibration": plain_unit(leds=(Led("red", (1e-3, 2e-3, 7e-3), 1e-3), *LEDS[1:]))}, "led red, position"),
+    [({"calibration": plain_unit(leds=(Led("red", (1e-3, 2e-3, 7e-3), 1e-3, 1.0), *LEDS[1:]))}, "led red, position"),
      ({"background": GREY[..., 0]}, "background"), ({"rest": NAN}, "rest height map")],
 )  # fmt: skip
 def test_bad_shader_is_refused(options: dict, where: str) -> None:

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.pictures.background import background_picture, fit_polynomial
+from tactile_core.pictures.background import fit_ambient
+from tactile_core.pictures.height_map import rest_height_map
+from tactile_core.pictures.shading import Shader
 from tactile_core.sensors.calibration_file import SHIPPED, load_calibration, write_calibration
 
 SHIPPED_TEXT = SHIPPED.read_text(encoding="utf-8")
@@ -25,7 +27,7 @@ def test_written_file_reads_back_and_is_stable(tmp_path: Path) -> None:
     again = load_calibration(first)
     assert again.unit == calibration.unit
     assert again.camera.apparent_height == pytest.approx(calibration.camera.apparent_height, rel=1e-5)
-    np.testing.assert_allclose(again.gain.along_right, calibration.gain.along_right, rtol=1e-5)
+    np.testing.assert_allclose(again.response.along_right, calibration.response.along_right, rtol=1e-5)
     write_calibration(second, again)
     assert second.read_bytes() == first.read_bytes()
 
@@ -39,17 +41,23 @@ def test_shipped_file_is_written_as_this_version_writes_it(tmp_path: Path) -> No
     ("old", "new", "where"),
     [
         ("px_per_mm_x =", "px_per_cm_x =", "unknown px_per_cm_x"),
-        ("albedo =", "# albedo =", "gel: albedo missing"),
-        ("radius_mm", "radius", "leds, .*unknown radius"),
+        ("albedo =", "# albedo =", "coating: albedo missing"),
+        ("radius_mm =", "radius =", "leds, .*unknown radius"),
         ("[noise]", "[other]", "unknown other"),
-        ('format = "tactile-calibration-1"', 'format = "tactile-calibration-9"', "format"),
+        ('format = "tactile-calibration-2"', 'format = "tactile-calibration-9"', "format"),
+        ('format = "tactile-calibration-2"', 'format = "tactile-calibration-1"', "of an older version"),
+        ("radiance = ", "radiance = -", "leds?,? red, radiance"),
+        ("radius_mm = ", "radius_mm = 9", "above the gel"),
+        ("index = 1", "index = 0", "gel, index"),
+        ("albedo = [0", "albedo = [2", "coating, albedo"),
+        ('bsdf = "diffuse"', 'bsdf = "bitmap"', "coating, bsdf"),
         ("width_px = 240", "width_px = 240.5", "width_px"),
         ("height_px = 320", "height_px = true", "height_px"),
         ("down_x = 1", "down_x = 0", "down_x"),
         ("position_mm = [", "position_mm = [nan, ", "position_mm"),
         ("position_mm = [", f"position_mm = [{10**400}, ", "position_mm"),
-        ("centre = [[", "centre = [[1], [", "gain, centre"),
-        ("centre = [[", "centre = [[-", "gain, centre"),
+        ("centre = [[", "centre = [[1], [", "response, centre"),
+        ("centre = [[", "centre = [[-", "response, centre"),
         ("dome_scale = ", "dome_scale = 100", "dome_scale"),
         ("position_mm = [", "position_mm = [1e300, ", r"the number 1e\+300"),
         ("px_per_mm_x = ", "px_per_mm_x = 1000", "px_per_mm_x"),
@@ -70,12 +78,12 @@ def test_absent_file_is_refused(tmp_path: Path) -> None:
         load_calibration(tmp_path / "none.toml")
 
 
-def test_zero_light_is_refused() -> None:
+def test_a_channel_blind_to_its_own_led_is_refused() -> None:
     calibration = load_calibration()
-    gain = np.array(calibration.gain.centre)
-    gain[1, 1] = 0
+    centre = np.array(calibration.response.centre)
+    centre[1, 1] = 0
     with pytest.raises(TactileError, match="0 levels of green"):
-        dataclasses.replace(calibration.gain, centre=tuple(map(tuple, gain)))
+        dataclasses.replace(calibration.response, centre=tuple(map(tuple, centre)))
 
 
 def test_photograph_takes_the_background_s_place(tmp_path: Path) -> None:
@@ -85,24 +93,44 @@ def test_photograph_takes_the_background_s_place(tmp_path: Path) -> None:
     Image.fromarray(photograph).save(tmp_path / "rest.png")
     file = tmp_path / "unit.toml"
     file.write_text(SHIPPED_TEXT.replace('photograph = ""', 'photograph = "rest.png"'), encoding="utf-8")
-    np.testing.assert_array_equal(background_picture(load_calibration(file)), photograph)
+    np.testing.assert_array_equal(Shader(load_calibration(file)).background, photograph)
     Image.fromarray(photograph[:-2]).save(tmp_path / "rest.png")
     with pytest.raises(TactileError, match="240 x 318"):
-        background_picture(load_calibration(file))
+        Shader(load_calibration(file))
     (tmp_path / "rest.png").unlink()
     with pytest.raises(TactileError, match=r"rest\.png"):
-        background_picture(load_calibration(file))
+        Shader(load_calibration(file))
 
 
-def test_background_is_smooth_and_its_polynomial_is_found_again() -> None:
-    calibration = load_calibration()
-    picture = background_picture(calibration)
+def test_picture_at_rest_is_smooth_and_its_ambient_light_is_found_again() -> None:
+    unit = load_calibration()
+    shader = Shader(unit)
+    picture = shader.background
     assert picture.shape == (320, 240, 3)
     for axis in (0, 1):
         assert np.abs(np.diff(picture, axis=axis)).max() <= 3  # levels a pixel: no edge
-    found = fit_polynomial(picture, calibration.camera)
-    again = dataclasses.replace(calibration, background=dataclasses.replace(calibration.background, polynomial=found))
-    assert np.abs(background_picture(again) - picture).max() <= 1  # rounding to whole levels
+    found = fit_ambient(picture, unit, shader.radiance(rest_height_map(unit.camera)))
+    np.testing.assert_allclose(found, unit.ambient, atol=1e-3)
+
+
+def test_each_led_takes_its_share_of_the_picture_at_rest_along() -> None:
+    """Off is black, doubled is twice as bright, ambient light with it; the LEDs' parts add up to the whole."""
+    unit = load_calibration()
+
+    def at_rest(*powers: float) -> np.ndarray:
+        pairs = zip(unit.leds, powers, strict=True)
+        leds = tuple(dataclasses.replace(led, radiance=led.radiance * power) for led, power in pairs)
+        return Shader(dataclasses.replace(unit, leds=leds)).background
+
+    whole = at_rest(1, 1, 1)
+    np.testing.assert_array_equal(at_rest(0, 0, 0), 0)
+    np.testing.assert_allclose(at_rest(2, 2, 2), 2 * whole, rtol=1e-5, atol=1e-3)
+    alone = [at_rest(*row) for row in np.eye(3)]
+    np.testing.assert_allclose(sum(alone), whole, atol=1e-3)
+    for led, part in enumerate(alone):
+        assert part.mean((0, 1)).argmax() == led
+    black = dataclasses.replace(unit, coating=dataclasses.replace(unit.coating, albedo=(0.0, 0.0, 0.0)))
+    np.testing.assert_array_equal(Shader(black).background, 0)
 
 
 def test_start_of_unlike_units_reads() -> None:

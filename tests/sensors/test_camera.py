@@ -91,9 +91,17 @@ def test_camera_refuses(field: str, value: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "value"), [("colour", "white"), ("position", (0, 0, -1e-3)), ("position", (0, 1e-3)), ("radius", 0.0)]
+    ("field", "value"),
+    [
+        ("colour", "white"),
+        ("position", (0, 0, -1e-3)),
+        ("position", (0, 1e-3)),
+        ("radius", 0.0),
+        ("radiance", -1.0),
+        ("radiance", float("nan")),
+    ],
 )
 def test_led_refuses(field: str, value: object) -> None:
-    good = {"colour": "red", "position": (1e-3, 0, 1e-3), "radius": 1e-3}
+    good = {"colour": "red", "position": (1e-3, 0, 1e-3), "radius": 1e-3, "radiance": 1.0}
     with pytest.raises(TactileError, match=field):
         Led(**good | {field: value})

@@ -23,9 +23,9 @@ Draw what the DIGIT's camera sees of a deformed gel. INPUT is one of
   a scene's folder   (or its scene.toml) with a [recording], which is simulated first
 
 DIR is a new folder, which appears whole or not at all:
-  images/%05d.png  8-bit pictures: background + C (L in contact - L at rest)
-  exr/%05d.exr     with --exr, float32: basis.red, .green, .blue = L of each LED; R, G, B = C L in grey levels
-  rest.exr         the same of the undeformed gel
+  images/%05d.png  8-bit pictures: response x radiance + ambient light
+  exr/%05d.exr     with --exr, float32: linear radiance of the coating, R, G, B = light of the red, green, blue LED
+  rest.exr         the same of the undeformed gel;  camera.exr  response and ambient light
   note.json        input, calibration, preset, versions;  timings.json  ms a frame
 
 Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (pip install "tactile-core[render]").

@@ -154,7 +154,7 @@ def _fingers(path: Path) -> list[str]:
 
 def unit_hash(calibration: Path) -> str:
     """Of a DIGIT's calibration file and the photograph that it names. Raises TactileError for a bad one."""
-    photograph = load_calibration(calibration).background.photograph
+    photograph = load_calibration(calibration).photograph
     digests = [content_hash(Path(file))[0] for file in (calibration, photograph) if file]
     return hashlib.sha256(" ".join(digests).encode()).hexdigest() if photograph else digests[0]
 

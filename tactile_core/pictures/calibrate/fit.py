@@ -8,8 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from ...errors import TactileError
-from ...sensors.calibration import Background, Calibration, Fit
-from ..background import fit_polynomial
+from ...sensors.calibration import Calibration, Fit
+from ..background import fit_ambient
+from ..height_map import rest_height_map
+from ..shading import Shader
 from .ball_pictures import BallPictures, working_factor
 from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_figures
 from .levenberg_marquardt import minimise
@@ -78,7 +80,8 @@ def calibrate(
     calibration = dataclasses.replace(
         fitted,
         unit=unit,
-        background=Background(fit_polynomial(photographs.background, fitted.camera)),
+        ambient=fit_ambient(photographs.background, fitted, Shader(fitted).radiance(rest_height_map(fitted.camera))),
+        photograph="",
         noise=photographs.noise,
         fit=Fit(note, names, ball_diameter, figures, errors, (*unknown, *NEVER_IDENTIFIED)),
     )

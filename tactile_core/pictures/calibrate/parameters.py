@@ -33,7 +33,7 @@ def parameters_of(calibration: Calibration) -> np.ndarray:
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
-    """A calibration with other numbers; raises TactileError for some that mean nothing."""
+    """A calibration with other numbers and the same gain; raises TactileError for some that mean nothing."""
     scale_x, scale_y, height, dome = (float(value) for value in numbers[:FIRST_LED])
     camera = dataclasses.replace(
         calibration.camera, px_per_mm_x=scale_x, px_per_mm_y=scale_y, apparent_height=1e-3 * height
@@ -42,4 +42,4 @@ def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibratio
         dataclasses.replace(led, position=tuple(1e-3 * float(v) for v in row[:3]), radius=1e-3 * float(row[3]))
         for led, row in zip(calibration.leds, numbers[FIRST_LED:].reshape(3, 4), strict=True)
     )
-    return dataclasses.replace(calibration, camera=camera, leds=leds, dome_scale=dome)
+    return dataclasses.replace(calibration, camera=camera, leds=leds, dome_scale=dome).with_gain(calibration.gain)

@@ -12,7 +12,7 @@ import dataclasses
 import numpy as np
 
 from ...errors import TactileError
-from ...sensors.calibration import Calibration, Gain
+from ...sensors.calibration import Calibration, Response
 from ..shading import SeenSurface
 from .ball_pictures import BallPictures
 from .parameters import FIRST_LED, LARGEST_RADIUS, SMALLEST_RADIUS, SPREAD, STEP, parameters_of, with_parameters
@@ -59,10 +59,10 @@ class UnitResiduals:
         centre, right, down = (tuple(map(tuple, part.tolist())) for part in np.split(self.gain, 3, axis=1))
         slopes = [tuple(tuple(1e3 * value for value in row) for row in part) for part in (right, down)]
         try:
-            gain = Gain(centre, *slopes)
+            gain = Response(centre, *slopes)
         except TactileError:  # on the way a colour may turn dark; at the end it may not
             gain = self._start.gain
-        return with_parameters(dataclasses.replace(self._start, gain=gain), numbers)
+        return with_parameters(self._start.with_gain(gain), numbers)
 
     def balls(self, x: np.ndarray) -> np.ndarray:
         """Right, down, depth, mm, of each press (n, 3)."""

@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...sensors.camera import Camera, Led
+from ...sensors.calibration import Calibration
+from ...sensors.camera import Camera
 from ..cast_shadows import bounding_box
 from ..perspective import bilinear
 
@@ -55,9 +56,9 @@ def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Calla
 
 
 def direct_light(
-    hits: Hits, seen: np.ndarray | None, points: Sequence[np.ndarray], leds: Sequence[Led], soften: bool = False
+    hits: Hits, seen: np.ndarray | None, points: Sequence[np.ndarray], unit: Calibration, soften: bool = False
 ) -> np.ndarray:
-    """Radiance (H, W, 3) float32 of the three LEDs, in the unit of ``calibration``.
+    """Radiance (H, W, 3) float32, levels, of the three LEDs on a matte coating.
 
     seen : (H, W) uint32, a bit a point; None where all of them are
     points : (n, 3) m of each LED, n <= 8, in the order of the bits
@@ -65,7 +66,7 @@ def direct_light(
     """
     radiance = np.zeros((*hits.level.shape, 3), np.float32)
     bit = 0
-    for led, cloud in zip(leds, points, strict=True):
+    for led, facing_level, cloud in zip(unit.leds, unit.facing, points, strict=True):
         x, y, z = np.asarray(led.position, np.float32)
         right, down, above = x - hits.right, y - hits.down, z - hits.height
         square = right * right + down * down + above * above
@@ -75,7 +76,7 @@ def direct_light(
             _dim(facing, hits, part, cloud, soften)
         np.maximum(facing, 0, out=facing)
         # Inverse square, and the length of the vector in the cosine.
-        facing *= hits.level / (square * np.sqrt(square)) * np.float32(np.square(led.position).sum())
+        facing *= hits.level / (square * np.sqrt(square)) * np.float32(np.square(led.position).sum() * facing_level)
         radiance[..., led.channel] += facing
         bit += len(cloud)
     return radiance

@@ -51,7 +51,7 @@ def interreflection(
     own = radiance[inside].copy()
     received = np.zeros_like(own)
     for _ in range(gather.bounces):
-        received = irradiance(coarse, radiance, margin, spacing, gather) * np.float32(unit.albedo)
+        received = irradiance(coarse, radiance, margin, spacing, gather) * np.asarray(unit.coating.albedo, np.float32)
         radiance[inside] = own + received
     row = (hits.down - np.float32(camera.down[first])) * np.float32(1 / spacing[1])
     column = (hits.right - np.float32(camera.right[first])) * np.float32(1 / spacing[0])
@@ -71,7 +71,7 @@ def _on_gel(
     place = np.stack([*np.meshgrid(right, down), height], -1).astype(np.float32)
     flat = np.zeros_like(height)
     rim = Hits.of(place, flat, flat)
-    radiance = direct_light(rim, None, [(led.position,) for led in unit.leds], unit.leds)
+    radiance = direct_light(rim, None, [(led.position,) for led in unit.leds], unit)
     outside = np.maximum(np.abs(place[..., 0]) - camera.right[-1], np.abs(place[..., 1]) - camera.down[-1])
     radiance[outside > MARGIN] = 0
     inside = slice(margin, -margin), slice(margin, -margin)

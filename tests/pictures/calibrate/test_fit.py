@@ -16,7 +16,7 @@ from tactile_core.errors import TactileError
 from tactile_core.pictures.calibrate.evaluate import evaluate_unit, mean_figures
 from tactile_core.pictures.calibrate.fit import Calibrated, calibrate
 from tactile_core.pictures.calibrate.photographs import chosen, read_photographs
-from tactile_core.sensors.calibration import Calibration, Gain
+from tactile_core.sensors.calibration import Calibration, Response
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
 # Presses that were kept from the fit of the calibration that ships.
@@ -35,7 +35,7 @@ def other_unit() -> Calibration:
     right = ((-6e3, 0.0, 0.0), (0.0, 8e3, 0.0), (0.0, 1e3, -3e3))
     down = ((2e3, 0.0, 0.0), (0.0, -4e3, 0.0), (0.0, 0.0, 5e3))
     camera = dataclasses.replace(plain.camera, px_per_mm_x=19.4, px_per_mm_y=19.2)
-    return dataclasses.replace(plain, camera=camera, leds=leds, gain=Gain(centre, right, down))
+    return dataclasses.replace(plain, camera=camera, leds=leds).with_gain(Response(centre, right, down))
 
 
 @pytest.fixture(scope="module")

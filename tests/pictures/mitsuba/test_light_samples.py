@@ -8,7 +8,7 @@ import pytest
 from tactile_core.pictures.mitsuba.light_samples import light_points, sphere_points
 from tactile_core.sensors.camera import Led
 
-LED = Led("green", (-13.3e-3, -8.5e-3, 7.6e-3), 1.0e-3)
+LED = Led("green", (-13.3e-3, -8.5e-3, 7.6e-3), 1.0e-3, 1.0)
 
 
 @pytest.mark.parametrize("count", [3, 4, 5, 6, 8])

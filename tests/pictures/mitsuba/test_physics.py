@@ -8,7 +8,7 @@ import zlib
 
 import numpy as np
 from gel_pictures import Press, levels, with_leds, works
-from plain_unit import plain_unit
+from plain_unit import LEVELS, plain_unit
 
 from tactile_core.accuracy import order
 from tactile_core.pictures.height_map import rest_height_map
@@ -19,13 +19,14 @@ from tactile_core.pictures.perspective import slopes
 from tactile_core.pictures.presets import REFERENCE, STANDARD
 from tactile_core.pictures.renderer import MitsubaLight
 from tactile_core.pictures.shading import Shader
+from tactile_core.sensors.coating import Coating
 
 DIRECT = dataclasses.replace(REFERENCE, gather=None, window=False)
 SIGNIFICANCE = 0.01  # of all pixels' tests together
 
 
 def path_traced(unit, height, variant, *, depth: int, spp: int, renders: int, point: bool = False):
-    """Mean (H, W, 3) and its variance of independent renders by Mitsuba's path integrator, in the unit of radiance.
+    """Mean (H, W, 3) and its variance of independent renders by Mitsuba's path integrator, levels.
 
     An own scene: diffuse gel with smooth normals, LEDs as glowing spheres (or points), a stock camera. depth : 2 for
     direct light, 3 with one bounce
@@ -36,7 +37,7 @@ def path_traced(unit, height, variant, *, depth: int, spp: int, renders: int, po
     values = mi.traverse(gel)
     values["faces"], values["vertex_positions"] = mesh.faces.ravel(), mesh.vertices(height).ravel()
     values.update()
-    gel.set_bsdf(mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": unit.albedo}}))
+    gel.set_bsdf(mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": list(unit.coating.albedo)}}))
     scene = mi.load_dict({"type": "scene", "gel": gel, "eye": eye(unit.camera, mi), **lamps(unit, point)})
     tracer = mi.load_dict({"type": "path", "max_depth": depth, "hide_emitters": True})
     found = [np.array(mi.render(scene, integrator=tracer, spp=spp, seed=k)) for k in range(renders)]
@@ -57,17 +58,17 @@ def eye(camera, mi):
 
 
 def lamps(unit, point: bool) -> dict:
-    """Each LED in its own channel, so strong that radiance comes out in the unit of ``calibration``."""
+    """Each LED in its own channel, in levels."""
     found = {}
-    for led in unit.leds:
+    for led, level in zip(unit.leds, unit.facing, strict=True):
         place = (np.array(led.position) * [MM, -MM, MM]).tolist()
         colour = [0.0, 0.0, 0.0]
         square = float(np.square(place).sum())  # times albedo / pi is what the coating scatters back
         if point:
-            colour[led.channel] = math.pi * square / unit.albedo
+            colour[led.channel] = math.pi * square / unit.coating.albedo[led.channel] * level
             found[led.colour] = {"type": "point", "position": place, "intensity": {"type": "rgb", "value": colour}}
         else:
-            colour[led.channel] = square / (led.radius * MM) ** 2 / unit.albedo
+            colour[led.channel] = led.radiance
             glow = {"type": "area", "radiance": {"type": "rgb", "value": colour}}
             found[led.colour] = {"type": "sphere", "center": place, "radius": led.radius * MM, "emitter": glow}
     return found
@@ -79,7 +80,7 @@ def test_direct_light_is_that_of_mitsubas_path_tracer(any_variant, small, press)
     mean, variance = path_traced(small, height, any_variant, depth=2, spp=16, renders=24)
     ours = MitsubaLight(small, DIRECT, any_variant, rest_height_map(small.camera), 0).radiance(height)
     # Pixels of 0.2 mm: triangles' normals against the map's slopes, and our own rest of noise, half a per cent.
-    deviation = np.sqrt(variance + (0.005 * ours) ** 2 + 1e-6)
+    deviation = np.sqrt(variance + (0.005 * ours) ** 2 + (1e-3 * LEVELS) ** 2)
     z = np.abs(ours - mean) / deviation
     tests = z.size
     single = 1 - (1 - SIGNIFICANCE) ** (1 / tests)
@@ -157,9 +158,9 @@ def test_light_is_never_made(any_variant, small, press):
     for bounces in (1, 2, 3):
         preset = dataclasses.replace(STANDARD, gather=Gather(4, 12, 0.3, bounces))
         totals.append(MitsubaLight(small, preset, any_variant, rest, 0).radiance(height).sum())
-    black = dataclasses.replace(small, albedo=0.0)
+    black = dataclasses.replace(small, coating=Coating(albedo=(0.0, 0.0, 0.0)))
     direct = MitsubaLight(small, STANDARD, any_variant, rest, 0).radiance(height).sum()
-    assert MitsubaLight(black, preset, any_variant, rest, 0).radiance(height).sum() == direct
+    assert not MitsubaLight(black, preset, any_variant, rest, 0).radiance(height).any()
     steps = np.diff([direct, *totals])
     assert (steps > 0).all()
     assert (steps[1:] < 0.3 * steps[:-1]).all()  # albedo 0.5 times the small part of the gel that sees gel

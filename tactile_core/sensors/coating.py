@@ -1,0 +1,38 @@
+"""The paint on the gel, as a material: how much light it scatters back, and how evenly."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from ..errors import TactileError
+
+DIFFUSE, ROUGH_PLASTIC, PRINCIPLED = MATERIALS = ("diffuse", "roughplastic", "principled")
+
+
+@dataclasses.dataclass(frozen=True)
+class Coating:
+    """One of three of Mitsuba's materials. Raises TactileError for a number out of its range.
+
+    bsdf : "diffuse" (Lambert), "roughplastic" (Lambert under a rough clear coat) or "principled" (Burley 2012)
+    albedo : 0..1 share of each LED's light that it scatters back
+    roughness : 0.02..1, width of highlights: GGX's alpha of roughplastic, Burley's roughness; not of diffuse
+    gloss : 0..1, size of highlights; not of diffuse
+    metallic : 0..1, of principled alone: 1 reflects as metal of that albedo does
+    """
+
+    bsdf: str = DIFFUSE
+    albedo: tuple[float, float, float] = (0.5, 0.5, 0.5)
+    roughness: float = 0.3
+    gloss: float = 0.5
+    metallic: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.bsdf not in MATERIALS:
+            raise TactileError("coating, bsdf", repr(self.bsdf), f"one of {', '.join(MATERIALS)}")
+        if len(self.albedo) != 3:
+            raise TactileError("coating, albedo", f"{len(self.albedo)} numbers", "three, one a LED")
+        ranges = [("albedo", value, 0.0) for value in self.albedo]
+        ranges += [("roughness", self.roughness, 0.02), ("gloss", self.gloss, 0.0), ("metallic", self.metallic, 0.0)]
+        for name, value, least in ranges:
+            if not least <= value <= 1:  # false for NaN
+                raise TactileError(f"coating, {name}", f"{value:g}", f"{least:g} to 1")
