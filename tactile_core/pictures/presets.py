@@ -22,9 +22,13 @@ TABLE = shipped("optics_presets.json")
 class Preset:
     """What Mitsuba is asked for.
 
-    points : that stand for each LED, a pass; passes : pictures from other points and other places of each pixel, over
-    which a picture is the mean; 1 looks at each pixel's middle alone
-    spacing : m between vertices of the gel's mesh
+    points : that stand for each LED, a pass; spacing : m between vertices of the gel's mesh
+    bounce_step : by LLVM, pixels between the places that one bounce is gathered at; 0 leaves it out
+    paths : by LLVM, passes of Mitsuba's path integrator, of 64 paths a pixel; 0 for our own integrator
+
+    Without LLVM, where the coating is matte:
+    passes : pictures from other points and other places of each pixel, over which a picture is the mean; 1 looks at
+        each pixel's middle alone
     gather : how finely the gel's own light is gathered; None leaves it out
     window : whether rays bend as the window makes them
     """
@@ -32,20 +36,26 @@ class Preset:
     name: str
     says: str
     points: int
-    passes: int = 1
     spacing: float = SPACING
+    bounce_step: int = 0
+    paths: int = 0
+    passes: int = 1
     gather: Gather | None = None
     window: bool = False
 
 
 FAST = "fast"  # shading.Shader: numpy alone
-STANDARD = Preset("standard", "direct light, 4 points an LED", points=4)
+STANDARD = Preset("standard", "direct light of the scene, 4 points an LED", points=4)
 QUALITY = Preset(
-    "quality", "6 points an LED, one bounce", points=6, gather=Gather(step=4, azimuths=12, growth=0.3, bounces=1)
+    "quality",
+    "6 points an LED, one bounce",
+    points=6,
+    bounce_step=4,
+    gather=Gather(step=4, azimuths=12, growth=0.3, bounces=1),
 )
 REFERENCE = Preset(
-    "reference", "512 points an LED and 64 places a pixel, four bounces, the window", points=8, passes=64,
-    spacing=SPACING / 2, gather=Gather(step=2, azimuths=32, growth=0.1, bounces=4), window=True,
+    "reference", "Mitsuba's path integrator, 256 paths a pixel, four bounces", points=8, spacing=SPACING / 2, paths=4,
+    passes=64, gather=Gather(step=2, azimuths=32, growth=0.1, bounces=4), window=True,
 )  # fmt: skip
 PRESETS = {preset.name: preset for preset in (STANDARD, QUALITY, REFERENCE)}
 NAMES = (FAST, *PRESETS)

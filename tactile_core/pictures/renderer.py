@@ -12,18 +12,17 @@ from .background import resting_picture
 from .camera_noise import camera_noise
 from .height_map import of_unit, rest_height_map
 from .mitsuba.direct_light import Hits, direct_light
+from .mitsuba.gel_light import ASIDE, GelLight
 from .mitsuba.gel_mesh import GelMesh
 from .mitsuba.interreflection import interreflection
 from .mitsuba.light_samples import light_points, sphere_points
 from .mitsuba.tracer import make_tracer
-from .mitsuba.variant import choose_variant
+from .mitsuba.variant import LLVM, choose_variant
 from .mitsuba.window import through_window
 from .perspective import slopes
 from .presets import DEFAULT, FAST, Preset, preset_named
 from .shading import Shader, camera_array, check_reach
 
-# Pixels off each pixel's middle, where else rays would meet vertices exactly and slip between triangles.
-_ASIDE = (0.013, 0.0071)
 # Steps of the additive recurrence that fills four dimensions evenly (M. Roberts, 2018: powers of 1 / g, g^5 = g + 1).
 _EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
 
@@ -69,7 +68,11 @@ class Renderer:
             self._light: Light = Shader(calibration, rest=resting)
         else:
             self.variant = choose_variant(variant).name
-            self._light = MitsubaLight(calibration, preset_named(preset), self.variant, resting, seed)
+            chosen = preset_named(preset)
+            if self.variant == LLVM:
+                self._light = GelLight(calibration, chosen, resting, seed)
+            else:
+                self._light = MitsubaLight(calibration, chosen, self.variant, resting, seed)
         self.rest_radiance = self._light.radiance(resting)
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")
@@ -110,11 +113,11 @@ class Renderer:
 
 
 class MitsubaLight:
-    """Radiance by one of Mitsuba's presets; arguments checked by the caller."""
+    """Radiance by one of Mitsuba's presets without LLVM, on a matte coating; arguments checked by the caller."""
 
     def __init__(self, unit: Calibration, preset: Preset, variant: str, rest: np.ndarray, seed: int) -> None:
         self.unit, self.preset = unit, preset
-        self._tracer = make_tracer(GelMesh(unit.camera, preset.spacing), rest, variant)
+        self._tracer = make_tracer(GelMesh(unit.camera, preset.spacing, square=True), rest, variant)
         self._start = np.random.default_rng(seed).random(4)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
@@ -136,13 +139,13 @@ class MitsubaLight:
         radiance, preset = direct, self.preset
         if preset.gather and any(self.unit.coating.albedo):
             radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)
-        return through_window(radiance, hits.height, self.unit.camera) if preset.window else radiance
+        return through_window(radiance, hits.height, self.unit) if preset.window else radiance
 
     def _one_pass(self, number: int, tilt: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Hits]:
         """Direct light (H, W, 3) and what pixels saw."""
         leds, count = self.unit.leds, self.preset.points
         if self.preset.passes == 1:
-            shift, points = _ASIDE, [light_points(led, count) for led in leds]
+            shift, points = ASIDE, [light_points(led, count) for led in leds]
         else:
             *shift, turn, depth = (self._start + number * _EVEN) % 1
             shift = (shift[0] - 0.5, shift[1] - 0.5)

@@ -12,7 +12,7 @@ import logging
 
 import numpy as np
 from gel_pictures import levels, with_leds
-from plain_unit import LEVELS, plain_unit
+from plain_unit import plain_unit
 from scipy.ndimage import distance_transform_edt
 
 from tactile_core import sensors
@@ -175,14 +175,14 @@ for _scale in (18.8, 400.0):
 
 def _lambert(preset: str) -> Found:
     """A small light 0.1 mm over the plane, 13 mm away: it comes in at half a degree."""
-    led = Led("green", (-13e-3, -3e-3, 0.1e-3), 1e-7)
-    unit = dataclasses.replace(HALF, leds=(HALF.leds[0], led, HALF.leds[2]))
+    led = Led("green", (-13e-3, -3e-3, 0.1e-3), 1e-7, 1.0)
+    unit = dataclasses.replace(HALF, leds=(HALF.leds[0], led, HALF.leds[2])).with_gain(HALF.gain)
     flat = np.zeros(unit.camera.shape, np.float32)
     right, down = np.meshgrid(unit.camera.right, unit.camera.down)
     x, y, z = led.position
     truth = (x**2 + y**2 + z**2) * z / ((right - x) ** 2 + (down - y) ** 2 + z**2) ** 1.5
     found = Renderer(unit, preset, rest=flat).radiance(flat)[..., 1]
-    return Found(100 * float(np.abs(found / truth - 1).max()), "percent", 0.2)
+    return Found(100 * float(np.abs(found / truth / unit.facing[1] - 1).max()), "percent", 0.2)
 
 
 for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
@@ -196,7 +196,7 @@ for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
 def grazing_bump() -> Found:
     """A bump of 0.3 mm on a plane, lights at 4 degrees: its shadows are 4 mm long."""
     leds = tuple(dataclasses.replace(led, position=(*led.position[:2], 1e-3), radius=0.2e-3) for led in HALF.leds)
-    unit = dataclasses.replace(HALF, leds=leds)
+    unit = dataclasses.replace(HALF, leds=leds).with_gain(HALF.gain)
     right, down = np.meshgrid(unit.camera.right, unit.camera.down)
     bump = (0.3e-3 * np.exp(-(right**2 + down**2) / (2 * (0.8e-3) ** 2))).astype(np.float32)
     return _compared(unit, bump, np.zeros_like(bump), 1.5)
@@ -223,8 +223,8 @@ def _cliff(preset: str) -> Found:
     """A step of 0.6 mm within one pixel, a far light at 30 degrees: the shadow is 0.6 mm / tan 30 degrees long."""
     height, angle = 0.6e-3, np.radians(30)
     camera = dataclasses.replace(HALF.camera, apparent_height=10.0)  # without perspective
-    light = Led("red", (-0.4 * np.cos(angle), 0.0, 0.4 * np.sin(angle)), 1e-4)
-    unit = dataclasses.replace(HALF, camera=camera, leds=(light, *HALF.leds[1:]))
+    light = Led("red", (-0.4 * np.cos(angle), 0.0, 0.4 * np.sin(angle)), 1e-4, 1.0)
+    unit = dataclasses.replace(HALF, camera=camera, leds=(light, *HALF.leds[1:])).with_gain(HALF.gain)
     right = np.meshgrid(camera.right, camera.down)[0]
     step = np.where(right < 0, height, 0.0).astype(np.float32)
     flat = np.zeros_like(step)
@@ -289,4 +289,4 @@ def single_levels() -> Found:
     height = (rest + 0.6e-3 * np.exp(-(right**2 + down**2) / (2 * (0.8e-3) ** 2))).astype(np.float32)
     drawn = Shader(HALF, background=np.full((*HALF.camera.shape, 3), 128))
     one, other = drawn.radiance(height), drawn.radiance(np.nextafter(height, np.float32(1)))
-    return Found(LEVELS * float(np.abs(one - other).max()), "levels", 0.05)
+    return Found(float(np.abs(one - other).max()), "levels", 0.05)

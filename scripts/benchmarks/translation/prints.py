@@ -69,7 +69,7 @@ def _drawn(signals: Signals, network: Translator, state: np.ndarray, render: Ren
     found = network(signals, state[rows])
     place = found.contact_center
     seen = np.isfinite(place[:, 0]) & render.camera.sees(*place.T)
-    rest = render.background.astype(float)
+    rest = np.rint(render.background)
     with folds_counted():  # counted, not logged frame by frame
         heights = height_map(found.displacement_digit, render.camera)
     levels = [strongest(render(height) - rest) for height in heights]

@@ -96,13 +96,13 @@ def _dim(facing: np.ndarray, hits: Hits, seen: np.ndarray, cloud: np.ndarray, so
     tables = np.column_stack([codes.mean(1), offsets]).astype(np.float32).T
     share, right, down, above = (table.take(seen[box]) for table in tables)
     if soften:
-        share, right, down, above = (_evened(values) for values in (share, right, down, above))
+        share, right, down, above = (evened(values) for values in (share, right, down, above))
     facing[box] *= share
     facing[box] += above - hits.slope_right[box] * right - hits.slope_down[box] * down
 
 
-def _evened(values: np.ndarray) -> np.ndarray:
-    """Means over 3 x 3; at the border, of what is there twice."""
+def evened(values: np.ndarray) -> np.ndarray:
+    """Means of values (h, w) over 3 x 3 pixels; at the border, of what is there twice."""
     for axis in (0, 1):
         total = np.moveaxis(values.copy(), axis, 0)
         along = np.moveaxis(values, axis, 0)

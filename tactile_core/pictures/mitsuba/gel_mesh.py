@@ -18,15 +18,15 @@ MM = 1e3
 class GelMesh:
     """Vertices and faces of height maps under one camera.
 
-    Mesh coordinates: right, up and toward the camera, mm, with up scaled so that pixels are square there. Straight
-    lines stay straight in them, so visibility is that of the real gel; lengths and angles along the picture are not.
+    Mesh coordinates: right, up and toward the camera, mm. Where pixels are made square, up is scaled: straight lines
+    stay straight, so visibility is that of the real gel; lengths and angles along the picture are not.
     """
 
-    def __init__(self, camera: Camera, spacing: float = SPACING) -> None:
-        """spacing : m between vertices, rounded to whole pixels."""
+    def __init__(self, camera: Camera, spacing: float = SPACING, *, square: bool = False) -> None:
+        """spacing : m between vertices, rounded to whole pixels; square : scale up so that pixels are square."""
         self.camera = camera
         right, down = camera.pixel_size
-        self.up_scale = right / down
+        self.up_scale = right / down if square else 1.0
         self._rows = _kept(camera.height, max(1, round(spacing / down)))
         self._columns = _kept(camera.width, max(1, round(spacing / right)))
         across, along = _extended(camera.right[self._columns]), _extended(camera.down[self._rows])
@@ -43,6 +43,11 @@ class GelMesh:
         """Vertices (n, 3) float32 in mesh coordinates of a height map (H, W) m."""
         self._plan[..., 2] = height[np.ix_(self._rows, self._columns)] * MM
         return self._plan.reshape(-1, 3).copy()
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest corner (3,) of the plane of height zero, mesh coordinates."""
+        flat = self._plan[..., :2].reshape(-1, 2)
+        return np.r_[flat.min(0), 0.0].astype(float), np.r_[flat.max(0), 0.0].astype(float)
 
     def to_mesh(self, points: np.ndarray) -> np.ndarray:
         """Points (n, 3) m, image frame (right, down, toward the camera), in mesh coordinates."""

@@ -1,0 +1,138 @@
+"""Radiance of the gel by a scene of Mitsuba's, compiled by LLVM: by our integrator, or by Mitsuba's paths."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import TactileError
+from ...sensors.calibration import Calibration
+from ..presets import Preset
+from .camera_rays import camera_rays
+from .direct_light import evened, lookup
+from .gel_mesh import GelMesh, check_mesh
+from .gel_scene import gel_shape, lamps, walls
+from .led_integrator import DIRECTIONS, bounced, direct, register
+from .tracer import MOST_MISSED
+from .variant import LLVM, activate
+
+# Pixels off each pixel's middle, where else rays would meet vertices exactly and slip between triangles.
+ASIDE = (0.013, 0.0071)
+DEPTH = 6  # of paths: light, four bounces on the way, the camera
+PATHS_A_PASS = 64  # a pixel: a square, as the sampler's strata want it
+
+
+class GelLight:
+    """Radiance by one preset; scenes are made once, only the gel's vertices change.
+
+    more : emitters and shapes of Mitsuba's beside the unit's own, by name; seed : of the reference's random numbers
+    """
+
+    def __init__(
+        self, unit: Calibration, preset: Preset, rest: np.ndarray, seed: int, more: dict[str, Any] | None = None
+    ) -> None:
+        self.unit, self.preset, self._seed = unit, preset, seed
+        self._mesh = GelMesh(unit.camera, preset.spacing)
+        mi = activate(LLVM)
+        register(mi, LLVM)
+        lights = lamps(unit) | (more or {})
+        around = walls(mi, unit, self._mesh) if more else {}  # black: the unit's own light never meets them
+        gel = gel_shape(mi, self._mesh, rest, unit)
+        # What stands in the way, without the LEDs: spheres would make each ray a third dearer, and none is ever met.
+        shadowing = {"type": "scene", "gel": gel, **around}
+        self._scene = mi.load_dict(shadowing | lights if preset.paths else shadowing)
+        self._lights = mi.load_dict({"type": "scene", **lights})  # kept, as its emitters do not keep it
+        self._emitters = self._lights.emitters()
+        self._values = mi.traverse(self._scene)
+        self._look(mi)
+
+    def _look(self, mi: Any) -> None:
+        """Rays that do not change."""
+        camera, step = self.unit.camera, self.preset.bounce_step
+        if self.preset.paths:
+            self._paths = mi.load_dict({"type": "path", "max_depth": DEPTH, "hide_emitters": True})
+            return
+        self._rays = self._towards(mi, 1)
+        row, column = np.indices(camera.shape)
+        # Four neighbours' points lie a quarter of their distance apart.
+        self._phase = mi.Float(((column % 2 + 2 * (row % 2)) / 4).ravel().astype(np.float32))
+        self._coarse = self._towards(mi, step, DIRECTIONS) if step else None
+        if step:
+            row, column = np.indices((camera.height // step, camera.width // step))
+            turned = (column % 2 + 2 * (row % 2) + 0.5) / 4
+            self._turned = mi.Float(np.repeat(turned.ravel(), DIRECTIONS).astype(np.float32))
+
+    def _towards(self, mi: Any, step: int, times: int = 1) -> Any:
+        """Rays at every step-th pixel, each so many times."""
+        camera = self.unit.camera
+        first = (step - 1) / 2
+        right = camera.right[0] + (first + step * np.arange(camera.width // step) + ASIDE[0]) * camera.pixel_size[0]
+        down = camera.down[0] + (first + step * np.arange(camera.height // step) + ASIDE[1]) * camera.pixel_size[1]
+        places = (np.repeat(each.ravel(), times) for each in np.meshgrid(right, down))
+        start, toward = camera_rays(self.unit, *places)
+        return mi.Ray3f(mi.Point3f(start), mi.Vector3f(toward))
+
+    def radiance(self, height_map: np.ndarray) -> np.ndarray:
+        """Radiance (H, W, 3) float32, levels, of heights (H, W) m."""
+        vertices = self._mesh.vertices(np.asarray(height_map, np.float32))
+        check_mesh(vertices, self._mesh.faces, self._mesh.count)
+        mi = activate(LLVM)
+        self._values["gel.vertex_positions"] = vertices.ravel()
+        self._values.update()
+        if self.preset.paths:
+            return self._by_paths(mi)
+        found = self._direct(mi)
+        return found if self._coarse is None else found + self._bounced(mi)
+
+    def _direct(self, mi: Any) -> np.ndarray:
+        import drjit as dr
+
+        shape = self.unit.camera.shape
+        hit = self._scene.ray_intersect(self._rays)
+        lights = direct(mi, self._scene, self._emitters, hit, self.preset.points, self._phase)
+        seen = hit.is_valid()
+        dr.eval(seen, *[part for light in lights for part in light])
+        radiance = np.zeros((*shape, 3), np.float32)
+        for light in lights:
+            share = np.array(light.share).reshape(shape)
+            radiance += np.array(light.open).T.reshape(*shape, 3) * evened(share)[..., None]
+        return self._mended(radiance, np.array(seen).reshape(shape))
+
+    def _mended(self, radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """A ray in a million slips between two triangles: its pixel gets what its neighbour has."""
+        if np.mean(~seen) > MOST_MISSED:
+            found = f"{np.sum(~seen)} of {seen.size} rays miss it"
+            raise TactileError("gel mesh", found, "a gel that fills the picture", "Check heights and camera")
+        for row, column in np.argwhere(~seen):
+            radiance[row, column] = radiance[row, column - 1 if column else 1]
+        return radiance
+
+    def _bounced(self, mi: Any) -> np.ndarray:
+        """Light (H, W, 3) of one bounce, gathered on a coarse grid."""
+        camera, step = self.unit.camera, self.preset.bounce_step
+        shape = camera.height // step, camera.width // step
+        hit = self._scene.ray_intersect(self._coarse)
+        found = bounced(mi, self._scene, self._emitters, hit, self._turned).reshape(*shape, 3)
+        row, column = (np.indices(camera.shape) - (step - 1) / 2) / step
+        at = lookup(row.astype(np.float32), column.astype(np.float32), shape)
+        return np.stack([at(evened(evened(np.ascontiguousarray(found[..., k])))) for k in range(3)], -1)
+
+    def _by_paths(self, mi: Any) -> np.ndarray:
+        import drjit as dr
+
+        camera = self.unit.camera
+        pixels, total = camera.width * camera.height, np.zeros((3, camera.width * camera.height))
+        for number in range(self.preset.paths):
+            sampler = mi.load_dict({"type": "multijitter", "sample_count": PATHS_A_PASS})
+            sampler.set_samples_per_wavefront(PATHS_A_PASS)
+            sampler.seed(self._seed * self.preset.paths + number, pixels * PATHS_A_PASS)
+            aside = np.array(sampler.next_2d()) - 0.5
+            row, column = np.divmod(np.repeat(np.arange(pixels), PATHS_A_PASS), camera.width)
+            right = camera.right[column] + aside[0] * camera.pixel_size[0]
+            start, toward = camera_rays(self.unit, right, camera.down[row] + aside[1] * camera.pixel_size[1])
+            ray = mi.RayDifferential3f(mi.Ray3f(mi.Point3f(start), mi.Vector3f(toward)))
+            light, _, _ = self._paths.sample(self._scene, sampler, ray)
+            total += np.stack([np.array(dr.block_sum(light[k], PATHS_A_PASS)) for k in range(3)])
+        total /= self.preset.paths * PATHS_A_PASS
+        return total.T.reshape(*camera.shape, 3).astype(np.float32)

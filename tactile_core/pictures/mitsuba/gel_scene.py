@@ -1,0 +1,92 @@
+"""A unit as a scene of Mitsuba's: coated gel, LEDs that shine, housing walls; in mm, right, up and toward the camera.
+
+Each LED shines in a band of its own: R, G and B of Mitsuba's spectra are the light of the red, green and blue LED. What
+the camera makes of them is the calibration's response. LEDs and coating lie in one medium, gel and acrylic.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...sensors.calibration import Calibration
+from ...sensors.camera import Led
+from ...sensors.coating import DIFFUSE, PRINCIPLED, Coating
+from .gel_mesh import MM, GelMesh, check_mesh
+
+PIGMENT_INDEX = 1.5  # of the clear coat of a glossy paint: acrylic and polyurethane binders
+WALL_GAP = 1.0  # mm round the LEDs, and above them
+
+
+def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration) -> Any:
+    """The gel as a mesh of Mitsuba's with its coating; height : (H, W) m."""
+    vertices = mesh.vertices(height)
+    check_mesh(vertices, mesh.faces, mesh.count)
+    gel = mi.Mesh("gel", mesh.count, len(mesh.faces), has_vertex_normals=True)
+    values = mi.traverse(gel)
+    values["faces"], values["vertex_positions"] = mesh.faces.ravel(), vertices.ravel()
+    values.update()
+    gel.set_bsdf(mi.load_dict(material(unit.coating, unit.gel_index)))
+    return gel
+
+
+def material(coating: Coating, gel_index: float) -> dict[str, Any]:
+    """A coating as Mitsuba's plugin."""
+    albedo = {"type": "rgb", "value": list(coating.albedo)}
+    if coating.bsdf == DIFFUSE:
+        return {"type": "diffuse", "reflectance": albedo}
+    if coating.bsdf == PRINCIPLED:
+        return {
+            "type": "principled", "base_color": albedo, "roughness": coating.roughness,
+            "metallic": coating.metallic, "specular": coating.gloss,
+        }  # fmt: skip
+    return {
+        "type": "roughplastic", "diffuse_reflectance": albedo, "alpha": coating.roughness, "int_ior": PIGMENT_INDEX,
+        "ext_ior": gel_index, "specular_reflectance": {"type": "rgb", "value": [coating.gloss] * 3},
+    }  # fmt: skip
+
+
+def lamps(unit: Calibration) -> dict[str, Any]:
+    """LEDs by their colours: black spheres that shine."""
+    return {led.colour: _lamp(led) for led in unit.leds}
+
+
+def _lamp(led: Led) -> dict[str, Any]:
+    radiance = [0.0, 0.0, 0.0]
+    radiance[led.channel] = led.radiance
+    return {
+        "type": "sphere", "center": to_scene(led.position), "radius": led.radius * MM,
+        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}},
+    }  # fmt: skip
+
+
+def walls(mi: Any, unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
+    """Four black walls round gel and LEDs, from the gel's height up, that keep light from outside away.
+
+    What the housing throws back near an LED is in that LED's fitted radius, which is several times a chip's.
+    """
+    lowest, highest = mesh.bounds()
+    for led in unit.leds:
+        place, reach = np.array(to_scene(led.position)), led.radius * MM + WALL_GAP
+        lowest, highest = np.minimum(lowest, place - reach), np.maximum(highest, place + reach)
+    lowest[2] = 0.0
+    middle, half = (lowest + highest) / 2, (highest - lowest) / 2
+    found = {}
+    for name, axis, side in (("left", 0, -1), ("right", 0, 1), ("lower", 1, -1), ("upper", 1, 1)):
+        normal = np.eye(3)[axis] * -side
+        across, up = np.cross([0.0, 0.0, 1.0], normal), np.array([0.0, 0.0, 1.0])
+        frame = np.eye(4)
+        frame[:3, 0], frame[:3, 1], frame[:3, 2] = across * half[1 - axis], up * half[2], normal
+        frame[:3, 3] = middle - normal * half[axis]
+        found[f"wall_{name}"] = {
+            "type": "rectangle", "to_world": mi.ScalarTransform4f(frame),
+            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},
+        }  # fmt: skip
+    return found
+
+
+def to_scene(place: tuple[float, float, float]) -> list[float]:
+    """A place right, down, toward the camera in m, in the scene's mm."""
+    return [place[0] * MM, -place[1] * MM, place[2] * MM]
