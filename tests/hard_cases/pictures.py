@@ -175,7 +175,7 @@ for _scale in (18.8, 400.0):
 
 def _lambert(preset: str) -> Found:
     """A small light 0.1 mm over the plane, 13 mm away: it comes in at half a degree."""
-    led = Led("green", (-13e-3, -3e-3, 0.1e-3), 1e-7, 1.0)
+    led = Led("green", (-13e-3, -3e-3, 0.1e-3), 1e-5, 1.0)
     unit = dataclasses.replace(HALF, leds=(HALF.leds[0], led, HALF.leds[2])).with_gain(HALF.gain)
     flat = np.zeros(unit.camera.shape, np.float32)
     right, down = np.meshgrid(unit.camera.right, unit.camera.down)

@@ -8,10 +8,11 @@ import numpy as np
 
 from ...errors import TactileError
 from ...sensors.calibration import Calibration
+from ..perspective import slopes
 from ..presets import Preset
 from .camera_rays import camera_rays
 from .direct_light import evened, lookup
-from .gel_mesh import GelMesh, check_mesh
+from .gel_mesh import MM, GelMesh, check_mesh
 from .gel_scene import gel_shape, lamps, walls
 from .led_integrator import DIRECTIONS, bounced, direct, register
 from .tracer import MOST_MISSED
@@ -38,7 +39,7 @@ class GelLight:
         register(mi, LLVM)
         lights = lamps(unit) | (more or {})
         around = walls(mi, unit, self._mesh) if more else {}  # black: the unit's own light never meets them
-        gel = gel_shape(mi, self._mesh, rest, unit)
+        gel = gel_shape(mi, self._mesh, rest, unit, smooth=bool(preset.paths))
         # What stands in the way, without the LEDs: spheres would make each ray a third dearer, and none is ever met.
         shadowing = {"type": "scene", "gel": gel, **around}
         self._scene = mi.load_dict(shadowing | lights if preset.paths else shadowing)
@@ -53,7 +54,10 @@ class GelLight:
         if self.preset.paths:
             self._paths = mi.load_dict({"type": "path", "max_depth": DEPTH, "hide_emitters": True})
             return
+        import drjit
+
         self._rays = self._towards(mi, 1)
+        self._slopes = mi.Texture2f(camera.shape, 2, use_accel=False, wrap_mode=drjit.WrapMode.Clamp)
         row, column = np.indices(camera.shape)
         # Four neighbours' points lie a quarter of their distance apart.
         self._phase = mi.Float(((column % 2 + 2 * (row % 2)) / 4).ravel().astype(np.float32))
@@ -75,21 +79,43 @@ class GelLight:
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3) float32, levels, of heights (H, W) m."""
-        vertices = self._mesh.vertices(np.asarray(height_map, np.float32))
+        height = np.asarray(height_map, np.float32)
+        vertices = self._mesh.vertices(height)
         check_mesh(vertices, self._mesh.faces, self._mesh.count)
         mi = activate(LLVM)
         self._values["gel.vertex_positions"] = vertices.ravel()
         self._values.update()
         if self.preset.paths:
+            # Mitsuba's own normals are sums in an order that varies; a second update leaves ours.
+            self._values["gel.vertex_normals"] = self._mesh.normals(height).ravel()
+            self._values.update()
             return self._by_paths(mi)
+        self._slopes.set_tensor(mi.TensorXf(np.stack(slopes(height, self.unit.camera), -1)))
         found = self._direct(mi)
         return found if self._coarse is None else found + self._bounced(mi)
+
+    def _hit(self, ray: Any) -> Any:
+        """What rays meet; the gel's shading normals are of the map's own slopes."""
+        mi = activate(LLVM)
+        import drjit as dr
+
+        camera = self.unit.camera
+        hit = self._scene.ray_intersect(ray)
+        place = mi.Point2f(
+            hit.p.x / (MM * camera.pixel_size[0] * camera.width) + 0.5,
+            -hit.p.y / (MM * camera.pixel_size[1] * camera.height) + 0.5,
+        )
+        right, down = self._slopes.eval(place)
+        hit.sh_frame.n = dr.normalize(mi.Normal3f(-right, down, 1))
+        hit.initialize_sh_frame()
+        hit.wi = hit.to_local(-ray.d)
+        return hit
 
     def _direct(self, mi: Any) -> np.ndarray:
         import drjit as dr
 
         shape = self.unit.camera.shape
-        hit = self._scene.ray_intersect(self._rays)
+        hit = self._hit(self._rays)
         lights = direct(mi, self._scene, self._emitters, hit, self.preset.points, self._phase)
         seen = hit.is_valid()
         dr.eval(seen, *[part for light in lights for part in light])
@@ -112,8 +138,8 @@ class GelLight:
         """Light (H, W, 3) of one bounce, gathered on a coarse grid."""
         camera, step = self.unit.camera, self.preset.bounce_step
         shape = camera.height // step, camera.width // step
-        hit = self._scene.ray_intersect(self._coarse)
-        found = bounced(mi, self._scene, self._emitters, hit, self._turned).reshape(*shape, 3)
+        hit = self._hit(self._coarse)
+        found = bounced(mi, self._hit, self._scene, self._emitters, hit, self._turned).reshape(*shape, 3)
         row, column = (np.indices(camera.shape) - (step - 1) / 2) / step
         at = lookup(row.astype(np.float32), column.astype(np.float32), shape)
         return np.stack([at(evened(evened(np.ascontiguousarray(found[..., k])))) for k in range(3)], -1)

@@ -7,6 +7,7 @@ import numpy as np
 from ...errors import TactileError
 from ...geometry.lattice import grid_faces
 from ...sensors.camera import Camera
+from ..perspective import slopes
 
 SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, about 20,000 vertices in the picture
 # m of gel round the picture, as high as the picture's edge (sensors.md: 18.4 x 25 mm, of which 13 x 17 are seen).
@@ -43,6 +44,13 @@ class GelMesh:
         """Vertices (n, 3) float32 in mesh coordinates of a height map (H, W) m."""
         self._plan[..., 2] = height[np.ix_(self._rows, self._columns)] * MM
         return self._plan.reshape(-1, 3).copy()
+
+    def normals(self, height: np.ndarray) -> np.ndarray:
+        """Unit normals (n, 3) float32 of the vertices, of the map's own slopes; in real, unscaled space alone."""
+        right, down = (each[np.ix_(self._rows, self._columns)] for each in slopes(height, self.camera))
+        found = np.stack([-right, down, np.ones_like(right)], -1)
+        found /= np.linalg.norm(found, axis=-1, keepdims=True)
+        return found.reshape(-1, 3).astype(np.float32)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner (3,) of the plane of height zero, mesh coordinates."""

@@ -16,14 +16,16 @@ from ...sensors.coating import DIFFUSE, PRINCIPLED, Coating
 from .gel_mesh import MM, GelMesh, check_mesh
 
 PIGMENT_INDEX = 1.5  # of the clear coat of a glossy paint: acrylic and polyurethane binders
+# Of an LED's distance: Mitsuba samples a smaller sphere's cone to no better than 0.1 % in single precision.
+POINTLIKE = 0.01
 WALL_GAP = 1.0  # mm round the LEDs, and above them
 
 
-def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration) -> Any:
-    """The gel as a mesh of Mitsuba's with its coating; height : (H, W) m."""
+def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration, *, smooth: bool) -> Any:
+    """The gel as a mesh of Mitsuba's with its coating; height : (H, W) m; smooth : give its vertices normals."""
     vertices = mesh.vertices(height)
     check_mesh(vertices, mesh.faces, mesh.count)
-    gel = mi.Mesh("gel", mesh.count, len(mesh.faces), has_vertex_normals=True)
+    gel = mi.Mesh("gel", mesh.count, len(mesh.faces), has_vertex_normals=smooth)
     values = mi.traverse(gel)
     values["faces"], values["vertex_positions"] = mesh.faces.ravel(), vertices.ravel()
     values.update()
@@ -48,13 +50,17 @@ def material(coating: Coating, gel_index: float) -> dict[str, Any]:
 
 
 def lamps(unit: Calibration) -> dict[str, Any]:
-    """LEDs by their colours: black spheres that shine."""
+    """LEDs by their colours: black spheres that shine, or points where they look as small."""
     return {led.colour: _lamp(led) for led in unit.leds}
 
 
 def _lamp(led: Led) -> dict[str, Any]:
     radiance = [0.0, 0.0, 0.0]
     radiance[led.channel] = led.radiance
+    if led.radius < POINTLIKE * np.linalg.norm(led.position):
+        intensity = [value * np.pi * (led.radius * MM) ** 2 for value in radiance]  # of an evenly bright disc
+        place = to_scene(led.position)
+        return {"type": "point", "position": place, "intensity": {"type": "rgb", "value": intensity}}
     return {
         "type": "sphere", "center": to_scene(led.position), "radius": led.radius * MM,
         "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},

@@ -1,14 +1,14 @@
 """An integrator of our own for Mitsuba: a few even points of each emitter, shadows evened out, one coarse bounce.
 
-It asks the scene's emitters and materials, so whatever shines or is painted takes part; Mitsuba's path integrator, given
-time, makes the same picture. A sphere's points are a ring that halves its solid angle: with Lambert's law and nothing
-in the way, their mean is exact. Nothing here is random.
+It asks the scene's emitters and materials, so whatever shines or is painted takes part; Mitsuba's path integrator,
+given time, makes the same picture. A sphere's points are a ring that halves its solid angle: with Lambert's law and
+nothing in the way, their mean is exact. Nothing here is random.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,10 +49,13 @@ def direct(mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, 
     return found
 
 
-def bounced(mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, phase: Any) -> np.ndarray:
+def bounced(
+    mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any
+) -> np.ndarray:
     """Radiance (n, 3) that n surface interactions show of light that came by one other place.
 
-    hit : each of them DIRECTIONS times, one behind the other; phase : 0..1 of each, turns its directions
+    meet : what rays meet; hit : each of them DIRECTIONS times, one behind the other
+    phase : 0..1 of each, turns its directions
     """
     import drjit as dr
 
@@ -61,10 +64,10 @@ def bounced(mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, phase: Any) 
     square = mi.Point2f((ring + phase) / RINGS, (spoke + phase + ring / RINGS) / SPOKES)
     local = mi.warp.square_to_uniform_hemisphere(mi.Point2f(square.y - dr.floor(square.y), square.x))
     own = hit.bsdf().eval(mi.BSDFContext(), hit, local) * (2 * dr.pi)
-    far = scene.ray_intersect(hit.spawn_ray(hit.to_world(local)), dr.any(own > 0))
+    far = meet(hit.spawn_ray(hit.to_world(local)))
     light = mi.Color3f(0)
     for lit in direct(mi, scene, emitters, far, 1, (mi.Float(number) + 0.5) / DIRECTIONS):
-        light += dr.select(far.is_valid(), lit.open * lit.share, 0)
+        light += dr.select(far.is_valid() & dr.any(own > 0), lit.open * lit.share, 0)
     light *= own
     sums = [dr.block_sum(light[k], DIRECTIONS) for k in range(3)]
     dr.eval(*sums)

@@ -1,0 +1,106 @@
+"""Pictures by Mitsuba's emitters and materials: against its path integrator, and whether each parameter acts."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from gel_pictures import Press, levels, works
+
+from tactile_core.pictures.height_map import rest_height_map
+from tactile_core.pictures.mitsuba.gel_light import GelLight
+from tactile_core.pictures.mitsuba.variant import LLVM
+from tactile_core.pictures.presets import QUALITY, REFERENCE, STANDARD
+from tactile_core.sensors.coating import Coating
+
+PRESS = Press(depth=1.2e-3)
+COATINGS = (Coating(), Coating("roughplastic"), Coating("principled", roughness=0.4))
+
+
+@pytest.fixture(autouse=True)
+def _llvm() -> None:
+    works(LLVM)
+
+
+def drawn(unit, preset=STANDARD, more=None) -> np.ndarray:
+    """Radiance (2, H, W, 3), levels, at rest and pressed."""
+    rest = rest_height_map(unit.camera)
+    light = GelLight(unit, preset, rest, 0, more)
+    return np.stack([light.radiance(height) for height in (rest, PRESS.on(unit.camera))])
+
+
+@pytest.mark.parametrize("coating", COATINGS, ids=lambda coating: coating.bsdf)
+def test_our_integrator_is_near_mitsubas_paths(small, coating):
+    """Means of 10 x 10 pixels, at rest and under a press of 1.2 mm: the paths' noise is 0.1 to 0.2 levels there."""
+    unit = dataclasses.replace(small, coating=coating)
+    truth, errors = drawn(unit, dataclasses.replace(REFERENCE, paths=16)), []
+    for preset in (STANDARD, QUALITY):
+        off = np.stack([levels(unit, each) for each in drawn(unit, preset) - truth])
+        errors.append(np.sqrt(np.mean(off.reshape(2, 8, 10, 6, 10, 3).mean((2, 4)) ** 2, axis=(1, 2, 3))))
+    assert (errors[1] < (0.8 if coating.bsdf == "diffuse" else 1.2)).all()  # measured 0.2 to 0.5, principled 1.0
+    assert (errors[1] < 0.8 * errors[0]).all()  # a bounce brings it nearer
+
+
+def test_an_led_that_is_off_or_doubled_or_moved_acts(small):
+    def with_red(**change) -> np.ndarray:
+        red = dataclasses.replace(small.leds[0], **change)
+        return drawn(dataclasses.replace(small, leds=(red, *small.leds[1:])))
+
+    whole, radiance, place = drawn(small), small.leds[0].radiance, small.leds[0].position
+    off, doubled = with_red(radiance=0.0), with_red(radiance=2 * radiance)
+    np.testing.assert_array_equal(off[..., 0], 0)
+    np.testing.assert_allclose(doubled[..., 0], 2 * whole[..., 0], rtol=1e-5)
+    for found in (off, doubled):
+        np.testing.assert_allclose(found[..., 1:], whole[..., 1:], rtol=1e-6)  # the others stay as they are
+    near = with_red(position=(place[0] - 2e-3, place[1] + 2e-3, place[2]))
+    assert (near[..., 0].mean((1, 2)) > 1.2 * whole[..., 0].mean((1, 2))).all()
+    # Toward the LED light grows with the inverse square: from 15.6 to 12.8 mm off the middle.
+    assert np.abs(near - whole)[..., 1:].max() < 1e-3
+
+
+def test_the_coating_acts(small):
+    def coated(**change) -> np.ndarray:
+        return drawn(dataclasses.replace(small, coating=Coating(**change)))
+
+    grey = coated()
+    np.testing.assert_array_equal(coated(albedo=(0.0, 0.0, 0.0)), 0)
+    np.testing.assert_allclose(coated(albedo=(1.0, 1.0, 1.0)), 2 * grey, rtol=1e-5)  # Lambert's law, one bounce: linear
+    rough = {"albedo": (0.0, 0.0, 0.0), "bsdf": "roughplastic"}
+    matte, glossy = coated(gloss=0.0, **rough), coated(gloss=1.0, **rough)
+    np.testing.assert_allclose(matte, 0, atol=1e-4)
+    assert (glossy.mean((1, 2, 3)) > 0.02).all()  # highlights alone
+    narrow = coated(gloss=1.0, roughness=0.1, **rough)
+    # A narrow highlight lies where the gel mirrors an LED into the camera: not on the level gel, but on a flank.
+    assert narrow[0].mean() < 0.2 * glossy[0].mean()
+    assert narrow[1].max() > 10 * narrow[0].max()
+    paint, metal = coated(bsdf="principled"), coated(bsdf="principled", metallic=1.0)
+    assert metal[0].mean() < 0.6 * paint[0].mean()  # a metal throws little sideways
+
+
+def test_the_gels_index_bends_the_cameras_rays(small):
+    """At rest the gel lies near the plane that rays are aimed at: what is off it, shifts."""
+    one, other = (drawn(dataclasses.replace(small, gel_index=index)) for index in (1.0, 1.6))
+    moved = np.sqrt(np.mean((one - other) ** 2, axis=(1, 2, 3)))
+    assert 0.02 < moved[1] < 2.0
+    assert moved[1] > moved[0]
+
+
+def test_another_lamp_adds_its_light_unless_the_housing_hides_it(small):
+    def lamp(place: list[float]) -> dict:
+        return {"type": "point", "position": place, "intensity": {"type": "rgb", "value": [9e3] * 3}}
+
+    whole = drawn(small)
+    over, beside = (drawn(small, more={"lamp": lamp(place)}) for place in ([0, 0, 12.0], [60.0, 0, 3.0]))
+    assert ((over - whole).min(-1).mean((1, 2)) > 5).all()
+    np.testing.assert_allclose(beside, whole, atol=1e-3)
+
+
+def test_a_picture_at_rest_has_no_pattern(small):
+    """Neighbours' points are turned against each other: on a level gel that must not be seen."""
+    unit = dataclasses.replace(small, coating=Coating("roughplastic"))
+    for each in (small, unit):
+        resting = drawn(each)[0][4:-4, 4:-4]
+        second = np.abs(resting[:, :-2] - 2 * resting[:, 1:-1] + resting[:, 2:])
+        smooth = np.abs(resting[:, :-4] - 2 * resting[:, 2:-2] + resting[:, 4:]) / 4  # of steps of two, which have none
+        assert (second[:, 1:-1] - smooth).max() < 0.1
