@@ -23,12 +23,12 @@ from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.png import write_png
 from ..files.stopwatch import Stopwatch
-from ..pictures.height_map import digit_mapper
+from ..pictures.height_map import digit_mapper, of_unit
+from ..pictures.mitsuba.scene_file import camera_planes, write_scene
 from ..pictures.presets import DEFAULT, FAST, PRESETS, fitting, measured, told
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import SHIPPED, load_calibration
-from ..sensors.camera import COLOURS
 from . import results, sampling_error
 from .frame_range import frames_text, select
 from .gel_frames import is_scene, read_frames
@@ -69,6 +69,7 @@ class Options:
     variant: str | None = None
     noise: bool = False
     overwrite: bool = False
+    scene_out: str | os.PathLike | None = None
 
 
 def render(
@@ -107,6 +108,8 @@ def render(
         with atomic.new_folder(out, overwrite=options.overwrite) as folder, progress(preset) as shown:
             made.begin(folder)
             made.write_rest(folder)
+            if options.scene_out is not None:
+                made.write_scene(options.scene_out, next(iter(frames.some(rows))))
             for done, (row, values) in enumerate(zip(rows, frames.some(rows), strict=True), 1):
                 made.write_frame(folder, int(frames.numbers[row]), values)
                 shown(done, len(rows))
@@ -212,6 +215,12 @@ class Pictures:
                 about = {**self.about, "frame": str(number)}
                 self._write_exr(folder / EXR / EXR_NAME.format(number), radiance, about)
 
+    def write_scene(self, path: str | os.PathLike, values: np.ndarray) -> None:
+        """Of a frame, as Mitsuba's file; values : as of `write_frame`."""
+        unit = self.renderer.calibration
+        height = values if self.heights else digit_mapper(unit.camera)(values)
+        write_scene(path, unit, of_unit(height, unit))
+
     def _write_exr(self, path: Path, radiance: np.ndarray, about: dict[str, str]) -> None:
         from ..files.exr import write_exr
 
@@ -221,13 +230,8 @@ class Pictures:
         """The response to each LED's light, and what is left of the picture at rest."""
         from ..files.exr import write_exr
 
-        renderer = self.renderer
-        response = renderer.calibration.response.matrices(renderer.camera).astype(np.float32)
-        ambient = renderer.background - renderer.in_levels(renderer.rest_radiance)
-        planes = {f"ambient.{name}": ambient[..., k] for k, name in enumerate("RGB")}
-        for k, name in enumerate("RGB"):
-            planes |= {f"response.{name}.{led}": response[..., k, j] for j, led in enumerate(COLOURS)}
-        write_exr(path, planes, self.about)
+        ambient = self.renderer.background - self.renderer.in_levels(self.renderer.rest_radiance)
+        write_exr(path, camera_planes(self.renderer.calibration, ambient), self.about)
 
 
 def pictures(

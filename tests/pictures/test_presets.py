@@ -35,7 +35,8 @@ def test_the_shipped_table_has_every_preset():
     for name in presets.NAMES:
         row = presets.measured()["presets"][name]
         assert row["error"] > 0 and row["ms"] and row["says"]
-    errors = [presets.measured()["presets"][name]["error"] for name in ("fast", "quality", "reference")]
+    # The reference's own row is the noise of its paths.
+    errors = [presets.measured()["presets"][name]["error"] for name in ("standard", "fast", "quality")]
     assert errors == sorted(errors, reverse=True)
 
 

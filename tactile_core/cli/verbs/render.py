@@ -26,12 +26,14 @@ DIR is a new folder, which appears whole or not at all:
   images/%05d.png  8-bit pictures: response x radiance + ambient light
   exr/%05d.exr     with --exr, float32: linear radiance of the coating, R, G, B = light of the red, green, blue LED
   rest.exr         the same of the undeformed gel;  camera.exr  response and ambient light
+  FILE.xml         with --scene-out: the first frame's LEDs, coating and gel for `mitsuba FILE.xml`, FILE.ply beside it
   note.json        input, calibration, preset, versions;  timings.json  ms a frame
 
 Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (pip install "tactile-core[render]").
   fast       direct light, soft shadows            standard   direct light, traced
-  quality    and the light of one bounce           reference  everything, seconds a frame
-A picture is the same with LLVM and without it, but for rounding; `tactile doctor` says which runs here.
+  quality    and the light of one bounce           reference  Mitsuba's path integrator, half a minute a frame
+With LLVM a scene of Mitsuba's makes the light: LEDs that shine, the coating as a material, the window. Without it the
+coating is matte, and standard and quality have no window; half a level apart. `tactile doctor` says which runs here.
 
 --error 0.6levels picks the cheapest preset whose measured error, rms from the full model of the same gel, is at most
 that; --error 50um, for a scene, the tier of contact as `tactile simulate` does. It says what it picked, and why.
@@ -57,6 +59,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="only these, counted from 0 as in Python")
     verb.add_argument("--size", metavar="WxH", help="pixels, such as 480x640 (default: the calibration's)")
     verb.add_argument("--exr", action="store_true", help="write OpenEXR beside PNG")
+    verb.add_argument("--scene-out", metavar="FILE.xml", help="write the first frame as a scene of Mitsuba's, too")
     verb.add_argument("--noise", action="store_true", help="add the unit's camera noise to PNG pictures")
     verb.add_argument("--variant", choices=("llvm", "scalar"), help="of Mitsuba (default: the faster one that works)")
     verb.add_argument("--overwrite", action="store_true", help="replace an older result")
@@ -83,8 +86,11 @@ def run(options: argparse.Namespace) -> int:
         variant=wanted,
         noise=options.noise,
         overwrite=options.overwrite,
+        scene_out=options.scene_out,
     )
     if options.plan or options.workers or options.cluster:
+        if options.scene_out is not None:
+            raise TactileError("--scene-out", "given with other processes", "one of the two", "Leave --workers out")
         if asked.error is not None:
             asked.error.only("levels", "Simulate the scene first, with --error, and render that")
         return _run_in_parts(options, asked)

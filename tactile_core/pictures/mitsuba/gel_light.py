@@ -38,7 +38,11 @@ class GelLight:
         mi = activate(LLVM)
         register(mi, LLVM)
         lights = lamps(unit) | (more or {})
-        around = walls(mi, unit, self._mesh) if more else {}  # black: the unit's own light never meets them
+        # Black: the unit's own light need not meet them.
+        around = {
+            name: wall | {"to_world": mi.ScalarTransform4f(wall["to_world"])}
+            for name, wall in (walls(unit, self._mesh) if more else {}).items()
+        }
         gel = gel_shape(mi, self._mesh, rest, unit, smooth=bool(preset.paths))
         # What stands in the way, without the LEDs: spheres would make each ray a third dearer, and none is ever met.
         shadowing = {"type": "scene", "gel": gel, **around}

@@ -68,10 +68,11 @@ def _lamp(led: Led) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def walls(mi: Any, unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
+def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
     """Four black walls round gel and LEDs, from the gel's height up, that keep light from outside away.
 
-    What the housing throws back near an LED is in that LED's fitted radius, which is several times a chip's.
+    Their places are matrices (4, 4). What the housing throws back near an LED is in that LED's fitted radius, which is
+    several times a chip's.
     """
     lowest, highest = mesh.bounds()
     for led in unit.leds:
@@ -87,7 +88,7 @@ def walls(mi: Any, unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
         frame[:3, 0], frame[:3, 1], frame[:3, 2] = across * half[1 - axis], up * half[2], normal
         frame[:3, 3] = middle - normal * half[axis]
         found[f"wall_{name}"] = {
-            "type": "rectangle", "to_world": mi.ScalarTransform4f(frame),
+            "type": "rectangle", "to_world": frame,
             "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},
         }  # fmt: skip
     return found

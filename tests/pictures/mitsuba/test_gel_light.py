@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from gel_pictures import Press, levels, works
 
+from tactile_core.errors import TactileError
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.gel_light import GelLight
-from tactile_core.pictures.mitsuba.variant import LLVM
+from tactile_core.pictures.mitsuba.scene_file import square_pixels, write_scene
+from tactile_core.pictures.mitsuba.variant import LLVM, activate
 from tactile_core.pictures.presets import QUALITY, REFERENCE, STANDARD
 from tactile_core.sensors.coating import Coating
 
@@ -104,3 +106,24 @@ def test_a_picture_at_rest_has_no_pattern(small):
         second = np.abs(resting[:, :-2] - 2 * resting[:, 1:-1] + resting[:, 2:])
         smooth = np.abs(resting[:, :-4] - 2 * resting[:, 2:-2] + resting[:, 4:]) / 4  # of steps of two, which have none
         assert (second[:, 1:-1] - smooth).max() < 0.1
+
+
+def test_stock_mitsuba_renders_the_written_scene_alike(small, tmp_path):
+    """Means of 10 x 10 pixels; square pixels here. Raised gel shifts by up to a third of a pixel without the window."""
+    unit = dataclasses.replace(small, coating=Coating("roughplastic"))
+    height = PRESS.on(unit.camera)
+    write_scene(tmp_path / "gel.xml", unit, height)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gel.camera.exr", "gel.ply", "gel.xml"]
+    mi = activate(LLVM)
+    found = np.array(mi.render(mi.load_file(str(tmp_path / "gel.xml")), spp=1024))
+    expected = GelLight(unit, QUALITY, rest_height_map(unit.camera), 0).radiance(height)
+    off = (found - expected).reshape(8, 10, 6, 10, 3).mean((1, 3))
+    assert np.abs(off.mean()) < 0.5 and np.sqrt(np.mean(off**2)) < 1.5
+
+
+def test_pixels_of_a_scene_file_are_square(small):
+    camera = dataclasses.replace(small.camera, px_per_mm_y=small.camera.px_per_mm_y * 0.9)
+    square = square_pixels(camera)
+    assert square.pixel_size[0] == square.pixel_size[1] and square.height == 89
+    with pytest.raises(TactileError, match="ends in"):
+        write_scene("gel.json", small, rest_height_map(small.camera))

@@ -1,0 +1,136 @@
+"""A unit's scene as a file that any Mitsuba 3 renders: XML, the gel as PLY, and what the camera makes of it.
+
+NAME.xml        LEDs, coating, housing, camera, Mitsuba's path integrator; `mitsuba NAME.xml` writes the radiance
+NAME.ply        the gel, mm
+NAME.camera.exr response and ambient light, by which radiance becomes 8-bit levels, as of ``jobs.render``
+
+The file's camera has square pixels, as wide as the unit's, and is a pinhole where the unit's appears: Mitsuba's camera
+cannot look through the window and keep the unit's even grid. Gel 1 mm up lies up to a third of a pixel off by that.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ...errors import TactileError
+from ...files import atomic
+from ...files.exr import write_exr
+from ...sensors.calibration import Calibration
+from ...sensors.camera import COLOURS, Camera
+from ..background import by_led
+from .gel_mesh import MM, SPACING, GelMesh, check_mesh
+from .gel_scene import lamps, material, walls
+
+VERSION = "3.0.0"  # of the scene format
+PATHS, DEPTH = 256, 6
+# Mitsuba's XML has a tag for each kind of plugin.
+_TAGS = {
+    "path": "integrator", "perspective": "sensor", "hdrfilm": "film", "box": "rfilter", "multijitter": "sampler",
+    "ply": "shape", "sphere": "shape", "rectangle": "shape", "area": "emitter", "point": "emitter",
+    "diffuse": "bsdf", "roughplastic": "bsdf", "principled": "bsdf",
+}  # fmt: skip
+
+
+def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarray) -> None:
+    """Write the scene of heights (H, W) m of the unit's own gel; each file appears whole or not at all.
+
+    Raises TactileError for another ending than .xml and for heights that are not finite.
+    """
+    path = Path(path)
+    if path.suffix != ".xml":
+        raise TactileError(path, f"the ending {path.suffix!r}", "a name that ends in .xml")
+    mesh = GelMesh(unit.camera, SPACING / 2)
+    check_mesh(mesh.vertices(height_map), mesh.faces, mesh.count)
+    square = square_pixels(unit.camera)
+    atomic.write_bytes(path.with_suffix(".ply"), _ply(mesh, np.asarray(height_map, np.float32)))
+    view = dataclasses.replace(unit, camera=square)
+    ambient = by_led(view, np.zeros((*square.shape, 3))).sum(-1)
+    write_exr(path.with_suffix(".camera.exr"), camera_planes(view, ambient), {"calibration": unit.unit})
+    content = {
+        "integrator": {"type": "path", "max_depth": DEPTH, "hide_emitters": True},
+        "eye": _eye(square),
+        "gel": {"type": "ply", "filename": path.with_suffix(".ply").name,
+                "coating": material(unit.coating, unit.gel_index)},
+        **lamps(unit), **walls(unit, mesh),
+    }  # fmt: skip
+    root = ElementTree.Element("scene", version=VERSION)
+    for name, value in content.items():
+        _add(root, name, value)
+    ElementTree.indent(root)
+    atomic.write_bytes(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+
+
+def square_pixels(camera: Camera) -> Camera:
+    """The same view with pixels as high as wide: as many rows as that makes, to half a row."""
+    rows = round(camera.height * camera.px_per_mm_x / camera.px_per_mm_y)
+    return dataclasses.replace(camera, height=rows, px_per_mm_y=camera.px_per_mm_x)
+
+
+def camera_planes(unit: Calibration, ambient: np.ndarray) -> dict[str, np.ndarray]:
+    """Planes (H, W) of an EXR file: response.R.red, ... and ambient.R, ..., which is (H, W, 3) levels."""
+    response = unit.response.matrices(unit.camera).astype(np.float32)
+    planes = {f"ambient.{name}": ambient[..., k] for k, name in enumerate("RGB")}
+    for k, name in enumerate("RGB"):
+        planes |= {f"response.{name}.{led}": response[..., k, j] for j, led in enumerate(COLOURS)}
+    return planes
+
+
+def _eye(camera: Camera) -> dict[str, Any]:
+    half, distance = camera.width / 2 * camera.pixel_size[0], camera.apparent_height
+    frame = np.diag([-1.0, 1.0, -1.0, 1.0])  # looks along -z, up is y
+    frame[2, 3] = distance * MM
+    return {
+        "type": "perspective", "fov_axis": "x", "fov": 2 * math.degrees(math.atan(half / distance)),
+        "near_clip": 1.0, "far_clip": 1e3, "to_world": frame,
+        "sampler": {"type": "multijitter", "sample_count": PATHS},
+        "film": {"type": "hdrfilm", "width": camera.width, "height": camera.height, "pixel_format": "rgb",
+                 "component_format": "float32", "filter": {"type": "box"}},
+    }  # fmt: skip
+
+
+def _add(parent: ElementTree.Element, name: str, value: Any) -> None:
+    """A plugin, colour, number, text or transform as XML."""
+    if isinstance(value, Mapping) and value["type"] == "rgb":
+        _field(parent, "rgb", name, ", ".join(f"{each:.9g}" for each in value["value"]))
+    elif isinstance(value, Mapping):
+        plugin = ElementTree.SubElement(parent, _TAGS[value["type"]], type=value["type"])
+        if parent.tag == "scene":  # names must differ over the whole file
+            plugin.set("id", name)
+        for key, each in value.items():
+            if key != "type":
+                _add(plugin, key, each)
+    elif isinstance(value, np.ndarray):
+        transform = ElementTree.SubElement(parent, "transform", name=name)
+        ElementTree.SubElement(transform, "matrix", value=" ".join(f"{each:.9g}" for each in value.ravel()))
+    elif isinstance(value, list):
+        ElementTree.SubElement(parent, "point", name=name, **{k: f"{v:.9g}" for k, v in zip("xyz", value, strict=True)})
+    elif isinstance(value, bool):
+        _field(parent, "boolean", name, "true" if value else "false")
+    else:
+        kind = {int: "integer", str: "string"}.get(type(value), "float")
+        _field(parent, kind, name, value if isinstance(value, str) else f"{value:.9g}")
+
+
+def _field(parent: ElementTree.Element, kind: str, name: str, value: str) -> None:
+    ElementTree.SubElement(parent, kind, name=name, value=value)
+
+
+def _ply(mesh: GelMesh, height: np.ndarray) -> bytes:
+    """Binary PLY of the gel with normals."""
+    vertices = np.hstack([mesh.vertices(height), mesh.normals(height)]).astype("<f4")
+    fields = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{fields}"
+        f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    faces = np.empty(len(mesh.faces), [("count", "u1"), ("index", "<i4", 3)])
+    faces["count"], faces["index"] = 3, mesh.faces
+    return header.encode() + vertices.tobytes() + faces.tobytes()
