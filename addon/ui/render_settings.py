@@ -35,11 +35,11 @@ class TactileRender(bpy.types.PropertyGroup):
     )  # fmt: skip
     lights: bpy.props.FloatVectorProperty(
         name="Lights", description="Strength of the red, green and blue LED, times that of the calibration", size=3,
-        default=(1.0, 1.0, 1.0), min=0.01, soft_max=2.0,
+        default=(1.0, 1.0, 1.0), min=0.0, soft_max=2.0,
     )  # fmt: skip
     albedo: bpy.props.FloatProperty(
-        name="Coating", description="Share of light that the coating scatters back; negative: the calibration's."
-        " Seen by the presets in which light bounces", default=-1.0, min=-1.0, max=1.0,
+        name="Coating", description="Share of light that the coating scatters back; negative: the calibration's",
+        default=-1.0, min=-1.0, max=1.0,
     )  # fmt: skip
 
 

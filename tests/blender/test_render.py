@@ -206,10 +206,10 @@ def test_a_bound_on_pictures_picks_the_preset(ready, part):
     table = part("tactile_core.pictures.presets").measured()["presets"]
     scene.tactile_render.preset = "standard"
     assert settings.preset_of(scene) == "standard"
-    for preset in ("fast", "reference"):
+    for preset in ("fast", "quality"):
         bound = f"9um,{table[preset]['error']}levels"
         scene.tactile_render.error = bound
         assert settings.preset_of(scene) == preset
     scene.tactile_render.error = "1e-9levels"
-    with pytest.raises(part("tactile_core.errors").TactileError, match="reference has"):
+    with pytest.raises(part("tactile_core.errors").TactileError, match="quality has"):
         settings.preset_of(scene)
