@@ -13,7 +13,7 @@ from . import axes, surfaces
 
 SKIN_COLOUR = (0.25, 0.55, 0.45, 0.35)  # see-through, so that core and electrodes show
 CORE_COLOUR = (0.08, 0.08, 0.1, 1.0)
-# The part of the profile table where every ray meets the core (sensors.md).
+# The part of the profile table where every ray meets the core (docs/sources.md, BioTac skin).
 _CORE_X, _CORE_ANGLE = (-18.8e-3, 4.9e-3), np.radians(115.0)
 
 

@@ -12,7 +12,7 @@ from ..ui import properties
 from . import axes, surfaces
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
-BESIDE = 7.1e-3 + digit.HALF_WIDTH + 6e-3  # m: half widths of BioTac (sensors.md) and DIGIT, and a gap
+BESIDE = 7.1e-3 + digit.HALF_WIDTH + 6e-3  # m: half widths of both (docs/sources.md, BioTac skin), a gap
 
 
 def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None) -> bpy.types.Object:

@@ -20,7 +20,7 @@ SHAPES = (
     ("ring", "Ring", "A ring of round wire that lies flat"),
     ("edge", "Edge", "The rounded ridge of a wedge along the finger"),
 )
-_ABOVE = 10e-3  # m over the sensors' frame: 1.7 mm above the pads, in the middle of both (sensors.md)
+_ABOVE = 10e-3  # m over the sensors' frame: 1.7 mm above the pads, in the middle of both (docs/sources.md, Frame)
 _MIDDLE = -8e-3  # m, x of the middle of the pads
 
 
