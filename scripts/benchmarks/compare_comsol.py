@@ -2,7 +2,7 @@
 
     python scripts/benchmarks/compare_comsol.py FOLDER [--json FILE]
 
-FOLDER holds one folder a press, as ../shared/data/biotac_comsol does. Prints a table; exits 1 when a row misses its
+FOLDER holds one folder a press of bsadr/biotac (docs/sources.md). Prints a table; exits 1 when a row misses its
 target, 2 when a file cannot be read. Under a minute a press. Needs the extra [fem].
 """
 

@@ -194,7 +194,7 @@ def verbs(folder: Path) -> list[Row]:
             continue
         loads = " ".join(sorted(cost.loaded)) or "-"
         of = f"{cost.wall:.2f} s on the wall, imports {cost.imports:.2f} s; loads {loads}"
-        # 0.15 s: issue 8; Python alone takes 0.02 s of it.
+        # 0.15 s: a target (one does not notice it); Python alone takes 0.02 s of it.
         yield row(f"{case.name}_cpu", cost.cpu, "s", 0.15 if case.name == "help" else None, of=of)
         yield row(f"{case.name}_memory", cost.peak, "MB", of="peak resident")
 

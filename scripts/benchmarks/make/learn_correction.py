@@ -33,7 +33,7 @@ SHARES = 0.4, 0.7, 1.0  # of a press's depth, at which it is sampled
 _RUBBING_STEP = 0.5e-3
 _FOLDS = 5
 _BINS = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 2.0  # depth over thickness, of what is trusted and told
-_SIGNIFICANT = 10e-6  # m, nodes that move less do not count (issue 3, point 8)
+_SIGNIFICANT = 10e-6  # m, nodes that move less do not count: they belong to no contact
 
 
 @dataclasses.dataclass(frozen=True)

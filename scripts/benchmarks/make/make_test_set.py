@@ -28,7 +28,7 @@ from tactile_core.simulation import full_pairs, pairs_file  # noqa: E402
 from tactile_core.simulation.pairs_card import card, card_path  # noqa: E402
 from tactile_core.simulation.scene import load_scene  # noqa: E402
 
-STEP = 1e-6  # m, of the displacements in the file: 0.3 um rms of rounding, a tenth of the least target of issue 4
+STEP = 1e-6  # m, of the displacements in the file: 0.3 um rms of rounding, a tenth of the least target
 Job = tuple[pathlib.Path, int, int]  # folder, seed, number
 
 

@@ -4,7 +4,8 @@
 
 Each setting is a whole training but for the networks that are not compared; errors are those of the full tier's test
 contacts that ship, nothing of which was trained on. ``published`` has the latents and the KL weight of the method's
-authors (sensors.md). ``direct`` is trained from three seeds, the bar that the chain must reach. ``--prototype`` adds a
+authors (docs/sources.md).
+``direct`` is trained from three seeds, the bar that the chain must reach. ``--prototype`` adds a
 training on pairs of scenes/prototype, the first prototype's set, judged by test presses of its own, as that was.
 Settings that are done are not trained again, so that a stopped sweep goes on. Needs torch; minutes a setting on one
 core.

@@ -7,7 +7,7 @@ import numpy as np
 from tactile_core.mechanics.solids.hex_mesh import HexMesh, hex_cells
 
 # Force, N, on a ball of 3.5 mm radius pressed m deep into a disc of 3 mm thickness and 13.5 mm radius, E = 1 MPa,
-# nu = .49, without friction, rim free: axisymmetric, finite strain, converged (h = 0.05 mm). [mechanics.md]
+# nu = .49, without friction, rim free: axisymmetric, finite strain, converged (h = 0.05 mm): docs/sources.md
 GOLDEN_BALL, GOLDEN_THICKNESS, GOLDEN_RADIUS = 3.5e-3, 3e-3, 13.5e-3
 GOLDEN_FORCE = {0.2e-3: 0.4176, 0.6e-3: 2.9513, 1.0e-3: 7.7420, 1.4e-3: 14.787, 1.8e-3: 24.241}
 

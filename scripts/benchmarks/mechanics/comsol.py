@@ -19,7 +19,7 @@ from tactile_core.errors import TactileError
 from tactile_core.mechanics.finite_strain.sp_press import INTERVALS, Pressed, SpPress
 from tactile_core.sensors import biotac_sp
 
-GAP, VOLUME, FORCE = 0.05, 0.2, 5.0  # mm, %, %: targets of issue MECHANICS
+GAP, VOLUME, FORCE = 0.05, 0.2, 5.0  # mm, %, %: targets (docs/sources.md, Targets)
 SQUEEZED = 1e-3  # mm, within which electrodes count as squeezed alike: mirrored twins differ by our interpolation
 DEEP = 0.3e-3  # m, forces count beyond this depth
 FITTED = "001"  # the press that ``biotac_sp.FORCE_SCALE`` was fitted on

@@ -33,7 +33,7 @@ from tactile_core.sensors import digit, divider
 DEPTHS = (0.15e-3, 0.4e-3, 0.7e-3, 1.0e-3, 1.2e-3)  # m, of every press
 INDENTERS = (Sphere(2e-3), Sphere(3.5e-3), Sphere(6e-3), Cylinder(3e-3, 0.5e-3))
 OVER_E18 = Placement(-4.17e-3, 0.0)
-E18_DEPTHS = (0.3e-3, 0.8e-3, 1.2e-3)  # m; mechanics.md found +11, +50, +137 % there
+E18_DEPTHS = (0.3e-3, 0.8e-3, 1.2e-3)  # m; a prototype found +11, +50, +137 % (docs/sources.md, BioTac electrodes)
 _RIM_MARGIN, _TILT = 1.0e-3, np.radians(20)  # m and rad: places and angles as ``tactile pairs`` draws them
 
 

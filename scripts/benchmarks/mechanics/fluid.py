@@ -18,7 +18,7 @@ from tactile_core.sensors import Material
 
 from .block import block
 
-TARGET = 1e-12  # issue MECHANICS
+TARGET = 1e-12  # relative, of the volume (docs/sources.md, Targets)
 _SIDE, _DEPTH = 4.5e-3, 0.6e-3  # m
 
 

@@ -1,4 +1,4 @@
-"""The golden forces of mechanics.md: a ball of 3.5 mm on a bonded layer of 3 mm, down to 60 % of it."""
+"""The golden forces of docs/sources.md, Mechanics: a ball of 3.5 mm on a bonded layer of 3 mm, down to 60 % of it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tactile_core.sensors import Material
 from .bonded_layer import GOLDEN_BALL, GOLDEN_FORCE, GOLDEN_RADIUS, GOLDEN_THICKNESS, quarter_disc
 from .pressed_disc import disc_mesh, pressed
 
-TARGET = 0.5  # percent, issue MECHANICS
+TARGET = 0.5  # percent (docs/sources.md, Targets)
 MATERIAL = Material(1e6, 0.49)
 _REACH = 4e-3  # m; the contact of 1.8 mm depth ends at 2.5 mm
 _STEP = 0.2e-3  # m
@@ -30,7 +30,7 @@ _QUARTERS = (
 
 
 def disc(spacing: float) -> FiniteStrainContact:
-    """The contact of mechanics.md with nodes ``spacing`` m apart near it."""
+    """The contact of the golden forces with nodes ``spacing`` m apart near it."""
     mesh = disc_mesh(GOLDEN_RADIUS, GOLDEN_THICKNESS, _REACH, spacing, 0.4e-3)
     return pressed(mesh, MATERIAL, Sphere(GOLDEN_BALL), _REACH)
 

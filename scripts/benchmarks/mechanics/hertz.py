@@ -15,7 +15,7 @@ from tactile_core.sensors import Material
 
 from .pressed_disc import contact_radius, disc_mesh, pressed
 
-TARGET = 1.0  # percent, issue MECHANICS
+TARGET = 1.0  # percent (docs/sources.md, Targets)
 BALL, YOUNGS = 10e-3, 1e6  # m, Pa
 # Contact radius over the block's thickness and half width: 0.05 would still leave 5 % of the bonded back in the force.
 _BLOCK = 200

@@ -15,7 +15,7 @@ from tactile_core.sensors import Material
 from .bonded_layer import dimitriadis, exact_layer
 from .pressed_disc import disc_mesh, pressed
 
-TARGET, THIN_TARGET = 1.0, 3.0  # percent, issue MECHANICS
+TARGET, THIN_TARGET = 1.0, 3.0  # percent (docs/sources.md, Targets)
 THICKNESS, YOUNGS = 3e-3, 1e6  # m, Pa
 # The formula is 0.2 % below the exact solution at sqrt(R d) / h = 0.1, 0.9 % at 0.19, 4 % at 0.35 and 12 % at 0.6
 # (nu = .5), so that beyond 0.15 the exact solution is what a solver is held against.

@@ -16,7 +16,7 @@ from tactile_core.mechanics.thickness import depth_at
 from .random_contacts import RandomContact, random_contacts
 from .tiers import TIME_TARGETS
 
-SETTLED_TARGET, PENETRATION = 99.0, 1e-6  # per cent, m: issue MECHANICS
+SETTLED_TARGET, PENETRATION = 99.0, 1e-6  # per cent, m: targets (docs/sources.md, Targets)
 _COUNT, _QUICK = 450, 45  # contacts
 _STEPS = 10  # of a path: what `tactile pairs` and scenes take, for every step is a contact
 

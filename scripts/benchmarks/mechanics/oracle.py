@@ -140,7 +140,7 @@ def _determinant(f: np.ndarray) -> np.ndarray:
 
 
 def _density(f: np.ndarray, shear: float) -> np.ndarray:
-    """Isochoric neo-Hookean energy density, as in mechanics.md."""
+    """Isochoric neo-Hookean energy density (docs/sources.md, Mechanics)."""
     return shear / 2 * (_determinant(f) ** (-2 / 3) * (f * f).sum((0, 1)) - 3)
 
 

@@ -11,7 +11,7 @@ from tactile_core.geometry.indenters import Box, BumpyCube, Cylinder, Indenter, 
 from tactile_core.mechanics.placement import Placement, on_gel
 from tactile_core.sensors import digit
 
-# Diameters and sizes as MECHANICS names them, in m; edges, wire and bumps are assumed.
+# Diameters and sizes of the published indenters (docs/sources.md, Networks), m; edges, wire and bumps are assumed.
 INDENTERS: dict[str, Indenter] = {
     "sphere 3.5": Sphere(1.75e-3),
     "sphere 7": Sphere(3.5e-3),

@@ -92,7 +92,7 @@ def _spacing(axes: Any, rows: list[Row]) -> None:
 
 def _force(axes: Any, rows: list[Row]) -> None:
     depths = np.array(list(GOLDEN_FORCE)) * 1e3
-    axes.plot(depths, list(GOLDEN_FORCE.values()), "-", label="golden, mechanics.md")
+    axes.plot(depths, list(GOLDEN_FORCE.values()), "-", label="golden (docs/sources.md)")
     errors = {row["name"]: row["value"] for row in rows}
     forces = [
         force * (1 + errors[f"golden_force_{1e3 * depth:.1f}mm_error"] / 100) for depth, force in GOLDEN_FORCE.items()

@@ -19,7 +19,7 @@ from tactile_core.sensors import digit
 
 from .incompressible import quality_rows
 
-# Issue MECHANICS, point 8: um rms and percent; the fast tier's shape up to 20 % depth, its force up to 40 %.
+# Targets (docs/sources.md, Targets): um rms and percent; the fast tier's shape up to 20 % depth, its force up to 40 %.
 SHAPE_TARGET, FAST_FORCE_TARGET, FULL_FORCE_TARGET = 5.0, 5.0, 1.0
 NORMAL_TARGET = 1.5  # degrees, mean inside the contact, point 2
 TIME_TARGETS = {("fast", "digit"): 2.5, ("fast", "biotac"): 3.5, ("full", "digit"): 1000.0, ("full", "biotac"): 1200.0}

@@ -11,7 +11,7 @@ from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
 
 from .golden import disc
 
-ORDER, REST = 1.9, 1e-8  # issue MECHANICS
+ORDER, REST = 1.9, 1e-8  # targets (docs/sources.md, Targets)
 _SPACING, _DEPTH = 0.1e-3, 0.8e-3  # m
 
 

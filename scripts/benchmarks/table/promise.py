@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_core.accuracy import Row, row
 
-COVER = 0.9, 0.98  # share of contacts below a bound of 95 %, between which it counts as right (issue 8)
+COVER = 0.9, 0.98  # share of contacts below a bound of 95 %, between which it counts as right (assumed)
 FEWEST = 200  # contacts: of fewer, such a share is 1.5 % off and more by chance, and has no target
 
 

@@ -17,7 +17,8 @@ from tactile_core.translation.contact_frame import on_skin
 from tactile_core.translation.network_sizes import PLACE
 from tactile_core.translation.networks import FORCE_SCALE, Networks, Posterior
 
-# Of issue 26, each frame alone: depths on the BioTac, mm -> largest median (least for the overlap).
+# Targets of each frame alone (docs/sources.md, Targets):
+# depths on the BioTac, mm -> largest median (least for the overlap).
 SETS = {
     "0.1 to 0.3 mm deep": (0.1e-3, 0.3e-3, {"place_mm": 1.2, "force_size_percent": 18.0, "peak_percent": 25.0}),
     "deeper than 0.3 mm": (

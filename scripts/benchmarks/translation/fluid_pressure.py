@@ -1,7 +1,7 @@
 """The fluid's pressure told from the electrodes against the one that PDC measures: the absolute label on real fingers.
 
 Slides hold both from one zero. Sample 7 of each material may be looked at, the others are reported; of grips only the
-order within a file counts, as their pressure has no zero (data README).
+order within a file counts, as their pressure has no zero (docs/sources.md, Real data sets).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from . import slide_set
 from .prints import CONTACT
 from .slide_metrics import rank_correlation
 
-AS_IT_COMES, SCALED = 20.0, 7.0  # per cent, targets of issue SIGNALS
+AS_IT_COMES, SCALED = 20.0, 7.0  # per cent, targets (docs/sources.md, Targets)
 ABOVE = 0.05  # share of contact frames above the training's largest pressure, likewise
 SWING = 550.0  # Pa, by which a grip's pressure must change to have an order
 

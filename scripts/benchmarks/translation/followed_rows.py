@@ -19,7 +19,7 @@ SHIPPED = Path(__file__).resolve().parents[3] / "scenes" / "press_roll_slide" / 
 UNITS = 8  # of gains drawn 10 % apart
 NOISE, GAIN = 1.1, 0.1  # counts beside the recording's own 1.0, together 1.5; as the test contacts are read
 TOUCHED = 0.1  # N, from which on a contact's place and force are judged
-PLACE, FORCE, PEAK = 0.35, 5.0, 14.0  # mm, %, %: targets of issue CONTACT, whole recordings
+PLACE, FORCE, PEAK = 0.35, 5.0, 14.0  # mm, %, %: the targets, of whole recordings (docs/sources.md, Targets)
 
 
 def rows(network: Translator, file: Path = SHIPPED) -> list[Row]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-NOISE = 1.5  # counts (issue 4; 0.7 to 1.5 in real recordings, data README)
-GAIN = 0.1  # standard deviation a channel (issue 4)
+NOISE = 1.5  # counts (the most of 0.7 to 1.5 in real recordings: docs/sources.md, BioTac read-out)
+GAIN = 0.1  # standard deviation a channel (assumed: docs/sources.md, BioTac read-out)
 
 
 def as_read(change: np.ndarray, seed: int, frames: int = 1) -> np.ndarray:

@@ -21,7 +21,7 @@ from tactile_core.translation.contact_track import FRAME, track
 from tactile_core.translation.translate import Translator
 
 WINDOW = 32  # px
-VISIBLE = 2.0  # grey levels rms in the strongest window: what one sees beside the camera's noise (issue SIGNALS)
+VISIBLE = 2.0  # grey levels rms in the strongest window: what one sees beside the camera's noise (a target)
 CONTACT, LOST = 550.0, 75.0  # Pa of the fluid: surely in contact; contact lost
 EVERY = 20  # frames between two that are drawn
 CHUNK = 32  # frames in memory at a time

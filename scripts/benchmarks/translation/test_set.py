@@ -18,7 +18,7 @@ from .contact_rows import answer_rows, posterior_rows
 from .noise import as_read
 from .slide_metrics import rank_correlation
 
-# Targets of issue 4, without shear, depth bins and indenters alike.
+# Targets (docs/sources.md, Targets), without shear, depth bins and indenters alike.
 TARGETS = {
     "MVB_rms_um": 3.0, "MVD_rms_um": 6.0,
     "M2MPN_rms_um": 12.0, "M2MPN_core_height_um": 30.0, "M2MPN_peak_depth_percent": 5.0, "M2MPN_iou": 0.85,
@@ -28,7 +28,7 @@ UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter th
 EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
 NULL_FIGURES = ("null_biotac_rms_um", "null_digit_rms_um", "null_digit_core_height_um")
 FROM_SIGNALS = ("S2MPN_rms_um", "S2MPN_position_mm", "force_percent", "chain_rms_um")
-WINDOW, RATE = 3, 100.0  # frames; Hz, of the electrodes (sensors.md)
+WINDOW, RATE = 3, 100.0  # frames; Hz, of the electrodes (docs/sources.md, BioTac read-out)
 BATCHES = {1: 0.8, 500: 0.25}  # frames a call -> target, ms a frame
 ROUNDS = 7  # calls, of which the fastest counts: what else runs only ever slows
 SEED = 7  # of the readings' noise
