@@ -1,7 +1,7 @@
 """A baseline after ACROSS (2025): its published network shapes, here on our surfaces, to be measured beside ours.
 
 A mesh is encoded by Chebyshev graph convolutions (Defferrard et al. 2016) on meshes that are halved four times, as in
-CoMA (Ranjan et al. 2018); signal and mesh latents are joined by plain perceptrons. Sizes from design/sensors.md; what
+CoMA (Ranjan et al. 2018); signal and mesh latents are joined by plain perceptrons. Sizes: docs/sources.md; what
 is not published and taken here as it suits the baseline best: ReLU in the mesh networks, halving by collapsing the
 shortest edges, displacements over one rms, signals compressed and roughened as for our networks.
 """

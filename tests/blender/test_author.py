@@ -139,7 +139,7 @@ def test_pressing_by_height_finds_the_force(sensors, part):
     bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
     ball = bpy.context.object
     sensors.render.fps, sensors.frame_start, sensors.frame_end = 100, 1, 3
-    touch = 8.3  # mm: the gel's top in the sensors' frame (sensors.md), where a ball's lowest point touches
+    touch = 8.3  # mm: the gel's top in the sensors' frame (docs/sources.md, Frame), where a ball's lowest point touches
     for frame, height in ((1, touch + 1), (3, touch - 0.5)):
         _key(ball, frame, z=height)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}

@@ -56,7 +56,7 @@ def test_the_scene_plays_in_the_recording_s_time(imported, scene):
 def test_the_scene_s_own_unit_is_kept_when_asked(imported, scene, nodes_of):
     skin = imported(millimetres=False)
     assert scene.unit_settings.scale_length == 1.0
-    assert np.ptp(nodes_of(skin)[:, 0]) == pytest.approx(0.02796, abs=2e-4)  # the skin's length (sensors.md), m
+    assert np.ptp(nodes_of(skin)[:, 0]) == pytest.approx(0.02796, abs=2e-4)  # m, the skin's length (docs/sources.md)
 
 
 def test_electrodes_sit_under_the_skin_and_show_their_signal(imported, part, scene):

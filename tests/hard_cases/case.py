@@ -32,7 +32,8 @@ class Found:
 class Case:
     """One hard case of one stage.
 
-    hard : the issue's words; expected : the behaviour, and where the target comes from; slow : not in a quick run
+    hard : the difficulty, by a name of ``table.HARD``
+    expected : the behaviour, and where the target comes from; slow : not in a quick run
     limit : why it is known to miss; "" where it must not
     """
 

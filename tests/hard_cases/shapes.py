@@ -21,7 +21,7 @@ SENSORS = ("digit", "biotac")
 PAIR = Several(tuple((Sphere(2e-3), Pose(np.array([x, 0.0, 0.0]), np.eye(3))) for x in (-2.5e-3, 2.5e-3)))
 CORNER = Placement(-8.2e-3, 1.13e-3, np.radians(35), np.radians(45))
 RIM = Placement(-8e-3, 8.6e-3)  # 0.6 mm from the gel's outline
-# name -> the words, indenter, place, depth m, friction
+# name -> the difficulty, indenter, place, depth m, friction
 CONTACTS: dict[str, tuple[str, Indenter, Placement, float, float]] = {
     "sharp_edge": ("sharp edges and corners", Edge(np.radians(60), 0.1e-3), MIDDLE, 0.3e-3, 0.0),
     "edge": ("sharp edges and corners", Edge(np.radians(60), 0.4e-3), MIDDLE, 0.3e-3, 0.0),

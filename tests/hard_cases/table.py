@@ -7,7 +7,7 @@ from .case import CASES
 
 GROUPS = (shapes, sliding, numerics, chain, signals, pictures)  # imported for the cases that they add
 
-# The hard cases, each of which must be in the table.
+# The difficulties that were set out from, each of which must be in the table.
 HARD = (
     "near-incompressible gel", "indentation beyond 60 % of the thickness", "sharp edges and corners",
     "ring and concave contact", "sliding and rolling", "contact at the pad's rim and leaving it",

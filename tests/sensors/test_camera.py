@@ -67,7 +67,7 @@ def test_picture_is_not_mirrored() -> None:
 
 
 def test_scale_is_one_of_those_measured_on_units() -> None:
-    assert 17 <= DIGIT_CAMERA.px_per_mm_x <= 21  # sensors.md, at 240 x 320
+    assert 17 <= DIGIT_CAMERA.px_per_mm_x <= 21  # docs/sources.md, DIGIT camera, at 240 x 320
     assert DIGIT_CAMERA.px_per_mm_y == pytest.approx(DIGIT_CAMERA.px_per_mm_x, rel=0.03)  # square pixels, as fitted
 
 
@@ -75,7 +75,7 @@ def test_lights_stand_where_another_fit_to_real_pictures_puts_them() -> None:
     position = np.array([led.position for led in DIGIT_LEDS])
     azimuth = np.degrees(np.arctan2(-position[:, 1], position[:, 0])) % 360
     elevation = np.degrees(np.arctan2(position[:, 2], np.hypot(*position[:, :2].T)))
-    np.testing.assert_allclose(azimuth, [45, 147, 276], atol=10)  # sensors.md, another camera model
+    np.testing.assert_allclose(azimuth, [45, 147, 276], atol=10)  # docs/sources.md, DIGIT LEDs: another camera model
     assert ((elevation > 16) & (elevation < 27)).all()
     assert [led.channel for led in DIGIT_LEDS] == [0, 1, 2]
 

@@ -7,7 +7,7 @@ from tactile_core import sensors
 from tactile_core.sensors import digit, unrolling
 from tactile_core.sensors.biotac import skin_surface
 
-RMS_LIMIT = 0.05e-3  # m, from the issue
+RMS_LIMIT = 0.05e-3  # m, a target
 
 
 def read_tet(path):
@@ -92,7 +92,7 @@ def test_skin_is_closed_and_as_thick_as_published():
     middle = pad & (np.abs(outer.rest[:, 0] + 8e-3) < 6e-3)
     nearest = unrolling.closest_on_triangles(inner, outer.rest[middle])[2]
     thickness = np.linalg.norm(nearest - outer.rest[middle], axis=1)
-    assert thickness.min() > 1.50e-3 and thickness.max() < 1.63e-3  # the published range (sensors.md)
+    assert thickness.min() > 1.50e-3 and thickness.max() < 1.63e-3  # the published range (docs/sources.md, BioTac skin)
 
 
 def test_window_of_the_gel_is_an_even_grid():
@@ -107,4 +107,4 @@ def test_window_of_the_gel_is_an_even_grid():
 
 def test_lowest_points_of_both_sensors_coincide():
     lowest = [make().rest[:, 1].min() for make in (sensors.biotac_surface, sensors.digit_surface)]
-    assert lowest == pytest.approx([-8.309e-3, -8.301e-3], abs=0.02e-3)  # sensors.md; table sampled every 0.6 mm
+    assert lowest == pytest.approx([-8.309e-3, -8.301e-3], abs=0.02e-3)  # docs/sources.md; table sampled every 0.6 mm

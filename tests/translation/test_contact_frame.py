@@ -62,7 +62,7 @@ def test_the_biotac_is_turned_so_that_inward_is_one_axis():
     """On the pad the inward normal is the second axis of every node's own frame."""
     surface, frame = sensors.biotac_surface(), frame_of("biotac", 3)
     rows, columns = surface.shape
-    radial = surface.rest[: rows * columns] - [0, -1.237e-3, 0]  # the axis of the pad (sensors.md)
+    radial = surface.rest[: rows * columns] - [0, -1.237e-3, 0]  # the axis of the pad (docs/sources.md, BioTac skin)
     radial[:, 0] = 0
     inward = np.zeros((1, len(surface.rest), 3))
     inward[0, : rows * columns] = -radial / np.linalg.norm(radial, axis=1, keepdims=True)

@@ -74,7 +74,7 @@ def test_a_hand_s_file_is_read_by_finger(tmp_path):
 
 
 def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
-    """The place of a flat object held by two real fingers, against the electrodes that it squeezes (data README)."""
+    """The place of a flat object held by two real fingers, against the electrodes it squeezes (docs/sources.md)."""
     pytest.importorskip("scipy", reason="scipy is absent: pip install tactile-core[matlab]")
     from tactile_core.recordings.signals import FRAMEWISE
     from tactile_core.translation import adapt, networks, reference_signals, translate

@@ -16,7 +16,7 @@ def test_without_the_data_there_are_no_rows(tmp_path):
 def test_the_public_gel_is_read(outside_data):
     mesh = public_mesh._read_medit(outside_data("digit_mesh") / "digit_gel.mesh")
     assert len(mesh.nodes) == 1834
-    assert mesh.nodes[:, 1].min() == pytest.approx(-8.301e-3, abs=1e-6)  # its lowest point (sensors.md)
+    assert mesh.nodes[:, 1].min() == pytest.approx(-8.301e-3, abs=1e-6)  # its lowest point (docs/sources.md, Frame)
 
 
 def test_our_displacement_is_taken_where_the_nodes_lie(outside_data):

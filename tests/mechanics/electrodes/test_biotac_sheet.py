@@ -9,7 +9,7 @@ from tactile_core.mechanics.electrodes.gap_law import FILM_FLOOR
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.sensors import biotac
 
-MIRROR = np.r_[10:16, 6, 8, 7, 9, 0:6, 16:19]  # E1..E6 and E11..E16, E8 and E9 are images of each other (sensors.md)
+MIRROR = np.r_[10:16, 6, 8, 7, 9, 0:6, 16:19]  # E1..E6 and E11..E16, E8 and E9 are mirror images (docs/sources.md)
 
 
 def dent(electrode: int, depth: float, width: float = 1.5e-3) -> np.ndarray:

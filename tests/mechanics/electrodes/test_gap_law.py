@@ -10,7 +10,7 @@ from tactile_core.mechanics.fast.sensing_points import electrode_feet
 def test_rest_gaps_lie_in_the_published_range():
     gap = electrode_feet().gap
     assert len(gap) == 19
-    # 0.51 to 1.76 mm from the public mesh (sensors.md); ours from its profile table, 0.05 mm rms apart
+    # 0.51 to 1.76 mm from the public mesh (docs/sources.md); ours from its profile table, 0.05 mm rms apart
     assert 0.46e-3 < gap.min() < 0.56e-3 and 1.71e-3 < gap.max() < 1.81e-3
 
 

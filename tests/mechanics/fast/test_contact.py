@@ -45,7 +45,7 @@ def test_force_on_a_bonded_layer(layer, depth):
 
 
 def test_force_of_the_converged_finite_strain_reference(layer):
-    # Golden number of shared/design/mechanics.md; the linear model is 1.5 % low at this depth (7 % of the thickness).
+    # Golden force of docs/sources.md, Mechanics; the linear model is 1.5 % low at this depth (7 % of the thickness).
     assert press_layer(layer, 0.2e-3).axial_force == pytest.approx(GOLDEN_FORCE[0.2e-3], rel=0.025)
 
 

@@ -179,7 +179,7 @@ def test_first_touch_is_found_from_far_and_from_within(layer):
 
 
 def test_linear_tetrahedra_agree_with_mixed_hexahedra_and_lock_where_nearly_incompressible():
-    """On the same nodes, 0.67 mm apart; mechanics.md found up to 1.7 times too much force at nu = .48."""
+    """On the same nodes, 0.67 mm apart; a prototype had up to 1.7 times too much force at nu .48 (docs/sources.md)."""
     mesh, attached = block(12)
     across = np.linspace(-4, 4, 13) * 1e-3
     hexes, _ = slab_mesh(across, across, np.linspace(3, 0, 7) * 1e-3)

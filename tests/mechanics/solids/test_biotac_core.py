@@ -49,4 +49,4 @@ def test_nodes_that_may_touch_lie_over_the_pad_and_off_the_core():
     facing = facing_core(inner)
     gap = BiotacCore().distance(inner[facing])[0]
     assert 0.3 < facing.mean() < 0.7 and gap.min() > 0.1e-3
-    assert 2.3e-3 < gap.max() < 2.6e-3  # sensors.md: the film is 2.45 mm at most
+    assert 2.3e-3 < gap.max() < 2.6e-3  # docs/sources.md, BioTac fluid: the film is 2.45 mm at most

@@ -182,7 +182,7 @@ def test_shipped_calibration_meets_real_presses_that_it_has_not_seen(outside_dat
     photographs = chosen(read_photographs(outside_data("digit_real") / "presses"), KEPT_APART)
     assert not set(KEPT_APART) & set(load_calibration().fit.photographs)
     ours, null = mean_figures(evaluate_unit(load_calibration(), photographs, BALL))
-    # Targets of the issue; measured: 30.6 dB, 5.7 levels, 0.80 and 3 %.
+    # Targets (docs/sources.md, Targets); measured: 30.6 dB, 5.7 levels, 0.80 and 3 %.
     assert ours["roi_psnr"] > 26 > null["roi_psnr"] + 5
     assert ours["roi_l1"] < 8 < null["roi_l1"]
     assert ours["lobe_iou"] > 0.6
