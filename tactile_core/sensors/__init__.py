@@ -26,25 +26,26 @@ class Material:
 # 0.905 MPa, 6 (C10 + C01) of the independent COMSOL model of the BioTac SP, simulated pressures are a fourth to a fifth
 # of real ones (``benchmarks.translation.skin_stiffness``). With 4.1 MPa real ones are .81 times as high in 12 firm
 # grips (quartiles .76 and .99), 1.19 times on slides (.81 and 1.41). The 1.552 MPa of the Isaac Gym authors were fitted
-# to forces on a mesh that locks (mechanics.md): a ball bears there 2.3 times what it does on ours with 0.905 MPa, as if
-# that were 2.1 MPa.
+# to forces on a mesh that locks (docs/sources.md, Mechanics): a ball bears there 2.3 times what it does on ours
+# with 0.905 MPa, as if that were 2.1 MPa.
 BIOTAC_SKIN = Material(youngs=4.1e6, poisson=0.48)  # Poisson's ratio assumed: silicone, nearly incompressible
 
-# Gel: Smooth-On Solaris, Shore 10A (sensors.md); E by Gent's relation (A. N. Gent, Rubber Chem. Technol. 31, 1958),
-# E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)) MPa, S = 10.
+# Gel: Smooth-On Solaris, Shore 10A (docs/sources.md, DIGIT gel). By Gent's relation (A. N. Gent, Rubber
+# Chem. Technol. 31, 1958) E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)) MPa, S = 10.
 DIGIT_GEL = Material(youngs=0.4126e6, poisson=0.48)  # Poisson's ratio assumed
 
-SAMPLE_RATE = 100.0  # Hz, one frame of 19 electrodes (sensors.md)
+SAMPLE_RATE = 100.0  # Hz, one frame of 19 electrodes (docs/sources.md, BioTac read-out)
 COUNT_MAX = 4095  # 12-bit electrodes
-REST_COUNT = 3300.0  # counts, typical reading without contact (sensors.md)
+REST_COUNT = 3300.0  # counts, typical reading without contact (docs/sources.md, BioTac read-out)
 # Raw counts fall where the fluid film over an electrode thins: each electrode is read in a voltage divider, and "as the
 # impedance over the sensing electrode increases, the measured voltage decreases" (SynTouch, BioTac SP manual). Fingers
-# that hold a flat object agree: where they are squeezed, counts fall as the fluid's pressure rises (sensors.md).
+# that hold a flat object agree: where they are squeezed, counts fall as the fluid's pressure rises (docs/sources.md,
+# BioTac read-out).
 COUNT_SIGN = -1.0
 
-PRESSURE_PER_COUNT = 36.5  # Pa a count of PDC (SynTouch, BioTac SP manual; sensors.md)
+PRESSURE_PER_COUNT = 36.5  # Pa a count of PDC (SynTouch, BioTac SP manual)
 
-# Electrodes E1..E19, mm, SynTouch's frame: x to the tip, z <= 0 on the pad (sensors.md).
+# Electrodes E1..E19, mm, SynTouch's frame: x to the tip, z <= 0 on the pad (docs/sources.md, BioTac electrodes).
 _ELECTRODES_SYNTOUCH_MM = np.array([
     [0.993, -4.855, -1.116], [-2.7, -3.513, -3.67], [-6.2, -3.513, -3.67], [-8.0, -4.956, -1.116],
     [-10.5, -3.513, -3.67], [-13.4, -4.956, -1.116], [4.763, 0.0, -2.33], [3.031, -1.95, -3.33],
@@ -52,7 +53,7 @@ _ELECTRODES_SYNTOUCH_MM = np.array([
     [-6.2, 3.513, -3.67], [-8.0, 4.956, -1.116], [-10.5, 3.513, -3.67], [-13.4, 4.956, -1.116],
     [-2.8, 0.0, -5.08], [-9.8, 0.0, -5.08], [-13.6, 0.0, -5.08],
 ])  # fmt: skip
-# The sign of z cannot be told from the symmetric mesh (sensors.md): +y of SynTouch's frame to +z, assumed.
+# The sign of z cannot be told from the symmetric mesh (docs/sources.md, Frame): +y of SynTouch's frame to +z, assumed.
 _LATERAL_SIGN = 1.0
 
 
@@ -62,7 +63,7 @@ def electrodes() -> np.ndarray:
 
 
 def from_syntouch(points: np.ndarray) -> np.ndarray:
-    """Points (n, 3) m of SynTouch's frame -> shared frame: x = -x_e - 13.97 mm, y = z_e, z = +-y_e (sensors.md)."""
+    """Points (n, 3) m of SynTouch's frame -> shared: x = -x_e - 13.97 mm, y = z_e, z = +-y_e (docs/sources.md)."""
     x, y, z = np.asarray(points).T
     return np.column_stack([-x - 13.97e-3, z, _LATERAL_SIGN * y])
 

@@ -10,7 +10,7 @@ from ..geometry.catmull_rom import catmull_rom
 from ..geometry.lattice import Lattice, cap_faces, grid_faces
 from .profiles import load_profile
 
-AXIS_Y = -1.237e-3  # the table's axis: (y, z) = (AXIS_Y, 0), also the pad's centre of curvature (sensors.md)
+AXIS_Y = -1.237e-3  # the table's axis: (y, z) = (AXIS_Y, 0), also the pad's centre of curvature (docs/sources.md)
 TIP_X, BASE_X = -14.0e-3, 1.2e-3  # between them outer and inner skin are cylinders, paired at the same x
 
 # Where the meridians meet the axis, tip and base, and the rounding of the cap (public mesh).
@@ -18,7 +18,7 @@ _POLES = {"outer": (-21.30e-3, 6.65e-3), "inner": (-19.725e-3, 5.08e-3)}
 
 TIP_ROWS, TRUNK_ROWS, BASE_ROWS = 18, 28, 12  # node intervals along a meridian, poles included
 PAD_ANGLE = np.pi / 2
-SKIN_THICKNESS = 1.58e-3  # uniform (sensors.md, public mesh)
+SKIN_THICKNESS = 1.58e-3  # uniform (docs/sources.md, BioTac skin)
 PAD_INTERVALS, BACK_INTERVALS = 40, 24  # round the axis: 4.5 degrees (0.56 mm) on the pad, 7.5 on the back
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..errors import TactileError
 
-# Plane of height zero, shared frame: the lowest point of the public gel mesh at rest (sensors.md). Heights grow
-# with y, toward the camera, so that an indentation raises them.
+# Plane of height zero, shared frame: the lowest point of the public gel mesh at rest (docs/sources.md, Frame). Heights
+# grow with y, toward the camera, so that an indentation raises them.
 HEIGHT_ZERO_Y = -8.301e-3
 MOST_PIXELS = 10_000_000  # 2.5 GB for a fast picture; the camera has 76,800 (assumed enough)
 FINEST = 1000.0  # pixels a millimetre; the shipped unit's camera has 20 (assumed enough)

@@ -17,7 +17,7 @@ THICKNESS = 4.06e-3  # at the apex
 ARC_X = X_TIP + HALF_WIDTH  # centre of the semicircular end
 CORNER_RADIUS = 1.15e-3  # of the two corners at the square end
 
-# The part of the lattice that is an even grid: a little more than the camera sees (13 x 17 mm, sensors.md).
+# The part of the lattice that is an even grid: a little more than the camera sees (13 x 17 mm: docs/sources.md).
 WINDOW_X, WINDOW_Z = (-16.2e-3, 1.2e-3), (-6.6e-3, 6.6e-3)
 WINDOW_NODES = (51, 39)  # 0.348 x 0.347 mm between nodes: at most 0.35 where the camera looks
 SPACING = (WINDOW_X[1] - WINDOW_X[0]) / (WINDOW_NODES[0] - 1)

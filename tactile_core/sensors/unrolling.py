@@ -10,9 +10,9 @@ from ..geometry.catmull_rom import on_grid
 from ..geometry.lattice import Lattice
 from . import biotac
 
-PAD_RADIUS = 7.065e-3  # m, cross-section of the pad about biotac_shape.AXIS_Y, rms 4 um (sensors.md)
+PAD_RADIUS = 7.065e-3  # m, cross-section of the pad about biotac.AXIS_Y, rms 4 um (docs/sources.md, BioTac skin)
 _STENCIL = 1e-3 * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])  # of (row, column), for differences
-ROLL_ORIGIN_X = -8.0e-3  # m, the place in the middle of the pad where both sensors share x (sensors.md, "unfolding")
+ROLL_ORIGIN_X = -8.0e-3  # m, the place in the middle of the pad where both share x (docs/sources.md, Two sensors)
 
 
 def node_normals(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -49,7 +49,7 @@ def _rolled_x() -> np.ndarray:
 def unrolled_nodes() -> np.ndarray:
     """Where each node of ``sensors.biotac_surface()`` comes to lie on the DIGIT's plane, (n_nodes, 2) = (x, z) m.
 
-    The BioTac rolls on the plane: z = R theta across, arc length of the lowest line along (sensors.md).
+    The BioTac rolls on the plane: z = R theta across, arc length of the lowest line along (docs/sources.md).
     NaN for nodes on the back, beyond 90 degrees, and for the poles, which never touch the plane.
     """
     theta = biotac.angles()
