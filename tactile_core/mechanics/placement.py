@@ -11,7 +11,7 @@ from ..geometry.indenters import Indenter, Pose, pose_on
 from ..sensors import digit, unrolling
 from .first_touch import first_touch
 
-FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (sensors.md), taken for both sensors
+FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (docs/sources.md, BioTac skin), taken for both sensors
 
 
 @dataclasses.dataclass(frozen=True)

@@ -29,7 +29,7 @@ from .thin_sheet import ThinSheet, resistances
 # each other, in series with every electrode; it takes part in no contact.
 CONDUCTIVITY = 0.69  # S/m
 INTERFACE = 570.0  # ohm
-# m: assumed (mechanics.md, 0.6 mm patches). With 0.3 mm the unit not fitted is missed by 21 %, with this by 20 %.
+# m: assumed (docs/sources.md, BioTac electrodes). With 0.3 mm the unit not fitted is missed by 21 %, with this by 20 %.
 ELECTRODE_RADIUS = 0.6e-3
 
 # Excitation electrodes X1..X4, mm, SynTouch's frame as in ``sensors``. From the drawing in the visualiser of Shadow

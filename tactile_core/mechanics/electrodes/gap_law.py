@@ -11,9 +11,9 @@ import numpy as np
 from ... import sensors
 from ..fast.sensing_points import electrode_feet
 
-FILM_FLOOR = 20e-6  # m, thinnest film the law knows (networks.md: s = 1 / max(gap, 0.02 mm))
-# counts m: assumed. No gap law is published (mechanics.md); this one puts the 95th percentile of the largest change a
-# press makes near 150 counts, the size that networks.md works with. One constant for all electrodes: against the thin
+FILM_FLOOR = 20e-6  # m, thinnest film the law knows (docs/sources.md, BioTac electrodes)
+# counts m: assumed. No gap law is published (docs/sources.md); this one puts the 95th percentile of the largest change
+# a press makes near 150 counts, as of the networks' prototype. One constant for all electrodes: against the thin
 # sheet it leaves 9 counts rms of 20 over 240 contacts, a constant for each electrode 7 (``electrode_law``).
 FILM_CONSTANT = 0.1
 

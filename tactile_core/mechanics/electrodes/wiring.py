@@ -17,8 +17,8 @@ class Wiring:
 
     rest_spread : counts; each electrode rests at ``sensors.REST_COUNT`` and up to this much more or less (assumed)
     gain_error : 1, standard deviation of the logarithm of each electrode's gain (assumed none)
-    drift : counts/s; each electrode drifts evenly at up to this rate (Ruppel: 88 counts in an hour, sensors.md)
-    noise : counts, standard deviation in each frame (0.7 to 1.5 in real recordings, data README)
+    drift : counts/s; each electrode drifts evenly at up to this rate (88 counts in an hour: docs/sources.md)
+    noise : counts, standard deviation in each frame (0.7 to 1.5 in real recordings: docs/sources.md)
     tared : whether the count at rest is taken off, as in files that keep changes alone
     """
 

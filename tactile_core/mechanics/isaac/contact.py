@@ -1,8 +1,8 @@
 """Contact as Isaac Gym computed it: linear tetrahedra, co-rotated linear law, no fluid, on a mesh the user gives.
 
-For those who hold data made that way. Linear tetrahedra lock (mechanics.md): forces come out about twice too high on
-the public BioTac mesh, which the published modulus does not undo. Differences to Isaac Gym that remain: equilibrium is
-found exactly instead of stepped in time, and there is no friction.
+For those who hold data made that way. Linear tetrahedra lock (docs/sources.md, Mechanics): forces come out about twice
+too high on the public BioTac mesh, which the published modulus does not undo. Differences to Isaac Gym that remain:
+equilibrium is found exactly instead of stepped in time, and there is no friction.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ..pose_path import between
 from .corotated_tets import CorotatedTets
 from .tet_file import TetMesh
 
-SKIN = Material(youngs=1.552e6, poisson=0.316)  # fitted by the Isaac Gym authors, on such a mesh (sensors.md)
-MAX_DEPTH = 2.5e-3  # m: the fluid's greatest depth under the pad (sensors.md), for the core's contact is left out
+SKIN = Material(youngs=1.552e6, poisson=0.316)  # fitted on such a mesh by Narang et al. (docs/sources.md, BioTac skin)
+MAX_DEPTH = 2.5e-3  # m: the fluid's greatest depth under the pad (docs/sources.md), for the core's contact is left out
 LOAD_STEP = 0.3e-3  # m, as for the BioTac's own mesh
 _ON_CORE = 0.02e-3  # m, nodes this close to the core are glued to it, as in hex_mesh: 532 nodes of the public mesh
 _BASE_CAP_X = 4.9e-3  # m, the inner base cap rests on the core (public mesh)
@@ -81,7 +81,7 @@ def near_body(mesh: TetMesh, path: str | os.PathLike) -> np.ndarray:
         raise TactileError(path, f"cannot be read ({error})", "a triangle mesh, such as core.obj") from error
     if not closed:
         raise TactileError(path, "the mesh is not closed", "a closed triangle mesh", "Close its holes")
-    body.apply_scale(1e3)  # in metres trimesh takes nearby places for one (mechanics.md)
+    body.apply_scale(1e3)  # in metres trimesh takes nearby places for one (docs/sources.md, Mechanics)
     return _held("core", trimesh.proximity.signed_distance(body, mesh.nodes * 1e3) >= -_ON_CORE * 1e3)
 
 
