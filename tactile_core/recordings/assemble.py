@@ -17,7 +17,7 @@ from .recording import ELECTRODES, NOMINAL_RATE, Recording, Truth
 MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
 MAX_READING = 1e5  # counts; nothing a 12-bit sensor gives, in any unit seen, comes near (assumed)
-GAP_STEPS = 1.9  # a missing frame is 2 median steps; jitter of whole recordings reaches 1.8 (data README: 18 ms)
+GAP_STEPS = 1.9  # a missing frame is 2 median steps; jitter of whole recordings reaches 1.8 (18 ms: docs/sources.md)
 MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 STAMP_UNITS = ((1e17, 1e-9, "nanoseconds"), (1e14, 1e-6, "microseconds"), (1e11, 1e-3, "milliseconds"))  # of unix time
 MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory

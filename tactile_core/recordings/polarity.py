@@ -19,7 +19,7 @@ POLARITIES = (FALLS, RISES)
 PATTERNS = "contact_patterns.npy"  # (P, 19) counts, changes of simulated contacts as raw readings have them
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a change says nothing
 # Counts of PDC, 0.55 kPa, that pressure must swing by. Under a steady grip the electrodes' drift is larger than what
-# pressure tells: of 36 real fingers (data README, trials 01 to 03) those that swing less are wrong in 4 of 19 cases,
+# pressure tells: of 36 real fingers (PHAC-2, trials 01 to 03) those that swing less are wrong in 4 of 19 cases,
 # those that swing more in none of 17.
 SWING = 15.0
 FEWEST = 20  # frames; of fewer no slope is taken (assumed)

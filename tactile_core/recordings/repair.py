@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-LIMIT = 30.0  # counts from the level around it; a glitch (data README: over 30 counts from the 11-sample median)
+LIMIT = 30.0  # counts from the level around it; a glitch (docs/sources.md, BioTac read-out)
 SHORT = 5  # samples; the longest glitch that a median of 11 samples can see
 STUCK = 50  # samples; longest stay of a single electrode at a wrong level that is still repaired (assumed, 0.5 s)
 END = 3  # samples; longest glitch at the very start or end of a recording (assumed)

@@ -9,10 +9,10 @@ import numpy as np
 WINDOW = 0.3  # s, the shortest part that is called quiet; 30 frames bring 1.5 counts of noise down to 0.3
 FEWEST = 8  # frames of a window, at slow rates
 CALM_STD = (
-    2.4  # counts within a window: noise is 0.7-1.5 (data README), plus 4 deviations of its estimate from 30 samples
+    2.4  # counts within a window: noise is 0.7-1.5 (docs/sources.md), plus 4 deviations of its estimate from 30 samples
 )
 CALM_TREND = 2.5  # counts from the first to the second half of a window: 4 deviations of that difference at 1.5 counts
-QUIET_PDC = 2.0  # counts over rest (data README: tare is right where PDC < 2)
+QUIET_PDC = 2.0  # counts over rest (a tare is right below 2: docs/sources.md, BioTac read-out)
 RECTIFIED_LEVEL = 4.0  # counts; without PDC a quiet electrode of a rectified recording stays below (noise folds to 1.2)
 RECTIFIED_LEVEL_PDC = 15.0  # counts; where PDC says that nothing touches, the rest is drift since the tare (assumed)
 LEVEL, LEVEL_RATE = (

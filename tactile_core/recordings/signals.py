@@ -19,11 +19,11 @@ from .rest_level import TARED_PDC, Quiet, baseline, calmest, find_quiet, level, 
 from .signal_kind import KINDS, detect
 from .smoothing import LONGEST, RECTIFIED, SIGNED, smooth
 
-# Counts that the 95th percentile of a scaled recording's largest changes is stretched to (networks.md).
+# Counts that the 95th percentile of a scaled recording's largest changes is stretched to (docs/sources.md, Networks).
 SCALED_PEAK = 150.0
 FRAMEWISE = ("change", "electrodes", "quiet", "flags", "pdc")  # arrays of `Signals` with a row for each frame
 UNIT_DRIFT = 60.0  # counts that a unit's rest may drift between recordings (the slide set's: 40 to 51 in two days)
-SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (data README)
+SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (docs/sources.md, BioTac read-out)
 SHOWN = 8  # bad places spelled out one by one in the warnings
 
 
