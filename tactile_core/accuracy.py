@@ -18,8 +18,8 @@ import numpy as np
 from .errors import TactileError
 
 Depth = Callable[[np.ndarray], np.ndarray]  # (C, n, 3) m -> (C, n) m
-MOVING = 10e-6  # m: nodes that move less do not belong to a contact (networks.md)
-CORE = 0.3  # share of the peak height above which a node belongs to the core of a contact (networks.md)
+MOVING = 10e-6  # m: nodes that move less do not belong to a contact (docs/sources.md, Networks)
+CORE = 0.3  # share of the peak height above which a node belongs to the core of a contact (docs/sources.md)
 Row = dict[str, Any]
 HEADER = "| name | value | unit | target | null | set | |\n|---|---|---|---|---|---|---|"
 COSTS = ("s", "ms", "MB")  # units of time and memory: their rows may miss a target without failing a run
@@ -34,7 +34,7 @@ def lengths(vectors: np.ndarray) -> np.ndarray:
 def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
     """(C,) m: root mean square of the vector error over the nodes whose true displacement exceeds 10 um.
 
-    NaN where no node moves that far. The average over contacts is the rmsC of networks.md.
+    NaN where no node moves that far. The average over contacts is the rmsC of docs/sources.md, Networks.
     """
     moving = lengths(true) > MOVING
     squares = np.where(moving, lengths(predicted - true) ** 2, 0.0).sum(-1)

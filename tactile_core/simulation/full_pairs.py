@@ -27,8 +27,8 @@ from .scene import Scene
 
 REGION_X = -14e-3  # m: the region of the pad toward the tip, x below this, that a network may be kept from seeing
 SHARES = 0.25, 0.55, 1.0  # of a press's greatest depth on the BioTac, at which it is sampled
-_SHALLOWEST, _DEEPEST = 0.3e-3, 1.5e-3  # m, a press's greatest depth on the BioTac, even between (issue 4)
-_SLIDE_MOST = 1e-3  # m, likewise of slides (issue 4)
+_SHALLOWEST, _DEEPEST = 0.3e-3, 1.5e-3  # m, a press's greatest depth on the BioTac, even between (assumed)
+_SLIDE_MOST = 1e-3  # m, likewise of slides (assumed)
 _SLIDING = 4, 11  # of twelve presses, those that end with a slide: one in the whole gel, one in the region
 # Of eight presses: the box's and the ring's, of which one is in the region; all others share the rest in turn.
 _BOX, _RING, _OTHERS = (0, 5), (2, 7), (1, 3, 4, 6)

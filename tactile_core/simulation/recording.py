@@ -18,7 +18,7 @@ from ..recordings import Truth, write_simulated
 from .frame_contact import FrameContact, frame_contact
 from .scene import RecordingSpec, Scene, load_scene
 
-PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (sensors.md)
+PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (docs/sources.md, BioTac fluid)
 _STILL_COUNT = 2000  # TDC and TAC, not simulated: a constant reading
 
 # What a file may hold beside time, force and, where there is a DIGIT, the contact's centre; and the sensor it needs.

@@ -26,7 +26,7 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     tilt_max_deg: Annotated[float, Meta(ge=0, le=45)] = 20.0
     rim_margin_mm: Annotated[float, Meta(ge=0, le=8)] = 1.0
     depth_max_percent: Annotated[float, Meta(gt=0, le=60)] = 60.0  # of the thickness under the first touch
-    friction: Annotated[float, Meta(ge=0, le=5)] = 0.78  # Coulomb's coefficient (sensors.md)
+    friction: Annotated[float, Meta(ge=0, le=5)] = 0.78  # Coulomb's coefficient (docs/sources.md, BioTac skin)
     slide_share: Annotated[float, Meta(ge=0, le=1)] = 0.0  # of the presses end with a slide at constant force
     slide_max_mm: Annotated[float, Meta(ge=0, le=3)] = 0.0  # slides are evenly long up to this
     depth_steps: Annotated[int, Meta(ge=0, le=100)] = 0  # contacts a press, paired by depth; 0: paired by force

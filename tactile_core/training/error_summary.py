@@ -10,7 +10,7 @@ from ..accuracy import Row, row
 from ..simulation.pairs_file import Pairs
 from .step_errors import Columns
 
-BINS = (0.1e-3, 0.3e-3, 0.6e-3, 0.9e-3, 1.2e-3)  # m, of depth on the BioTac, the sensor that is read (issue 4)
+BINS = (0.1e-3, 0.3e-3, 0.6e-3, 0.9e-3, 1.2e-3)  # m, of depth on the BioTac, the sensor that is read (assumed)
 
 MEDIANS = ("position_mm", "percent")
 NULLS = {"MVB": "null_biotac", "S2MPN": "null_biotac", "D2B": "null_biotac"}

@@ -42,7 +42,7 @@ class Block(nn.Module):
 
 
 class Residual(nn.Module):
-    """Residual MLP with a linear skip from input to output (networks.md)."""
+    """Residual MLP with a linear skip from input to output (docs/sources.md, Networks)."""
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int) -> None:
         super().__init__()
@@ -175,7 +175,7 @@ class MeshVae(Vae):
 
 
 def signal_vae(latent: int) -> Vae:
-    """SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (sensors.md, later code of the authors).
+    """SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (ACROSS: docs/sources.md, Networks).
 
     The twentieth input says whether the signals are rectified.
     """

@@ -15,8 +15,8 @@ def measured(
 
     Rectified changes are given with the sign of a thinning film, as the networks read them.
 
-    Gain error a channel, noise, whole counts, the ends of the 12 bits. The rest lies near 3,300 counts (sensors.md) and
-    between whole counts, as the mean of many readings does.
+    Gain error a channel, noise, whole counts, the ends of 12 bits. The rest lies near 3,300 counts (docs/sources.md)
+    and between whole counts, as the mean of many readings does.
     unit : share of frames read as a real unit is known: its gains spread more, its rest is off
     rectified : share of frames that lose their sign. They stand for recordings of unknown units, whose tare cannot be
         mended once folded: gains spread more, rest is off, channels may be missing, and the skin bulges more or less

@@ -14,12 +14,12 @@ class Options:
     latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
     half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
-    components : Gaussians of S2MPN's posterior over contacts (five: networks.md's mixture)
+    components : Gaussians of S2MPN's posterior over contacts (five: docs/sources.md, Networks)
     epochs : stage -> passes over the training contacts; `effort` multiplies all of them. More make
         simulated contacts better, not real recordings (docs/train.md)
-    beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: networks.md)
+    beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: docs/sources.md, Networks)
     astray : weight of a translated place's distance on the DIGIT from the true one, in cells, against the same loss
-    noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (networks.md)
+    noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (docs/sources.md)
     unit : share of training samples that keep their sign and are read as a real unit is known, its rest found from
         recordings that never touch nothing: unit_gain, standard deviation of the logarithm of a channel's gain,
         unit_offset, counts, of its rest (10 to 60 counts between two halves of a unit's recordings; docs/convert.md)

@@ -33,7 +33,7 @@ from .step_errors import (
 from .surface_codec import SILENT
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 0.999)
-# The shapes that networks.md's prototype was trained on, in its words three spheres and a flat cylinder.
+# The shapes that the prototype (docs/sources.md, Networks) was trained on: three spheres and a flat cylinder.
 PROTOTYPE = ("sphere_3.5mm", "sphere_7mm", "sphere_14mm", "short_cylinder_7mm")
 SHARES = dict(zip(KINDS, (0.0, 1.0), strict=True))  # of frames that lose their sign
 SILENT_FRAMES = 2048  # two of them lie above the outermost quantile

@@ -122,8 +122,8 @@ def error_columns(
     return found | {"x_m": contact_center(answers["digit"], bodies.digit.rest, silent)[:, 0]}
 
 
-FORCE_FROM = 0.2  # N: below, the share of an error says nothing (issue 4)
-PRESSURE_FROM = 550.0  # Pa: below, a real finger may not touch (data README)
+FORCE_FROM = 0.2  # N: below, the share of an error says nothing (assumed)
+PRESSURE_FROM = 550.0  # Pa: below, a real finger may not touch (docs/sources.md, BioTac read-out)
 PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 

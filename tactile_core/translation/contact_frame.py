@@ -1,8 +1,8 @@
 """The frame that moves with a contact: a window of the surface's lattice round the dent, by whole cells.
 
 A dent keeps its shape where it moves, which a fixed linear basis cannot say: a frame that moves with the contact is
-worth a factor of three (networks.md). Whole cells need no interpolation, so nothing is lost; what is left of the
-place, within half a cell, is told to the networks.
+worth a factor of three (docs/sources.md, Networks). Whole cells need no interpolation, so nothing is lost; what is
+left of the place, within half a cell, is told to the networks.
 """
 
 from __future__ import annotations

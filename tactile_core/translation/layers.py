@@ -38,7 +38,7 @@ def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray
 
 
 def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndarray:
-    """Residual MLP with a linear skip from input to output (networks.md)."""
+    """Residual MLP with a linear skip from input to output (docs/sources.md, Networks)."""
     hidden = linear(x, tensors, f"{name}.first")
     for block in range(blocks):
         inner = layer_norm(hidden, tensors, f"{name}.blocks.{block}.norm")

@@ -23,7 +23,7 @@ FEWEST = 16  # of them: from fewer contacts nothing can be matched (assumed)
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a signal tells nothing of gains
 TURNS = 15  # of k-means; more change nothing that matters
 MOST = 10_000  # signals that k-means looks at
-NOISE = 1.5  # counts (data README)
+NOISE = 1.5  # counts (docs/sources.md, BioTac read-out)
 TRIES = 2_000  # readings made up to find the match's own bias
 
 

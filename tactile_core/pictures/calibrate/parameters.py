@@ -9,8 +9,8 @@ import numpy as np
 from ...sensors.calibration import Calibration
 from ...sensors.camera import COLOURS
 
-# name, standard deviation of units round the calibration that a fit starts from (assumed, but for the scale: sensors.md
-# has 17 to 21 px/mm), step of the differences that make the Jacobian
+# name, standard deviation of units round the calibration that a fit starts from (assumed, but for the scale: 17 to
+# 21 px/mm, docs/sources.md, DIGIT camera), step of the differences that make the Jacobian
 CAMERA = (("px_per_mm_x", 0.7, 0.02), ("px_per_mm_y", 0.7, 0.02), ("apparent_height_mm", 4.0, 0.2))
 GEL = (("dome_scale", 0.1, 0.02),)
 LED = (("right_mm", 2.0, 0.05), ("down_mm", 2.0, 0.05), ("up_mm", 1.0, 0.05), ("radius_mm", 1.0, 0.05))

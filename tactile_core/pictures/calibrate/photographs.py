@@ -14,7 +14,7 @@ from .lighting_drift import lighting_drift
 from .photo_metrics import windowed
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-CHANGE = 18  # grey levels in some channel, of a pixel that the press has changed (issue: region of interest)
+CHANGE = 18  # grey levels in some channel, of a pixel that the press has changed (assumed)
 DILATION = 9  # px, by which the region reaches beyond such pixels
 SMALLEST_PRESS = 300  # px at 240 x 320 changed by more than CHANGE; less is dust or drift, a light press has 2,000
 LARGEST_SHARE = 0.6  # of the picture changed: another lighting, not a press
