@@ -86,7 +86,7 @@ def plan(
     return job, [spec.name for spec in scene.indenters], text
 
 
-def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
     """Count what is there, and say how many blocks that asks for."""
     _scene(job.inputs[index], tuple(job.recipe.files))
     return wanted(_counts(folder, job, index), job.recipe.count, job.inputs[index].path), False
@@ -108,7 +108,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def seen(folder: Path, job: Job, index: int) -> Seen | None:
+def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
     """As many blocks as are wanted by those that are there."""
     counts = _counts(folder, job, index)
     if not counts:

@@ -70,7 +70,7 @@ def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> J
 
 
 def _put_together(folder: Path, job: Job, out: Path, options: Options) -> None:
-    words, heights, frames = told(folder, job, 0)
+    words, heights, frames = input_kind(folder, job, 0)
     name, recipe = job.inputs[0].name, job.recipe
     shape = None
     if heights:
@@ -87,7 +87,7 @@ def _put_together(folder: Path, job: Job, out: Path, options: Options) -> None:
         atomic.write_json(partial / results.NOTE, note)
 
 
-def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
     """Read the input, simulating a scene; keep what is to be rendered of it."""
     from .frame_range import parse_frames, select
     from .gel_frames import read_frames
@@ -117,7 +117,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     found = array_pack.read(
         jobs.prepared_file(folder, one.name), slice(start, start + recipe.shard_frames), (NUMBERS, VALUES)
     )
-    shape = found[VALUES].shape[1:] if told(folder, job, index)[1] else None
+    shape = found[VALUES].shape[1:] if input_kind(folder, job, index)[1] else None
     pictures = _pictures(job.calibration, recipe, shape)
     with tempfile.TemporaryDirectory() as name:
         pictures.begin(Path(name))
@@ -127,7 +127,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def seen(folder: Path, job: Job, index: int) -> Seen | None:
+def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
     """Frames of an input that was read."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
@@ -140,7 +140,7 @@ def count(folder: Path, job: Job, index: int) -> int:
     return -(-_frames(folder, job, index) // job.recipe.shard_frames)
 
 
-def told(folder: Path, job: Job, index: int) -> tuple[str, bool, int]:
+def input_kind(folder: Path, job: Job, index: int) -> tuple[str, bool, int]:
     """Of an input that was read: its kind in words, whether it holds height maps, its frames."""
     found = array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(KIND, HEIGHTS))
     return found[KIND].tobytes().decode(), bool(found[HEIGHTS]), _frames(folder, job, index)

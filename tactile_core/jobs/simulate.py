@@ -92,7 +92,7 @@ def _put_together(folder: Path, job: Job, out: Path) -> None:
         raise TactileError(out, found, "room for it", "Make room, then give the command again") from error
 
 
-def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
     """Nothing: a recording is one shard."""
     return 1, False
 
@@ -117,6 +117,6 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def seen(folder: Path, job: Job, index: int) -> Seen | None:
+def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
     """One shard."""
     return Seen(1)

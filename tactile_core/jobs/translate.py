@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 GROWS = False
 
 
-def first(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
     """Prepare a recording."""
     frames, made = prepared_signals.make(folder, job, index)
     return frame_shard.count(frames, job), made
@@ -33,7 +33,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit))
 
 
-def seen(folder: Path, job: Job, index: int) -> Seen | None:
+def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
     """Shards, frames and warnings of a prepared recording."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
     try:

@@ -1,10 +1,10 @@
 """The kinds of job, a module of ``jobs`` each. Each has
 
-``first(folder, job, index)``  does what an input needs before its shards; returns how many shards it has, as far as is
-    known, and whether anything was made
+``prepare_input(folder, job, index)``  does what an input needs before its shards; returns how many shards it has, as far
+    as is known, and whether anything was made
 ``make(folder, job, index, number)``  makes a shard unless it is there and whole; returns whether it was made
-``seen(folder, job, index)``  what the files tell of an input, None before its first task was done
-``GROWS``  whether `first` is to be asked again when all its shards are there
+``inspect_input(folder, job, index)``  what the files tell of an input, None before its first task was done
+``GROWS``  whether `prepare_input` is to be asked again when all its shards are there
 
 Both doing functions raise TactileError for what cannot be done, OSError where the disk cannot be written.
 """
@@ -36,6 +36,6 @@ class Seen:
     warnings: tuple[str, ...] = ()
 
 
-def of(job: Job) -> ModuleType:
+def module_for(job: Job) -> ModuleType:
     """The module that does a job."""
     return importlib.import_module(f"...{MODULES[type(job.recipe)]}", __name__)

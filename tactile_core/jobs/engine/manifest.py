@@ -45,7 +45,7 @@ def status(folder: Path, job: Job) -> Status:
     found = Status(len(job.inputs), aside=_aside(folder))
     there = {path.name for path in (folder / jobs.SHARDS).glob("*.h5")}
     for index, one in enumerate(job.inputs):
-        seen = kinds.of(job).seen(folder, job, index)
+        seen = kinds.module_for(job).inspect_input(folder, job, index)
         if seen is None:
             continue
         names = [jobs.shard_file(folder, one.name, number).name for number in range(seen.shards)]
@@ -71,7 +71,7 @@ def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
 
     Where the job was done once, by its manifest: shards that are gone, and whole ones of another place or job, too.
     """
-    told = _told(folder)
+    told = _read_checksums(folder)
     there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]
     files = sorted({*there, *told})
     bad = []
@@ -83,7 +83,7 @@ def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
     return bad
 
 
-def _told(folder: Path) -> dict[Path, str]:
+def _read_checksums(folder: Path) -> dict[Path, str]:
     """Shards of a manifest and their hashes; none where there is no manifest, or one that cannot be read."""
     try:
         found = msgspec.json.decode(read_small(folder / jobs.MANIFEST, jobs.MOST), type=_Manifest)
@@ -118,7 +118,7 @@ def write(folder: Path, job: Job) -> None:
 
 def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
     one = job.inputs[index]
-    seen = kinds.of(job).seen(folder, job, index) or kinds.Seen(0)
+    seen = kinds.module_for(job).inspect_input(folder, job, index) or kinds.Seen(0)
     told: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
     for number in range(seen.shards):
         path = jobs.shard_file(folder, one.name, number)

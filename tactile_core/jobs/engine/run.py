@@ -89,7 +89,7 @@ def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, pro
     for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
         (folder / name).mkdir(exist_ok=True)
     with place:
-        for task in work.first():
+        for task in work.first_tasks():
             place.submit(task)
         for task, reply in place.results(work.awaited):
             for follow in work.take(task, reply):
@@ -107,14 +107,14 @@ class _Work:
         self._folder, self._job = folder, job
         self._part, self._parts = part or (0, 1)
         self.done, self.known, self.finished = Done(), 0, 0
-        self._grows = kinds.of(job).GROWS
+        self._grows = kinds.module_for(job).GROWS
         self._asked, self._open = Counter[int](), Counter[int]()  # shards of each input: so far, and not done of them
 
     def awaited(self) -> int:
         """Tasks whose reply has not come."""
         return self.known - self.finished
 
-    def first(self) -> list[Task]:
+    def first_tasks(self) -> list[Task]:
         """The recordings to prepare. A part of an array begins with its own: they are then there for the others."""
         count = len(self._job.inputs)
         own = [index for index in range(count) if index % self._parts == self._part]

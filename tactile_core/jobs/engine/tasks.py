@@ -51,9 +51,9 @@ def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
 def _run(folder: Path, task: Task) -> Reply:
     try:
         job = _job(str(folder), _stamp(folder))
-        kind = kinds.of(job)
+        kind = kinds.module_for(job)
         if task.shard is None:
-            shards, made = kind.first(folder, job, task.recording)
+            shards, made = kind.prepare_input(folder, job, task.recording)
             return Reply(made=made, shards=shards)
         return Reply(made=kind.make(folder, job, task.recording, task.shard))
     except TactileError as error:

@@ -112,7 +112,7 @@ def test_a_conflicted_copy_is_no_block_of_pairs(tmp_path):
     job = jobs.make([made], recipes.Pairs(10, 0, [], []), None)
     (tmp_path / jobs.SHARDS).mkdir()
     (tmp_path / jobs.SHARDS / "00000_presses-000000 (conflicted copy).h5").write_bytes(b"")
-    assert pairs.seen(tmp_path, job, 0) is None
+    assert pairs.inspect_input(tmp_path, job, 0) is None
 
 
 def test_lists_name_what_is_there(recordings, tmp_path):
