@@ -20,7 +20,7 @@ def labelled_arrays() -> dict[str, np.ndarray]:
     from tactile_core.translation.contact_frame import on_skin
 
     pairs = read_pairs(PAIRS)
-    pairs = pairs.some(np.flatnonzero(pairs.press < BALANCED))
+    pairs = pairs.select_rows(np.flatnonzero(pairs.press < BALANCED))
     random = np.random.default_rng(5)
     gain = np.exp(0.4 * random.standard_normal(19))
     frame = networks.load().frames["MVB"]

@@ -92,7 +92,7 @@ def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], 
             for tier, count in (("fast", full), ("full", full), ("reference", 0 if quick else REFERENCE))}  # fmt: skip
     pairs, (scene, _) = read_pairs(TRAINING / "test_contacts.h5"), load_scene(TRAINING)
     if quick:
-        pairs = pairs.some(np.flatnonzero(pairs.press < 2 * QUICK))
+        pairs = pairs.select_rows(np.flatnonzero(pairs.press < 2 * QUICK))
     fast = [*fast_misses(sensor, pairs, scene), *misses(kept["fast"], kept["full"])]
     finer = by_depth([*misses(kept["full"], kept["reference"]), *validated(sensor)], FULL_EDGES)
     bins = {"fast": by_depth(fast, FAST_EDGES), "full": finer, "reference": [share_of(each) for each in finer]}

@@ -43,7 +43,7 @@ class Frames:
     scale: float = 1.0
     heights: np.ndarray | None = None
 
-    def some(self, rows: np.ndarray) -> Iterator[np.ndarray]:
+    def iterate_rows(self, rows: np.ndarray) -> Iterator[np.ndarray]:
         """Displacement (M, 3) m or heights (H, W) m of each of some frames."""
         for row in rows:
             if self.heights is not None:

@@ -109,8 +109,8 @@ def render(
             made.begin(folder)
             made.write_rest(folder)
             if options.scene_out is not None:
-                made.write_scene(options.scene_out, next(iter(frames.some(rows))))
-            for done, (row, values) in enumerate(zip(rows, frames.some(rows), strict=True), 1):
+                made.write_scene(options.scene_out, next(iter(frames.iterate_rows(rows))))
+            for done, (row, values) in enumerate(zip(rows, frames.iterate_rows(rows), strict=True), 1):
                 made.write_frame(folder, int(frames.numbers[row]), values)
                 shown(done, len(rows))
             note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)

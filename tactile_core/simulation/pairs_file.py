@@ -88,7 +88,7 @@ class Pairs:
     attributes: dict[str, str]
     sha256: str
 
-    def some(self, rows: np.ndarray) -> Pairs:
+    def select_rows(self, rows: np.ndarray) -> Pairs:
         """The contacts of these rows alone."""
         return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in DATASETS})
 

@@ -38,7 +38,7 @@ class Known(NamedTuple):
     fold: np.ndarray
     rubbing: np.ndarray
 
-    def some(self, which: np.ndarray) -> Known:
+    def select_rows(self, which: np.ndarray) -> Known:
         """Those of them."""
         return Known(*(values[which] for values in self))
 

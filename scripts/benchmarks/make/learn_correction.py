@@ -162,7 +162,7 @@ def _guessed_apart(known: Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
     """Logarithms (n,) and fields (n, g, 3) of the samples of one kind, each learned from the other folds."""
     log_factor, fields = np.zeros(len(known.x)), np.zeros_like(known.fields)
     for f in range(_FOLDS):
-        rest = known.some(known.fold != f)
+        rest = known.select_rows(known.fold != f)
         part = fit(rest, *choices(rest, kind))
         for i in np.flatnonzero((known.fold == f) & (known.rubbing == kind)):
             log_factor[i], fields[i] = part.log_factor(known.x[i]), part.field(known.x[i])

@@ -64,7 +64,7 @@ def _contacts(count: int) -> Pairs:
     row, column = camera.to_pixel(pairs.contact_center[:, 0], pairs.contact_center[:, 1])
     seen = deep & (row >= 0) & (row < camera.height) & (column >= 0) & (column < camera.width)
     rows = np.random.default_rng(SEED_OF_CONTACTS).permutation(np.flatnonzero(seen))[:count]
-    return pairs.some(np.sort(rows))
+    return pairs.select_rows(np.sort(rows))
 
 
 def _draw_truth(unit, mapper, pairs, passes, file) -> None:  # noqa: ANN001

@@ -67,7 +67,7 @@ def _on_test_contacts(sensor: str, quick: bool) -> list[Row]:
     """The fast tier against the full tier, with friction."""
     pairs, (scene, _) = read_pairs(TEST_SET), load_scene(TRAINING)
     if quick:
-        pairs = pairs.some(np.flatnonzero(pairs.press % EVERY == 0))
+        pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
     found = list(fast_misses(sensor, pairs, scene))
     shape, force, null = (np.median([getattr(each, name) for each in found]) for name in ("shape", "force", "null"))
     of = f"{len(found)} test contacts with friction, against the full tier"

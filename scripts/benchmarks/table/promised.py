@@ -85,7 +85,7 @@ def of_mechanics(quick: bool) -> Iterator[Promise]:
     """The fast tier's shape and force."""
     pairs, (scene, _) = read_pairs(TEST_SET), load_scene(TRAINING)
     if quick:
-        pairs = pairs.some(np.flatnonzero(pairs.press % EVERY == 0))
+        pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
     for sensor in SENSORS:
         misses = list(fast_misses(sensor, pairs, scene))
         bounds = np.empty((len(misses), 2))
@@ -111,7 +111,7 @@ def of_translation(quick: bool) -> Iterator[Promise]:
     """The largest node error from signals."""
     pairs, translator = read_pairs(TEST_SET), load_translator()
     if quick:
-        pairs = pairs.some(np.flatnonzero(pairs.press % EVERY == 0))
+        pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
     change, rows = as_read(pairs.signal, SEED), np.arange(len(pairs.press))
     silent, bodies = translator.silent("digit_m"), our_bodies()
     columns = joined(

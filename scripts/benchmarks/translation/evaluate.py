@@ -94,7 +94,7 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
     """Rows of simulated contacts."""
     pairs, bodies = read_pairs(options.test_set), our_bodies()
     if options.quick:
-        pairs = pairs.some(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
+        pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
     found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network)]
     found += test_set.speed_rows(network, pairs)
     apart = [translate.load_translator(folder) for folder in options.kept_apart]
