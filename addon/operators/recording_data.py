@@ -62,10 +62,10 @@ def _translated(path: str, tare: str, frames: str, progress: Callable[[float], N
     options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)
     signals = recordings.prepare(recording, options)
 
-    def told(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
+    def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
         return recording.time[start:stop], translator().posterior(_part(signals, np.arange(start, stop)))
 
-    tracked, parts = Tracked(told, len(recording)), []
+    tracked, parts = Tracked(read_posteriors, len(recording)), []
     for start in range(0, len(chosen), CHUNK):
         frames = chosen[start : start + CHUNK]
         parts.append(translator()(_part(signals, frames), tracked(frames)))

@@ -31,7 +31,7 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         try:
             picture = self._picture(depsgraph)
         except (TactileError, OSError, ModuleNotFoundError) as error:
-            self.report({"ERROR"}, _told(error))
+            self.report({"ERROR"}, _describe_error(error))
             return
         except tracer.Stopped:
             tracer.close_all()
@@ -61,7 +61,7 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         return tracer.tracer_for(unit, preset).draw(heights, self.test_break)
 
 
-def _told(error: Exception) -> str:
+def _describe_error(error: Exception) -> str:
     if isinstance(error, ModuleNotFoundError):
         return f"{error.name} is missing. {reports.ADVICE}"
     return str(error)

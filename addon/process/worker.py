@@ -59,7 +59,7 @@ def simulate(folder: Path, job: dict, progress: Progress) -> None:
     tiers = {sensor: choice.tier for sensor, choice in choices.items()}
     scene, out = folder / "scene.toml", folder / "recording.h5"
     simulate_recording(scene, out, job["seed"], progress, keep=job["keep"], tiers=tiers)
-    _result(folder, [choice.told(sensor) for sensor, choice in choices.items()])
+    _result(folder, [choice.describe(sensor) for sensor, choice in choices.items()])
 
 
 def _forces_from_heights(folder: Path, progress: Progress) -> None:

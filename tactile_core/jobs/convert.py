@@ -73,7 +73,7 @@ def load_tools(
     return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked)
 
 
-def within(tools: Tools, levels: float) -> tuple[Tools, str]:
+def choose_preset(tools: Tools, levels: float) -> tuple[Tools, str]:
     """Tools whose pictures are within a bound, grey levels, and in words what was chosen, and why.
 
     Raises TactileError where none are.
@@ -85,7 +85,7 @@ def within(tools: Tools, levels: float) -> tuple[Tools, str]:
         from ..pictures.renderer import Renderer
 
         tools = dataclasses.replace(tools, shade=Renderer(preset=chosen), preset=chosen)
-    return tools, presets.told(chosen, levels)
+    return tools, presets.describe_choice(chosen, levels)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,7 +141,7 @@ def convert(
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
         found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
-    return Done(Path(folder), made.warnings(), added, made.left())
+    return Done(Path(folder), made.warnings(), added, made.describe_expected_error())
 
 
 def _added(options: Options, made: FramePass) -> str:

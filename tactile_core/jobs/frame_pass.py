@@ -69,12 +69,12 @@ class Tools:
         if self.posterior is None:
             return None
 
-        def told(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
+        def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
             """Times and posteriors of these frames."""
             time, signals = read(start, stop)
             return time, self.posterior(signals)
 
-        return Tracked(told, count)
+        return Tracked(read_posteriors, count)
 
 
 def translated(signals: Signals, tools: Tools, tracked: Tracked | None, frames: np.ndarray) -> dict[str, np.ndarray]:
@@ -141,7 +141,7 @@ class FramePass:
 
     def warnings(self) -> tuple[str, ...]:
         """What the user should know: of the recording, and of what became of its frames."""
-        found = [*self.signals.warnings, *self.tools.answer.told()]
+        found = [*self.signals.warnings, *self.tools.answer.describe_shift()]
         for name, meaning in REMARKABLE.items():
             if self.flagged[name]:
                 found.append(f"{self.flagged[name]} of {len(self.frames)} frames: {meaning} (flag {name})")
@@ -149,7 +149,7 @@ class FramePass:
             found.append(f"{self.folded} frames: the translated gel folds over itself; heights there are guesses")
         return tuple(found)
 
-    def left(self) -> str:
+    def describe_expected_error(self) -> str:
         """What the translation itself leaves on the DIGIT, in words: the median of the frames in contact."""
         errors = np.concatenate(self._errors, axis=1)
         if not errors.shape[1]:

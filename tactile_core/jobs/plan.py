@@ -189,7 +189,7 @@ def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
         full = costs()["full_ms"][sensor]
         ms += full * tiers[choice.tier][sensor]["ms"] / tiers["full"][sensor]["ms"]
     once = max(part["start"] - start["start"], 0)
-    told = f"{contacts} contacts; {choice.told(sensor)}"
+    told = f"{contacts} contacts; {choice.describe(sensor)}"
     disk = part["kb"] * contacts / 1e3 if kept else 0.0
     seconds, memory = once + ms * contacts / 1e3, max(part["mb"] - start["mb"], 0)
     return Part(f"{NAMES[sensor]} contacts", "simulate", told, seconds, memory, disk)

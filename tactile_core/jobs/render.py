@@ -25,7 +25,7 @@ from ..files.png import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import digit_mapper, of_unit
 from ..pictures.mitsuba.scene_file import camera_planes, write_scene
-from ..pictures.presets import DEFAULT, FAST, PRESETS, fitting, measured, told
+from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, fitting, measured
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import SHIPPED, load_calibration
@@ -90,7 +90,7 @@ def render(
     preset = claimed(out, options)
     bound = options.error or Budget()
     if bound.levels is not None:
-        say(told(preset, bound.levels))
+        say(describe_choice(preset, bound.levels))
     scene = is_scene(Path(path))
     tier = _tier(Path(path), bound.um, say) if scene and bound.um is not None else "fast"
     with clock.stage("read"):
@@ -154,7 +154,7 @@ def _tier(path: Path, um: float, say: Callable[[str], None]) -> str:
         expected = f"more than {sampled:.3g}, which heights between nodes add alone"
         raise TactileError("--error", f"{um:g} um", expected, "Allow more")
     choice = tier_choice.choose("digit", share, um - sampled)
-    say(f"{choice.told('digit')}; heights between nodes add {sampled:.2g} um")
+    say(f"{choice.describe('digit')}; heights between nodes add {sampled:.2g} um")
     return choice.tier
 
 

@@ -96,7 +96,7 @@ def fitting(error: float, variant: str | None = None) -> str:
     return cheapest(error, chosen)
 
 
-def told(name: str, error: float) -> str:
+def describe_choice(name: str, error: float) -> str:
     """Why a preset was picked for a bound, in words."""
     found = measured()["presets"][name]
     return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"

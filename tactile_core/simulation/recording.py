@@ -71,7 +71,7 @@ def simulate_recording(
         pressure, still = _pressure(frames), np.full(len(time), _STILL_COUNT, np.int16)
         counts = {"electrodes": readings(_signals(frames, electrodes), time, wiring, seed), "pdc": pdc_counts(pressure)}
         counts |= {"tac": still, "tdc": still}
-        told = " " + _told(pressure, electrodes)
+        told = " " + _describe_fluid(pressure, electrodes)
     write_simulated(
         out, time=time, **counts, truth=_truth(frames, keep), scene=text, seed=seed,
         made_by=f"tactile {__version__}, mechanics.recording{_tiers_told(tiers)}",
@@ -147,7 +147,7 @@ def pdc_counts(pressure: np.ndarray) -> np.ndarray:
     return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
 
 
-def _told(pressure: np.ndarray, electrodes: str) -> str:
+def _describe_fluid(pressure: np.ndarray, electrodes: str) -> str:
     """The fluid's pressure and the electrodes' law in words for the file."""
     low, high = pressure.min() / 1e3, pressure.max() / 1e3
     told = f"Fluid pressure {low:.2f} to {high:.2f} kPa; PDC counts {sensors.PRESSURE_PER_COUNT:g} Pa each."

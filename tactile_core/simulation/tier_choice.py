@@ -27,7 +27,7 @@ class TierChoice(NamedTuple):
     ms: float
     share: float
 
-    def told(self, sensor: str) -> str:
+    def describe(self, sensor: str) -> str:
         """In words, and why."""
         which = "BioTac" if sensor == "biotac" else "DIGIT"
         return (

@@ -47,7 +47,7 @@ class Answer:
         """(2,) m."""
         return 1e-3 * np.array(self.mount_shift_mm)
 
-    def told(self) -> tuple[str, ...]:
+    def describe_shift(self) -> tuple[str, ...]:
         """What the user of a result should know of it."""
         if not any(self.mount_shift_mm):
             return ()

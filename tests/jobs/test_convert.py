@@ -261,10 +261,10 @@ def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
     drawn = []
     monkeypatch.setattr(renderer, "Renderer", lambda preset: drawn.append(preset) or str)
     monkeypatch.setattr(presets, "choose_variant", lambda wanted: Choice(SCALAR, ""))
-    tools, told = convert.within(fake_tools.tools(), 5)
+    tools, told = convert.choose_preset(fake_tools.tools(), 5)
     assert (tools.preset, drawn) == ("fast", []) and "fast" in told
     exact = presets.measured()["presets"]["quality"]["error"]
-    tools, told = convert.within(fake_tools.tools(), exact)
+    tools, told = convert.choose_preset(fake_tools.tools(), exact)
     assert (tools.preset, tools.shade, drawn) == ("quality", str, ["quality"]) and "quality" in told
 
 

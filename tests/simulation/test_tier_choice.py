@@ -64,8 +64,8 @@ def test_a_scene_is_as_deep_as_its_deepest_point(scene, table, monkeypatch):
     monkeypatch.setattr(tier_choice, "stored", loaded)
     found = tier_choice.choose_for_scene(scene, ("biotac", "digit"), 35)
     assert 0.05 < found["digit"].share < found["biotac"].share < DEPTH_LIMIT  # 0.6 N on 7 mm: the skin is softer
-    assert found["biotac"].tier == "fast" and "35" not in found["biotac"].told("biotac")
-    assert "fast tier" in found["biotac"].told("biotac") and "95 of 100" in found["biotac"].told("biotac")
+    assert found["biotac"].tier == "fast" and "35" not in found["biotac"].describe("biotac")
+    assert "fast tier" in found["biotac"].describe("biotac") and "95 of 100" in found["biotac"].describe("biotac")
 
 
 def test_without_matrices_a_scene_counts_as_deep_as_it_may_be(scene, table, monkeypatch, tmp_path):

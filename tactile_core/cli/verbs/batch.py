@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
         place = engine.place(folder, options)
         with bar("batch", "task", options.progress) as shown:
             done = runs.run(folder, job, place, part, shown)
-    status = engine.told(done)
+    status = engine.report_failures(done)
     tell(f"{folder}: {done.made} shards made, {done.kept} kept, {len(done.aside)} set aside")
     return status
 

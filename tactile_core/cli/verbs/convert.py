@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(options.weights, answer=answer_words(options))
     if budget is not None and budget.levels is not None:
-        tools, why = convert.within(tools, budget.levels)
+        tools, why = convert.choose_preset(tools, budget.levels)
         say(why)
     for path, folder in zip(paths, folders, strict=True):
         try:

@@ -74,7 +74,7 @@ def place_or_none(options: argparse.Namespace) -> Callable[[Path], Place] | None
     return lambda folder: place(folder, options)
 
 
-def told(done: Done) -> int:
+def report_failures(done: Done) -> int:
     """Complain of what was set aside; the exit status."""
     for name, why in done.aside.items():
         complain(f"{name}: {why}")

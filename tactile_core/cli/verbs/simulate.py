@@ -117,7 +117,7 @@ def _tiers(scene: str, keep: tuple[str, ...], bound: float) -> dict[str, str]:
 
     found = choose_for_scene(scene, sensors_of(keep), bound)
     for sensor, choice in found.items():
-        say(choice.told(sensor))
+        say(choice.describe(sensor))
     return {sensor: choice.tier for sensor, choice in found.items()}
 
 

@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
                 break
             if time.perf_counter() - told >= TOLD:
                 told = time.perf_counter()
-                say(view.told() + (f"; force {shown.force:.2f} N" if shown else ""))
+                say(view.describe_latency() + (f"; force {shown.force:.2f} N" if shown else ""))
     except TactileError:
         failed = not view.frames
         raise
@@ -88,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
         if not failed:
             say(f"rest from {view.rest_found}" if view.rest_found else "rest was not found")
             say(f"counts that {view.polarity.name[:-1]}: {view.polarity.evidence}")
-            tell(f"{view.frames} frames: {view.told()}")
+            tell(f"{view.frames} frames: {view.describe_latency()}")
     return 0
 
 

@@ -1,7 +1,7 @@
 """The kinds of job, a module of ``jobs`` each. Each has
 
-``prepare_input(folder, job, index)``  does what an input needs before its shards; returns how many shards it has, as far
-    as is known, and whether anything was made
+``prepare_input(folder, job, index)``  does what an input needs before its shards; returns how many shards it has, as
+    far as is known, and whether anything was made
 ``make(folder, job, index, number)``  makes a shard unless it is there and whole; returns whether it was made
 ``inspect_input(folder, job, index)``  what the files tell of an input, None before its first task was done
 ``GROWS``  whether `prepare_input` is to be asked again when all its shards are there

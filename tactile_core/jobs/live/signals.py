@@ -24,7 +24,7 @@ class LiveSignals:
     def __init__(self, rate: float = NOMINAL_RATE, polarity: str = AUTO) -> None:
         self._rate = rate
         self._seen, self._pdc, self._looked_at = np.empty((0, 19)), np.empty(0), 0
-        self.polarity = _told(polarity, "as told")
+        self.polarity = _stated_polarity(polarity, "as told")
         self.rest: np.ndarray | None = None
         self.kind, self.found = "raw", ""
 
@@ -34,7 +34,7 @@ class LiveSignals:
         pdc : (T,) counts, where there are; polarity : what the file says of its counts, where it does
         """
         if not self.polarity.sure and polarity in POLARITIES:
-            self.polarity = _told(polarity, "as the file says")
+            self.polarity = _stated_polarity(polarity, "as the file says")
         if self.rest is not None and self.polarity.sure:
             return True
         whole = np.isfinite(electrodes).all(axis=1)
@@ -87,7 +87,7 @@ class LiveSignals:
         )  # fmt: skip
 
 
-def _told(polarity: str, who: str) -> Polarity:
+def _stated_polarity(polarity: str, who: str) -> Polarity:
     """What somebody says of the counts; an assumption where nobody does."""
     if polarity in POLARITIES:
         return Polarity(polarity, who, True)

@@ -76,7 +76,7 @@ class View:
         state = self._follow(self._tools.posterior(signals), self.frames / self._rate)
         return self._tools.translate(signals, state)
 
-    def told(self) -> str:
+    def describe_latency(self) -> str:
         """The latencies of the last pictures in words."""
         if not self.latencies:
             return "no picture yet: waiting for a quiet part"

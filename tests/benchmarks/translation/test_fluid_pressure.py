@@ -13,8 +13,8 @@ NETWORK = SimpleNamespace(card={"pairs": {"largest_pressure_Pa": 3000.0}})
 
 
 @pytest.fixture
-def told(monkeypatch, tmp_path):
-    """``told(factor)``: rows where a network tells ``factor`` times the pressure, the electrodes' sum its root."""
+def pressure_rows(monkeypatch, tmp_path):
+    """``pressure_rows(factor)``: rows of a network that says ``factor`` times the pressure, their sum its root."""
 
     def rows(factor):
         names = [tmp_path / f"mat1_{sample}_bio.csv" for sample in (7, 31)]
@@ -26,14 +26,14 @@ def told(monkeypatch, tmp_path):
     return rows
 
 
-def test_the_truth_has_no_error_and_a_constant_has(told):
-    found = told(1.0)
+def test_the_truth_has_no_error_and_a_constant_has(pressure_rows):
+    found = pressure_rows(1.0)
     assert found["pressure_error"]["value"] == 0 and found["pressure_error"]["null"] > 20
     assert found["pressure_error_scaled"]["value"] == 0 and found["pressure_error_scaled"]["null"] > 5
     assert found["pressure_above_training"]["value"] == pytest.approx(np.mean(PRESSURE > 3000))
 
 
-def test_a_wrong_scale_is_an_error_until_it_is_taken_from_the_sample_to_choose_by(told):
-    found = told(0.5)
+def test_a_wrong_scale_is_an_error_until_it_is_taken_from_the_sample_to_choose_by(pressure_rows):
+    found = pressure_rows(0.5)
     assert found["pressure_error"]["value"] == pytest.approx(50)
     assert found["pressure_error_scaled"]["value"] == pytest.approx(0, abs=1e-9)

@@ -74,7 +74,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
         })  # fmt: skip
         place.end_episode()
     place.close()
-    _write_meta(folder, episodes, features, {name: found.told() for name, found in stats.items()}, rate, done)
+    _write_meta(folder, episodes, features, {name: found.summarise() for name, found in stats.items()}, rate, done)
 
 
 def _features(one: Recorded) -> dict[str, dict[str, Any]]:
@@ -205,7 +205,7 @@ class _Stats:
         self._low = np.minimum(self._low, np.where(good, values, np.inf).min(axis=0))
         self._high = np.maximum(self._high, np.where(good, values, -np.inf).max(axis=0))
 
-    def told(self) -> dict[str, list[float]]:
+    def summarise(self) -> dict[str, list[float]]:
         """As stats.json has them; 0 where no number was finite."""
         count = np.maximum(self._count, 1)
         mean = self._sum / count
