@@ -124,7 +124,7 @@ def convert(
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
         finger = split(os.fspath(recording_path))[1]
-        unit = None if options.sensor is None else options.sensor.of(recording_path, finger, "--sensor")
+        unit = None if options.sensor is None else options.sensor.gains_for(recording_path, finger, "--sensor")
         signals = electrode_gains.prepare_unit(recording, options.prepare, unit)
     try:
         with atomic.new_folder(folder, overwrite=options.overwrite) as partial:

@@ -101,7 +101,7 @@ def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
     """Each part of a recording prepared, and how many of its frames the part before had."""
     options, rest, rest_pdc = job.recipe.prepare.options(), None, np.nan
     sensor = job.recipe.sensor
-    unit = None if sensor is None else sensor.of(path, split(path)[1], "--sensor")
+    unit = None if sensor is None else sensor.gains_for(path, split(path)[1], "--sensor")
     if unit is not None:
         options = dataclasses.replace(options, rest=unit.rest())
     evidence, doubts = "", np.uint16(0)

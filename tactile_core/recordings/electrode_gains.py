@@ -67,7 +67,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
         names = ("unit", *(f"finger{number}" for number in range(FINGERS)))
         return {name: found for name in names if (found := getattr(self, name)) is not None}
 
-    def of(self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike) -> ElectrodeGains:
+    def gains_for(self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike) -> ElectrodeGains:
         """The unit that a recording was made with. Raises TactileError where the file has no section for it."""
         name = "unit" if finger is None else f"finger{finger}"
         sections = self.sections()

@@ -61,7 +61,7 @@ class Header:
     separator: str
 
     @classmethod
-    def of(cls, path: str, start: bytes) -> Header:
+    def parse(cls, path: str, start: bytes) -> Header:
         """Of a text that starts with these whole lines. Raises TactileError."""
         return cls(*_header(path, _text(path, start)))
 

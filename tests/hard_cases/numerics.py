@@ -51,7 +51,7 @@ def _gel_full(poisson: float) -> Found:
     """The gel itself, made of another material, 0.6 mm deep in one step from rest."""
     pose = pose_at("digit", BALL, MIDDLE)
     body = graded_body("digit", BALL, pose, 0.6e-3)
-    law = SplitBulkModulus.of(NeoHookean.of(Material(sensors.DIGIT_GEL.youngs, poisson)))
+    law = SplitBulkModulus.from_law(NeoHookean.from_material(Material(sensors.DIGIT_GEL.youngs, poisson)))
     body = dataclasses.replace(body, solid=FiniteStrainSolid(body.solid.mesh, law, body.graded.pattern))
     problem = body.contact(BALL, pose, 0.6e-3, 0.0)
     touch = problem.move(pose.moved(0.6e-3), problem.start(), 5e-3)

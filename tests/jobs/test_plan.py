@@ -38,7 +38,7 @@ def tables(monkeypatch):
     monkeypatch.setattr(tier_choice, "choose_for_scene", choose)
 
 
-def of(path=PRESS, keep=None, budget=None, preset=None):
+def plan_for(path=PRESS, keep=None, budget=None, preset=None):
     return plan.plan(path, keep, budget or Budget(), preset)
 
 
@@ -57,7 +57,7 @@ def built(found):
     ],
 )
 def test_only_what_outputs_need_is_built(keep, has, lacks):
-    found = of(keep=keep)
+    found = plan_for(keep=keep)
     assert has <= set(built(found)) and not lacks & set(built(found))
     for name in ("BioTac", "DIGIT"):
         assert any(text.startswith(name) for text in found.left_out) == (f"{name} contacts" not in built(found))
@@ -66,26 +66,26 @@ def test_only_what_outputs_need_is_built(keep, has, lacks):
 def test_outputs_add_up(monkeypatch, tmp_path):
     """The press has 201 frames, 129 of them in contact; a start of 1 s, and 10 ms, 2 kB each on the DIGIT."""
     monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))  # so that nothing is cached, on every machine
-    found = of(keep="displacement_digit")
+    found = plan_for(keep="displacement_digit")
     contacts = next(part for part in found.parts if part.what == "DIGIT contacts")
     number = int(contacts.told.split()[0])
     assert 100 < number < 160 and contacts.seconds == pytest.approx(0.01 * number)
     assert contacts.disk == pytest.approx(0.002 * number)
-    alone, both = found.seconds, of(keep="displacement_digit,displacement_biotac").seconds
+    alone, both = found.seconds, plan_for(keep="displacement_digit,displacement_biotac").seconds
     assert both - alone == pytest.approx(0.03 * number + plan.BUILD_S)
-    assert of(keep="displacement_biotac").memory == plan.BUILD_MB + 150 and found.memory == plan.BUILD_MB + 100
-    assert of(keep="displacement_digit,displacement_biotac").memory == plan.BUILD_MB + 150  # one after the other
+    assert plan_for(keep="displacement_biotac").memory == plan.BUILD_MB + 150 and found.memory == plan.BUILD_MB + 100
+    assert plan_for(keep="displacement_digit,displacement_biotac").memory == plan.BUILD_MB + 150  # one after the other
 
 
 def test_an_exact_bound_costs_the_full_tier():
-    found, exact = (of(keep="displacement_digit", budget=Budget(um=um)) for um in (30, 5))
+    found, exact = (plan_for(keep="displacement_digit", budget=Budget(um=um)) for um in (30, 5))
     assert exact.seconds > found.seconds + 100 and "full tier" in "\n".join(exact.lines())
 
 
 def test_matrices_that_are_not_cached_are_to_be_built(monkeypatch, tmp_path):
     monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))
     monkeypatch.setattr(compliance, "build", lambda *given: pytest.fail("matrices were built"))
-    found = of(keep="displacement_digit")
+    found = plan_for(keep="displacement_digit")
     matrices = next(part for part in found.parts if part.what == "DIGIT matrices")
     assert matrices.seconds == plan.BUILD_S and matrices.disk == 151 and str(tmp_path) in matrices.told
     assert list(tmp_path.iterdir()) == []
@@ -97,25 +97,25 @@ def test_matrices_that_are_cached_are_told_with_their_size(monkeypatch, tmp_path
     folder.mkdir()
     for name in compliance.Arrays._fields:
         (folder / f"{name}.npy").write_bytes(bytes(1_000_000))
-    matrices = next(part for part in of(keep="image").parts if part.what == "DIGIT matrices")
+    matrices = next(part for part in plan_for(keep="image").parts if part.what == "DIGIT matrices")
     assert matrices.seconds == 0 and "7 MB, cached" in matrices.told and "2867 surface nodes" in matrices.told
 
 
 def test_pictures_cost_what_their_preset_was_measured_to(monkeypatch):
-    fast, reference = (of(keep="image", preset=name).seconds for name in ("fast", "reference"))
+    fast, reference = (plan_for(keep="image", preset=name).seconds for name in ("fast", "reference"))
     ms = {name: plan._preset_ms(name) for name in ("fast", "reference")}
     assert reference - fast == pytest.approx(201 * (ms["reference"] - ms["fast"]) / 1e3)
     monkeypatch.setattr(plan, "_variant", lambda preset: "scalar_rgb")
     assert plan._preset_ms("standard") == presets.measured()["presets"]["standard"]["ms"]["scalar_rgb"]
     exact = presets.measured()["presets"]["fast"]["error"]
-    assert any("preset fast" in part.told for part in of(keep="image", budget=Budget(levels=exact)).parts)
+    assert any("preset fast" in part.told for part in plan_for(keep="image", budget=Budget(levels=exact)).parts)
 
 
 def test_a_recording_is_planned_as_it_is_converted(slide_csv):
-    latent, everything = of(slide_csv(), "latent"), of(slide_csv(), "latent,displacement,height,image")
+    latent, everything = plan_for(slide_csv(), "latent"), plan_for(slide_csv(), "latent,displacement,height,image")
     assert built(latent) == ["networks"] and "contact mechanics" in latent.left_out
     assert built(everything) == ["networks", "height maps", "pictures"]
-    assert built(of(slide_csv())) == ["networks", "pictures"]  # as `convert` keeps them
+    assert built(plan_for(slide_csv())) == ["networks", "pictures"]  # as `convert` keeps them
     assert latent.seconds == pytest.approx(1.0 + 0.01 * 150) and "150 frames" in latent.parts[0].told
 
 
@@ -125,7 +125,7 @@ def test_a_recording_is_planned_as_it_is_converted(slide_csv):
 )
 def test_unknown_words_are_refused(keep, preset, words):
     with pytest.raises(TactileError, match=words):
-        of(keep=keep, preset=preset)
+        plan_for(keep=keep, preset=preset)
 
 
 def test_the_command_prints_a_table_or_json(capsys):

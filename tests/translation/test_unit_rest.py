@@ -66,11 +66,11 @@ def test_a_grip_without_rest_is_measured_from_the_unit_s_own():
 def test_a_hand_s_file_is_read_by_finger(tmp_path):
     unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19)
     sensor = SensorFile(FORMAT, finger0=unit)
-    assert sensor.of("hand.mat#0", 0, "unit.toml") is unit
+    assert sensor.gains_for("hand.mat#0", 0, "unit.toml") is unit
     with pytest.raises(TactileError, match=r"unit\.toml.*finger1"):
-        sensor.of("hand.mat#1", 1, "unit.toml")
+        sensor.gains_for("hand.mat#1", 1, "unit.toml")
     with pytest.raises(TactileError, match=r"of one unit.*\[unit\]"):
-        sensor.of("touch.csv", None, "unit.toml")
+        sensor.gains_for("touch.csv", None, "unit.toml")
 
 
 def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
@@ -88,7 +88,7 @@ def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
     for path in hard:
         for finger in (0, 1):
             recording = recordings.read(f"{path}#{finger}")
-            signals = prepare_unit(recording, None, sensor.of(path, finger, "made"))
+            signals = prepare_unit(recording, None, sensor.gains_for(path, finger, "made"))
             some = {name: getattr(signals, name)[::100] for name in FRAMEWISE}
             for name, order in (("as read", slice(None)), ("shuffled", shuffled)):
                 turned = {"change": some["change"][:, order], "rest": signals.rest[order]}

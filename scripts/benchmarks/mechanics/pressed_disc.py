@@ -31,7 +31,7 @@ def pressed(mesh: QuadMesh, material: Material, ball: Indenter, reach: float) ->
     """The contact of a ball that touches the middle; nodes within ``reach`` m of the axis may touch it."""
     near = mesh.surface[mesh.nodes[mesh.surface, 0] < reach]
     middle = mesh.nodes[mesh.surface[0]]
-    solid = AxisymmetricSolid(mesh, NeoHookean.of(material))
+    solid = AxisymmetricSolid(mesh, NeoHookean.from_material(material))
     pose = pose_on(ball, middle, np.array([0, -1.0, 0]))
     return FiniteStrainContact(solid, near, ball, pose, fixed=mesh.fixed, tolerance=_TOLERANCE)
 

@@ -72,8 +72,8 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
         raise TactileError(folder, f"{len(soft)} soft and {len(hard)} hard grips", "some of each, by their trials")
     sensor, _ = adapt.adapt_hand(soft, reference_signals.read(networks.WEIGHTS_FOLDER))
     held = [(one, finger) for path in hard for finger, one in enumerate(each_finger(path))]
-    prepared = [prepare_unit(recordings.read(one), None, sensor.of(one, finger, SOFT)) for one, finger in held]
-    every = [prepare_unit(recordings.read(one), None, sensor.of(one, finger, SOFT)) for path in files
+    prepared = [prepare_unit(recordings.read(one), None, sensor.gains_for(one, finger, SOFT)) for one, finger in held]
+    every = [prepare_unit(recordings.read(one), None, sensor.gains_for(one, finger, SOFT)) for path in files
              if _trial(path) in REPORTING for finger, one in enumerate(each_finger(path))]  # fmt: skip
     told = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
     told += prints.rows("grip", prepared, network)
@@ -85,7 +85,7 @@ def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> li
     told, null = [], []
     for path in hard:
         for finger, one in enumerate(each_finger(path)):
-            unit = sensor.of(one, finger, SOFT)
+            unit = sensor.gains_for(one, finger, SOFT)
             told.append(_judged(recordings.read(one), unit, network))
             null.append(_judged(recordings.read(one), unit, network, shuffle))
     of = f"{len(told)} grips of hard flat objects, trials 04 and 05; null: electrodes shuffled"

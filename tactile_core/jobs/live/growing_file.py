@@ -44,7 +44,7 @@ class Growing:
         if not end:
             return None
         if self._header is None:
-            self._header = Header.of(str(self._path), whole + end)
+            self._header = Header.parse(str(self._path), whole + end)
         table = read_lines(str(self._path), self._header, whole + end, self._lines)
         self._lines += whole.count(b"\n") + 1
         if table is None:

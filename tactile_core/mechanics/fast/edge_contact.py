@@ -75,7 +75,7 @@ class EdgeContactProblem(ContactProblem):
 
     def _resting(self) -> np.ndarray:
         nodes = super()._resting()
-        return np.concatenate([nodes, self._points.of(nodes)])
+        return np.concatenate([nodes, self._points.interpolate(nodes)])
 
     def _within(self, pose: Pose, reach: float) -> np.ndarray:
         """Nodes and points less than ``reach`` m outside the indenter, and what nodes those points depend on."""

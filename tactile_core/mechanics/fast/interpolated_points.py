@@ -19,7 +19,7 @@ class InterpolatedPoints(NamedTuple):
     nodes: np.ndarray
     weights: np.ndarray
 
-    def of(self, values: np.ndarray) -> np.ndarray:
+    def interpolate(self, values: np.ndarray) -> np.ndarray:
         """Values (v, 3) at the points from those at all touchable nodes (m, 3)."""
         return np.einsum("vs,vsi->vi", self.weights, values[self.nodes])
 

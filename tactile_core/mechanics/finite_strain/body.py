@@ -109,7 +109,9 @@ def graded_body(
     graded = graded_gel(footprint) if sensor == "digit" else graded_skin(footprint)
     mesh = graded.mesh
     if sensor == "digit":
-        solid = FiniteStrainSolid(mesh, SplitBulkModulus.of(NeoHookean.of(sensors.DIGIT_GEL)), graded.pattern)
+        solid = FiniteStrainSolid(
+            mesh, SplitBulkModulus.from_law(NeoHookean.from_material(sensors.DIGIT_GEL)), graded.pattern
+        )
         return Body(sensor, tier, solid, None, np.empty(0, int), graded)
     solid = FiniteStrainSolid(mesh, sensors.BIOTAC_SKIN, graded.pattern)
     free = mesh.inner[~mesh.clamped[mesh.inner]]

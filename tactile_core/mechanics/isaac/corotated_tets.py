@@ -31,7 +31,7 @@ class CorotatedTets:
     def __init__(self, mesh: TetMesh, attached: np.ndarray, material: Material) -> None:
         self.mesh = _Mesh(mesh.nodes, mesh.cells, attached)
         self.shear = material.youngs / (2 * (1 + material.poisson))
-        self.law = NeoHookean.of(material)  # newton asks for the bulk modulus alone
+        self.law = NeoHookean.from_material(material)  # newton asks for the bulk modulus alone
         self.lame = material.youngs * material.poisson / ((1 + material.poisson) * (1 - 2 * material.poisson))
         corners = mesh.nodes[mesh.cells]
         edges = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)  # columns

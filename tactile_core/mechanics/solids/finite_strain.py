@@ -42,7 +42,7 @@ class FiniteStrainSolid:
 
     def __init__(self, mesh: HexMesh, material: Material | Law, pattern: BlockPattern | None = None) -> None:
         self.mesh = mesh
-        self.law: Law = NeoHookean.of(material) if isinstance(material, Material) else material
+        self.law: Law = NeoHookean.from_material(material) if isinstance(material, Material) else material
         if pattern is not None:
             self.pattern = pattern
         points, weights, reference = reference_gradients()

@@ -31,7 +31,7 @@ class NeoHookean:
     bulk: float
 
     @classmethod
-    def of(cls, material: Material) -> NeoHookean:
+    def from_material(cls, material: Material) -> NeoHookean:
         """mu = E / (2 (1 + nu)), kappa = E / (3 (1 - 2 nu)): the linear material at small strain."""
         shear = material.youngs / (2 * (1 + material.poisson))
         return cls(shear, material.youngs / (3 * (1 - 2 * material.poisson)))

@@ -28,7 +28,7 @@ class SplitBulkModulus:
     at_points: float
 
     @classmethod
-    def of(cls, law: NeoHookean) -> SplitBulkModulus:
+    def from_law(cls, law: NeoHookean) -> SplitBulkModulus:
         """``SHARE`` shear moduli at the points."""
         return cls(law, SHARE * law.shear)
 

@@ -70,7 +70,7 @@ def _on_gel(
     camera = unit.camera
     place = np.stack([*np.meshgrid(right, down), height], -1).astype(np.float32)
     flat = np.zeros_like(height)
-    rim = Hits.of(place, flat, flat)
+    rim = Hits.from_slopes(place, flat, flat)
     radiance = direct_light(rim, None, [(led.position,) for led in unit.leds], unit)
     outside = np.maximum(np.abs(place[..., 0]) - camera.right[-1], np.abs(place[..., 1]) - camera.down[-1])
     radiance[outside > MARGIN] = 0

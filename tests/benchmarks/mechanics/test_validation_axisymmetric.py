@@ -18,7 +18,7 @@ RUBBER = Material(1e6, 0.49)
 
 @pytest.fixture(scope="module")
 def solid():
-    return AxisymmetricSolid(disc(np.linspace(0, 2e-3, 7), np.linspace(0, 1e-3, 5)), NeoHookean.of(RUBBER))
+    return AxisymmetricSolid(disc(np.linspace(0, 2e-3, 7), np.linspace(0, 1e-3, 5)), NeoHookean.from_material(RUBBER))
 
 
 def disturbed(solid):
@@ -60,7 +60,7 @@ def test_newton_step_is_second_order(solid):
 def test_squeezed_rod_has_the_analytic_stress():
     """Stretches (s, s, t) everywhere: the axial force over the area at rest is the first Piola-Kirchhoff stress."""
     s, t = 1.2, 0.8
-    solid = AxisymmetricSolid(disc(np.linspace(0, 2e-3, 5), np.linspace(0, 1e-3, 5)), NeoHookean.of(RUBBER))
+    solid = AxisymmetricSolid(disc(np.linspace(0, 2e-3, 5), np.linspace(0, 1e-3, 5)), NeoHookean.from_material(RUBBER))
     state = solid.rest()
     state.displacement = solid.mesh.nodes * [s - 1, t - 1, 0]
     state.pressure += solid.linearise(state).pressure_step(np.zeros_like(state.displacement))

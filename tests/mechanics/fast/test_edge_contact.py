@@ -32,7 +32,7 @@ def test_points_lie_on_the_smooth_surface_halfway_between_nodes(sensor):
     nodes = compliance.touchable[points.nodes[amid]]
     first = np.array(np.divmod(nodes[:, 5], surface.shape[1]), float)  # the lower of the middle two, either way
     expected = on_grid(surface.axes, first + 0.5, closed=surface.closed)
-    np.testing.assert_allclose(points.of(surface.rest[compliance.touchable])[amid], expected, atol=1e-15)
+    np.testing.assert_allclose(points.interpolate(surface.rest[compliance.touchable])[amid], expected, atol=1e-15)
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
