@@ -28,7 +28,7 @@ _FRONT = 4e-3  # m, what lies this much behind the front is the far side of the 
 _MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
 
 
-def fall(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
+def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
     """How much farther in, m, than at ``pose``, itself at first touch, an indenter touches where it has slid.
 
     Where it has slid off the sensor, as far as its motion is followed.

@@ -267,7 +267,7 @@ class _FiniteStrain(_Path):
         return touch_at_force(move, self.last, pose.direction, force, self.limit, self.where, tolerance)
 
     def _solution(self, touch: ContactState) -> Solution:
-        below = self.body.hidden(touch, self.indenter)
+        below = self.body.penetration_depth(touch, self.indenter)
         gap = touch.outer.gaps(self.body.solid.mesh.nodes + touch.state.displacement)
         table, across = self.errors(touch.depth), self._nodes_across(touch)
         stated = error_estimate.of_finite_strain(table, touch.depth, int((touch.pressing > 0).sum()), across, below)

@@ -161,7 +161,7 @@ def _on_biotac(
     try:
         for depth, slide in steps:
             there = pose.slid(*slide)
-            found.append(biotac.at_depth(depth + biotac.fall(there), there))
+            found.append(biotac.at_depth(depth + biotac.surface_drop(there), there))
             if found[-1].axial_force <= 0:
                 del found[-1]
                 raise TactileError("full tier, biotac", "no force", "a contact")

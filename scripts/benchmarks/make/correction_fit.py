@@ -96,15 +96,15 @@ def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
     coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
     forces = np.clip(known.log_ratio, -MOST, MOST)[:, None]
     every = [Choice(width, ridge) for width in _WIDTHS for ridge in _RIDGES]
-    both = [_left(known, kind, ALL, np.column_stack([forces, coarse]), choice) for choice in every]
-    few = [_left(known, kind, ESSENTIAL, forces, choice) for choice in every]
+    both = [_fold_errors(known, kind, ALL, np.column_stack([forces, coarse]), choice) for choice in every]
+    few = [_fold_errors(known, kind, ESSENTIAL, forces, choice) for choice in every]
     pairs = itertools.product(range(len(every)), repeat=2)
     one, other = min(pairs, key=lambda pair: _size((both[pair[0]][:, :1] + few[pair[1]]) / 2))
     fields = min(range(len(every)), key=lambda i: _size(both[i][:, 1:]))
     return every[one], every[other], every[fields]
 
 
-def _left(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.ndarray, choice: Choice) -> np.ndarray:
+def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.ndarray, choice: Choice) -> np.ndarray:
     """Errors (m, k) of goals (n, k) of the samples of one kind in each fold, learned from the rest."""
     error, rubbing = np.zeros_like(goals), rubs(known.x)
     for f in np.unique(known.fold):

@@ -70,7 +70,7 @@ def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[st
         began = time.process_time()
         try:
             touch = problem.press(depth, touch, _RUBBING_STEP if friction else ONE_STEP)
-            body.hidden(touch, press.indenter)  # raises where it went through the surface
+            body.penetration_depth(touch, press.indenter)  # raises where it went through the surface
         except TactileError as error:
             log.info("%s: %s", press.name, error)
             break

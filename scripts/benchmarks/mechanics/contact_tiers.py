@@ -12,7 +12,7 @@ import numpy as np
 from tactile_core import accuracy, sensors
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.press import CorrectedPress
-from tactile_core.mechanics.first_touch import fall
+from tactile_core.mechanics.first_touch import surface_drop
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Sensor, Solution, Step, Tier, solve_path
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, depth_at, thickness_under
@@ -63,7 +63,9 @@ def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
             if found.linear.converged:
                 true = true_displacement(pairs, sensor, np.array([row]))[0]
                 along = float(pairs.force[row] @ turned.direction)  # the same on both sensors
-                share = (found.linear.depth - fall(sensors.sensor_surface(sensor), indenter, pose, slid)) / thick
+                share = (
+                    found.linear.depth - surface_drop(sensors.sensor_surface(sensor), indenter, pose, slid)
+                ) / thick
                 yield miss(int(press), share, found.corrected.displacement, found.axial_force, true, along)
 
 

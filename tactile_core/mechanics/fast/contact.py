@@ -90,18 +90,18 @@ class ContactProblem:
 
     def _look_near(self, pose: Pose, start: Contact | None = None) -> None:
         """Follow the nodes that the indenter may reach at a pose, and those that ``start`` touched."""
-        wanted = self._within(pose, _REACH)
+        wanted = self._nodes_within(pose, _REACH)
         touched = np.empty(0, int) if start is None else start.nodes
         if len(self.near) > _LARGE * len(wanted) or not (
             _among(wanted, self.near).all() and _among(touched, self.near).all()
         ):
-            near = wanted if start is None else np.union1d(self._within(pose, _REACH + _SPARE), touched)
+            near = wanted if start is None else np.union1d(self._nodes_within(pose, _REACH + _SPARE), touched)
             self._rows = self._rows_of(near)
 
     def _rows_of(self, near: np.ndarray) -> ComplianceRows:
         return ComplianceRows(self.compliance, near)
 
-    def _within(self, pose: Pose, reach: float) -> np.ndarray:
+    def _nodes_within(self, pose: Pose, reach: float) -> np.ndarray:
         """Sorted touchable indices (k,) of the resting nodes that lie less than ``reach`` m outside the indenter."""
         nodes, _ = self.compliance.surface.blocks.near(self.indenter, pose, reach)
         touchable = self.compliance.touchable

@@ -77,13 +77,13 @@ class EdgeContactProblem(ContactProblem):
         nodes = super()._resting()
         return np.concatenate([nodes, self._points.interpolate(nodes)])
 
-    def _within(self, pose: Pose, reach: float) -> np.ndarray:
+    def _nodes_within(self, pose: Pose, reach: float) -> np.ndarray:
         """Nodes and points less than ``reach`` m outside the indenter, and what nodes those points depend on."""
         near = np.zeros(self._m, bool)
-        near[super()._within(pose, reach + _MARGIN)] = True
+        near[super()._nodes_within(pose, reach + _MARGIN)] = True
         points = np.flatnonzero(near[self._points.nodes].all(axis=1))
         points = points[pose.distance(self.indenter, self._rest[self._m + points])[0] < reach]
-        nodes = np.union1d(super()._within(pose, reach), self._points.nodes[points])
+        nodes = np.union1d(super()._nodes_within(pose, reach), self._points.nodes[points])
         return np.concatenate([nodes, self._m + points])
 
     def _rows_of(self, near: np.ndarray) -> SpringRows:

@@ -80,7 +80,7 @@ class Friction:
         points = self.rest + place
         (gap, normal), off = there.distance(self.indenter, points), self._off(points, there)
         for iteration in range(1, MAX_ITERATIONS + 1):
-            seen = self._seen(guess, place, off, there, gap, normal, curved=calm)
+            seen = self._evaluate_forces(guess, place, off, there, gap, normal, curved=calm)
             guess = self._step(guess, seen, axial_force)
             if axial_force is not None:
                 there = self.pose.moved(guess.shift)
@@ -114,7 +114,7 @@ class Friction:
             (gap, normal), off = there.distance(self.indenter, points), self._off(points, there)
         return state
 
-    def _seen(self, guess: _Guess, place, off, there: Pose, gap, normal, *, curved: bool) -> _Seen:  # noqa: ANN001
+    def _evaluate_forces(self, guess: _Guess, place, off, there: Pose, gap, normal, *, curved: bool) -> _Seen:  # noqa: ANN001
         """What the forces do once brought within Coulomb's law at the normals (k, 3) of the place (k, 3) m."""
         k = self.block.k
         guess.force = np.where(guess.active[:k, None], guess.force, 0.0)

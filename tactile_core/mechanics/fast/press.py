@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
-from ..first_touch import fall
+from ..first_touch import surface_drop
 from ..force_search import touch_at_force
 from ..penetration import PenetrationError
 from ..pose_path import same_line
@@ -98,7 +98,7 @@ class CorrectedPress:
         contact = self.problem.at_pose(pose.moved(depth), self.last)
         if contact.converged:
             self.last = contact
-        return self._with_correction(contact, self._fall_to(pose))
+        return self._with_correction(contact, self._surface_drop(pose))
 
     def _at_force(self, force: float, pose: Pose) -> FastContact | None:
         """A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
@@ -107,7 +107,7 @@ class CorrectedPress:
         """
         if isinstance(self.problem, EdgeContactProblem):
             return self._by_depths(force, pose)
-        contact, fall = self.last or self._first(pose), self._fall_to(pose)
+        contact, fall = self.last or self._find_first_contact(pose), self._surface_drop(pose)
         if contact is not None and not same_line(contact.pose, pose):
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
         before: tuple[float, float] | None = None  # linear and corrected force, N
@@ -134,7 +134,7 @@ class CorrectedPress:
 
         Raises SunkError and UnsolvedError.
         """
-        fall = self._fall_to(pose)
+        fall = self._surface_drop(pose)
 
         def move(depth: float, before: FastContact) -> FastContact:
             contact = self.problem.at_pose(pose.moved(depth + fall), before.linear)
@@ -161,7 +161,7 @@ class CorrectedPress:
                 self._last_power = float(np.clip(corrected / linear, *_POWERS))
         return self._last_power
 
-    def _first(self, pose: Pose) -> Contact | None:
+    def _find_first_contact(self, pose: Pose) -> Contact | None:
         """The first contact that carries force; a coarse lattice may be missed by the shallowest depths."""
         depth = _FIRST_DEPTH
         while depth <= self.limit:
@@ -171,8 +171,8 @@ class CorrectedPress:
             depth *= 1.5
         return None
 
-    def _fall_to(self, pose: Pose) -> float:
-        return fall(self.compliance.surface, self.problem.indenter, self.pose, pose)
+    def _surface_drop(self, pose: Pose) -> float:
+        return surface_drop(self.compliance.surface, self.problem.indenter, self.pose, pose)
 
     def _with_correction(self, contact: Contact, fall: float) -> FastContact:
         made = correct(self.compliance, _from_touch(contact, fall))

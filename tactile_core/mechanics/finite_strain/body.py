@@ -71,7 +71,7 @@ class Body:
         faces = outer_faces(mesh)
         return faces[np.isin(faces, near).all(axis=1)]
 
-    def hidden(self, touch: ContactState, indenter: Indenter) -> float:
+    def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
         """How deep, m, the surface lies in the indenter between nodes; raises SunkError where it does not follow it."""
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])

@@ -161,17 +161,17 @@ class ContactSet:
 
         stiffness -= float(np.einsum("ki,kij,kj->", along, self._gripping, along))
 
-        def left(share: float) -> float:
+        def residual_force(share: float) -> float:
             rubbing, _ = self._capped(self._trial - share * self.grip * along)
             return force + share * stiffness - float((along * rubbing).sum())
 
-        begin, end = left(0.0), left(1.0)
+        begin, end = residual_force(0.0), residual_force(1.0)
         if begin >= 0 or end <= _OVERSHOT * -begin:
             return 1.0
         low, high = 0.0, 1.0
         while high - low > _SHARE_STEP:
             middle = (low + high) / 2
-            low, high = (middle, high) if left(middle) < 0 else (low, middle)
+            low, high = (middle, high) if residual_force(middle) < 0 else (low, middle)
         return high
 
     def bending(self, at: np.ndarray) -> np.ndarray:

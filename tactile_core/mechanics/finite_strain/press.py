@@ -13,7 +13,7 @@ from ...geometry.indenters import Indenter, Pose
 from ...sensors import biotac
 from ..electrodes.biotac_sheet import biotac_sheet
 from ..fast.sensing_points import electrode_feet
-from ..first_touch import fall
+from ..first_touch import surface_drop
 from ..pose_path import same_line
 from .body import Body, Sensor, graded_body
 from .contact_state import ContactState
@@ -75,7 +75,7 @@ class FullPress:
         Raises TactileError where none is found, or the indenter sinks in between the nodes, as ``at_force`` does.
         """
         self.last = self.problem.move((pose or self.pose).moved(depth), self.last, _STEP)
-        self.body.hidden(self.last, self.indenter)
+        self.body.penetration_depth(self.last, self.indenter)
         return full_contact(self.body, self.last)
 
     def at_force(self, force: float, guess: float, pose: Pose | None = None) -> FullContact:
@@ -87,7 +87,7 @@ class FullPress:
         """
         pose = pose or self.pose
         begin, depth, before = self.last, guess, None
-        tried = [(self.fall(pose), 0.0)]
+        tried = [(self.surface_drop(pose), 0.0)]
         if same_line(begin.pose, pose):
             before, tried = full_contact(self.body, begin), [(begin.depth, _axial(begin))]
         for _ in range(_MOST_TRIES):
@@ -96,16 +96,16 @@ class FullPress:
             miss = abs(found.axial_force / force - 1)
             enough = miss <= FORCE_TOLERANCE
             if enough or (before and miss <= _NEAR):
-                self.body.hidden(touch, self.indenter)
+                self.body.penetration_depth(touch, self.indenter)
                 return found if enough else on_line(before, found, force)
             tried.append((depth, found.axial_force))
             before, begin = found, begin if found.axial_force > force else touch
             depth = _next_depth(tried, force)
         raise TactileError(f"full tier, {self.sensor}", f"{found.axial_force:.4g} N", f"{force:.4g} N", "Another force")
 
-    def fall(self, pose: Pose) -> float:
+    def surface_drop(self, pose: Pose) -> float:
         """How much farther in, m, than at the press's own pose the resting surface lies under a slid one."""
-        return fall(sensors.sensor_surface(self.sensor), self.indenter, self.pose, pose)
+        return surface_drop(sensors.sensor_surface(self.sensor), self.indenter, self.pose, pose)
 
 
 def full_contact(body: Body, touch: ContactState) -> FullContact:

@@ -35,15 +35,15 @@ def check_orientation(photographs: Photographs, ball_diameter: float, start: Cal
     unit = fitted_size(start, photographs)
     factor = working_factor(unit.camera.width, unit.camera.height)
     bench = BallPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
-    given = _left(plain, bench, ball_diameter / 2)
+    given = _median_unexplained(plain, bench, ball_diameter / 2)
     for (rows, columns), name in WAYS.items():
-        left = _left([turned(press, rows, columns) for press in plain], bench, ball_diameter / 2)
+        left = _median_unexplained([turned(press, rows, columns) for press in plain], bench, ball_diameter / 2)
         if left < CLEARLY * given:
             found = f"{name}: {100 * left:.0f} % of the presses is unexplained so, {100 * given:.0f} % as they are"
             raise TactileError(photographs.folder, found, "fingertip up, as the camera sees the gel", "Turn them")
 
 
-def _left(presses: list[Press], bench: BallPictures, radius: float) -> float:
+def _median_unexplained(presses: list[Press], bench: BallPictures, radius: float) -> float:
     """Median share of presses' squares that balls of a radius, m, leave."""
     sights = [Sight(press) for press in presses]
     return float(np.median([unexplained_share(sight, fit_ball(bench, sight, radius)[1]) for sight in sights]))

@@ -10,7 +10,7 @@ BUMPY = BumpyCube(14e-3, 0.5e-3, 1.5e-3, 1e-3, 4e-3)
 HERE = Pose(np.zeros(3), np.eye(3))
 
 
-def seen(indenter, point):
+def surface_point_below(indenter, point):
     """A point of the indenter's surface below ``point`` (3,), and the normal there."""
     gap, normal = indenter.distance(point[None])
     return point - gap[0] * normal[0], normal[0]
@@ -28,7 +28,7 @@ def test_a_node_at_the_foot_of_a_bump_touches_bump_and_face(away):
     rim = np.array([foot, 0.0, 1e-3])
     up_the_side = np.radians(20) + away / 1.5e-3  # from the ball's equator, below it
     side = np.array([1.5e-3 * np.cos(up_the_side), 0.0, 1.5e-3 * (1 - np.sin(up_the_side))])
-    left, normal = seen(BUMPY, rim + np.array([away, 0.0, 0.05e-3]))
+    left, normal = surface_point_below(BUMPY, rim + np.array([away, 0.0, 0.05e-3]))
     candidates = one(side)
     candidates.split(np.array([0]), left[None], normal[None], BUMPY, HERE, np.zeros((1, 3)))
     assert candidates.nodes.tolist() == [7, 7]
@@ -40,7 +40,7 @@ def test_a_node_at_the_foot_of_a_bump_touches_bump_and_face(away):
 
 def test_a_smooth_surface_has_no_crease():
     ring = Ring(2.5e-3, 1e-3)
-    left, normal = seen(ring, np.array([3.4e-3, 0.0, 0.9e-3]))
+    left, normal = surface_point_below(ring, np.array([3.4e-3, 0.0, 0.9e-3]))
     candidates = one(np.array([1.7e-3, 0.0, 0.6e-3]))
     for _ in range(3):
         assert not candidates.faced.any()
