@@ -35,7 +35,7 @@ def penetration_between(
 ) -> float:
     """How deep, m, a surface (rows, columns, 3) m lies in a body halfway between nodes, wherever some are near it.
 
-    Raises SunkError for a body pressed ``depth`` m in, where that is too much: also more than a share of the depth.
+    Raises PenetrationError for a body ``depth`` m in, where that is too much: also more than a share of the depth.
     """
     columns = grid.shape[1]
     gap, _ = pose.distance(indenter, grid.reshape(-1, 3))
@@ -64,7 +64,7 @@ def check_follows(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, normals: np.ndarray, *,
     closed: bool, behind: float = BEHIND,
 ) -> None:  # fmt: skip
-    """Raise SunkError where a body pressed ``depth`` m in has sunk in between a surface's nodes.
+    """Raise PenetrationError where a body pressed ``depth`` m in has sunk in between a surface's nodes.
 
     normals : (k, 3) of the body, at the nodes that carry force
     behind : least cosine of theirs and the motion

@@ -15,7 +15,7 @@ from tactile_core.mechanics.electrodes.biotac_sheet import (
     BiotacSheet,
     biotac_sheet,
     growth,
-    watched_films,
+    sensing_films,
 )
 from tactile_core.mechanics.electrodes.gap_law import FILM_CONSTANT, signal_of_gaps
 from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
@@ -101,7 +101,7 @@ def _grid_rows(sheet: BiotacSheet, skin: list[np.ndarray]) -> Iterator[Row]:
 
 def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) -> Iterator[Row]:
     """The sheet on few fields: its time and error a contact, and with films that a contact of the fast tier watches."""
-    reduced, watched = reduced_sheet(), [watched_films(contact) for contact in touches]
+    reduced, watched = reduced_sheet(), [sensing_films(contact) for contact in touches]
     films = [sheet.films(moved) for moved in skin]
     started = time.perf_counter()
     exact = np.stack([sheet.resistances(each) for each in films])

@@ -15,7 +15,7 @@ import numpy as np
 
 from tactile_core import recordings
 from tactile_core.accuracy import Row, row
-from tactile_core.mechanics.electrodes.biotac_sheet import watched_films
+from tactile_core.mechanics.electrodes.biotac_sheet import sensing_films
 from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
 from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
 from tactile_core.mechanics.fast.compliance import biotac_compliance
@@ -56,7 +56,7 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
 def _laws(contacts: list[Contact]) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     """Name -> what gives the changes (n, 19) of contacts on a unit that rests at counts (19,)."""
     gap = signal_of_gaps(np.stack([contact.electrode_gaps for contact in contacts]))
-    growth = np.stack([reduced_sheet().growth(watched_films(contact)) for contact in contacts])
+    growth = np.stack([reduced_sheet().growth(sensing_films(contact)) for contact in contacts])
     return {
         "wrong_sign": lambda at_rest: -gap,
         "gap": lambda at_rest: gap,

@@ -18,7 +18,7 @@ from ...geometry.lattice import Lattice, cap_faces
 from ...sensors import biotac
 from ...sensors.unrolling import closest_on_triangles
 from ..fast.contact_state import Contact
-from ..fast.sensing_points import watched_nodes
+from ..fast.sensing_points import sensing_nodes
 from ..solids.biotac_core import above_core
 from ..solids.hex_mesh import skin_mesh
 from .gap_law import FILM_FLOOR
@@ -47,14 +47,14 @@ class BiotacSheet:
 
     sheet : on the nodes that bound fluid, with the 19 electrodes and the 4 of the excitation
     wet : (k,) the sheet's nodes in ``biotac.skin_surface("inner")``
-    watched : (k,) which of ``sensing_points.watched_nodes`` they are
+    sensing : (k,) which of ``sensing_points.sensing_nodes`` they are
     film : (k,) m, thickness at rest; outward : (k, 3), from the core to the skin
     unresolved : (23,) what the grid is too coarse for: resistance of each electrode in a film of 1 m and 1 S/m
     """
 
     sheet: ThinSheet
     wet: np.ndarray
-    watched: np.ndarray
+    sensing: np.ndarray
     film: np.ndarray
     outward: np.ndarray
     unresolved: np.ndarray
@@ -64,8 +64,8 @@ class BiotacSheet:
         return np.maximum(self.film + np.einsum("ki,ki->k", displacement[self.wet], self.outward), FILM_FLOOR)
 
     def films_of(self, change: np.ndarray) -> np.ndarray:
-        """Thickness (k,) m where the gaps of ``sensing_points.watched_nodes`` (f,) have changed by so much, m."""
-        return np.maximum(self.film + change[self.watched], FILM_FLOOR)
+        """Thickness (k,) m where the gaps of ``sensing_points.sensing_nodes`` (f,) have changed by so much, m."""
+        return np.maximum(self.film + change[self.sensing], FILM_FLOOR)
 
     def near(self, films: np.ndarray) -> np.ndarray:
         """What the grid misses of each electrode's resistance (23,) ohm in films (k,) m."""
@@ -110,15 +110,15 @@ def biotac_sheet(*, core_of_mesh: bool = False) -> BiotacSheet:
     centers = np.einsum("ek,ekd->ed", weights, middle[corners])
     wet, faces = np.unique(_connected(faces[(film > FILM_FLOOR)[faces].all(1)]), return_inverse=True)
     sheet = ThinSheet(middle[wet], faces.reshape(-1, 3), centers, ELECTRODE_RADIUS)
-    order = np.argsort(watched_nodes())
-    watched = order[np.searchsorted(watched_nodes(), wet, sorter=order)]
-    return BiotacSheet(sheet, wet, watched, film[wet], outward[wet], sheet.unresolved(_FINE))
+    order = np.argsort(sensing_nodes())
+    sensing = order[np.searchsorted(sensing_nodes(), wet, sorter=order)]
+    return BiotacSheet(sheet, wet, sensing, film[wet], outward[wet], sheet.unresolved(_FINE))
 
 
-def watched_films(contact: Contact) -> np.ndarray:
+def sensing_films(contact: Contact) -> np.ndarray:
     """Films (k,) m of the sheet in a contact of the fast tier, from the inner nodes that it watches."""
     skin = contact.compliance
-    return biotac_sheet().films_of((contact.watched_gaps - skin.watch_gap)[skin.feet :])
+    return biotac_sheet().films_of((contact.sensing_gaps - skin.watch_gap)[skin.feet :])
 
 
 def _spread(places: np.ndarray, values: np.ndarray, points: np.ndarray) -> np.ndarray:

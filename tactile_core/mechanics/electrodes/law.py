@@ -9,7 +9,7 @@ from ...errors import TactileError
 from ...sensors import divider
 from ..fast.contact_state import Contact
 from ..finite_strain.press import FullContact
-from .biotac_sheet import watched_films
+from .biotac_sheet import sensing_films
 from .gap_law import signal_of_gaps
 from .reduced_sheet import reduced_sheet
 
@@ -23,7 +23,7 @@ def signal_of(contact: Contact | FullContact, law: str = SHEET) -> np.ndarray:
     Raises TactileError for another law.
     """
     if law == SHEET:
-        films = contact.films if isinstance(contact, FullContact) else watched_films(contact)
+        films = contact.films if isinstance(contact, FullContact) else sensing_films(contact)
         return divider.reading(reduced_sheet().growth(films), sensors.REST_COUNT) - sensors.REST_COUNT
     if law == GAP:
         return signal_of_gaps(contact.electrode_gaps)

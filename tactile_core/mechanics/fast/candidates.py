@@ -19,7 +19,7 @@ class Candidates:
     """Nodes that may carry force, sorted; a node stands twice where it touches two faces of a concave crease.
 
     nodes : (k,) touchable indices; displacement : (k, 3) m, first guess; probe : (k, 3) m, see ``split``
-    active : (k,) bool, first guess of which touch; inner : (c,) watched points of the inner skin that may press
+    active : (k,) bool, first guess of which touch; inner : (c,) sensing points of the inner skin that may press
     looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known
     """
 

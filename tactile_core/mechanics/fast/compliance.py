@@ -45,14 +45,14 @@ class Compliance:
     touchable : (m,) int, surface nodes that can carry contact force
     move : (3 r, 3 n) float32, m/N; row 3 i + k is the surface displacement under 1 N along axis k at the i-th of the r
         touchable nodes with z >= 0, and mirrored that under the same force on its image (``answers``)
-    watch : (3 m, w) float32, m/N; motion of the watched inner points along their watch directions (BioTac only:
+    watch : (3 m, w) float32, m/N; motion of the inner sensing points along their watch directions (BioTac only:
         first the electrode feet, then the inner skin under the pad and beside it; toward the core is negative)
     watch_gap : (w,) float64, m, their distance to electrode or core at rest
     pressure : (3 m,) float64, Pa/N, fluid pressure under the same forces (zero for the gel)
     inner_move : (w, 3 n) float32, m/N, surface displacement under 1 N at a watched point along its direction
-    inner_watch : (w, w) float32, m/N, motion of the watched points under the same forces
+    inner_watch : (w, w) float32, m/N, motion of the sensing points under the same forces
     inner_pressure : (w,) float64, Pa/N, fluid pressure under them
-    feet : how many of the watched points, the first ones, are electrode feet
+    feet : how many of the sensing points, the first ones, are electrode feet
     facing : how many after them face the core, which may press on them
     """
 
@@ -157,9 +157,9 @@ def _folder(solid: _Solid) -> pathlib.Path:
     """Named by all that decides the arrays."""
     name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
-    watched = sensing_points_of(mesh)
+    sensing = sensing_points_of(mesh)
     # Rounded, and without a minus before zero, which differ between versions of numpy and scipy.
-    places = watched.rows, watched.columns, *(np.round(each * 1e9) + 0.0 for each in (watched.weights, watched.gap))
+    places = sensing.rows, sensing.columns, *(np.round(each * 1e9) + 0.0 for each in (sensing.weights, sensing.gap))
     for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, *places):
         digest.update(np.ascontiguousarray(array).tobytes())
     return cache_folder() / f"compliance-{name}-{digest.hexdigest()[:16]}"
@@ -213,10 +213,10 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
     touchable : (m,) surface nodes that may carry force. Raises ValueError for a solid without mirror symmetry or held
     nowhere, TactileError where the memory does not suffice.
     """
-    watched = sensing_points_of(mesh)
-    source, mirrored = images(mesh, len(watched.gap))
+    sensing = sensing_points_of(mesh)
+    source, mirrored = images(mesh, len(sensing.gap))
     kept = np.unique(source)
-    loads = watched.dense(3 * len(mesh.nodes), kept)
+    loads = sensing.dense(3 * len(mesh.nodes), kept)
     column, sign = np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
     if len(mesh.inner):
         loads = np.column_stack([loads, _volume_gradient(mesh)])
@@ -230,7 +230,7 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
         inner_move = place.loads(even.under_loads, odd.under_loads, column, sign)
         every = np.ix_(column, column)
         among = even.among[every] + odd.among[every] * np.outer(sign, sign)
-        inner_pressure, pressure = np.zeros(len(watched.gap)), np.zeros(3 * len(touchable))
+        inner_pressure, pressure = np.zeros(len(sensing.gap)), np.zeros(3 * len(touchable))
         touch_dofs = axes_of(touchable)
         if len(mesh.inner):  # the fluid keeps its volume: its pressure is one more force, and takes one more row away
             swell, stiffness = inner_move[-1], 1 / among[-1, -1]
@@ -245,7 +245,7 @@ def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lat
     except MemoryError as error:
         raise TactileError("compliance", "out of memory", "2.2 GB of free memory", "Close other programs") from error
     inner = inner_move.astype(np.float32), among.astype(np.float32), inner_pressure
-    return Arrays(move, watch, watched.gap, pressure, *inner)
+    return Arrays(move, watch, sensing.gap, pressure, *inner)
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ class ComplianceBlock:
     """Compliance of k surface nodes (three axes) and c points of the inner skin that may press on the core.
 
     nodes : (k,) sorted touchable indices (with ``SpringRows`` its numbers), twice where one touches two faces
-    inner : (c,) sorted watched points
+    inner : (c,) sorted sensing points
     rows : the entries of nodes near them, where they are already at hand
     matrix : (3 k + c, 3 k + c) float32, m/N: surface axes first
     """
@@ -38,7 +38,7 @@ class ComplianceBlock:
         self.matrix = surface if not self.c else np.empty((size + self.c, size + self.c), np.float32)
         if self.c:
             self.matrix[:size, :size] = surface
-            self.matrix[:size, size:] = rows.watched(nodes, inner)
+            self.matrix[:size, size:] = rows.sensing_motion(nodes, inner)
             self.matrix[size:, :size] = self.matrix[:size, size:].T
             self.matrix[size:, size:] = compliance.inner_watch[np.ix_(inner, inner)]
 

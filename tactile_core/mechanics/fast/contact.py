@@ -82,7 +82,7 @@ class ContactProblem:
         return self._walk(pose, axial_force, start)
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise SunkError where the indenter has sunk in between the surface's nodes."""
+        """Raise PenetrationError where the indenter has sunk in between the surface's nodes."""
         surface, deformed = self.compliance.surface, contact.deformed
         _, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable[contact.nodes]])
         where, grid = f"fast tier, {self.compliance.name}", surface.grid(deformed)

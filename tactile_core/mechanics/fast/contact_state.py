@@ -22,7 +22,7 @@ class Contact:
         those whose cubic interpolation it is, some of them small and outward
     slipping : (k,) bool, nodes whose friction is spent; without friction all
     converged : whether it may be used; iterations : linearised problems solved for it
-    core_nodes : (c,) watched inner points that press on the core; core_force : (c,), on the skin, away from the core
+    core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
     penetration : m, deepest place of a node in the indenter or of the inner skin in the core
     sideways : nodal forces across the indenter's normals over the whole force: 0 without friction
     """
@@ -55,8 +55,8 @@ class Contact:
         return self.compliance.surface.rest + self.displacement
 
     @property
-    def watched_gaps(self) -> np.ndarray:
-        """(w,) m, of the watched points: 19 electrodes, then inner skin over the core, then beside it."""
+    def sensing_gaps(self) -> np.ndarray:
+        """(w,) m, of the sensing points: 19 electrodes, then inner skin over the core, then beside it."""
         return self._gaps(len(self.compliance.watch_gap))
 
     @property

@@ -64,7 +64,7 @@ class EdgeContactProblem(ContactProblem):
         return self.near[self.near < self._m]
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise SunkError where the indenter has come in between nodes in spite of the points, or lies behind nodes."""
+        """Raise PenetrationError where the body is in between nodes in spite of the points, or lies behind nodes."""
         surface, deformed = self.compliance.surface, contact.deformed
         gap, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable])
         normals = normals[np.abs(gap) < _ON_BODY]

@@ -64,10 +64,10 @@ class SpringRows:
         block.reshape(-1)[:: len(block) + 1][springs] += self.softness
         return block
 
-    def watched(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Motion (3 k, c) float32 m/N of watched points (c,) under forces on numbers (k,)."""
+    def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
+        """Motion (3 k, c) float32 m/N of sensing points (c,) under forces on numbers (k,)."""
         used, sums = self._sums(numbers)
-        felt = self._rows.watched(used, inner)
+        felt = self._rows.sensing_motion(used, inner)
         return (sums @ felt.reshape(len(used), -1)).reshape(3 * len(numbers), len(inner))
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:

@@ -62,7 +62,7 @@ class CorrectedPress:
     def at_depth(self, depth: float, pose: Pose | None = None) -> FastContact:
         """The contact at a depth, m, of the press's pose or of another one; it may not have converged.
 
-        Raises SunkError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
+        Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
         """
         return self._guarded_if_needed(lambda: self._at_depth(depth, pose or self.pose))
 
@@ -132,7 +132,7 @@ class CorrectedPress:
     def _by_depths(self, force: float, pose: Pose) -> FastContact | None:
         """The same among contacts at depths: where all points feel the turn of their normals those are found quicker.
 
-        Raises SunkError and UnsolvedError.
+        Raises PenetrationError and UnsolvedError.
         """
         fall = self._surface_drop(pose)
 

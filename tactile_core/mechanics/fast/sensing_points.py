@@ -19,7 +19,7 @@ ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 
 
 class SensingPoints(NamedTuple):
-    """What turns a displacement into the change of w watched gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
+    """What turns a displacement into the change of w gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
 
     rows, columns : (k,) int; weights : (k,); gap : (w,) m
     """
@@ -30,7 +30,7 @@ class SensingPoints(NamedTuple):
     gap: np.ndarray
 
     def dense(self, size: int, points: np.ndarray) -> np.ndarray:
-        """The matrix (size, p) of sorted watched points (p,): 500 MB for half of the skin's; only a build needs it."""
+        """The matrix (size, p) of sorted sensing points (p,): 500 MB for half of the skin's; only a build needs it."""
         matrix, chosen = np.zeros((size, len(points))), np.isin(self.columns, points)
         matrix[self.rows[chosen], np.searchsorted(points, self.columns[chosen])] = self.weights[chosen]
         return matrix
@@ -51,7 +51,7 @@ def sensing_points_of(mesh: HexMesh) -> SensingPoints:
     return SensingPoints(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap, side_gap])
 
 
-def watched_nodes() -> np.ndarray:
+def sensing_nodes() -> np.ndarray:
     """Nodes (f,) of the inner skin that are watched after the electrodes' feet: all that can move, in their order."""
     return np.r_[facing_nodes(skin_mesh()), _beside(skin_mesh())]
 
@@ -116,7 +116,7 @@ def facing_nodes(mesh: HexMesh) -> np.ndarray:
 
 
 def images(mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """For each of ``count`` watched points the one whose mirror image it is, else itself; and whether it is an
+    """For each of ``count`` sensing points the one whose mirror image it is, else itself; and whether it is an
     image."""
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count

@@ -1,4 +1,4 @@
-"""What the whole surface, the watched points and the fluid do under the forces of a contact."""
+"""What the whole surface, the sensing points and the fluid do under the forces of a contact."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def displacement(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
 ) -> np.ndarray:
     """Displacement (n, 3) float32, m, of the surface under forces (k, 3) N at sorted, single touchable ``nodes`` and
-    (c,) N at watched points."""
+    (c,) N at sensing points."""
     rows, mirror, image = compliance.answers
     row, mirrored = rows[nodes], mirror[nodes]
     moved = _under(compliance, row[~mirrored], force[~mirrored])
@@ -46,7 +46,7 @@ def _under(compliance: Compliance, row: np.ndarray, force: np.ndarray) -> np.nda
 def sensing_gaps(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray, count: int
 ) -> np.ndarray:
-    """Gaps (count,) m of the first watched points under the same forces."""
+    """Gaps (count,) m of the first sensing points under the same forces."""
     gaps = compliance.watch_gap[:count].astype(float)
     if not len(gaps):
         return gaps

@@ -6,7 +6,7 @@ from tactile_core.mechanics.electrodes.biotac_sheet import CONDUCTIVITY, biotac_
 from tactile_core.mechanics.electrodes.gap_law import FILM_FLOOR
 from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
 from tactile_core.mechanics.fast.compliance import biotac_compliance
-from tactile_core.mechanics.fast.sensing_points import watched_nodes
+from tactile_core.mechanics.fast.sensing_points import sensing_nodes
 
 
 def dented(seed: int) -> np.ndarray:
@@ -34,10 +34,10 @@ def test_it_is_near_in_dented_films():
     assert np.sqrt(np.mean(error**2)) < 0.15 * np.sqrt(np.mean(change**2))
 
 
-def test_watched_nodes_are_all_that_move_and_fill_the_sheet():
-    skin, sheet, nodes = biotac_compliance(), biotac_sheet(), watched_nodes()
+def test_sensing_nodes_are_all_that_move_and_fill_the_sheet():
+    skin, sheet, nodes = biotac_compliance(), biotac_sheet(), sensing_nodes()
     assert len(skin.watch_gap) == skin.feet + len(nodes) and len(np.unique(nodes)) == len(nodes)
-    np.testing.assert_array_equal(nodes[sheet.watched], sheet.wet)
+    np.testing.assert_array_equal(nodes[sheet.sensing], sheet.wet)
     np.testing.assert_array_equal(sheet.films_of(np.zeros(len(nodes))), np.maximum(sheet.film, FILM_FLOOR))
 
 

@@ -109,7 +109,7 @@ def test_fluid_keeps_its_volume():
     ball = Sphere(3.5e-3)
     skin = biotac_compliance()
     contact = ContactProblem(skin, ball, biotac_pose(ball, PLACES[0]), 8e-4).at_depth(8e-4)
-    change = contact.watched_gaps - skin.watch_gap
+    change = contact.sensing_gaps - skin.watch_gap
     assert change[17] < -0.2e-3  # E18, under the ball
     assert change[19:].max() > 0.02e-3
     outer = contact.displacement.astype(float)
@@ -138,7 +138,7 @@ def test_the_inner_skin_rests_on_the_core():
     light, deep = problem.at_depth(0.2e-3), problem.at_depth(1.2e-3)
     assert len(light.core_nodes) == 0 and len(deep.core_nodes) > 0 and deep.converged
     assert (deep.core_force > 0).all()
-    gaps = deep.watched_gaps
+    gaps = deep.sensing_gaps
     assert gaps[skin.feet : skin.feet + skin.facing].min() > -1e-6  # m, the penetration MECHANICS allows
     assert np.abs(gaps[deep.core_nodes]).max() < 0.3e-6  # closed to the solver's tolerance
     # with the core the same depth takes more force: it holds the skin against the ball

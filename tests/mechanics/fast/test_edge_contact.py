@@ -54,7 +54,7 @@ def test_points_move_with_their_nodes_and_their_springs(sensor):
     np.testing.assert_allclose((force.ravel() @ block).reshape(-1, 3), moved, atol=1e-5 * np.abs(moved).max())
     watched = compliance.watch.reshape(m, 3, -1)[nodes][:, :, inner]
     felt = np.einsum("ki,kic->c", loads, watched)
-    found = force.ravel() @ rows.watched(numbers, inner)
+    found = force.ravel() @ rows.sensing_motion(numbers, inner)
     np.testing.assert_allclose(found, felt, atol=1e-5 * np.abs(felt).max(initial=1e-9))
 
 
