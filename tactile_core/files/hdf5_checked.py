@@ -127,7 +127,9 @@ def _check(path: str | os.PathLike, name: str | bytes, data: h5py.Dataset) -> No
 
 
 def _check_chunk(path, name, data, chunk, size: int, filters: list[int]) -> None:  # noqa: ANN001
-    """Raise TactileError for a packed chunk that unpacks to more than its size; those small enough to be harmless pass."""
+    """Raise TactileError for a packed chunk that unpacks to more than its size; those small enough to be
+    harmless pass.
+    """
     if MAX_RATIO * chunk.size <= MAX_CHUNK:
         return
     if chunk.size > size + size // 8 + STEP:  # packing makes hardly more of what it cannot pack

@@ -31,7 +31,7 @@ def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
-    """Hold a lock on ``file``, which is not removed afterwards: a lock on a file that others remove protects nothing."""
+    """Hold a lock on ``file``, which stays afterwards: a lock on a file that others remove protects nothing."""
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         _take(descriptor, shared)

@@ -1,4 +1,4 @@
-"""The smooth grid of a mesh's signed distance, and how far an indenter is from its mesh."""
+"""Build the smooth grid of a mesh's signed distance, and measure an indenter's error against its mesh."""
 
 from __future__ import annotations
 
