@@ -110,7 +110,7 @@ def write_cells(
     point_data: Data | None = None,
     cell_data: Data | None = None,
 ) -> None:
-    """Any cells of one kind as VTK's XML unstructured grid, base64 inside.
+    """Write cells of one kind as VTK's XML unstructured grid, base64 inside.
 
     nodes : (n, 3) m; cells : (m, k) int in VTK's order; kind : VTK's cell type, such as TRIANGLE
     point_data, cell_data : values (n or m,) or (n or m, k) by name; floats become float32
@@ -133,7 +133,7 @@ def write_cells(
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """One DataArray; VTK wants the number of bytes before them, inside the same base64."""
+    """Format one DataArray; VTK wants the number of bytes before them, inside the same base64."""
     little = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     text = base64.b64encode(struct.pack("<Q", len(little)) + little).decode()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""

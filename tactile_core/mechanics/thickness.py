@@ -1,4 +1,4 @@
-"""How thick a sensor is where it is touched: the measure of depth in per cent."""
+"""Thickness of a sensor where it is touched: the reference for depth in per cent."""
 
 from __future__ import annotations
 

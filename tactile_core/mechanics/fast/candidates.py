@@ -1,4 +1,4 @@
-"""Which nodes enter a contact's solve, and how a solved contact shows that others must."""
+"""Choose the nodes that enter a contact's solve, and find from a solved contact those that must be added."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest ov
 
 
 class _Around(NamedTuple):
-    """What a contact does to the nodes near it: displacement (n, 3) m, gaps (n,) m; gaps (g,) m of skin and core."""
+    """Effect of a contact on the nodes near it: displacement (n, 3) m, gaps (n,) m; gaps (g,) m of skin and core."""
 
     moved: np.ndarray
     gap: np.ndarray
@@ -62,7 +62,7 @@ class ContactProblem:
         self._look_near(pose.moved(reach))
 
     def _resting(self) -> np.ndarray:
-        """Where what may touch rests: the touchable nodes (m, 3) m."""
+        """Rest positions (m, 3) m of the touchable nodes."""
         return self.compliance.surface.rest[self.compliance.touchable]
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
@@ -210,7 +210,9 @@ class ContactProblem:
         return Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
 
     def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
-        """Where nodes (k,) stick on the indenter, (k, 3) m in its frame: where they were, or where they meet it."""
+        """Sticking points (k, 3) m of nodes (k,), in the indenter's frame: their old ones, or where they meet
+        the indenter.
+        """
         points = self._rest[nodes] + moved[np.searchsorted(self.near, nodes)]
         spots, new = before.pose.to_own(points), ~_among(nodes, before.nodes)
         if pose is not before.pose:
@@ -233,7 +235,7 @@ class ContactProblem:
         return found
 
     def _nothing(self, pose: Pose, *, converged: bool = True, iterations: int = 0) -> Contact:
-        """No contact, or one that was not found."""
+        """Return a result without contact, or one that was not found."""
         none, depth = np.empty(0, int), float((pose.apex - self.pose.apex) @ pose.direction)
         return Contact(
             self.compliance, pose, depth, np.zeros(3), 0.0, none, np.zeros((0, 3)), np.zeros(0, bool), converged,
@@ -296,7 +298,7 @@ def _borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Which of the nodes (k,) are among sorted others (j,): (k,) bool; a few times quicker than ``np.isin``."""
+    """Mark (k,) bool the nodes (k,) that are among sorted others (j,); a few times quicker than ``np.isin``."""
     if not len(others):
         return np.zeros(len(nodes), bool)
     return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes

@@ -1,4 +1,4 @@
-"""One solved contact of an indenter with a sensor's surface."""
+"""State of a solved contact of an indenter with a sensor's surface."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .compliance import Compliance
 
 @dataclasses.dataclass(frozen=True)
 class Contact:
-    """One solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
+    """Solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
 
     pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
     force : (3,); axial_force : its part along the motion

@@ -72,7 +72,9 @@ class Body:
         return faces[np.isin(faces, near).all(axis=1)]
 
     def hidden(self, touch: ContactState, indenter: Indenter) -> float:
-        """How deep, m, the surface lies in the indenter between nodes; raises SunkError where it does not follow it."""
+        """Penetration, m, of the surface into the indenter between nodes; raises SunkError where it does not
+        follow it.
+        """
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"

@@ -1,9 +1,9 @@
-"""What keeps an indenter out between the nodes of a surface, where it is sharper than they are dense.
+"""Penalty points that keep an indenter out between the nodes of a surface, where it is sharper than they are dense.
 
 Nodes touch exactly (``contact_set``). Without friction they slide off edges, which would then cut in between them and
-find no equilibrium. Where a contact lets the indenter through, or is not found, points halfway between nodes push
-back, each by a stiff spring (a penalty: P. Wriggers, Computational Contact Mechanics, 2006, chapter 6). All other
-contacts are left to the nodes alone.
+find no equilibrium. Where a contact lets the indenter through, or is not found, points halfway between nodes push back,
+each by a stiff spring (a penalty: P. Wriggers, Computational Contact Mechanics, 2006, chapter 6). All other contacts
+are left to the nodes alone.
 """
 
 from __future__ import annotations
@@ -72,14 +72,14 @@ class PenaltyPoints:
         self._nodes, self._weights = np.repeat(faces, len(_WEIGHTS), axis=0), np.tile(_WEIGHTS, (len(faces), 1))
 
     def deepest(self, obstacle: Obstacle, at: np.ndarray) -> float:
-        """How deep, m, the deepest point lies in an obstacle."""
+        """Penetration, m, of the deepest point into an obstacle."""
         return max(-float(obstacle.distance(self._points(at))[0].min(initial=0.0)), 0.0)
 
     def _points(self, at: np.ndarray) -> np.ndarray:
         return np.einsum("pa,pai->pi", self._weights, at[self._nodes])
 
     def push(self, obstacle: Obstacle, at: np.ndarray, stiffness: float) -> Push:
-        """What an obstacle does to the points.
+        """Push of an obstacle on the points.
 
         at : (n, 3) m, the mesh's nodes; stiffness : N/m, of each point's spring
         """

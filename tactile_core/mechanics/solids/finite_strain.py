@@ -61,11 +61,11 @@ class FiniteStrainSolid:
 
     @functools.cached_property
     def pattern(self) -> BlockPattern:
-        """Where the stiffness matrix has entries."""
+        """Sparsity pattern of the stiffness matrix."""
         return BlockPattern(self.mesh.cells, self.mesh.clamped)
 
     def rest(self) -> State:
-        """No displacement, no pressure."""
+        """Return the state without displacement and pressure."""
         return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 4)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
