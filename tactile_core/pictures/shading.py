@@ -85,7 +85,7 @@ class Shader:
 
 
 class SeenSurface:
-    """What all LEDs need of the gel that the pixels see, all (H, W) float32.
+    """Data of the gel that the pixels see, shared by all LEDs, all (H, W) float32.
 
     With s = 1 - h / H the seen point is (q s, h), and its normal is along (-dh/dq, tilt), where dh/dq are the slopes of
     h over the picture and tilt = s - q . dh/dq / H (from h(q) = height(q s)).
@@ -110,7 +110,7 @@ class SeenSurface:
 
 
 class Lamp:
-    """One LED and what it gives to the gel that the pixels see."""
+    """Light of one LED on the gel that the pixels see."""
 
     def __init__(self, camera: Camera, led: Led) -> None:
         self.led = led

@@ -29,7 +29,7 @@ TARGETS = {
 
 @dataclasses.dataclass(frozen=True)
 class Evaluation:
-    """One photograph's trial.
+    """Result of a calibration on one photograph.
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
     picture : (H, W, 3) uint8, rendered; figures, null : by the names of FIGURES; flags : in words
@@ -52,7 +52,7 @@ def evaluate_unit(
     search_radius: bool = True,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Each press of the photographs under a calibration; radius : m, of the ball.
+    """Evaluate a calibration on each press of the photographs; radius : m, of the ball.
 
     Raises TactileError for photographs of another shape than the calibration's pictures.
     """
@@ -97,7 +97,7 @@ def _try_press(
 
 
 def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
-    """What is wrong with a photograph, in words; now that the ball's place is known, whether the edge cuts it."""
+    """Describe what is wrong with a photograph; as the ball's place is known by now, also whether the edge cuts it."""
     camera = bench.camera
     contact = CONTACT_SHARE * np.sqrt(2 * ball.radius * ball.depth)
     over_right = abs(ball.right) + contact > camera.width / 2 * camera.pixel_size[0]

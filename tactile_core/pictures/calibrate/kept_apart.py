@@ -1,4 +1,4 @@
-"""What a calibration is worth on presses that it was not fitted on, and how photographs lie."""
+"""Evaluate a calibration on presses that it was not fitted on, and check the layout of photographs."""
 
 from __future__ import annotations
 
@@ -55,7 +55,9 @@ def tried_apart(
     start: Calibration,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Each press under a calibration fitted on the others, by thirds; none for a single press. ball_diameter : m."""
+    """Evaluate each press with a calibration fitted on the others, by thirds; none for a single press.
+    ball_diameter : m.
+    """
     names = [press.name for press in photographs.presses]
     folds = min(FOLDS, len(names))
     tried = []

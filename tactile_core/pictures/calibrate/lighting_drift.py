@@ -1,4 +1,4 @@
-"""How the light drifts between photographs: a smooth change of the whole picture, which is no press."""
+"""Drift of the light between photographs: a smooth change of the whole picture, which is no press."""
 
 from __future__ import annotations
 

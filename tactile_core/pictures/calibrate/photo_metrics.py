@@ -1,4 +1,4 @@
-"""How far a picture is from a photograph of a press: the figures of ``tactile calibrate --test``, grey levels."""
+"""Metrics of a picture against a photograph of a press, as in ``tactile calibrate --test``, grey levels."""
 
 from __future__ import annotations
 

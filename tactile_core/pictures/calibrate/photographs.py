@@ -26,7 +26,7 @@ NOISE_LIMIT = 15  # grey levels; more is dust or the rim of a press
 
 @dataclasses.dataclass(frozen=True)
 class Press:
-    """One photograph of a press.
+    """Photograph of a press.
 
     picture : (H, W, 3) uint8; drift : (H, W, 3) float32, grey levels, by which the light had drifted
     change : (H, W, 3) float32, grey levels, picture less background and drift; touched : (H, W) bool, near large ones
@@ -70,7 +70,7 @@ class Photographs:
 
 
 def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | None = None) -> Photographs:
-    """All pictures of a folder, by name; without a background photograph it is estimated.
+    """Read all pictures of a folder, by name; without a background photograph it is estimated.
 
     Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
     pictures to tell the background.
@@ -104,7 +104,7 @@ def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | 
 
 
 def chosen(photographs: Photographs, names: list[str]) -> Photographs:
-    """Some presses of a set, with the whole set's background; raises TactileError for a name that is none."""
+    """Select presses of a set, with the whole set's background; raises TactileError for an unknown name."""
     by_name = {press.name: press for press in photographs.presses}
     for name in names:
         if name not in by_name:
