@@ -1,4 +1,6 @@
-"""One frame of a scene on one sensor: a force at a place, in any tier, and what a recording keeps of it."""
+"""Solve a frame of a scene on one sensor: a force at a place, in any tier; and extract what a recording stores
+of it.
+"""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def _motion(where: str | os.PathLike, spec: RecordingSpec) -> tuple[np.ndarray, 
 
 
 def _frames(press: Press, mesh: TetMesh, poses: list[Pose], forces: np.ndarray) -> Iterator[Solution]:
-    """One solution a frame, each found from the one before."""
+    """Yield one solution a frame, each started from the one before."""
     depth: float | None = None  # of the frame before, where it touched
     for pose, force in zip(poses, forces, strict=True):
         if force == 0:

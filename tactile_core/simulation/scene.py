@@ -19,7 +19,9 @@ LARGEST = 1e9  # of any number: none that means something comes near, squares of
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """How paired contacts are drawn: places evenly over the gel, tilts evenly over a cone, force growing by a ratio."""
+    """Distribution of paired contacts: places evenly over the gel, tilts evenly over a cone, force growing by a
+    ratio.
+    """
 
     force_min_n: Positive = 0.02
     force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5
@@ -54,7 +56,7 @@ class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """One scene file."""
+    """Content of a scene file."""
 
     format: str
     name: str

@@ -26,7 +26,7 @@ Value = float | str
 
 
 def combinations(words: Sequence[str]) -> list[dict[str, Value]]:
-    """All of them, the last name's values changing fastest. Raises TactileError for a bad or doubled word."""
+    """List all combinations, the last name's values changing fastest. Raises TactileError for a bad or doubled word."""
     axes: dict[str, list[Value]] = {}
     for word in words:
         name, mark, text = word.partition("=")

@@ -39,7 +39,7 @@ class Batch:
 
 
 class Contacts:
-    """All contacts, their split, both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror.
+    """Contacts with their split and both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror.
 
     device : where batches go; the contacts themselves stay in the host's memory
     """
@@ -65,7 +65,7 @@ class Contacts:
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
-        """What an epoch trains on, in its order: contacts of the split or their mirror images, and silence."""
+        """Draw the contacts of an epoch, in its order: contacts of the split or their mirror images, and silence."""
         rows = rng.permutation(self.with_silence(self.split.train))
         turned = (rng.random(len(rows)) < self.options.mirrored) & (rows != SILENT)
         return rows + turned * len(self.pairs.press)

@@ -142,11 +142,11 @@ class MeshVae(Vae):
         self.surface, self.modes = surface, modes
 
     def mean(self, x: Tensor) -> Tensor:
-        """What the encoder reads (B, K + 4) -> latent (B, L)."""
+        """Map the encoder's input (B, K + 4) to the latent (B, L)."""
         return torch.cat([x[:, self.modes : self.modes + PLACE], super().mean(x)], -1)
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """As `Vae.sample`; the place is not noisy."""
+        """Sample like `Vae.sample`; the place is not noisy."""
         code, divergence = super().sample(x, generator)
         return torch.cat([x[:, self.modes : self.modes + PLACE], code], -1), divergence
 
@@ -160,11 +160,11 @@ class MeshVae(Vae):
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
 
     def shape_loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """As `loss`, of the code (B, L - 2) at the contacts' true places."""
+        """Compute `loss` of the code (B, L - 2) at the contacts' true places."""
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """How far, in cells, the places of latents (B, L) are from the contacts': see `Surface.astray`."""
+        """Distance, in cells, of the places of latents (B, L) from the contacts': see `Surface.astray`."""
         return self.surface.astray(latent[:, :PLACE], rows)
 
     def field(self, latent: Tensor) -> Tensor:

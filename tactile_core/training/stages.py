@@ -87,7 +87,7 @@ Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage: the networks it changes, or parts of them, and its loss."""
+    """Stage of the training: the networks it changes, or parts of them, and its loss."""
 
     name: str
     nets: tuple[str, ...]
@@ -145,7 +145,7 @@ def latent_loss(found: Tensor, target: Tensor) -> Tensor:
 
 
 def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Everything together: a frozen chain is 23-26 % worse than signal -> DIGIT directly (networks.md).
+    """Compute the loss of the whole chain: a frozen chain is 23-26 % worse than signal -> DIGIT directly (networks.md).
 
     Shapes are held against the truth where the contact truly is, places by themselves: a dent that is told beside its
     place would be paid for with being faint. The autoencoders' own losses stay in at half, so that latents keep their

@@ -1,4 +1,4 @@
-"""Each step of the translation on paired contacts, against the simulated truth, contact by contact."""
+"""Measure each step of the translation on paired contacts, against the simulated truth, contact by contact."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Bodies:
 
 
 def our_bodies() -> Bodies:
-    """Those of this version's sensors."""
+    """Return the bodies of this version's sensors."""
     return Bodies(sensors.digit_surface(), unrolling.unrolled_nodes())
 
 
@@ -61,7 +61,7 @@ def parts(count: int) -> list[slice]:
 
 
 def joined(columns: Iterator[Columns]) -> Columns:
-    """One table from those of parts."""
+    """Join the tables of parts into one."""
     found = list(columns)
     return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
 

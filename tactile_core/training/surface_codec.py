@@ -1,4 +1,4 @@
-"""One sensor's displacements as training sees them: in the nodes' own frames, in coefficients, with a loss."""
+"""Represent one sensor's displacements for training: in the nodes' own frames, in coefficients, with a loss."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, bu
 
 
 class SurfaceCodec:
-    """One sensor's displacements, the frame that moves over them and their linear bases, in the host's memory.
+    """Displacements of one sensor, the frame that moves over them and their linear bases, in the host's memory.
 
     data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i seen in a mirror
     wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
@@ -78,7 +78,7 @@ class SurfaceCodec:
         return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
 
     def _tapered(self, rows: np.ndarray) -> Tensor:
-        """What the near basis is drawn from: it fades toward the window's edge, where decoded gel would have a step."""
+        """Input of the near basis: it fades toward the window's edge, where decoded gel would have a step."""
         fade = torch.from_numpy(self.frame.fade())
         return (self._rest_in_window(rows).view(len(rows), *fade.shape, 3) * fade[:, :, None]).flatten(1)
 
@@ -96,7 +96,9 @@ class SurfaceCodec:
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """As `MovingFrame.cells`: whole cells (B, 2) and what is left, through which gradients flow to the place."""
+        """Compute `MovingFrame.cells`: whole cells (B, 2) and what is left, through which gradients flow to the
+        place.
+        """
         middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
         at = place * PLACE_UNIT + middle
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
