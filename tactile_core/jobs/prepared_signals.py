@@ -46,7 +46,7 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """What is told of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all."""
+    """Facts reported of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all."""
 
     recording: str
     layout: str
@@ -98,7 +98,7 @@ def _write(file: Path, job: Job, path: str, digest: str) -> int:
 
 
 def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
-    """Each part of a recording prepared, and how many of its frames the part before had."""
+    """Prepare each part of a recording; also yields the number of its frames that the part before had."""
     options, rest, rest_pdc = job.recipe.prepare.options(), None, np.nan
     sensor = job.recipe.sensor
     unit = None if sensor is None else sensor.of(path, split(path)[1], "--sensor")
@@ -225,7 +225,7 @@ class Prepared:
         return self._read(lambda file: len(file["time"]))
 
     def about(self) -> About:
-        """What is told of the recording."""
+        """Facts reported of the recording."""
         return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
     def rows(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:

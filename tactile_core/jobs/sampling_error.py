@@ -1,4 +1,4 @@
-"""What the toolkit adds to a translation or a solved contact by itself: rounding, and heights between the nodes."""
+"""Error that the toolkit itself adds to a translation or a solved contact: rounding, and heights between the nodes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TABLE = shipped("sampling.json")
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """What ``scripts/benchmarks/measure_sampling.py`` found; bins of depth over thickness, m."""
+    """Read the results of ``scripts/benchmarks/measure_sampling.py``; bins of depth over thickness, m."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
@@ -40,7 +40,7 @@ def rounding() -> float:
 
 
 def check(bound: float, share: float | None) -> str:
-    """What is added to a gel, in words; share : the depth over the thickness of its heights, None without heights.
+    """Describe the error added to a gel; share : the depth over the thickness of its heights, None without heights.
 
     Raises TactileError where that is more than the bound, um: there is nothing more exact to choose.
     """

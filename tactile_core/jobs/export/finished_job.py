@@ -37,14 +37,14 @@ def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
 
 @dataclasses.dataclass(frozen=True)
 class Recorded:
-    """One recording. name : of it in the job; frames : of it; shards : its files, in order."""
+    """Recording of a finished job. name : its name in the job; frames : their number; shards : its files, in order."""
 
     name: str
     frames: int
     shards: tuple[Path, ...]
 
     def blocks(self) -> Iterator[dict[str, np.ndarray]]:
-        """All arrays of some frames after another, by the names of ``frames_file``."""
+        """Yield all arrays of blocks of frames in order, by the names of ``frames_file``."""
         import h5py
 
         for path in self.shards:
@@ -67,7 +67,7 @@ class Finished:
 
     @property
     def frames(self) -> int:
-        """Of all recordings."""
+        """Number of frames of all recordings."""
         return sum(one.frames for one in self.recordings)
 
 

@@ -77,7 +77,7 @@ class Growing:
 
 
 def _identity(found: os.stat_result) -> tuple[int, int]:
-    """What a file keeps while it grows."""
+    """Identity of a file that does not change while it grows."""
     return found.st_dev, found.st_ino
 
 

@@ -206,7 +206,7 @@ class _Stats:
         self._high = np.maximum(self._high, np.where(good, values, -np.inf).max(axis=0))
 
     def told(self) -> dict[str, list[float]]:
-        """As stats.json has them; 0 where no number was finite."""
+        """Return the statistics as in stats.json; 0 where no number was finite."""
         count = np.maximum(self._count, 1)
         mean = self._sum / count
         std = np.sqrt(np.maximum(self._squares / count - mean**2, 0))
