@@ -31,7 +31,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("presses", metavar="PRESSES", help="folder of photographs of one unit, fingertip up")
     verb.add_argument("--out", metavar="FILE", help="new TOML file to write")
     verb.add_argument("--ball-diameter", type=float, metavar="MM", help="of the ball (with --test: as fitted)")

@@ -1,4 +1,4 @@
-"""What several verbs share."""
+"""Arguments and helpers that several verbs share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def progress_argument(verb: argparse.ArgumentParser) -> None:
 
 
 def prepare_arguments(verb: argparse.ArgumentParser) -> None:
-    """How readings become signals."""
+    """Add the arguments that control how readings become signals."""
     verb.add_argument(
         "--tare",
         default="auto",
@@ -67,7 +67,7 @@ def electrodes_argument(verb: argparse.ArgumentParser) -> None:
 
 
 def answer_arguments(verb: argparse.ArgumentParser) -> None:
-    """What a frame is answered by; see ``translation.answer``."""
+    """Add the arguments that control the estimate for a frame; see ``translation.answer``."""
     verb.add_argument(
         "--answer",
         choices=("likely", "mean"),
@@ -122,7 +122,7 @@ def check_seed(seed: int) -> None:
 
 
 def prepare_words(options: argparse.Namespace) -> dict[str, Any]:
-    """What ``recordings.PrepareOptions`` is told, from the arguments of a verb that prepares recordings."""
+    """Return the fields of ``recordings.PrepareOptions`` from the arguments of a verb that prepares recordings."""
     return {
         "kind": options.kind,
         "tare": None if options.tare == "auto" else options.tare,

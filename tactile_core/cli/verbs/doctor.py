@@ -18,7 +18,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb: none."""
+    """Add no arguments: this verb has none."""
 
 
 def run(options: argparse.Namespace) -> int:

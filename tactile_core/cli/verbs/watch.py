@@ -37,7 +37,7 @@ TOLD = 1.0  # s between two lines of figures
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("recording", nargs="?", metavar="PATH", help="a CSV file that grows; with --play any recording")
     verb.add_argument("--play", action="store_true", help="play a finished recording, of any layout, bags too")
     verb.add_argument("--rosbag-play", metavar="FILE", help="play this ROS 1 or 2 bag or MCAP file (bag#2: a finger)")
