@@ -124,7 +124,7 @@ class Double(networks.Networks):
 
 
 def as_rows(found: dict) -> list[Row]:
-    """One row a bin."""
+    """Make one row a bin."""
     rows = [
         row(f"sampling_height_error_{one['depth_share_to']:.0%}", 1e6 * one["rms_m"], "um",
             of=f"median of {one['contacts']} full-tier presses, 95 %: {1e6 * one['rms_95_m']:.2f} um")

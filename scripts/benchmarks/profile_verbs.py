@@ -106,7 +106,7 @@ CASES = (
 
 
 class Cost(NamedTuple):
-    """Of one run. cpu, wall, imports : s; peak : MB; loaded : libraries of HEAVY."""
+    """Cost of one run. cpu, wall, imports : s; peak : MB; loaded : libraries of HEAVY."""
 
     status: int
     cpu: float
@@ -167,7 +167,7 @@ points = [
 
 
 def run(case: Case, folder: Path) -> Cost:
-    """One case in a fresh process."""
+    """Run one case in a fresh process."""
     told = folder / "told.json"
     told.unlink(missing_ok=True)
     words = [word.replace("{}", str(folder)) for word in case.words.split()]
@@ -200,7 +200,7 @@ def verbs(folder: Path) -> list[Row]:
 
 
 def packings() -> list[Row]:
-    """What a picture of the demo costs as PNG, by zlib's level, and as the toolkit packs it."""
+    """Measure the cost of a picture of the demo as PNG, by zlib's level, and with the toolkit's settings."""
     from PIL import Image
 
     from tactile_core.pictures import shading
@@ -221,7 +221,7 @@ def packings() -> list[Row]:
 
 
 def live_picture() -> list[Row]:
-    """What `tactile watch` takes from a frame's rows to its picture, of the thread's own time."""
+    """Measure the thread time of `tactile watch` from a frame's rows to its picture."""
     recording, view, work = recordings.read(RECORDING), live.View(load_tools(), NOMINAL_RATE), []
     for start, stop in [(0, 60), *((i, i + 1) for i in range(60, 160))]:
         rows = dataclasses.replace(

@@ -95,7 +95,7 @@ class AxisymmetricSolid:
         self.pattern = BlockPattern(mesh.cells, mesh.clamped)
 
     def rest(self) -> State:
-        """No displacement, no pressure."""
+        """Return the state without displacement and pressure."""
         return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 3)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

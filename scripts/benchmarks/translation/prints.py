@@ -1,4 +1,5 @@
-"""How visible real contacts are in the translated pictures: the strongest change of grey levels in a small window.
+"""Measure how visible real contacts are in the translated pictures: the strongest change of grey levels in a small
+window.
 
 A translation that answers every contact with the same shallow average passes where places and ranks are judged; its
 pictures stay empty.

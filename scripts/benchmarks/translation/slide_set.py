@@ -56,7 +56,8 @@ def find(folder: str | os.PathLike) -> list[Path]:
 
 
 def reporting(folder: str | os.PathLike) -> list[Path]:
-    """Those of `find` by which nothing is chosen: all but sample 7 of each material; these too where there is no other.
+    """List the recordings of `find` by which nothing is chosen: all but sample 7 of each material; these too where
+    there is no other.
 
     Raises TactileError where there is none.
     """
@@ -70,7 +71,7 @@ def name_of(path: Path) -> str:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether wrench and pose lie beside a recording; without them its strength cannot be judged."""
+    """Return true if wrench and pose lie beside a recording; without them its strength cannot be evaluated."""
     return all(path.with_name(name_of(path) + topic).exists() for topic in (WRENCH, POSE))
 
 
