@@ -89,7 +89,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def check_python(version: tuple[int, int]) -> None:
-    """Raises SetupError for a Python that the pinned packages have no wheels for."""
+    """Raise SetupError for a Python that the pinned packages have no wheels for."""
     if not OLDEST <= version <= NEWEST:
         raise SetupError(
             "this is Python {}.{}; the project needs {}.{} to {}.{}. Run it with one of these, such as "

@@ -44,7 +44,7 @@ def fingerprint(thing: bpy.types.Object) -> str:
 
 
 def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
-    """Raises TactileError for what no indenter can be: mirrored, or a spec's body that is scaled or turned.
+    """Raise TactileError for what no indenter can be: mirrored, or a spec's body that is scaled or turned.
 
     relative : (3, 3) of the object's axes in those of the sensor
     """

@@ -30,7 +30,7 @@ class TACTILE_OT_simulate(TactileOperator):
     seed: bpy.props.IntProperty(name="Seed", description="Of the electrodes' noise: same seed, same recording", min=0)
 
     def _begin(self, context: bpy.types.Context) -> None:
-        """Raises TactileError."""
+        """Raise TactileError."""
         require("h5py", "msgspec", "scipy")
         from ...tactile_core.simulation.scene_text import write_scene
 

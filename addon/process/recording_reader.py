@@ -47,7 +47,7 @@ def _hdf5_works() -> bool:
 
 
 def _read_elsewhere(path: str) -> Recording:
-    """Raises TactileError as the reader does."""
+    """Raise TactileError as the reader does."""
     with JobFolder() as folder:
         job = Job("read", folder, path=path)
         while not job.poll(_LOOK):

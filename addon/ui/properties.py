@@ -83,7 +83,7 @@ def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = N
 
 
 def check_format(thing: bpy.types.Object) -> None:
-    """Raises TactileError for an object that a newer version of the add-on made."""
+    """Raise TactileError for an object that a newer version of the add-on made."""
     if thing.tactile.format > FORMAT:
         raise TactileError(
             thing.name, f"made by a newer version of the add-on (format {thing.tactile.format})",

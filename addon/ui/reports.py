@@ -28,7 +28,7 @@ def missing(*names: str) -> list[str]:
 
 
 def require(*names: str) -> None:
-    """Raises TactileError naming the modules that are not there."""
+    """Raise TactileError naming the modules that are not there."""
     lacking = missing(*names)
     if lacking:
         uses = ", ".join(dict.fromkeys(MODULES[name] for name in lacking))

@@ -68,7 +68,7 @@ def report() -> Iterator[str]:
 
 
 def try_library(library: Library) -> tuple[str, str]:
-    """(version, "") of a library that imports, or ("", what is wrong, in words)."""
+    """Import a library; returns (version, "") if it imports, or ("", what is wrong, in words)."""
     install = f'pip install "tactile-core[{library.extra}]"' if library.extra else f"pip install {library.package}"
     try:
         if importlib.util.find_spec(library.module) is None:

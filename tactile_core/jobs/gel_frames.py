@@ -171,7 +171,7 @@ def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.n
 
 
 def check_numbers(path: str | os.PathLike, numbers: np.ndarray) -> None:
-    """Raises TactileError for frame numbers (T,) that are no whole numbers from 0 on, each greater than the last."""
+    """Raise TactileError for frame numbers (T,) that are no whole numbers from 0 on, each greater than the last."""
     whole = np.isfinite(numbers).all() and (numbers == np.floor(numbers)).all() and (numbers >= 0).all()
     if not (whole and (np.diff(numbers) > 0).all() and (numbers < 2**31).all()):
         found = f"frame numbers {np.array2string(numbers, threshold=6, edgeitems=3)}"

@@ -223,7 +223,7 @@ def _preset(budget: Budget, preset: str) -> str:
 
 
 def _preset_ms(name: str) -> float:
-    """ms a picture, by the variant that runs here where it was measured."""
+    """Time of a picture, ms, by the variant that runs here where it was measured."""
     from ..pictures.presets import measured
 
     ms = measured()["presets"][name]["ms"]

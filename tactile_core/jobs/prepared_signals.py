@@ -260,7 +260,7 @@ class Prepared:
 
 
 def _check(path: Path, file: h5py.File) -> None:
-    """Raises ValueError or TactileError for other arrays than ours, whose rows would take more memory."""
+    """Raise ValueError or TactileError for other arrays than ours, whose rows would take more memory."""
     import h5py
 
     count = len(file["time"])

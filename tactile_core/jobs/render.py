@@ -247,7 +247,7 @@ def pictures(
     exr: bool,
     clock: Stopwatch | None = None,
 ) -> Pictures:
-    """What writes frames; heights : (H, W) of height maps, None for displacements; the rest as of `Options`.
+    """Return the writer of frames; heights : (H, W) of height maps, None for displacements; the rest as of `Options`.
 
     Raises TactileError for a bad calibration or size, and what ``Renderer`` raises.
     """  # fmt: skip

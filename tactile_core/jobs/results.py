@@ -64,7 +64,7 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
 
 
 def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
-    """Raises TactileError where a result may not stand: one is there (unless `overwrite`), or something else is.
+    """Raise TactileError where a result may not stand: one is there (unless `overwrite`), or something else is.
 
     maker : what its note says of who made it; another verb's result is something else, and so is one among whose files
         there are others

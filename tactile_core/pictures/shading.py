@@ -169,7 +169,7 @@ def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.nd
 
 
 def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
-    """Raises TactileError for heights (H, W) m that reach an LED's middle or the camera."""
+    """Raise TactileError for heights (H, W) m that reach an LED's middle or the camera."""
     lowest = min(unit.leds, key=lambda led: led.position[2])
     limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
     for what, limit in limits.items():

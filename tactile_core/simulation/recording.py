@@ -97,7 +97,7 @@ def _tiers_told(tiers: Mapping[str, str] | None) -> str:
 
 
 def check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
-    """Raises TactileError for a point that presses beside the DIGIT's gel."""
+    """Raise TactileError for a point that presses beside the DIGIT's gel."""
     for number, point in enumerate(spec.points, 1):
         if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3):
             raise TactileError(

@@ -89,7 +89,7 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
 
 
 def check(file: str | os.PathLike, scene: Scene) -> None:
-    """Raises TactileError for what the fields' types do not say: finite numbers, names, growing times."""
+    """Raise TactileError for what the fields' types do not say: finite numbers, names, growing times."""
     if scene.format != FORMAT:
         raise TactileError(f"{file}, format", repr(scene.format), repr(FORMAT))
     numbers = list(_numbers(msgspec.to_builtins(scene)))

@@ -99,7 +99,7 @@ def without(split: Split, pairs: Pairs, options: Options, path: str | os.PathLik
 
 
 def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
-    """Raises TactileError if the pairs were made on other surfaces than this version's."""
+    """Raise TactileError if the pairs were made on other surfaces than this version's."""
     for sensor in ("biotac", "digit"):
         surface, key = sensor_surface(sensor), f"{sensor}_nodes_sha256"
         found = pairs.attributes[key]

@@ -37,6 +37,6 @@ def measured(stage: str, quick: bool, file: str, missing: dict[str, str], only: 
 
 
 def one(stage: str, name: str, quick: bool, file: str) -> Method | None:
-    """Measure one method in a process of its own."""
+    """Measure one method; it is run in a process of its own."""
     measure = importlib.import_module(f"benchmarks.table.{stage}").measure
     return measure(name, quick, file) if stage in WITH_FILE else measure(name, quick)

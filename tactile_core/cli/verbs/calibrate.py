@@ -46,7 +46,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit and write, or try and tell."""
+    """Fit and write, or evaluate and report."""
     from ...pictures.calibrate.photographs import chosen, read_photographs
 
     _check_options(options)

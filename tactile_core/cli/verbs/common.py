@@ -106,7 +106,7 @@ def answer_words(options: argparse.Namespace) -> Answer:
 
 
 def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
-    """``--error``; what : the units that mean something here, in words."""
+    """Add ``--error``; what : the units that mean something here, in words."""
     verb.add_argument("--error", metavar="BOUND", help=f"the largest error that the toolkit itself may add: {what}")
 
 
@@ -116,7 +116,7 @@ def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
 
 
 def check_seed(seed: int) -> None:
-    """Raises TactileError for a seed that the generators do not take."""
+    """Raise TactileError for a seed that the generators do not take."""
     if not 0 <= seed <= MAX_SEED:
         raise TactileError("--seed", str(seed), f"0 to {MAX_SEED}", "Give another one")
 

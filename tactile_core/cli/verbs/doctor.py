@@ -22,7 +22,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Look and tell."""
+    """Check this machine and report."""
     from .. import doctor
 
     for line in doctor.report():

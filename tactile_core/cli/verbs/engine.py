@@ -35,7 +35,7 @@ def parts_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def check_counts(options: argparse.Namespace, *names: str) -> None:
-    """Raises TactileError for a number of workers or the like below 1."""
+    """Raise TactileError for a number of workers or the like below 1."""
     for name in names:
         value = getattr(options, name)
         if value is not None and value < 1:

@@ -37,7 +37,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Plan and tell."""
+    """Plan and report."""
     import json
 
     from ... import accuracy

@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Raises TactileError for words that do not go together."""
+    """Raise TactileError for words that do not go together."""
     if (options.recording is None) == (options.rosbag_play is None):
         raise TactileError("tactile watch", "no recording, or two", "PATH or --rosbag-play FILE")
     if options.speed is not None:

@@ -66,7 +66,7 @@ def _remove(folder: Path) -> None:
 
 
 def check(done: runs.Done) -> None:
-    """Raises TactileError for the first task that could not be done."""
+    """Raise TactileError for the first task that could not be done."""
     for name, why in sorted(done.aside.items()):
         where, _, found = why.partition(": ")
         raise TactileError(where, found) if found else TactileError(name, why)

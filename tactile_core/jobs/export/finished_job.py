@@ -96,7 +96,7 @@ def load(folder: Path) -> Finished:
 
 
 def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
-    """Raises TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
+    """Raise TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
     if checksummed.verified_checksum(path) is None:
         raise TactileError(path, "damaged", "a whole shard", ADVICE)
     if not frame_shard.is_of(path, job, index, number, frames):
@@ -114,7 +114,7 @@ def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
 
 
 def _check_alike(paths: list[Path]) -> None:
-    """Raises TactileError where an array's frames are not of one shape and type in all shards."""
+    """Raise TactileError where an array's frames are not of one shape and type in all shards."""
     first: dict[str, str] = {}
     for path in paths:
         for name, found in _kinds(path).items():

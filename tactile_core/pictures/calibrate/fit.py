@@ -38,7 +38,7 @@ class Calibrated:
 
 
 def check_diameter(ball_diameter: float) -> None:
-    """Raises TactileError for a ball, m, that does not fit on the gel."""
+    """Raise TactileError for a ball, m, that does not fit on the gel."""
     if not MM_LIMITS[0] <= 1e3 * ball_diameter <= MM_LIMITS[1]:
         expected = f"{MM_LIMITS[0]:g} to {MM_LIMITS[1]:g}"
         raise TactileError("ball diameter, mm", f"{1e3 * ball_diameter:g}", expected)

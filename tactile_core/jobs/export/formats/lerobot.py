@@ -121,7 +121,7 @@ def _rate(one: Recorded) -> float:
 
 
 def _check_rate(one: Recorded, first: float) -> None:
-    """Raises TactileError for a recording of another rate than the first one's, and for less than a frame a second."""
+    """Raise TactileError for a recording of another rate than the first one's, and for less than a frame a second."""
     rate = _rate(one)
     if round(first) < 1 or abs(rate / first - 1) > SAME_RATE:
         expected = f"{first:g} frames/s, as the first: the layout has one rate" if round(first) else "1 or more"
