@@ -114,7 +114,7 @@ def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
-    """(3, 3): the object's axes, scaled, in those of a sensor object."""
+    """Axes (3, 3) of the object, scaled, in those of a sensor object."""
     return np.array(sensor.matrix_world.inverted() @ thing.matrix_world)[:3, :3]
 
 

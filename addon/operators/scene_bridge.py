@@ -116,7 +116,7 @@ def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.typ
 
 
 def _motion(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001
-    """apex (P, 3) m in the sensor's frame and force (P,) N; the scene is left on the frame it was on."""
+    """Apex (P, 3) m in the sensor's frame and force (P,) N; the scene is left on the frame it was on."""
     scene, now = context.scene, (context.scene.frame_current, context.scene.frame_subframe)
     apex, force = [], []
     try:

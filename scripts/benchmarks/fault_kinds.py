@@ -52,7 +52,7 @@ def killed_workers(bench: Bench) -> Lost:
 
 
 def killed_client(bench: Bench) -> Lost:
-    """kill -9 to the command at random moments, then the same command again."""
+    """Kill -9 the command at random moments, then run the same command again."""
     out, blows = bench.folder / "client", 0
     for _ in range(bench.blows):
         process = start(bench.command(out))

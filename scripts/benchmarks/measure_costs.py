@@ -115,7 +115,7 @@ def conversions(folder: Path) -> dict[str, Part]:
 
 
 def full_tier() -> dict[str, float]:
-    """ms a contact of the full tier at a force, by sensor: the median of three forces."""
+    """Time of a contact of the full tier at a force, ms, by sensor: the median of three forces."""
     found = {}
     for sensor in ("biotac", "digit"):
         times = []

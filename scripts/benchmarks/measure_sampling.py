@@ -75,7 +75,7 @@ def measured(quick: bool) -> dict:
 
 
 def press_error(indenter, place: Placement, share: float) -> float | None:  # noqa: ANN001
-    """rms m of the height map between nodes; None where the full tier finds no equilibrium."""
+    """RMS error, m, of the height map between nodes; None where the full tier finds no equilibrium."""
     pose = pose_at("digit", indenter, place)
     depth = share * thickness_under("digit", indenter, pose)
     try:
@@ -88,7 +88,7 @@ def press_error(indenter, place: Placement, share: float) -> float | None:  # no
 
 
 def between_nodes(solution: Solution) -> float:
-    """rms m over the full tier's own surface nodes in the picture that have moved."""
+    """RMS error, m, over the full tier's own surface nodes in the picture that have moved."""
     solid, state = solution.volume
     rest = solid.mesh.nodes[solid.mesh.surface]
     moved = rest + state.displacement[solid.mesh.surface]

@@ -137,7 +137,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write_inputs(folder: Path) -> None:
-    """touch.csv, the first 100 frames of the shipped recording; scene.toml, one press of 11 frames."""
+    """Write touch.csv, the first 100 frames of the shipped recording; scene.toml, one press of 11 frames."""
     write_scene(folder, (0.0, -8.0, 0.0, 0.0), (0.1, -8.0, 0.0, 0.3))
     electrodes = recordings.read(RECORDING).electrodes[:100]
     names = ["timestamp", "tdc", "tac", "pdc", *(f"pac{i}" for i in range(1, 23)), *(f"ele{i}" for i in range(1, 20))]
@@ -147,7 +147,7 @@ def write_inputs(folder: Path) -> None:
 
 
 def write_scene(folder: Path, *points: tuple[float, float, float, float]) -> None:
-    """scene.toml of a 7 mm ball; points : its way, (time s, x mm, z mm, force N)."""
+    """Write scene.toml of a 7 mm ball; points : its way, (time s, x mm, z mm, force N)."""
     lines = ["    {{ time_s = {}, x_mm = {}, z_mm = {}, force_n = {} }},\n".format(*point) for point in points]
     (folder / "scene.toml").write_text(
         f"""format = "tactile-scene-1"

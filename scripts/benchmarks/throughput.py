@@ -117,7 +117,7 @@ def workers(folder: Path) -> list[Row]:
 
 
 def client_cost(folder: Path) -> float:
-    """ms of the client's own CPU time a task: the answers come from a process that does nothing."""
+    """CPU time of the client itself a task, ms: the replies come from a process that does nothing."""
     from tactile_core.jobs.engine.tasks import Task
 
     answer = "import sys\nfor line in sys.stdin:\n    print('{}', flush=True)"

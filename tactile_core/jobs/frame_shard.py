@@ -77,7 +77,7 @@ def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
 
 
 def _identity(job: Job, index: int, number: int, frames: int) -> dict[str, str | int]:
-    """The attributes that tell a shard from others."""
+    """The attributes that distinguish a shard from others."""
     return {
         "recording_sha256": job.inputs[index].sha256, "recipe": job.id, "shard": number, "shards": count(frames, job)
     }  # fmt: skip

@@ -140,7 +140,7 @@ def _one_polarity(path: str, options: PrepareOptions) -> tuple[PrepareOptions, s
 
 
 def _decided_once(signals: Signals, doubts: np.uint16, evidence: str, *, first: bool) -> Signals:
-    """A part's signals under what was decided of the whole recording's polarity, which is told once."""
+    """A part's signals under what was decided of the whole recording's polarity, which is reported once."""
     flags = (signals.flags & ~DOUBTS) | doubts
     report = signals.report | ({"polarity_evidence": evidence} if evidence else {})
     keep = first and not evidence
@@ -213,7 +213,7 @@ class _Writer:
 
 
 class Prepared:
-    """An open look into a prepared file; every call opens it anew, so that nothing stays open in a worker.
+    """An open look into a prepared file; every call opens it again, so that nothing stays open in a worker.
 
     Each raises TactileError for a damaged file.
     """

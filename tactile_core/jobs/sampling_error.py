@@ -22,7 +22,9 @@ def measured() -> dict[str, Any]:
 
 
 def height_error(share: float) -> float:
-    """um rms of a height map between nodes that 95 of 100 contacts stay below, up to a depth over the thickness."""
+    """Bound, um rms, on the error of a height map between nodes for 95 of 100 contacts, up to a depth over the
+    thickness.
+    """
     bins = measured()["bins"]
     reached = [each for each in bins if each["depth_share_to"] < share] + [_bin_of(share)]
     return 1e6 * max(each["rms_95_m"] for each in reached)
@@ -35,7 +37,7 @@ def _bin_of(share: float) -> dict[str, float]:
 
 
 def rounding() -> float:
-    """um, largest that float32 changes in a translated gel."""
+    """Largest change, um, that float32 makes in a translated gel."""
     return 1e6 * measured()["float32_m"]
 
 

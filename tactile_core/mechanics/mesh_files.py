@@ -23,7 +23,7 @@ _VTK_NAMES = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "int
 
 
 def vtk_order() -> np.ndarray:
-    """(27,) which node of a ``HexMesh`` cell, a + 3 b + 9 c, VTK's triquadratic hexahedron has at each of its places.
+    """Node (27,) of a ``HexMesh`` cell, a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
 
     VTK counts corners, then edges, faces -x +x -y +y -z +z and the middle, bottom before top and the bottom's edges
     before the upright ones last: Schroeder, Martin, Lorensen, The Visualization Toolkit, vtkTriQuadraticHexahedron.

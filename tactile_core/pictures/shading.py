@@ -159,7 +159,7 @@ class Lamp:
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """values as float32; raises TactileError, by their name, for another shape or what is not finite."""
+    """Convert values to float32; raises TactileError, by their name, for another shape or what is not finite."""
     values = np.asarray(values)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")

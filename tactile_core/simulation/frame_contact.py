@@ -38,7 +38,7 @@ class FrameContact:
 
     @property
     def displacement(self) -> np.ndarray:
-        """(n, 3) m, of the sensor's surface nodes."""
+        """Displacement (n, 3) m of the sensor's surface nodes."""
         solved = self._solved
         return solved.corrected.displacement if isinstance(solved, FastContact) else solved.displacement
 

@@ -107,7 +107,7 @@ def check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
 
 
 def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """time (T,) s, place (T, 2) m and force (T,) N at 100 Hz."""
+    """Compute time (T,) s, place (T, 2) m and force (T,) N at 100 Hz."""
     points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
     time = np.arange(round(points[0, 0] * sensors.SAMPLE_RATE), round(points[-1, 0] * sensors.SAMPLE_RATE) + 1)
     time = time / sensors.SAMPLE_RATE

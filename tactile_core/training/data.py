@@ -71,7 +71,7 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """(B, 20) the signals of the contacts as a sensor would give them: see `noise_model.measured`."""
+        """Signals (B, 20) of the contacts as a sensor would give them: see `noise_model.measured`."""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes()]
@@ -98,5 +98,5 @@ class Contacts:
 
 
 def _depth(pairs: Pairs) -> np.ndarray:
-    """(C,) float32 m, how deep each contact's deepest node of the gel lies."""
+    """Depth (C,) float32 m of each contact's deepest node of the gel."""
     return pairs.displacement_digit[:, :, 1].max(1) * np.float32(pairs.scale_digit)

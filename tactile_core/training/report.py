@@ -48,7 +48,7 @@ class Measure:
         self.change = self.read(self.rows, 2)
 
     def read(self, rows: np.ndarray, stream: int) -> np.ndarray:
-        """(C, 19) counts as read, signed."""
+        """Signals (C, 19) counts as read, signed."""
         return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
 

@@ -55,11 +55,11 @@ class SurfaceCodec:
 
     @property
     def nodes(self) -> int:
-        """n."""
+        """Number n of nodes."""
         return self.data.shape[1]
 
     def _local(self, rows: np.ndarray) -> np.ndarray:
-        """(B, n, 3) float32 of contacts, in whole units and in the nodes' own frames."""
+        """Displacements (B, n, 3) float32 of contacts, in whole units and in the nodes' own frames."""
         values, turned = self.data[rows % len(self.data)].astype(np.float32), rows >= len(self.data)
         if turned.any():
             values[turned] = across(values[turned][:, self._image])
@@ -90,7 +90,7 @@ class SurfaceCodec:
         return torch.stack([squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()], -1)
 
     def inputs(self, rows: np.ndarray) -> Tensor:
-        """(B, K + K' + 4) what the encoder reads: coefficients, place, what is left of it; zero for silent ones."""
+        """Input (B, K + K' + 4) of the encoder: coefficients, place, what is left of it; zero for silent ones."""
         at = np.maximum(rows, 0)
         place = torch.from_numpy(np.concatenate([self.place[at], self.left[at]], -1))
         return torch.cat([self.modes[at], place], -1) * touching(rows)
@@ -105,7 +105,7 @@ class SurfaceCodec:
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
     def true_place(self, rows: np.ndarray) -> Tensor:
-        """(B, 2) of the contacts' dents; 0 for silent ones."""
+        """Places (B, 2) of the contacts' dents; 0 for silent ones."""
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
@@ -137,12 +137,12 @@ class SurfaceCodec:
         return torch.from_numpy(self.frame.add(whole, near, cell.cpu().numpy()))
 
     def true(self, rows: np.ndarray) -> Tensor:
-        """(B, n, 3) m, in the nodes' own frames."""
+        """Displacements (B, n, 3) m, in the nodes' own frames."""
         values = torch.from_numpy(self._local(np.maximum(rows, 0)))
         return values * (self.unit * touching(rows)[:, :, None])
 
     def _at_cells(self, rows: np.ndarray, cells: Tensor) -> Tensor:
-        """(B, K + K') m, the coefficients of contacts in windows round other cells (B, 2) than their own."""
+        """Coefficients (B, K + K') m of contacts in windows round other cells (B, 2) than their own."""
         metres, cell = self.modes[rows] * self.scale, cells.cpu().numpy()
         moved = (cell != self.cell[rows]).any(-1)
         if moved.any():
@@ -155,7 +155,9 @@ class SurfaceCodec:
 
 
 def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """(C, n, 3) int16 in the nodes' own frames; where none is turned the data themselves, which are large."""
+    """Displacements (C, n, 3) int16 in the nodes' own frames; where none is turned the data themselves, which
+    are large.
+    """
     if not frame.turn.any():
         return data
     local = np.empty_like(data)
@@ -180,5 +182,5 @@ def _parts(count: int) -> list[slice]:
 
 
 def touching(rows: np.ndarray) -> Tensor:
-    """(B, 1): 1 for contacts, 0 for silent samples."""
+    """Mask (B, 1): 1 for contacts, 0 for silent samples."""
     return torch.from_numpy((rows != SILENT).astype(np.float32))[:, None]

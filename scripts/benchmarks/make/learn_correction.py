@@ -180,7 +180,7 @@ def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.nda
 
 
 def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> list[float]:
-    """rms and largest shape error m, relative force error; each after the correction, then before."""
+    """RMS and largest shape error m, relative force error; each after the correction, then before."""
     truth = sample.full.astype(float)
     counts = np.linalg.norm(truth, axis=1) > _SIGNIFICANT
     after = sample.fast + sample.depth * correction.spread_field(sensor, sample.frame, field) - truth

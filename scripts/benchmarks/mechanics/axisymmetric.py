@@ -34,7 +34,7 @@ class QuadMesh:
 
     @property
     def fixed(self) -> np.ndarray:
-        """(3 n,) bool: clamped nodes, the hoop, and the radius on the axis."""
+        """Mask (3 n,) bool: clamped nodes, the hoop, and the radius on the axis."""
         fixed = np.repeat(self.clamped, 3).reshape(-1, 3)
         fixed[:, 2] = True
         fixed[self.nodes[:, 0] == 0, 0] = True

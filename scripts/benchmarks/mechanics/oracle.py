@@ -80,7 +80,7 @@ class _Other:
         self._assemble(self.basis.interpolate(field).grad)
 
     def _numbering(self) -> np.ndarray:
-        """(n, 3) scikit-fem's degree of freedom of each of our nodes, found by place."""
+        """Degree of freedom (n, 3) in scikit-fem of each of our nodes, found by place."""
         places = self.basis.doflocs.T
         axes, dofs = np.empty(self.basis.N, int), self.basis.dofs
         for table in (dofs.nodal_dofs, dofs.edge_dofs, dofs.facet_dofs, dofs.interior_dofs):

@@ -88,7 +88,9 @@ def same_pairs() -> str:
 
 
 def plot(methods: Sequence[Method]) -> bytes:
-    """PNG: error over time, both logarithmic, one panel a stage; the Pareto front, and doing nothing, as lines."""
+    """Draw a PNG: error over time, both logarithmic, one panel a stage; the Pareto front, and doing nothing, as
+    lines.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -89,7 +89,7 @@ def _part(signals: Signals, rows: slice) -> Signals:
 def _translate(
     signals: Signals, network: Translate, state: np.ndarray | list[None]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
-    """force N, volume mm3, centre mm, latent, count of numbers that are none."""
+    """Translate to force N, volume mm3, centre mm, latent, and the count of NaN."""
     found = network(signals, state) if isinstance(state, np.ndarray) else network(signals)
     arrays = (found.force, found.displacement_biotac, found.displacement_digit, found.latent_digit, found.confidence)
     not_finite = sum(int(np.count_nonzero(~np.isfinite(array))) for array in arrays)
@@ -98,7 +98,7 @@ def _translate(
 
 
 def displaced_volume(displacement: np.ndarray) -> np.ndarray:
-    """(T,) m3 by which the gel gives way, for displacements (T, M, 3) m of its surface; bulges do not count."""
+    """Volume (T,) m3 of the gel's dent, for displacements (T, M, 3) m of its surface; bulges do not count."""
     digit = sensors.digit_surface()
     areas = unrolling.node_areas(np.asarray(digit.rest), np.asarray(digit.faces))
     return np.maximum(accuracy.height(displacement), 0) @ areas

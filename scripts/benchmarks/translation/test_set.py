@@ -115,7 +115,7 @@ def _share_row(name: str, value: float, low: float | None, high: float | None, s
 
 
 def speed_rows(translator: Translator, pairs: Pairs) -> list[Row]:
-    """ms a frame, from changes to both displacements, and with expected errors and confidence."""
+    """Measure ms a frame, from changes to both displacements, and with expected errors and confidence."""
     nets, found = translator.nets, []
 
     def surfaces(change: np.ndarray) -> None:

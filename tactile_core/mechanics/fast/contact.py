@@ -82,7 +82,7 @@ class ContactProblem:
         return self._walk(pose, axial_force, start)
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise SunkError where the indenter has sunk in between the surface's nodes."""
+        """Raise SunkError where the indenter has penetrated between the surface's nodes."""
         surface, deformed = self.compliance.surface, contact.deformed
         _, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable[contact.nodes]])
         where, grid = f"fast tier, {self.compliance.name}", surface.grid(deformed)
@@ -109,7 +109,7 @@ class ContactProblem:
 
     @property
     def near(self) -> np.ndarray:
-        """(n,) sorted touchable indices of the nodes that are followed."""
+        """Sorted touchable indices (n,) of the nodes that are followed."""
         return self._rows.near
 
     @property

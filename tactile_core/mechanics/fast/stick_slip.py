@@ -44,12 +44,12 @@ class Slipping:
 
     @functools.cached_property
     def across(self) -> np.ndarray:
-        """(s, 3), unit vectors across the normal and friction."""
+        """Unit vectors (s, 3) across the normal and friction."""
         return cross(self.normal, self.lean)
 
     @functools.cached_property
     def limit(self) -> np.ndarray:
-        """(s,) N, of friction."""
+        """Limit (s,) N of friction."""
         return self.friction * np.maximum(self.pressing, LEAST_FORCE)
 
     def turning(self) -> np.ndarray:

@@ -88,7 +88,7 @@ class Body:
         return self.graded.on_lattice(moved)
 
     def contact_patch(self, touch: ContactState) -> np.ndarray:
-        """(n,) bool, lattice nodes that carry force."""
+        """Mark (n,) bool the lattice nodes that carry force."""
         flags = np.isin(self.solid.mesh.surface, touch.nodes[touch.pressing > 0])
         return self.graded.nearest_on_lattice(flags)
 

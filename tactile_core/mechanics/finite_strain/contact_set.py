@@ -58,12 +58,12 @@ class ContactSet:
 
     @property
     def nodes(self) -> np.ndarray:
-        """(k,) mesh nodes that touch."""
+        """Mesh nodes (k,) that touch."""
         return self.candidates[self.active]
 
     @property
     def forces(self) -> np.ndarray:
-        """(k, 3) N, of the obstacle on ``nodes``."""
+        """Forces (k, 3) N of the obstacle on ``nodes``."""
         return self.pressing[:, None] * self.normals + self.rubbing
 
     @property
@@ -213,7 +213,7 @@ class ContactSet:
         return held, step
 
     def rubbing_in_frames(self) -> np.ndarray:
-        """(k, 3) N, friction in the frames of ``begin``."""
+        """Friction (k, 3) N in the frames of ``begin``."""
         if not self.friction:
             return np.zeros((int(self.active.sum()), 3))
         return np.einsum("kji,kj->ki", self._frames, self.rubbing)

@@ -24,7 +24,7 @@ _NEAR = 100e-6
 
 
 def _weights() -> np.ndarray:
-    """(16, 9), of a face's nodes, for its points halfway between them."""
+    """Weights (16, 9) of a face's nodes, for its points halfway between them."""
     line, _ = quadratic(np.array([-1.0, -0.5, 0.0, 0.5, 1.0]))
     every = np.einsum("ib,ja->ijba", line, line).reshape(25, 9)
     return every[every.max(axis=1) < 1]
@@ -48,11 +48,11 @@ class Push:
 
     @property
     def total(self) -> np.ndarray:
-        """(3,) N."""
+        """Total force (3,) N."""
         return self.force.sum(axis=0)
 
     def loads(self, n: int) -> np.ndarray:
-        """(n, 3) N, on a mesh's n nodes."""
+        """Loads (n, 3) N on a mesh's n nodes."""
         loads = np.zeros((n, 3))
         np.add.at(loads, self.nodes, self.weights[:, :, None] * self.force[:, None])
         return loads

@@ -77,7 +77,7 @@ class SpPress:
 
     @property
     def fluid_volume(self) -> float:
-        """m3 of fluid, which the initial pressure sets and no press changes."""
+        """Volume of the fluid, m3, which the initial pressure sets and no press changes."""
         return (2 if self.mirrored else 1) * self.contact.volume
 
     def steps(self, advances: np.ndarray) -> list[Pressed]:

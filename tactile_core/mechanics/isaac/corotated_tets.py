@@ -101,7 +101,7 @@ class Linearised:
     stiffness: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """(3 n,) N; there is nothing to condense."""
+        """Internal force (3 n,) N; there is nothing to condense."""
         size = self.solid.mesh.nodes.size
         return np.bincount(self.solid.dofs.ravel(), self.force.ravel(), minlength=size)
 

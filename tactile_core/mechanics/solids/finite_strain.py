@@ -134,7 +134,7 @@ class Linearised:
     pressure_gap: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """(3 n,) N; ``condensed`` as the Newton step needs it."""
+        """Internal force (3 n,) N; ``condensed`` as the Newton step needs it."""
         values = self.condensed if condensed else self.residual
         size = 3 * len(self.solid.mesh.nodes)
         return np.bincount(self.solid.dofs.ravel(), values.ravel(), minlength=size)

@@ -1,6 +1,6 @@
 """A calibration tried on photographs: three numbers a press are fitted, and the picture is held against the photograph.
 
-The null answer stands beside each figure: the background alone, as if nothing had touched the gel.
+The baseline stands beside each metric: the background alone, as if nothing had touched the gel.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
 
 
 def mean_figures(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
-    """Means over presses of the figures and of the null's; NaN ones left out, NaN where all are."""
+    """Means over presses of the metrics and of the baseline's; NaN ones left out, NaN where all are."""
     means = []
     for which in ("figures", "null"):
         rows = [getattr(each, which) for each in tried]

@@ -167,7 +167,7 @@ class _Search:
         return self._problem.unit(self._x)
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Standard errors by name, and the names of what the photographs tell too little of.
+        """Standard errors by name, and the names of parameters that the photographs do not determine.
 
         The errors count what is assumed of units as one more measurement; misfits of the model as MODEL_ERROR.
         """

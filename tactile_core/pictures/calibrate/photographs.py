@@ -44,7 +44,7 @@ class Press:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """(row, column) of the change's centre of mass."""
+        """Centre of mass (row, column) of the change."""
         weight = np.abs(self.change).max(-1) * self.touched
         rows, columns = np.indices(weight.shape)
         return float((weight * rows).sum() / weight.sum()), float((weight * columns).sum() / weight.sum())
@@ -65,7 +65,7 @@ class Photographs:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(H, W) of each photograph, pixels."""
+        """Shape (H, W) of each photograph, pixels."""
         return self.background.shape[:2]
 
 
@@ -150,13 +150,13 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """(H, W) bool: some channel differs by more than 18 levels within 9 px; from the photograph alone."""
+    """Mask (H, W) bool where some channel differs by more than 18 levels within 9 px; from the photograph alone."""
     changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
     return dilated(changed, DILATION)
 
 
 def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
-    """mask (H, W) grown by a disc of a radius in px."""
+    """Grow a mask (H, W) by a disc of a radius in px."""
     height, width = mask.shape
     padded = np.zeros((height + 2 * radius, width + 2 * radius + 1), np.int32)
     padded[radius : radius + height, radius + 1 : radius + 1 + width] = mask

@@ -31,7 +31,7 @@ class Ball:
 
     @property
     def numbers(self) -> tuple[float, float, float, float]:
-        """right, down, depth, radius, all m."""
+        """Parameters right, down, depth, radius, all m."""
         return self.right, self.down, self.depth, self.radius
 
 
