@@ -1,4 +1,4 @@
-"""What each part of a simulation, a conversion and a rendering costs, as `tactile plan` reads it.
+"""Measure the cost of each part of a simulation, a conversion and a rendering, for `tactile plan`.
 
     python scripts/benchmarks/measure_costs.py                       writes data/costs.json, about five minutes
     python scripts/benchmarks/measure_costs.py --quick --json FILE   one sensor, and writes rows alone

@@ -1,4 +1,4 @@
-"""What the surface lattice and the height map add to a solved contact: full-tier presses, seen between the nodes.
+"""Measure the error that surface lattice and height map add to a solved contact: full-tier presses, between the nodes.
 
     python scripts/benchmarks/measure_sampling.py                       writes data/sampling.json, two minutes
     python scripts/benchmarks/measure_sampling.py --quick --json FILE   two presses, and writes rows alone

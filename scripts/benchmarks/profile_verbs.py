@@ -1,4 +1,4 @@
-"""What each verb of ``tactile`` costs, in a process of its own: time, memory, and the heavy libraries it loads.
+"""Measure the cost of each verb of ``tactile``, in its own process: time, memory, and the heavy libraries it loads.
 
     python scripts/benchmarks/profile_verbs.py --json FILE   and 700 frames converted, with the ten hottest functions
     python scripts/benchmarks/profile_verbs.py --quick --json FILE  each verb on as little as it takes, about a minute

@@ -1,4 +1,4 @@
-"""What `tactile batch` costs: frames a second against workers, overhead a shard, memory, growth with the frames.
+"""Measure the cost of `tactile batch`: frames a second by workers, overhead a shard, memory, growth with the frames.
 
     python scripts/benchmarks/throughput.py --quick --json FILE   1e3 and 1e4 frames
     python scripts/benchmarks/throughput.py --most 1000000 --pictures 20000

@@ -103,7 +103,7 @@ class Local:
 
 
 def _search_path() -> str:
-    """Path where a worker finds this package under its name, which is a long one inside Blender."""
+    """Search path on which a worker finds this package under its name, which is a long one inside Blender."""
     root = Path(__file__).parents[__package__.count(".") + 1]
     return os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
 

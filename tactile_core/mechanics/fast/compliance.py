@@ -254,5 +254,5 @@ def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -
 
 
 def _volume_gradient(mesh: HexMesh) -> np.ndarray:
-    """d(fluid volume) / d(node) (3 n_nodes,), m2, at rest."""
+    """Gradient d(fluid volume) / d(node) (3 n_nodes,), m2, at rest."""
     return FluidCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)

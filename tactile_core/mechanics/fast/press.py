@@ -74,7 +74,9 @@ class CorrectedPress:
             return None
 
     def _guarded_if_needed(self, solve: Callable[[], FastContact | None]) -> FastContact | None:
-        """Return the result of ``solve``; where frictionless nodes do not hold the indenter, with points
+        """Solve; where frictionless nodes do not hold the indenter, solve again from the start with points between
+        them, kept from then on.
+
         between them, solved from the start, and from then on.
         """
         try:
