@@ -104,7 +104,7 @@ def build(out: Path, platform: str | None, python: str, wheels: list[Path]) -> P
 
 
 def add(file: zipfile.ZipFile, name: str, content: bytes, how: int) -> None:
-    """One member, without the time of day or the builder's file modes."""
+    """Add one member, without the time of day or the builder's file modes."""
     member = zipfile.ZipInfo(name, EPOCH)
     member.compress_type, member.external_attr = how, 0o644 << 16
     file.writestr(member, content)

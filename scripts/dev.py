@@ -89,7 +89,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def check_python(version: tuple[int, int]) -> None:
-    """Raises SetupError for a Python that the pinned packages have no wheels for."""
+    """Raise SetupError for a Python that the pinned packages have no wheels for."""
     if not OLDEST <= version <= NEWEST:
         raise SetupError(
             "this is Python {}.{}; the project needs {}.{} to {}.{}. Run it with one of these, such as "
@@ -235,7 +235,7 @@ def make_venv(folder: Path) -> Path:
 
 
 def is_foreign(folder: Path) -> bool:
-    """Whether a folder holds files but no virtual environment, so that making one there would destroy them."""
+    """Return true if a folder holds files but no virtual environment, so that making one there would destroy them."""
     return any(folder.iterdir()) and not (folder / "pyvenv.cfg").exists()
 
 
@@ -290,7 +290,7 @@ def run_pip(python: Path, folder: Path, what: list[str], numpy: str | None) -> s
 
 
 def why_pip_failed(text: str, log: Path) -> str:
-    """One sentence from what pip said."""
+    """Return one sentence from pip's output."""
     if any(sign in text for sign in NETWORK_SIGNS):
         return (
             "the package index cannot be reached, or lacks a package. Check the network, or set PIP_INDEX_URL or "
@@ -315,7 +315,7 @@ def environment() -> dict[str, str]:
 
 
 def read_stamp(folder: Path) -> dict:
-    """What is installed in an environment, {} when nothing is known of it."""
+    """Read what is installed in an environment, {} when nothing is known of it."""
     try:
         found = json.loads((folder / STAMP).read_text(encoding="utf-8"))
     except (OSError, ValueError):

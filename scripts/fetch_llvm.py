@@ -24,7 +24,7 @@ SECONDS = 300
 
 
 class NoLlvm(Exception):
-    """Why there is none, in words."""
+    """Error that says why there is no LLVM."""
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,6 +1,6 @@
 """Translate touch between robot fingertips: BioTac electrode signals to DIGIT pictures, through deformation.
 
-Importing this package costs the standard library alone; numpy comes with the rooms that compute.
+Importing this package loads the standard library alone; the subpackages that compute load numpy.
 """
 
 __version__ = "0.1.0"

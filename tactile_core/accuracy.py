@@ -1,8 +1,8 @@
-"""Errors of displacements, forces and contact places against the truth, rows of reports, and bounds on errors.
+"""Measure errors of displacements, forces and contact positions against the truth; rows of reports; error bounds.
 
 The truth is a finite-element mesh or a known load.
-Each figure has a null answer, the figure of doing nothing: no displacement, no force, the mean place.
-All displacements are (C, n, 3) m, one contact a row; every function works contact by contact.
+Each metric has a baseline, its value for no displacement, no force or the mean position.
+All displacements are (C, n, 3) m, one contact a row; every function treats each contact by itself.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ def lengths(vectors: np.ndarray) -> np.ndarray:
 
 
 def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """(C,) m: root mean square of the vector error over the nodes whose true displacement exceeds 10 um.
+    """Root mean square (C,) m of the vector error over the nodes whose true displacement exceeds 10 um.
 
-    NaN where no node moves that far. The average over contacts is the rmsC of docs/sources.md, Networks.
+    NaN where no node moves that much. The average over contacts is the rmsC of docs/sources.md, Networks.
     """
     moving = lengths(true) > MOVING
     squares = np.where(moving, lengths(predicted - true) ** 2, 0.0).sum(-1)
@@ -43,19 +43,19 @@ def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def max_error(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """(C,) m: largest vector error of a node."""
+    """Largest vector error (C,) m of any node."""
     return lengths(predicted - true).max(-1)
 
 
 def height(displacement: np.ndarray) -> np.ndarray:
-    """(C, n) m: how far nodes moved along +y, into the DIGIT's gel."""
+    """Displacement (C, n) m of nodes along +y, into the DIGIT's gel."""
     return np.asarray(displacement[..., 1], np.float64)
 
 
 def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
-    """(C,) m: rms error of the depth over the core, the nodes above 30 % of the true peak; NaN without contact.
+    """RMS error (C,) m of the depth over the core, the nodes above 30 % of the true peak; NaN without contact.
 
-    depth : what depth means on this surface: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved
+    depth : function that gives the depth: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved
     """
     found, truth = depth(predicted), depth(true)
     peak = truth.max(-1, keepdims=True)
@@ -65,14 +65,14 @@ def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = he
 
 
 def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
-    """(C,): error of the depth of the deepest node, share of the true one; NaN without contact."""
+    """Error (C,) of the depth of the deepest node, as a share of the true depth; NaN without contact."""
     peak, truth = depth(predicted).max(-1), depth(true).max(-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(truth > MOVING, np.abs(peak - truth) / truth, np.nan)
 
 
 def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """(C, 2) m: (x, z) of the dent, mean place of its core weighted with depth; NaN where nothing moves 10 um.
+    """Centre (C, 2) = (x, z) m of the dent, depth-weighted mean position of its core; NaN where no node moves 10 um.
 
     displacement : (C, n, 3) m
     rest : (n, 3) m
@@ -81,7 +81,7 @@ def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) -> np.ndarray:
-    """(C, 2), mean of the places (n, 2) of a dent's core, weighted with depth (C, n) m; NaN if none is above least."""
+    """Depth-weighted mean (C, 2) of the places (n, 2) of a dent's core; NaN if no depth (C, n) m is above least."""
     peak = depth.max(-1, keepdims=True)
     weight = np.where((depth > CORE * peak) & (peak > least), depth, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -89,13 +89,13 @@ def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) ->
 
 
 def mean(values: np.ndarray) -> float | None:
-    """Mean over contacts without the NaN ones; None if none is left (JSON knows no NaN)."""
+    """Mean over contacts without NaN; None if none is left (JSON has no NaN)."""
     values = np.asarray(values)[np.isfinite(values)]
     return float(values.mean()) if len(values) else None
 
 
 def mesh_figures(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
-    """The four figures of a mesh for each contact: micrometres, and per cent for the peak."""
+    """Compute the four metrics of a mesh for each contact: micrometres, and per cent for the peak."""
     return {
         "rms_um": 1e6 * rms_in_contact(predicted, true),
         "max_um": 1e6 * max_error(predicted, true),
@@ -114,7 +114,7 @@ def row(
     of: str = "",
     at_least: bool = False,
 ) -> Row:
-    """One figure, rounded to four digits; ``of`` says on what it was measured.
+    """Make a report row of one value, rounded to four digits; ``of`` names the data it was measured on.
 
     ok : |value| <= target, or value >= target for ``at_least``; None where there is no target
     """
@@ -124,25 +124,25 @@ def row(
 
 
 def line(row: Row) -> str:
-    """A row as a line of the table."""
+    """Format a row as a line of the table."""
     mark = {None: "", True: "ok", False: "MISSED"}[row["ok"]]
     cells = [row["name"], row["value"], row["unit"], row["target"], row["null"], row["set"], mark]
     return "| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |"
 
 
 def failed(rows: list[Row]) -> list[Row]:
-    """Rows of errors that miss their target."""
+    """Return the rows of errors that miss their target."""
     return [found for found in rows if found["ok"] is False and found["unit"] not in COSTS]
 
 
 def order(sizes: list[float], errors: list[float]) -> float:
-    """Observed order of accuracy: slope of a straight line through log(error) over log(size)."""
+    """Observed order of accuracy: slope of the straight line fitted to log(error) over log(size)."""
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
 
 
 @dataclasses.dataclass(frozen=True)
 class Budget:
-    """The largest error that will do; None where the user does not say.
+    """Largest acceptable error; None where the user gives no bound.
 
     um : micrometres rms of a surface, or of a height map; levels : grey levels rms of a picture
     """
@@ -151,12 +151,12 @@ class Budget:
     levels: float | None = None
 
     def __str__(self) -> str:
-        """As `parse_budget` reads it."""
+        """Format the bounds as `parse_budget` reads them."""
         given = {"um": self.um, "levels": self.levels}
         return ",".join(f"{value:g}{unit}" for unit, value in given.items() if value is not None)
 
     def only(self, unit: str, why: str) -> float:
-        """The bound in one unit, where the other has no meaning. Raises TactileError where it is asked for."""
+        """Return the bound in ``unit``; raises TactileError where one is given in the other unit, meaningless here."""
         other = "levels" if unit == "um" else "um"
         if getattr(self, other) is not None:
             raise TactileError("--error", f"{getattr(self, other):g}{other}", f"a bound in {unit}", why)
@@ -164,7 +164,7 @@ class Budget:
 
 
 def parse_budget(text: str) -> Budget:
-    """``"5um"``, ``"0.6levels"`` or ``"5um,0.6levels"``. Raises TactileError for anything else."""
+    """Parse ``"5um"``, ``"0.6levels"`` or ``"5um,0.6levels"``. Raises TactileError for anything else."""
     found: dict[str, float] = {}
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d*\.?\d+(?:e[+-]?\d+)?)\s*(um|µm|μm|levels?)\s*", part, re.IGNORECASE)
@@ -177,7 +177,7 @@ def parse_budget(text: str) -> Budget:
 
 
 class Candidate(NamedTuple):
-    """One way to do it: its measured error, in the unit of the bound, and what it costs, ms."""
+    """Method with its measured error, in the unit of the bound, and its cost, ms."""
 
     name: str
     error: float
@@ -185,9 +185,9 @@ class Candidate(NamedTuple):
 
 
 def cheapest(candidates: Sequence[Candidate], bound: float, unit: str, what: str = "") -> Candidate:
-    """The candidate of least cost whose error is at most the bound; what : of which they are, for the message.
+    """Return the candidate of least cost whose error is at most the bound; what : their subject, for the message.
 
-    Raises TactileError, naming the best there is, where none is.
+    Raises TactileError, naming the most exact candidate, where none is exact enough.
     """
     good = [each for each in candidates if each.error <= bound]
     if not good:

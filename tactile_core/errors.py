@@ -1,4 +1,4 @@
-"""The one error a user meets: what is wrong, where, what was expected, what to do."""
+"""The one error type shown to users: what is wrong, where, what was expected, what to do."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class TactileError(Exception):
         super().__init__(self._sentence())
 
     def __reduce__(self) -> tuple[type, tuple[str, str, str, str]]:
-        """Worker processes hand errors over; by default only the sentence would arrive."""
+        """Pickle all fields, so that worker processes pass errors on; by default only the sentence would arrive."""
         return type(self), (self.where, self.found, self.expected, self.advice)
 
     def _sentence(self) -> str:

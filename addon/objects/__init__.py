@@ -1,1 +1,1 @@
-"""What stands in the scene: sensors, indenters, electrodes, their meshes, keys and colours."""
+"""Objects of the scene: sensors, indenters, electrodes, their meshes, keys and colours."""

@@ -1,7 +1,7 @@
-"""From the sensors' frame in metres to Blender's axes in the scene's units, and back.
+"""Convert between the sensors' frame in metres and Blender's axes in the scene's units.
 
-The sensors' frame (``tactile_core.sensors``): x along the finger, y normal to the pad with the contact side at -y,
-z lateral. In Blender the pad looks up: X = x, Y = z, Z = -y, a rotation. Lengths follow the scene: one Blender unit is
+The sensors' frame (``tactile_core.sensors``): x along the finger, y normal to the pad with the contact side at -y, z
+lateral. In Blender the pad looks up: X = x, Y = z, Z = -y, a rotation. Lengths follow the scene: one Blender unit is
 ``unit_settings.scale_length`` metres. The importers set it to 0.001 unless told otherwise, so that a fingertip is 28
 units long and the viewport's clipping and grid suit it; the sidebar then shows millimetres.
 """

@@ -42,6 +42,6 @@ def write_curve(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.n
 
 
 def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray) -> None:
-    """One F-curve a column of ``values`` (T, k)."""
+    """Write one F-curve a column of ``values`` (T, k)."""
     for index in range(values.shape[1]):
         write_curve(owner, path, frames, values[:, index], index)

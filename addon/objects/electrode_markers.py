@@ -38,7 +38,7 @@ def add_markers(
 
 
 def colours_of(change: np.ndarray) -> np.ndarray:
-    """(T, 19) counts -> (T, 19, 3) colours, grey at rest."""
+    """Convert (T, 19) counts to (T, 19, 3) colours, grey at rest."""
     share = change / max(float(np.abs(change).max(initial=0.0)), 1.0)
     strength = np.sqrt(np.abs(share))[..., None]  # light touches show too
     return _REST + strength * (np.where(share[..., None] > 0, _HIGH, _LOW) - _REST)

@@ -44,7 +44,7 @@ def fingerprint(thing: bpy.types.Object) -> str:
 
 
 def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
-    """Raises TactileError for what no indenter can be: mirrored, or a spec's body that is scaled or turned.
+    """Raise TactileError for what no indenter can be: mirrored, or a spec's body that is scaled or turned.
 
     relative : (3, 3) of the object's axes in those of the sensor
     """
@@ -105,7 +105,7 @@ def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.D
 
 
 def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """From the object's origin to where it touches first, (3,) Blender units: zero for a spec's body."""
+    """Vector from the object's origin to its point of first touch, (3,) Blender units: zero for a spec's body."""
     if thing.tactile.spec:
         return np.zeros(3)
     nodes = triangles_of(thing, relative, depsgraph).reshape(-1, 3)
@@ -114,11 +114,11 @@ def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
-    """(3, 3): the object's axes, scaled, in those of a sensor object."""
+    """Axes (3, 3) of the object, scaled, in those of a sensor object."""
     return np.array(sensor.matrix_world.inverted() @ thing.matrix_world)[:3, :3]
 
 
 def place_of(thing: bpy.types.Object, sensor: bpy.types.Object, foot: np.ndarray) -> np.ndarray:
-    """Where the indenter touches, (3,) m in the sensor's frame."""
+    """Point where the indenter touches, (3,) m in the sensor's frame."""
     origin = np.array((sensor.matrix_world.inverted() @ thing.matrix_world).translation)
     return axes.to_sensor(origin + foot, sensor.tactile.per_metre)

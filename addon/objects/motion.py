@@ -1,4 +1,4 @@
-"""One way in to the three ways of animating a surface."""
+"""Animate a surface in any of three ways, through one interface."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ COMPACT_ERROR = 10e-6  # m, largest error of a vertex that compact keys aim at: 
 
 
 def write_absolute(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray) -> None:
-    """One key a frame, shown one after the other by one F-curve of ``eval_time``.
+    """Write one key a frame, shown one after the other by one F-curve of ``eval_time``.
 
     rest : (n, 3), displacement : (T, n, 3), in the object's own units; frames : (T,) of the scene
     """

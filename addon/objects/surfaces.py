@@ -23,7 +23,7 @@ def new_mesh_object(name: str, nodes: np.ndarray, faces: np.ndarray, smooth: boo
 
 
 def paint(thing: bpy.types.Object, colour: tuple[float, float, float, float]) -> None:
-    """One material, which shows the object's own colour, so that it can be animated and seen in every shading."""
+    """Assign a material that shows the object's own colour, so that it can be animated and seen in every shading."""
     thing.color = colour
     thing.data.materials.append(_material())
 

@@ -1,1 +1,1 @@
-"""What buttons and menus do: import, translate, simulate, render."""
+"""Operators of buttons and menus: import, translate, simulate, render."""

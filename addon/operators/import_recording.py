@@ -98,7 +98,7 @@ class TACTILE_FH_recording(bpy.types.FileHandler):
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
-        """Only on 3D views."""
+        """Return true on 3D views only."""
         return context.area is not None and context.area.type == "VIEW_3D"
 
 

@@ -12,12 +12,12 @@ _failed = ""  # why the last frame could not be drawn; shown in the panel
 
 
 def is_on() -> bool:
-    """Whether the frame handler exists."""
+    """Return true if the frame handler exists."""
     return _draw in bpy.app.handlers.frame_change_post
 
 
 def failure() -> str:
-    """Why the last picture could not be drawn, or nothing."""
+    """Return why the last picture could not be drawn, or nothing."""
     return _failed
 
 
@@ -49,7 +49,7 @@ class TACTILE_OT_live_picture(TactileOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Only where there is a gel to look at; it can always be switched off."""
+        """Return true where there is a gel to look at, or the picture is on: it can always be switched off."""
         if not is_on() and properties.of_role(context.scene, "DIGIT") is None:
             cls.poll_message_set("Translate a recording first, or add a DIGIT")
             return False

@@ -69,7 +69,7 @@ class TACTILE_PT_render(bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Only for this engine."""
+        """Return true for this engine only."""
         return context.engine == ID
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -39,7 +39,7 @@ def indenter_of(context: bpy.types.Context) -> bpy.types.Object:
 
 
 def sensor_of(context: bpy.types.Context) -> bpy.types.Object:
-    """What places refer to: the DIGIT's gel, else the BioTac's skin. Raises TactileError."""
+    """Return the sensor that places refer to: the DIGIT's gel, else the BioTac's skin. Raises TactileError."""
     found = properties.of_role(context.scene, "DIGIT") or properties.of_role(context.scene, "BIOTAC")
     if found is None:
         raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
@@ -116,7 +116,7 @@ def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.typ
 
 
 def _motion(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001
-    """apex (P, 3) m in the sensor's frame and force (P,) N; the scene is left on the frame it was on."""
+    """Apex (P, 3) m in the sensor's frame and force (P,) N; the scene is left on the frame it was on."""
     scene, now = context.scene, (context.scene.frame_current, context.scene.frame_subframe)
     apex, force = [], []
     try:
@@ -143,7 +143,7 @@ def _points(scene: bpy.types.Scene, frames: np.ndarray, values: dict, originals:
 
 
 def _same(points: list[dict], originals: list[dict]) -> bool:
-    """Whether the points are those of the file, but for what float32 keyframes round away."""
+    """Return true if the points are those of the file, up to the rounding of float32 keyframes."""
     if len(points) != len(originals):
         return False
     found, wanted = ([list(point.values()) for point in each] for each in (points, originals))

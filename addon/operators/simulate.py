@@ -16,7 +16,7 @@ _STEP = 0.1  # s between two looks at the worker
 
 
 def _outputs(scene: bpy.types.Scene) -> list[str]:
-    """What the sensors of a scene are for: one that is not there is not solved."""
+    """List the outputs for the sensors of a scene: one that is not there is not solved."""
     of = {"BIOTAC": ["electrodes", "displacement_biotac"], "DIGIT": ["displacement_digit"]}
     return [word for role, words in of.items() if properties.of_role(scene, role) for word in words]
 
@@ -30,7 +30,7 @@ class TACTILE_OT_simulate(TactileOperator):
     seed: bpy.props.IntProperty(name="Seed", description="Of the electrodes' noise: same seed, same recording", min=0)
 
     def _begin(self, context: bpy.types.Context) -> None:
-        """Raises TactileError."""
+        """Raise TactileError."""
         require("h5py", "msgspec", "scipy")
         from ...tactile_core.simulation.scene_text import write_scene
 
@@ -67,7 +67,7 @@ class TACTILE_OT_simulate(TactileOperator):
         skin.tactile.frames, skin.tactile.first_frame = ":", context.scene.frame_start
 
     def work(self, context: bpy.types.Context) -> None:
-        """Without a window, or from a script: waits for the end."""
+        """Simulate without a window, or from a script: waits for the end."""
         try:
             self._begin(context)
             while not self._job.poll(_STEP):
@@ -77,7 +77,7 @@ class TACTILE_OT_simulate(TactileOperator):
             self._close(context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """From the window: goes on while Blender stays usable."""
+        """Simulate from the window: goes on while Blender stays usable."""
         try:
             with reported(self):
                 self._begin(context)

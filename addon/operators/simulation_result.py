@@ -1,4 +1,4 @@
-"""What a simulation leaves in the scene: moving sensors, force curves, the indenter where it stood, pictures."""
+"""Put a simulation's result into the scene: moving sensors, force curves, the indenter where it was, pictures."""
 
 from __future__ import annotations
 

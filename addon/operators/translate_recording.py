@@ -1,4 +1,4 @@
-"""One button: the imported recording as a DIGIT would have felt it."""
+"""Translate the imported recording to a DIGIT's at the press of one button."""
 
 import bpy
 
@@ -20,7 +20,7 @@ class TACTILE_OT_translate(TactileOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Only where there is a BioTac to translate."""
+        """Return true where there is a BioTac to translate."""
         if properties.of_role(context.scene, "BIOTAC", context.object) is None:
             cls.poll_message_set("Import a BioTac recording first")
             return False

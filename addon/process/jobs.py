@@ -43,7 +43,7 @@ class Job:
 
     @property
     def share(self) -> float:
-        """How much is done, 0..1."""
+        """Share of the job that is done, 0..1."""
         return self.done / self.total
 
     def tell(self, message: dict) -> None:
@@ -85,7 +85,7 @@ class Job:
                     pipe.close()
 
     def _messages(self, wait: float) -> Iterator[dict]:
-        """What has come since the last time; waits at most so many seconds for the first."""
+        """Yield the messages since the last call; waits at most so many seconds for the first."""
         try:
             yield _message(self._lines.get(timeout=wait) if wait else self._lines.get_nowait())
             while True:

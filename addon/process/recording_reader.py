@@ -36,7 +36,7 @@ def _is_hdf5(path: str | os.PathLike) -> bool:
 
 @functools.cache
 def _hdf5_works() -> bool:
-    """Whether h5py can be imported; where it is missing altogether, the reader says so."""
+    """Return true if h5py can be imported, or is missing altogether, which the reader reports."""
     try:
         import h5py  # noqa: F401
     except ModuleNotFoundError:
@@ -47,7 +47,7 @@ def _hdf5_works() -> bool:
 
 
 def _read_elsewhere(path: str) -> Recording:
-    """Raises TactileError as the reader does."""
+    """Raise TactileError as the reader does."""
     with JobFolder() as folder:
         job = Job("read", folder, path=path)
         while not job.poll(_LOOK):

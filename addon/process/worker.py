@@ -39,7 +39,7 @@ def main(folder: Path) -> int:
 
 
 def say(**message: Any) -> None:
-    """One line for Blender."""
+    """Print one line for Blender."""
     sys.stdout.write(json.dumps(message) + "\n")
     sys.stdout.flush()
 
@@ -129,7 +129,9 @@ def _result(folder: Path, picked: list[str]) -> None:
 
 
 def render(folder: Path, job: dict, progress: Progress) -> None:
-    """For each line on stdin: FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8, by FOLDER/unit.toml."""
+    """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8, by
+    FOLDER/unit.toml.
+    """
     from tactile_core.pictures.renderer import Renderer
     from tactile_core.sensors.calibration_file import load_calibration
 

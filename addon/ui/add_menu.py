@@ -77,7 +77,7 @@ class TACTILE_OT_add_indenter(TactileOperator):
     )
 
     def draw(self, _context: bpy.types.Context) -> None:
-        """Only the sizes that the shape has."""
+        """Draw only the sizes that the shape has."""
         self.layout.prop(self, "shape")
         for name in SIZES[self.shape].values():
             self.layout.prop(self, name)
@@ -127,7 +127,7 @@ class TACTILE_OT_use_as_indenter(TactileOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Only for a mesh that is no sensor."""
+        """Return true for a mesh that is no sensor."""
         thing = context.object
         if thing is None or thing.type != "MESH" or thing.tactile.role not in ("NONE", "INDENTER"):
             cls.poll_message_set("Select a mesh of your own")

@@ -55,7 +55,7 @@ def _numbers(layout: bpy.types.UILayout, skin: bpy.types.Object | None) -> None:
 
 
 class TACTILE_PT_picture(_Panel, bpy.types.Panel):
-    """What the DIGIT's camera sees"""
+    """Picture that the DIGIT's camera sees"""
 
     bl_idname = "TACTILE_PT_picture"
     bl_label = "Picture"

@@ -1,4 +1,4 @@
-"""What the add-on remembers in a .blend: which object is what, and where its recording lies."""
+"""Properties that the add-on stores in a .blend: the role of each object, and the path of its recording."""
 
 import bpy
 
@@ -37,7 +37,7 @@ POLARITIES = (
 
 
 class TactileObject(bpy.types.PropertyGroup):
-    """Of each object."""
+    """Properties of each object."""
 
     role: bpy.props.EnumProperty(name="Role", description="What this object is to the Tactile add-on", items=ROLES)
     format: bpy.props.IntProperty(name="Format", description="Of these properties, to tell older files", default=0)
@@ -83,7 +83,7 @@ def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = N
 
 
 def check_format(thing: bpy.types.Object) -> None:
-    """Raises TactileError for an object that a newer version of the add-on made."""
+    """Raise TactileError for an object that a newer version of the add-on made."""
     if thing.tactile.format > FORMAT:
         raise TactileError(
             thing.name, f"made by a newer version of the add-on (format {thing.tactile.format})",

@@ -1,4 +1,4 @@
-"""What a scene says of its DIGIT pictures: preset, unit, lights, coating."""
+"""Settings of a scene's DIGIT pictures: preset, unit, lights, coating."""
 
 import dataclasses
 import importlib.util
@@ -22,7 +22,7 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class TactileRender(bpy.types.PropertyGroup):
-    """Of each scene."""
+    """Render settings of each scene."""
 
     preset: bpy.props.EnumProperty(name="Preset", description="How exactly the picture is made", items=PRESETS)
     calibration: bpy.props.StringProperty(
@@ -50,7 +50,7 @@ def budget_of(scene: bpy.types.Scene) -> accuracy.Budget:
 
 
 def preset_of(scene: bpy.types.Scene) -> str:
-    """What a scene renders with: the preset, or the cheapest within its bound on pictures. Raises TactileError."""
+    """Return a scene's preset, or the cheapest within its bound on pictures. Raises TactileError."""
     levels = budget_of(scene).levels
     if levels is None:
         return scene.tactile_render.preset

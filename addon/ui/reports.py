@@ -1,4 +1,4 @@
-"""How an operator ends: errors of the library become Blender's own error reports, and the scene is left as it was."""
+"""Turn errors of the library into Blender's own error reports; the scene is left as it was."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ ADVICE = "Install the extension's zip for this platform, which brings it"
 
 
 def missing(*names: str) -> list[str]:
-    """Which of these modules Blender's Python does not have."""
+    """Return the modules among these that Blender's Python does not have."""
     return [name for name in names if importlib.util.find_spec(name) is None]
 
 
 def require(*names: str) -> None:
-    """Raises TactileError naming the modules that are not there."""
+    """Raise TactileError naming the modules that are not there."""
     lacking = missing(*names)
     if lacking:
         uses = ", ".join(dict.fromkeys(MODULES[name] for name in lacking))
@@ -59,7 +59,7 @@ def reported(operator: bpy.types.Operator) -> Iterator[None]:
 
 
 class TactileOperator(bpy.types.Operator):
-    """What the add-on's operators share: ``work`` does it, and whatever it cannot do is reported."""
+    """Base of the add-on's operators: ``work`` does the work, and its errors are reported."""
 
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads plain class attributes)
 

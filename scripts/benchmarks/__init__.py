@@ -1,1 +1,1 @@
-"""What measures, and what makes the data that ships; no part of the package. Scripts here are run by their path."""
+"""Benchmarks, and scripts that make the data that ships; no part of the package. Scripts here are run by their path."""

@@ -1,4 +1,4 @@
-"""What ``fault_kinds.py`` breaks: a small job, an undisturbed run of it, and comparisons with that."""
+"""Bench for ``fault_kinds.py``: a small job, an undisturbed run of it, and comparisons with that."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def write_hdf5(path: Path, frames: int) -> None:
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    """Every file of a job but its lock and job file, by name; leftovers too."""
+    """Read every file of a job but its lock and job file, by name; leftovers too."""
     skipped = {"job.json"}
     files = [file for file in out.rglob("*") if file.is_file() and not file.name.startswith(".tactile-batch-lock")]
     return {str(file.relative_to(out)): file.read_bytes() for file in files if file.name not in skipped}

@@ -52,7 +52,7 @@ def killed_workers(bench: Bench) -> Lost:
 
 
 def killed_client(bench: Bench) -> Lost:
-    """kill -9 to the command at random moments, then the same command again."""
+    """Kill -9 the command at random moments, then run the same command again."""
     out, blows = bench.folder / "client", 0
     for _ in range(bench.blows):
         process = start(bench.command(out))
@@ -68,7 +68,7 @@ def killed_client(bench: Bench) -> Lost:
 
 
 def array_runners(bench: Bench) -> Lost:
-    """Two parts of an array at once, one of them killed and begun again."""
+    """Run two parts of an array at once; one of them is killed and started again."""
     out = bench.run("array", "--plan")
     first, second = (start([*TACTILE, "--out", str(out), "--array", f"{i}/2"]) for i in range(2))
     while first.poll() is None and not list(out.glob("*/*.h5")):
@@ -128,7 +128,7 @@ def power_cuts(bench: Bench) -> Lost:
 
 
 def full_disk(bench: Bench) -> Lost:
-    """No file may grow beyond 1 MB, as on a full disk; then room is made."""
+    """Limit files to 1 MB, like a full disk; then remove the limit."""
     import resource
 
     out = bench.folder / "full"
@@ -144,7 +144,7 @@ def full_disk(bench: Bench) -> Lost:
 
 
 def bit_flips(bench: Bench) -> Lost:
-    """One bit of each file, anywhere: --verify names them all, the next run makes them anew."""
+    """Flip one bit of each file, anywhere: --verify names them all, the next run makes them again."""
     out = bench.folder / "flips"
     shutil.copytree(bench.calm, out)
     files = sorted([*out.glob("prepared/*.h5"), *out.glob("shards/*.h5")])
@@ -213,7 +213,7 @@ def dask_worker_dies(bench: Bench) -> Lost | None:
 
 
 def wait_for_address(file: Path) -> str:
-    """Of the scheduler that writes this file."""
+    """Wait for the address of the scheduler that writes this file."""
     deadline = time.monotonic() + MOST
     while time.monotonic() < deadline:
         with suppress(OSError, ValueError):
@@ -250,7 +250,7 @@ def tiny_recordings(bench: Bench) -> Lost:
 
 
 def long_recording(bench: Bench) -> Lost:
-    """One recording of very many frames, latents alone; the command is killed half-way and given again."""
+    """Process one recording of very many frames, latents alone; the command is killed half-way and given again."""
     out, file = bench.folder / "long_job", bench.folder / "long.h5"
     write_hdf5(file, bench.long)
     found = _killed_half_way(out, [*TACTILE, str(file), "--out", str(out), "--keep", "latent"], bench.long // 1000)

@@ -65,7 +65,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _row(case: Case) -> Row:
-    """What was found; a case that breaks off misses."""
+    """Make the row of a case; one that breaks off misses."""
     try:
         return case.row()
     except Exception as error:

@@ -1,4 +1,4 @@
-"""What each part of a simulation, a conversion and a rendering costs, as `tactile plan` reads it.
+"""Measure the cost of each part of a simulation, a conversion and a rendering, for `tactile plan`.
 
     python scripts/benchmarks/measure_costs.py                       writes data/costs.json, about five minutes
     python scripts/benchmarks/measure_costs.py --quick --json FILE   one sensor, and writes rows alone
@@ -86,7 +86,7 @@ def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
 
 
 def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
-    """Of `tactile simulate --keep`."""
+    """Measure `tactile simulate --keep`."""
     costs, sizes = [], []
     scene, out = folder / "scene", folder / "out.h5"
     scene.mkdir(exist_ok=True)
@@ -99,7 +99,7 @@ def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
 
 
 def conversions(folder: Path) -> dict[str, Part]:
-    """Of `tactile convert` by what it keeps, and of `tactile render` by the fast preset."""
+    """Measure `tactile convert` by what it keeps, and `tactile render` by the fast preset."""
     found = {}
     keeps = "latent", "displacement", "height", "image"
     words = {f"convert_{keep}": f"convert {RECORDING} --keep {keep}" for keep in keeps}
@@ -115,7 +115,7 @@ def conversions(folder: Path) -> dict[str, Part]:
 
 
 def full_tier() -> dict[str, float]:
-    """ms a contact of the full tier at a force, by sensor: the median of three forces."""
+    """Time of a contact of the full tier at a force, ms, by sensor: the median of three forces."""
     found = {}
     for sensor in ("biotac", "digit"):
         times = []
@@ -128,7 +128,7 @@ def full_tier() -> dict[str, float]:
 
 
 def as_rows(parts: dict[str, Part], full: dict[str, float]) -> list[Row]:
-    """Three rows a part."""
+    """Make three rows a part."""
     rows = []
     for name, part in parts.items():
         rows.append(row(f"cost_{name}", part.ms, "ms", of=f"a frame; {part.start:.2f} s before the first"))

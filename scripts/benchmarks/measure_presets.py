@@ -76,7 +76,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
-    """All rows; errors are measured with the faster variant, and once between the variants."""
+    """Yield all rows; errors are measured with the faster variant, and once between the variants."""
     heights = fields(unit, count)
     variants = working_variants()
     best = variants[0]
@@ -164,7 +164,7 @@ def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> f
 
 
 def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
-    """How far the two variants' pictures differ."""
+    """Measure the difference of the two variants' pictures."""
     for name in ("standard", "quality"):
         one, other = (Renderer(unit, name, variant) for variant in (LLVM, SCALAR))
         difference = one.in_levels(one.radiance(height) - other.radiance(height))
@@ -197,7 +197,7 @@ def best_ms(renderer: Renderer, height: np.ndarray, repeats: int) -> float:
 
 
 def one_thread(variant: str) -> None:
-    """As the targets are for one core."""
+    """Limit the variant to one thread: the targets are for one core."""
     if variant == LLVM:
         import drjit
         import mitsuba

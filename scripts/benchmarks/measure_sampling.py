@@ -1,4 +1,4 @@
-"""What the surface lattice and the height map add to a solved contact: full-tier presses, seen between the nodes.
+"""Measure the error that surface lattice and height map add to a solved contact: full-tier presses, between the nodes.
 
     python scripts/benchmarks/measure_sampling.py                       writes data/sampling.json, two minutes
     python scripts/benchmarks/measure_sampling.py --quick --json FILE   two presses, and writes rows alone
@@ -75,7 +75,7 @@ def measured(quick: bool) -> dict:
 
 
 def press_error(indenter, place: Placement, share: float) -> float | None:  # noqa: ANN001
-    """rms m of the height map between nodes; None where the full tier finds no equilibrium."""
+    """RMS error, m, of the height map between nodes; None where the full tier finds no equilibrium."""
     pose = pose_at("digit", indenter, place)
     depth = share * thickness_under("digit", indenter, pose)
     try:
@@ -88,7 +88,7 @@ def press_error(indenter, place: Placement, share: float) -> float | None:  # no
 
 
 def between_nodes(solution: Solution) -> float:
-    """rms m over the full tier's own surface nodes in the picture that have moved."""
+    """RMS error, m, over the full tier's own surface nodes in the picture that have moved."""
     solid, state = solution.volume
     rest = solid.mesh.nodes[solid.mesh.surface]
     moved = rest + state.displacement[solid.mesh.surface]
@@ -124,7 +124,7 @@ class Double(networks.Networks):
 
 
 def as_rows(found: dict) -> list[Row]:
-    """One row a bin."""
+    """Make one row a bin."""
     rows = [
         row(f"sampling_height_error_{one['depth_share_to']:.0%}", 1e6 * one["rms_m"], "um",
             of=f"median of {one['contacts']} full-tier presses, 95 %: {1e6 * one['rms_95_m']:.2f} um")

@@ -85,7 +85,7 @@ def table(work: Path, quick: bool) -> tuple[dict, dict[Sensor, list]]:
 
 
 def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], list[dict]]:
-    """Every tier of one sensor, and the contacts that the reference tier settled."""
+    """Measure every tier of one sensor; also returns the contacts that the reference tier solved."""
     full = FULL[sensor]
     contacts = drawn(QUICK if quick else full, SEED)
     kept = {tier: [keep(work, sensor, tier, i, contact) for i, contact in enumerate(contacts[:count])]
@@ -123,7 +123,7 @@ def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomCon
 
 
 def misses(found: list[dict], true: list[dict]) -> Iterator[Miss]:
-    """Of contacts that both tiers settle."""
+    """Yield the errors of contacts that both tiers solved."""
     for one, other in zip(found, true, strict=False):
         if one and other:
             pair = one["displacement"], float(one["force"]), other["displacement"], float(other["force"])
@@ -131,7 +131,7 @@ def misses(found: list[dict], true: list[dict]) -> Iterator[Miss]:
 
 
 def validated(sensor: Sensor) -> Iterator[Miss]:
-    """Of the full tier's presses that the validation's report tells of."""
+    """Yield the errors of the full tier's presses in the validation's report."""
     rows = dict(
         re.findall(rf"^\| {sensor}_full_(\S+) \| ([^|]+ \|[^|]*\|[^|]*\|[^|]*)\|", REPORT.read_text(), re.MULTILINE)
     )

@@ -1,4 +1,4 @@
-"""What each verb of ``tactile`` costs, in a process of its own: time, memory, and the heavy libraries it loads.
+"""Measure the cost of each verb of ``tactile``, in its own process: time, memory, and the heavy libraries it loads.
 
     python scripts/benchmarks/profile_verbs.py --json FILE   and 700 frames converted, with the ten hottest functions
     python scripts/benchmarks/profile_verbs.py --quick --json FILE  each verb on as little as it takes, about a minute
@@ -106,7 +106,7 @@ CASES = (
 
 
 class Cost(NamedTuple):
-    """Of one run. cpu, wall, imports : s; peak : MB; loaded : libraries of HEAVY."""
+    """Cost of one run. cpu, wall, imports : s; peak : MB; loaded : libraries of HEAVY."""
 
     status: int
     cpu: float
@@ -137,7 +137,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write_inputs(folder: Path) -> None:
-    """touch.csv, the first 100 frames of the shipped recording; scene.toml, one press of 11 frames."""
+    """Write touch.csv, the first 100 frames of the shipped recording; scene.toml, one press of 11 frames."""
     write_scene(folder, (0.0, -8.0, 0.0, 0.0), (0.1, -8.0, 0.0, 0.3))
     electrodes = recordings.read(RECORDING).electrodes[:100]
     names = ["timestamp", "tdc", "tac", "pdc", *(f"pac{i}" for i in range(1, 23)), *(f"ele{i}" for i in range(1, 20))]
@@ -147,7 +147,7 @@ def write_inputs(folder: Path) -> None:
 
 
 def write_scene(folder: Path, *points: tuple[float, float, float, float]) -> None:
-    """scene.toml of a 7 mm ball; points : its way, (time s, x mm, z mm, force N)."""
+    """Write scene.toml of a 7 mm ball; points : its way, (time s, x mm, z mm, force N)."""
     lines = ["    {{ time_s = {}, x_mm = {}, z_mm = {}, force_n = {} }},\n".format(*point) for point in points]
     (folder / "scene.toml").write_text(
         f"""format = "tactile-scene-1"
@@ -167,7 +167,7 @@ points = [
 
 
 def run(case: Case, folder: Path) -> Cost:
-    """One case in a fresh process."""
+    """Run one case in a fresh process."""
     told = folder / "told.json"
     told.unlink(missing_ok=True)
     words = [word.replace("{}", str(folder)) for word in case.words.split()]
@@ -200,7 +200,7 @@ def verbs(folder: Path) -> list[Row]:
 
 
 def packings() -> list[Row]:
-    """What a picture of the demo costs as PNG, by zlib's level, and as the toolkit packs it."""
+    """Measure the cost of a picture of the demo as PNG, by zlib's level, and with the toolkit's settings."""
     from PIL import Image
 
     from tactile_core.pictures import shading
@@ -221,7 +221,7 @@ def packings() -> list[Row]:
 
 
 def live_picture() -> list[Row]:
-    """What `tactile watch` takes from a frame's rows to its picture, of the thread's own time."""
+    """Measure the thread time of `tactile watch` from a frame's rows to its picture."""
     recording, view, work = recordings.read(RECORDING), live.View(load_tools(), NOMINAL_RATE), []
     for start, stop in [(0, 60), *((i, i + 1) for i in range(60, 160))]:
         rows = dataclasses.replace(

@@ -1,4 +1,4 @@
-"""What `tactile batch` costs: frames a second against workers, overhead a shard, memory, growth with the frames.
+"""Measure the cost of `tactile batch`: frames a second by workers, overhead a shard, memory, growth with the frames.
 
     python scripts/benchmarks/throughput.py --quick --json FILE   1e3 and 1e4 frames
     python scripts/benchmarks/throughput.py --most 1000000 --pictures 20000
@@ -117,7 +117,7 @@ def workers(folder: Path) -> list[Row]:
 
 
 def client_cost(folder: Path) -> float:
-    """ms of the client's own CPU time a task: the answers come from a process that does nothing."""
+    """CPU time of the client itself a task, ms: the replies come from a process that does nothing."""
     from tactile_core.jobs.engine.tasks import Task
 
     answer = "import sys\nfor line in sys.stdin:\n    print('{}', flush=True)"

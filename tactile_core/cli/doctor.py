@@ -1,4 +1,4 @@
-"""What this machine can do: the libraries that are here, and which of Mitsuba's variants works."""
+"""Report the capabilities of this machine: the installed libraries, and which of Mitsuba's variants works."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def report() -> Iterator[str]:
 
 
 def try_library(library: Library) -> tuple[str, str]:
-    """(version, "") of a library that imports, or ("", what is wrong, in words)."""
+    """Import a library; returns (version, "") if it imports, or ("", what is wrong, in words)."""
     install = f'pip install "tactile-core[{library.extra}]"' if library.extra else f"pip install {library.package}"
     try:
         if importlib.util.find_spec(library.module) is None:
@@ -87,7 +87,7 @@ def try_library(library: Library) -> tuple[str, str]:
 
 
 def _mitsuba(works: bool) -> Iterator[str]:
-    """Which variant is used, why, and how to get the faster one."""
+    """Yield the variant that is used, why, and how to get the faster one."""
     if not works:
         yield "pictures: preset fast alone, which needs no Mitsuba"
         return

@@ -1,4 +1,4 @@
-"""What a verb says: results on stdout, everything else in single lines on stderr, and progress."""
+"""Print a verb's output: results on stdout, everything else in single lines on stderr, and progress."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def tell(text: str) -> None:
 
 
 def say(text: str) -> None:
-    """One line on stderr, whatever the text holds."""
+    """Print one line on stderr, whatever the text holds."""
     sys.stderr.write("tactile: " + " ".join(text.split()) + "\n")
 
 

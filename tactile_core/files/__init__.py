@@ -1,1 +1,1 @@
-"""Files, whatever they hold: atomic writing, checked reading, packs, pictures, locks, caches, provenance."""
+"""File handling independent of content: atomic writing, checked reading, packs, pictures, locks, caches, provenance."""

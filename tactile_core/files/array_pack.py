@@ -1,4 +1,4 @@
-"""Arrays, or whole files, in one sealed HDF5 file: a shard of what is put together at the end of a job."""
+"""Pack arrays, or whole files, into one HDF5 file with a checksum: a shard of what a job joins at its end."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def write(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
-    """All arrays or those of some names, or some rows of them. Raises TactileError for a damaged file."""
+    """Read all arrays, or those named in `names`, or some of their rows. Raises TactileError for a damaged file."""
     import h5py
 
     found: dict[str, np.ndarray] = {}
@@ -54,7 +54,7 @@ def write_files(file: Path, folder: Path) -> None:
 
 
 def unpack(file: Path, folder: Path) -> None:
-    """The files of a pack, into a folder that has none of those names. Raises TactileError for a damaged pack."""
+    """Unpack a pack's files into a folder that has none of those names. Raises TactileError for a damaged pack."""
     for name, content in read(file).items():
         path = folder / name
         if not path.resolve().is_relative_to(folder.resolve()):

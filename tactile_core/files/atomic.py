@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all, whatever interrupts the writing."""
+"""Write files and folders that appear whole or not at all, whatever interrupts the writing."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from ..errors import TactileError
 def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]:
     """Yield a temporary path in the same folder; leaving the block flushes it to disk and moves it to `path`.
 
-    An error inside the block removes the temporary file and leaves what stood at `path` untouched. A killed process
+    An error inside the block removes the temporary file and leaves what was at `path` untouched. A killed process
     leaves `.<name>.tactile-partial`, which the next writer of the same file replaces.
-    shared : several processes may write the same file at once; each has a temporary name of its own, and `sweep_files`
+    shared : several processes may write the same file at once; each has its own temporary name, and `sweep_files`
         clears those of killed ones
     """
     path = Path(path)
@@ -40,7 +40,7 @@ def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]
 
 
 def write_bytes(path: str | os.PathLike, content: bytes, *, shared: bool = False) -> None:
-    """Write a whole file or nothing; shared : as for `new_file`."""
+    """Write a whole file or nothing; shared : see `new_file`."""
     with new_file(path, shared=shared) as partial:
         partial.write_bytes(content)
 
@@ -56,10 +56,10 @@ def write_json(path: str | os.PathLike, content: Any, *, shared: bool = False) -
 def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Iterator[Path]:
     """Yield an empty folder beside `path`; leaving the block moves it to `path` as one piece.
 
-    An error or Ctrl-C inside the block removes it and leaves what stood at `path` untouched. What a killed process
-    left behind is cleared by the next one (or by `sweep`): a lock on `.<name>.tactile-lock`, which the system drops
-    when its holder dies, tells a dead writer from a living one. Raises TactileError when the folder exists and
-    `overwrite` is not true (None: the user has no such option), and when another process is writing it.
+    An error or Ctrl-C inside the block removes it and leaves what was at `path` untouched. What a killed process left
+    behind is cleared by the next one (or by `sweep`): a lock on `.<name>.tactile-lock`, which the system drops when its
+    holder dies, tells a dead writer from a living one. Raises TactileError when the folder exists and `overwrite` is
+    not true (None: the user has no such option), and when another process is writing it.
     """
     path = Path(os.path.abspath(path))
     partial, old = _beside(path, "partial"), _beside(path, "old")
@@ -81,7 +81,7 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Ite
 
 
 def sweep(folder: str | os.PathLike) -> None:
-    """Clear what killed writers of folders left in `folder`; living ones, and files of others, are let alone."""
+    """Remove what killed writers of folders left in `folder`; running writers and third-party files are left alone."""
     for lock in Path(folder).glob(".*.tactile-lock"):
         name = lock.name.removeprefix(".").removesuffix(".tactile-lock")
         if name in ("", ".", "..") or lock.is_symlink() or not lock.is_file():
@@ -92,21 +92,24 @@ def sweep(folder: str | os.PathLike) -> None:
 
 
 def sweep_files(folder: str | os.PathLike) -> None:
-    """Clear the temporary files of killed writers; only for who knows that none is living."""
+    """Remove the temporary files of killed writers; call it only when no writer is running."""
     for leftover in Path(folder).glob(".*.tactile-partial"):
         if not leftover.is_dir():
             leftover.unlink(missing_ok=True)
 
 
 def _beside(path: Path, role: str) -> Path:
-    """A hidden name in the same folder, that no other program uses. Raises TactileError for a path without a name."""
+    """Return a hidden name in the same folder that no other program uses.
+
+    Raises TactileError for a path without a name.
+    """
     if not path.name:
         raise TactileError(path, "no name", "a new file or folder")
     return path.with_name(f".{path.name}.tactile-{role}")
 
 
 def _recover(path: Path) -> None:
-    """Undo an exchange that was cut between its two moves, then clear what is left of it."""
+    """Undo an exchange that was interrupted between its two moves, then remove its leftovers."""
     partial, old = _beside(path, "partial"), _beside(path, "old")
     if old.is_dir() and not old.is_symlink() and not path.exists():
         os.replace(old, path)
@@ -119,7 +122,7 @@ def _recover(path: Path) -> None:
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock of one folder's writer; raises TactileError when another process holds it."""
+    """Hold the lock of a folder's only writer; raises TactileError when another process holds it."""
     lock = _beside(path, "lock")
     while True:
         try:
@@ -187,7 +190,7 @@ def _sync_folder(path: Path) -> None:
 
 
 def claim(path: str | os.PathLike) -> None:
-    """Before a long job: refuse a `path` that exists or cannot be written, and make its folder.
+    """Refuse, before a long job, a `path` that exists or cannot be written, and make its folder.
 
     Raises TactileError for an empty name, an existing file, or a folder that cannot be made or written.
     """

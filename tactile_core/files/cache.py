@@ -1,4 +1,4 @@
-"""Where what takes long to compute is kept from run to run."""
+"""Folder in which results that take long to compute are kept between runs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pathlib
 
 
 def cache_folder() -> pathlib.Path:
-    """``$TACTILE_CACHE``, else ``~/.cache/tactile`` (``%LOCALAPPDATA%`` on Windows); it need not exist."""
+    """Return ``$TACTILE_CACHE``, else ``~/.cache/tactile`` (``%LOCALAPPDATA%`` on Windows); it need not exist."""
     chosen = os.environ.get("TACTILE_CACHE")
     if chosen:
         return pathlib.Path(chosen)

@@ -1,6 +1,6 @@
-"""HDF5 files that prove themselves whole: the hash of all that follows stands in the file's first 512 bytes.
+"""HDF5 files with their own checksum: the first 512 bytes hold the hash of all that follows.
 
-HDF5 lets a file begin with room for others (its "user block"), which every HDF5 reader skips.
+HDF5 lets a file begin with a block for other uses (its "user block"), which every HDF5 reader skips.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ _DIGITS = 64
 
 
 def write_checksum(path: Path) -> str:
-    """Write the seal into the room of a closed file; returns the hash of what follows it."""
+    """Write the checksum into the user block of a closed file; returns the hash of what follows it."""
     digest = _digest(path)
     with open(path, "rb+") as file:
         file.write(_line(digest))
@@ -22,7 +22,9 @@ def write_checksum(path: Path) -> str:
 
 
 def verified_checksum(path: Path) -> str | None:
-    """The hash of a whole sealed file; None for one that is missing, cut, changed, or never sealed."""
+    """Return the hash of a file that matches its checksum; None for one that is missing, cut, changed or without
+    checksum.
+    """
     try:
         digest = stated_checksum(path)
         return digest if digest is not None and _digest(path) == digest else None
@@ -31,7 +33,7 @@ def verified_checksum(path: Path) -> str | None:
 
 
 def stated_checksum(path: Path) -> str | None:
-    """The hash that a file's seal names, whether or not its content still has it; None where there is no seal."""
+    """Return the hash stored in a file, without checking that its content still matches; None where there is none."""
     try:
         with open(path, "rb") as file:
             room = file.read(ROOM)

@@ -25,7 +25,7 @@ def write_exr(path: str | os.PathLike, channels: Mapping[str, np.ndarray], about
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Channels (H, W) by name, as they are, and the text attributes; raises TactileError for what is no EXR file."""
+    """Read channels (H, W) by name, unchanged, and the text attributes; raises TactileError for what is no EXR file."""
     import OpenEXR
 
     try:
@@ -41,7 +41,7 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
 
 
 def _check_size(path: str | os.PathLike) -> None:
-    """Raises ValueError for a file whose parts declare more than MOST_BYTES in all, and for deep ones."""
+    """Raise ValueError for a file whose parts declare more than MOST_BYTES in all, and for deep ones."""
     import OpenEXR
 
     size, flat = 0, (OpenEXR.scanlineimage, OpenEXR.tiledimage)
@@ -56,7 +56,7 @@ def _check_size(path: str | os.PathLike) -> None:
 
 
 def read_height(path: str | os.PathLike) -> np.ndarray:
-    """The height map (H, W) m in an EXR file: its channel "height", or its only one.
+    """Read the height map (H, W) m in an EXR file: its channel "height", or its only one.
 
     Raises TactileError for a file without such a channel.
     """

@@ -1,4 +1,4 @@
-"""HDF5 files of strangers: nothing beside the file is read, and no chunk unpacks to more than it declares."""
+"""Read third-party HDF5 files safely: no other file is read, and no chunk unpacks to more than it declares."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @contextmanager
 def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
-    """Open for reading. Raises what h5py does, and TactileError for a file that could ask for more than it holds.
+    """Open for reading. Raises h5py's errors, and TactileError for a file that could take more memory than it declares.
 
-    Refused: datasets in other files (external links, external or virtual storage), chunks of over 256 MB, filters
-    other than gzip, lzf, shuffle and checksums, and chunks that unpack to more than their size. Reading a row then
-    takes at most one chunk of memory beyond the row, reading a dataset its declared size, which is the caller's to
-    limit: see ``declared``.
+    Refused: datasets in other files (external links, external or virtual storage), chunks of over 256 MB, filters other
+    than gzip, lzf, shuffle and checksums, and chunks that unpack to more than their size. Reading a row then takes at
+    most one chunk of memory beyond the row, reading a dataset takes its declared size, which the caller has to limit:
+    see ``declared``.
     """
     import h5py
 
@@ -46,10 +46,11 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
 
 
 def check_before_opening(path: str | os.PathLike) -> None:
-    """Raises TactileError for a file that the library would take all memory for (both found by fuzzing), and OSError.
+    """Raise TactileError for a file on which the HDF5 library would use up all memory, and OSError. Fuzzing found two
+    kinds.
 
-    One begins with a driver's information, for which it takes up to 4 GB whatever the file holds; only files in several
-    parts have it. Another has a list without end, see ``hdf5_free_lists``.
+    The first begins with a driver's information, for which the library takes up to 4 GB whatever the file holds; only
+    files in several parts have it. The second has an endless free list, see ``hdf5_free_lists``.
     """
     found = os.stat(path)
     _check_bytes(os.fspath(path), found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
@@ -78,7 +79,7 @@ def _check_bytes(path: str, *_identity: int) -> None:
 
 
 def declared(data: h5py.Dataset, where: str) -> None:
-    """Raises TactileError for a dataset that declares more than what is stored of it can unpack to."""
+    """Raise TactileError for a dataset that declares more data than its stored bytes can unpack to."""
     stored = data.id.get_storage_size()
     if data.size * data.dtype.itemsize > MAX_RATIO * stored + STEP:
         found = f"shape {data.shape} in {stored} stored bytes"
@@ -86,9 +87,9 @@ def declared(data: h5py.Dataset, where: str) -> None:
 
 
 def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
-    """Raises TactileError for a dataset of more than numbers in this file, perhaps with checksums: none of it unpacks.
+    """Raise TactileError for a dataset other than plain numbers in this file, uncompressed, with or without checksums.
 
-    For files of our own, of which a few rows are read again and again: `open_checked` looks at each chunk.
+    Meant for the project's own files, of which a few rows are read many times: `open_checked` would check each chunk.
     """
     layout, name = data.id.get_create_plist(), data.name
     if layout.get_external_count() or data.is_virtual or data.dtype.kind not in "fiub":
@@ -100,7 +101,7 @@ def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
 
 
 def _outside(name: bytes, link: h5py.h5l.LinkInfo) -> bytes | None:
-    """The name of a link to another file."""
+    """Return the name of a link to another file, None for other links."""
     import h5py
 
     return name if link.type == h5py.h5l.TYPE_EXTERNAL else None
@@ -126,7 +127,9 @@ def _check(path: str | os.PathLike, name: str | bytes, data: h5py.Dataset) -> No
 
 
 def _check_chunk(path, name, data, chunk, size: int, filters: list[int]) -> None:  # noqa: ANN001
-    """A packed chunk small enough to be harmless however it unpacks is left to HDF5; others are unpacked on trial."""
+    """Raise TactileError for a packed chunk that unpacks to more than its size; those small enough to be
+    harmless pass.
+    """
     if MAX_RATIO * chunk.size <= MAX_CHUNK:
         return
     if chunk.size > size + size // 8 + STEP:  # packing makes hardly more of what it cannot pack
@@ -136,7 +139,7 @@ def _check_chunk(path, name, data, chunk, size: int, filters: list[int]) -> None
 
 
 def _unpacked(packed: bytes, limit: int) -> int:
-    """Bytes that a deflate stream unpacks to, counted no further than just beyond `limit`."""
+    """Count the bytes that a deflate stream unpacks to, no further than just beyond `limit`."""
     unpacker, count = zlib.decompressobj(), 0
     try:
         while packed and not unpacker.eof and count <= limit:

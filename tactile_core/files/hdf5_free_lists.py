@@ -1,7 +1,7 @@
-"""Local heaps of HDF5 files of strangers, where the names of an old-style group lie.
+"""Check the local heaps of third-party HDF5 files, which hold the names of an old-style group.
 
-A heap lists its free places, each with the place of the next. The library (up to 2.0) follows a list that runs in a
-circle until no memory is left (found by fuzzing: one changed byte in 32 kB).
+A heap lists its free places, each with the place of the next. The library (up to 2.0) follows a circular list until no
+memory is left (found by fuzzing: one changed byte in 32 kB).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MOST_OF_HEAP, MOST = 10_000, 1_000_000  # free places of a heap, and of a file (
 
 
 def check_free_lists(path: str | os.PathLike, start: int, width: int, length: int) -> None:
-    """Raises TactileError for a file with a list of free places that does not end. The file is read once.
+    """Raise TactileError for a file whose list of free places does not end. The file is read once.
 
     start : byte of the superblock, from which addresses count; width, length : bytes of an address and of a size
     """
@@ -34,14 +34,15 @@ def check_free_lists(path: str | os.PathLike, start: int, width: int, length: in
 
 
 def _free_places(data: mmap.mmap, place: int, start: int, width: int, length: int) -> int:
-    """How many free places a heap lists, counted up to MOST_OF_HEAP; what the library refuses by itself ends the list.
+    """Count the free places that a heap lists, up to MOST_OF_HEAP; an entry that the library itself refuses ends the
+    list.
 
-    The header: signature, version, three bytes, size of the heap's data, first free place in them, their address.
-    A free place: the next one, its own size.
+    The header: signature, version, three bytes, size of the heap's data, first free place in them, their address. A
+    free place: the next one, its own size.
     """
 
     def number(at: int, size: int) -> int:
-        """A whole number of the file."""
+        """Read an unsigned integer of ``size`` bytes at byte ``at``."""
         return int.from_bytes(data[at : at + size], "little")
 
     if data[place + 4 : place + 5] != bytes([VERSION]):
@@ -57,5 +58,7 @@ def _free_places(data: mmap.mmap, place: int, start: int, width: int, length: in
 
 
 def _named(data: mmap.mmap, address: int, width: int) -> bool:
-    """Whether the file names an address, as a group does its heap's; else it is of a file within the file's values."""
+    """Return whether the file contains this address, as a group does its heap's; else the heap is of a file within the
+    values.
+    """
     return address < 256**width and data.find(address.to_bytes(width, "little")) >= 0

@@ -1,4 +1,4 @@
-"""What an HDF5 file is written through, so that a full disk is told in words and not by a crash."""
+"""File object through which HDF5 files are written, so that a full disk raises an error instead of a crash."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 
 
 class Disk(io.RawIOBase):
-    """The file below HDF5, which never learns that the disk is full; `check` tells.
+    """File object for HDF5 that hides a full disk from the library; `check` reports it.
 
-    HDF5 cannot close a file whose writing failed: it keeps the place on the disk and crashes at the process's end
-    (seen with HDF5 1.14 and packed datasets). Here it always closes, into a file that is thrown away then.
+    HDF5 cannot close a file whose writing failed: it keeps the place on the disk and crashes at the process's end (seen
+    with HDF5 1.14 and packed datasets). Here it always closes, into a file that is thrown away then.
     """
 
     def __init__(self, path: Path) -> None:
@@ -25,7 +25,7 @@ class Disk(io.RawIOBase):
             raise OSError(self._failure.errno, self._failure.strerror, str(self._path)) from self._failure
 
     def write(self, data: Any) -> int:
-        """As of any file, but all of it, and no error: `check` raises that."""
+        """Write all of the data like any file, but without raising: `check` raises the error."""
         rest = memoryview(data).cast("B")
         count = len(rest)
         try:
@@ -36,7 +36,7 @@ class Disk(io.RawIOBase):
         return count
 
     def truncate(self, size: int | None = None) -> int:
-        """As of any file, but no error: `check` raises that."""
+        """Truncate like any file, but without raising: `check` raises the error."""
         try:
             return self._file.truncate(size)
         except OSError as error:

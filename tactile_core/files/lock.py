@@ -1,4 +1,4 @@
-"""One job a folder: the lock of a job, which the system drops when its holder dies."""
+"""Lock that allows one job a folder; the system drops it when its holder dies."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ FILE = ".tactile-batch-lock"
 def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
     """Hold the folder; with `part` (i, n) share it with the other parts of an array, but not with the same part.
 
-    Raises TactileError where another job, or the same part of it, is running. On a network file system the lock holds
-    as far as that passes locks on (NFS 4 and Lustre with flock do).
+    Raises TactileError where another job, or the same part of it, is running. On a network file system the lock works
+    only if that forwards locks (NFS 4 and Lustre with flock do).
     """
     with contextlib.ExitStack() as stack:
         if part is None:
@@ -31,7 +31,7 @@ def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
-    """The file stays: a lock on a file that others remove guards nothing."""
+    """Hold a lock on ``file``, which stays afterwards: a lock on a file that others remove protects nothing."""
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         _take(descriptor, shared)

@@ -1,4 +1,4 @@
-"""Pictures as PNG: the one place that says how they are packed."""
+"""Write pictures as PNG, with one compression setting for all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a result is made of and by: hashes of files, versions of libraries, the machine."""
+"""Provenance of a result: hashes of its input files, versions of libraries, the machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .. import __version__
 
 
 def sha256(path: str | os.PathLike) -> str:
-    """Hash of a file's bytes; of a folder (a bag): of its files' names and hashes."""
+    """Hash of a file's bytes; for a folder (a bag), hash of its files' names and hashes."""
     import hashlib
 
     if os.path.isdir(path):
@@ -21,7 +21,9 @@ def sha256(path: str | os.PathLike) -> str:
 
 
 def versions(*more: str) -> dict[str, str]:
-    """What can change the bytes of a result, besides its input and the weights; more : libraries that made it too."""
+    """Return versions that can change the bytes of a result, besides its input and the weights; more : further
+    libraries.
+    """
     import importlib
     import platform
 
@@ -31,14 +33,14 @@ def versions(*more: str) -> dict[str, str]:
 
 
 def machine() -> dict[str, str | int | None]:
-    """What can change the timings."""
+    """Describe what can change timings: system, processor, number of cores."""
     import platform
 
     return {"system": platform.platform(), "processor": _processor(), "cores": os.cpu_count()}
 
 
 def _processor() -> str:
-    """The processor's name; Linux tells it only in /proc."""
+    """Name of the processor; Linux gives it only in /proc."""
     import platform
 
     try:

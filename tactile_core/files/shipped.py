@@ -1,4 +1,4 @@
-"""Where the tables and networks that ship with the package lie."""
+"""Paths of the tables and networks that ship with the package."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ _DATA = Path(__file__).parents[1] / "data"
 
 
 def shipped(name: str) -> Path:
-    """Path of a file or folder that ships, named relative to ``data/``."""
+    """Path of a file or folder that ships with the package, named relative to ``data/``."""
     return _DATA / name

@@ -1,4 +1,4 @@
-"""Text files of strangers, read only as far as such a file can be long."""
+"""Read third-party text files, up to the length that such a file can have."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOST_DOTS = 100  # in a key; tomllib's time grows with the square of them (Pytho
 
 
 def read_small(path: str | os.PathLike, most: int = MOST) -> str:
-    """UTF-8 text of a file of at most `most` bytes; a byte order mark is passed over.
+    """Read the UTF-8 text of a file of at most `most` bytes; a byte order mark is skipped.
 
     Raises OSError and UnicodeDecodeError, TactileError for a longer file, a pipe or a device.
     """
@@ -28,7 +28,7 @@ def read_small(path: str | os.PathLike, most: int = MOST) -> str:
 
 
 def read_toml_text(path: str | os.PathLike) -> str:
-    """As `read_small`, of a TOML file. Raises TactileError for a key of over a hundred parts, too."""
+    """Read a TOML file by `read_small`. Raises TactileError for a key of over a hundred parts, too."""
     text = read_small(path)
     if any(piece.count(".") > MOST_DOTS for piece in re.split(r"[=,#{}\[\]\n]", text)):
         raise TactileError(path, f"a key of over {MOST_DOTS} parts", "short keys")

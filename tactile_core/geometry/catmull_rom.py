@@ -18,7 +18,7 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
 
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """The nodes (4, 4, n), row * columns + column, of a grid whose weighted sum each place (2, n) is, and weights."""
+    """Nodes (4, 4, n), as row * columns + column, whose weighted sum gives each place (2, n), and their weights."""
     rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)

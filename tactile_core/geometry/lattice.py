@@ -34,18 +34,18 @@ class Lattice:
 
     @property
     def closed(self) -> bool:
-        """Whether the last column joins the first: a surface with poles closes round its axis."""
+        """True where the last column joins the first: a surface with poles closes round its axis."""
         return len(self.rest) > self.shape[0] * self.shape[1]
 
     @property
     def sha256(self) -> str:
-        """Name of this surface in files: hash of the rest nodes rounded to 1 nm, so that two builds agree."""
+        """Hash of the rest nodes rounded to 1 nm, so that two builds agree; files identify the surface by it."""
         rounded = np.round(self.rest * 1e9).astype("<i8")
         return hashlib.sha256(rounded.tobytes()).hexdigest()
 
     @functools.cached_property
     def blocks(self) -> LatticeBlocks:
-        """Finds the resting nodes near an indenter."""
+        """Return the search index for resting nodes near an indenter."""
         return LatticeBlocks(self.rest, self.shape)
 
     @functools.cached_property
@@ -61,7 +61,7 @@ class Lattice:
 
 
 def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
-    """Two triangles a cell of a grid whose rows and columns run so that (row x column) points outward.
+    """Triangles of a grid, two per cell, outward if the cross product (row x column) points outward.
 
     closed : the last column joins the first. Returns (n, 3) int32.
     """

@@ -1,4 +1,4 @@
-"""Blocks of neighbouring nodes: most of a surface is far from an indenter, and a look at its blocks tells."""
+"""Blocks of neighbouring nodes, to skip the large part of a surface that is far from an indenter."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _STEEPEST = 1.1  # of a distance: 1, but for smooth grids of it (assumed)
 
 
 class LatticeBlocks:
-    """Of nodes ``rest`` (n, 3) m on a grid of ``shape`` (rows, columns); each node after the grid is a block."""
+    """Blocks of nodes ``rest`` (n, 3) m on a grid of ``shape`` (rows, columns); each node after the grid is a block."""
 
     def __init__(self, rest: np.ndarray, shape: tuple[int, int]) -> None:
         row, column = np.divmod(np.arange(shape[0] * shape[1]), shape[1])
@@ -29,7 +29,9 @@ class LatticeBlocks:
         ])  # fmt: skip
 
     def near(self, indenter: Indenter, pose: Pose, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Sorted nodes (k,) less than ``reach`` m outside an indenter, or in it, and their distances (k,) m."""
+        """Find the nodes (k,), sorted, inside an indenter or less than ``reach`` m outside, and their distances
+        (k,) m.
+        """
         close = pose.distance(indenter, self._centre)[0] < reach + _STEEPEST * self._radius
         nodes = np.flatnonzero(close.take(self._label))
         gap = pose.distance(indenter, self._rest.take(nodes, axis=0))[0]

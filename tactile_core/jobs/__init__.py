@@ -1,1 +1,1 @@
-"""What the verbs do: a recording, scene or folder in, a result folder out."""
+"""Jobs behind the verbs: a recording, scene or folder in, a result folder out."""

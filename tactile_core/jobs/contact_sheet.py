@@ -23,7 +23,7 @@ STYLE = {"font.size": 9, "axes.linewidth": 0.6, "agg.path.chunksize": 10_000}
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Contents:
-    """What a sheet of a recording of T frames shows, in k columns. Raises ValueError where these do not count alike.
+    """Contents of a sheet of a recording of T frames, in k columns. Raises ValueError where their counts differ.
 
     name : of the recording; time : (T,) s; electrodes : (T, 19) counts, change from rest
     pressure, pressure_measured : (T,) Pa, rise of the fluid's as translated and by PDC; NaN where it was not measured

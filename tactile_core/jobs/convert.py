@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """What to make of a recording.
+    """Options of the conversion of a recording.
 
     frames : part of it, the same for every recording; keep : words of results.KEEPABLE
     prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
@@ -145,7 +145,9 @@ def convert(
 
 
 def _added(options: Options, made: FramePass) -> str:
-    """What the toolkit added to displacements or heights; raises TactileError where that is more than allowed."""
+    """Describe the toolkit's own error in displacements or heights; raises TactileError where that is more than
+    allowed.
+    """
     if options.error is None or options.error.um is None:
         return ""
     from . import sampling_error
@@ -158,7 +160,9 @@ def _silent(done: int, total: int) -> None:
 
 
 def note(recording: Recording, made: FramePass, options: Options, tools: Tools) -> dict:
-    """Where a result came from, fit for JSON: only what the same input makes again, so no paths and no time of day."""
+    """Return the origin of a result, fit for JSON: only what the same input reproduces, so no paths and no time
+    of day.
+    """
     prepare = None if options.prepare is None else dataclasses.asdict(options.prepare)
     return {
         "format": results.FORMAT,

@@ -1,4 +1,4 @@
-"""One pass over the frames of a recording: translate, shade, write, a chunk at a time."""
+"""Process the frames of a recording in one pass: translate, shade, write, a chunk at a time."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ REMARKABLE = {
 
 @dataclasses.dataclass(frozen=True)
 class Tools:
-    """What a conversion works with; the same for every recording.
+    """Tools of a conversion; the same for every recording.
 
     translate : Signals -> Translation; card, sha256 : of its weights
     height_map : (T, M, 3) m -> (T, H, W) m; shade : (H, W) m -> (H, W, 3) uint8, by a preset of ``pictures.presets``
@@ -78,7 +78,7 @@ class Tools:
 
 
 def translated(signals: Signals, tools: Tools, tracked: Tracked | None, frames: np.ndarray) -> dict[str, np.ndarray]:
-    """What a translation makes of `signals`, T first, by the names of frames.h5; frames : (T,) in the recording."""
+    """Translate `signals` to arrays, T first, by the names of frames.h5; frames : (T,) in the recording."""
     translation = tools.translate(signals) if tracked is None else tools.translate(signals, tracked(frames))
     arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
     if tools.plausible is not None:
@@ -140,7 +140,7 @@ class FramePass:
             file.annotate("electrodes", rest=self.signals.rest, kind=self.signals.kind)
 
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know: of the recording, and of what became of its frames."""
+        """Warnings for the user: of the recording, and of its translated frames."""
         found = [*self.signals.warnings, *self.tools.answer.describe_shift()]
         for name, meaning in REMARKABLE.items():
             if self.flagged[name]:
@@ -150,7 +150,7 @@ class FramePass:
         return tuple(found)
 
     def describe_expected_error(self) -> str:
-        """What the translation itself leaves on the DIGIT, in words: the median of the frames in contact."""
+        """Describe the translation's own error on the DIGIT: the median of the frames in contact."""
         errors = np.concatenate(self._errors, axis=1)
         if not errors.shape[1]:
             return "no frame is in contact, so the translation expects no error"
@@ -167,7 +167,7 @@ class FramePass:
         self.share = max(self.share, depth_share(arrays["displacement_digit"]))
 
     def _translate(self, frames: np.ndarray) -> dict[str, np.ndarray]:
-        """All arrays of some frames, T first, by the names of frames.h5."""
+        """Translate some frames to all arrays, T first, by the names of frames.h5."""
         with self.clock.stage("translate"):
             arrays = translated(self._signals(frames), self.tools, self._tracked, frames)
         return arrays | {"frame": frames.astype(np.int32), "time": self.recording.time[frames]}

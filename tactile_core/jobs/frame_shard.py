@@ -63,7 +63,9 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
 
 
 def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
-    """Whether a whole shard is shard `number` of recording `index`, of so many frames, and no other under its name."""
+    """Return true if a whole shard is shard `number` of recording `index`, with this number of frames, and no
+    other under its name.
+    """
     import h5py
 
     try:
@@ -75,7 +77,7 @@ def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
 
 
 def _identity(job: Job, index: int, number: int, frames: int) -> dict[str, str | int]:
-    """The attributes that tell a shard from others."""
+    """The attributes that distinguish a shard from others."""
     return {
         "recording_sha256": job.inputs[index].sha256, "recipe": job.id, "shard": number, "shards": count(frames, job)
     }  # fmt: skip
@@ -90,7 +92,7 @@ def _arrays(
     tools: Tools,
     tracked: Tracked | None,
 ) -> dict[str, np.ndarray]:
-    """All arrays of some rows of a shard that begins at frame `start`."""
+    """Compute all arrays of some rows of a shard that begins at frame `start`."""
     part = {name: getattr(signals, name)[rows] for name in FRAMEWISE}
     frames = np.arange(len(time), dtype=np.int32)[rows] + np.int32(start)
     arrays = translated(dataclasses.replace(signals, **part), tools, tracked, frames)

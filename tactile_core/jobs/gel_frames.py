@@ -1,4 +1,4 @@
-"""What can be rendered: frames of a recording, height maps, a scene; each becomes height maps under a camera."""
+"""Read inputs of rendering, frames of a recording, height maps or a scene, as height maps under a camera."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 
 @dataclasses.dataclass(frozen=True)
 class Frames:
-    """What is in an input: displacements of the DIGIT's nodes or height maps, one of the two.
+    """Frames of an input: displacements of the DIGIT's nodes or height maps, one of the two.
 
     kind : in words; numbers : (T,) by which frames are known
     displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m
@@ -53,12 +53,13 @@ class Frames:
 
 
 def is_scene(path: Path) -> bool:
-    """Whether an input is a scene, which is simulated first."""
+    """Return true if an input is a scene, which is simulated first."""
     return path.is_dir() or path.suffix == ".toml"
 
 
 def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier: str = "fast") -> Frames:
-    """What is in a file or folder; a scene is simulated, under `progress`, which yields a callback (done, in all).
+    """Read the frames of a file or folder; a scene is simulated, under `progress`, which yields a callback (done, in
+    all).
 
     tier : of a scene's contacts
 
@@ -81,7 +82,7 @@ def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier:
 
 
 def _is_hdf5(path: Path) -> bool:
-    """Whether a file begins as HDF5 does; our own have no room before that."""
+    """Return true if a file begins like HDF5; the project's own files for this have no user block."""
     with open(path, "rb") as file:
         return file.read(len(SIGNATURE)) == SIGNATURE
 
@@ -170,7 +171,7 @@ def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.n
 
 
 def check_numbers(path: str | os.PathLike, numbers: np.ndarray) -> None:
-    """Raises TactileError for frame numbers (T,) that are no whole numbers from 0 on, each greater than the last."""
+    """Raise TactileError for frame numbers (T,) that are no whole numbers from 0 on, each greater than the last."""
     whole = np.isfinite(numbers).all() and (numbers == np.floor(numbers)).all() and (numbers >= 0).all()
     if not (whole and (np.diff(numbers) > 0).all() and (numbers < 2**31).all()):
         found = f"frame numbers {np.array2string(numbers, threshold=6, edgeitems=3)}"

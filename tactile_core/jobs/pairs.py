@@ -109,7 +109,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
-    """As many blocks as are wanted by those that are there."""
+    """Return the number of blocks needed in all, by the counts in the present ones; None if there are none."""
     counts = _counts(folder, job, index)
     if not counts:
         return None
@@ -153,7 +153,7 @@ def _counts(folder: Path, job: Job, index: int) -> dict[int, int]:
 
 
 def _count(file: Path) -> int:
-    """Of a block; one that is damaged counts as empty until it is made anew."""
+    """Number of contacts in a block; a damaged one counts as empty until it is made again."""
     try:
         return int(array_pack.read(file, names=(COUNT,))[COUNT])
     except (TactileError, KeyError):

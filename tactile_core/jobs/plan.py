@@ -1,4 +1,4 @@
-"""What a scene or a recording will build, and what that will cost, before it is run; from measured tables.
+"""Predict, from measured tables, what a scene or a recording will build and at what cost, before it is run.
 
 A plan is rows: what is built, by which verb, how much of it, and its expected time, memory and disk. Times are of one
 thread of the machine that the tables were measured on.
@@ -33,7 +33,7 @@ BUILD_S, BUILD_MB, MATRICES_MB = 60.0, 2200.0, {"biotac": 342.0, "digit": 151.0}
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """One thing that is built.
+    """Output that is built, with its cost.
 
     verb : which builds it; told : how much of it; seconds; memory, disk : MB it adds
     building : MB taken meanwhile, and given back
@@ -58,7 +58,7 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """In all."""
+        """Time of all parts together, s."""
         return sum(part.seconds for part in self.parts)
 
     @property
@@ -73,13 +73,13 @@ class Plan:
         return sum(part.disk for part in self.parts)
 
     def as_json(self) -> dict[str, Any]:
-        """All of it, fit for JSON."""
+        """Return the whole plan, fit for JSON."""
         whole = {"of": self.of, "parts": [dataclasses.asdict(part) for part in self.parts]}
         totals = {"seconds": self.seconds, "memory_mb": self.memory, "disk_mb": self.disk}
         return whole | {"left_out": list(self.left_out)} | {key: round(value, 3) for key, value in totals.items()}
 
     def lines(self) -> list[str]:
-        """All of it, to read."""
+        """Return the whole plan as lines of text."""
         found = [self.of, f"{'verb':9}{'what':22}{'s':>9}{'MB':>7}{'disk MB':>9}  of"]
         for part in self.parts:
             numbers = f"{part.seconds:9.2f}{part.memory or part.building:7.0f}{part.disk:9.1f}"
@@ -90,12 +90,12 @@ class Plan:
 
 @functools.cache
 def costs() -> dict[str, Any]:
-    """What ``scripts/benchmarks/measure_costs.py`` found."""
+    """Read the results of ``scripts/benchmarks/measure_costs.py``."""
     return json.loads(COSTS.read_text(encoding="utf-8"))
 
 
 def plan(path: str | os.PathLike, keep: str | None, budget: Budget, preset: str | None) -> Plan:
-    """Of a scene (a folder or a .toml) or a recording.
+    """Plan a scene (a folder or a .toml) or a recording.
 
     keep : its outputs as text; None for all that a scene can have, and for what `tactile convert` keeps by itself
 
@@ -161,7 +161,7 @@ def _part(name: str) -> dict[str, float]:
 
 
 def _each(what: str, verb: str, told: str, frames: int, name: str, beside: str) -> Part:
-    """What one output costs a frame beyond what is done beside it anyway."""
+    """Cost of one output a frame beyond what is done beside it anyway."""
     own, other = _part(name), _part(beside)
     seconds, disk = (max(own[key] - other[key], 0) * frames / 1e3 for key in ("ms", "kb"))
     return Part(what, verb, told, seconds, max(own["mb"] - other["mb"], 0), disk)
@@ -223,7 +223,7 @@ def _preset(budget: Budget, preset: str) -> str:
 
 
 def _preset_ms(name: str) -> float:
-    """ms a picture, by the variant that runs here where it was measured."""
+    """Time of a picture, ms, by the variant that runs here where it was measured."""
     from ..pictures.presets import measured
 
     ms = measured()["presets"][name]["ms"]
@@ -231,7 +231,7 @@ def _preset_ms(name: str) -> float:
 
 
 def _variant(preset: str) -> str:
-    """Of Mitsuba, that runs here; "" where none is needed, or none is there. Mitsuba itself is not loaded."""
+    """Variant of Mitsuba that runs here; "" where none is needed or present. Mitsuba itself is not loaded."""
     from ..pictures.mitsuba.variant import LLVM, SCALAR, llvm_trouble
 
     if preset == "fast" or importlib.util.find_spec("mitsuba") is None:

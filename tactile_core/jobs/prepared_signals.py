@@ -46,7 +46,7 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """What is told of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all."""
+    """Facts reported of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all."""
 
     recording: str
     layout: str
@@ -98,7 +98,7 @@ def _write(file: Path, job: Job, path: str, digest: str) -> int:
 
 
 def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
-    """Each part of a recording prepared, and how many of its frames the part before had."""
+    """Prepare each part of a recording; also yields the number of its frames that the part before had."""
     options, rest, rest_pdc = job.recipe.prepare.options(), None, np.nan
     sensor = job.recipe.sensor
     unit = None if sensor is None else sensor.gains_for(path, split(path)[1], "--sensor")
@@ -140,7 +140,7 @@ def _one_polarity(path: str, options: PrepareOptions) -> tuple[PrepareOptions, s
 
 
 def _decided_once(signals: Signals, doubts: np.uint16, evidence: str, *, first: bool) -> Signals:
-    """A part's signals under what was decided of the whole recording's polarity, which is told once."""
+    """A part's signals under what was decided of the whole recording's polarity, which is reported once."""
     flags = (signals.flags & ~DOUBTS) | doubts
     report = signals.report | ({"polarity_evidence": evidence} if evidence else {})
     keep = first and not evidence
@@ -213,7 +213,7 @@ class _Writer:
 
 
 class Prepared:
-    """An open look into a prepared file; every call opens it anew, so that nothing stays open in a worker.
+    """An open look into a prepared file; every call opens it again, so that nothing stays open in a worker.
 
     Each raises TactileError for a damaged file.
     """
@@ -225,7 +225,7 @@ class Prepared:
         return self._read(lambda file: len(file["time"]))
 
     def about(self) -> About:
-        """What is told of the recording."""
+        """Facts reported of the recording."""
         return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
     def rows(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
@@ -260,7 +260,7 @@ class Prepared:
 
 
 def _check(path: Path, file: h5py.File) -> None:
-    """Raises ValueError or TactileError for other arrays than ours, whose rows would take more memory."""
+    """Raise ValueError or TactileError for other arrays than ours, whose rows would take more memory."""
     import h5py
 
     count = len(file["time"])

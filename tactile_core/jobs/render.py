@@ -44,7 +44,7 @@ Progress = Callable[[int, int], None]
 
 
 def _silent(text: str) -> None:
-    """For callers that do not ask what was picked."""
+    """Do nothing, for callers that do not ask what was picked."""
 
 
 MAKER = "tactile render"  # in the note
@@ -52,7 +52,7 @@ MAKER = "tactile render"  # in the note
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """How to render.
+    """Options of rendering.
 
     preset : its name, None to choose by error; error : what will do, None for the default preset and the fast tier
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
@@ -145,7 +145,10 @@ def choose_preset(options: Options) -> str:
 
 
 def _tier(path: Path, um: float, say: Callable[[str], None]) -> str:
-    """Of contact, for a scene: within the bound less what its height map adds. Raises TactileError where none is."""
+    """Choose the tier of contact for a scene: within the bound less what its height map adds.
+
+    Raises TactileError where none is.
+    """
     from ..simulation import tier_choice
 
     share = tier_choice.choose_for_scene(path, ("digit",), None)["digit"].share
@@ -216,7 +219,7 @@ class Pictures:
                 self._write_exr(folder / EXR / EXR_NAME.format(number), radiance, about)
 
     def write_scene(self, path: str | os.PathLike, values: np.ndarray) -> None:
-        """Of a frame, as Mitsuba's file; values : as of `write_frame`."""
+        """Write a frame as Mitsuba's file; values : see `write_frame`."""
         unit = self.renderer.calibration
         height = values if self.heights else digit_mapper(unit.camera)(values)
         write_scene(path, unit, of_unit(height, unit))
@@ -244,7 +247,7 @@ def pictures(
     exr: bool,
     clock: Stopwatch | None = None,
 ) -> Pictures:
-    """What writes frames; heights : (H, W) of height maps, None for displacements; the rest as of `Options`.
+    """Return the writer of frames; heights : (H, W) of height maps, None for displacements; the rest as of `Options`.
 
     Raises TactileError for a bad calibration or size, and what ``Renderer`` raises.
     """  # fmt: skip
@@ -257,7 +260,7 @@ def pictures(
 def note_of(
     path: str | os.PathLike, kind: str, count: int, renderer: Renderer, preset: str, options: Options
 ) -> dict[str, Any]:
-    """Where a result came from, fit for JSON: only what the same input makes again."""
+    """Return the origin of a result, fit for JSON: only what the same input reproduces."""
     path = Path(path)
     file = path / "scene.toml" if path.is_dir() else path
     unit, calibration = renderer.calibration.unit, Path(options.calibration or SHIPPED)

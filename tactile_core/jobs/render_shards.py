@@ -37,7 +37,7 @@ def render_in_parts(
     place: Callable[[Path], Place],
     progress: Callable[[int, int], None],
 ) -> Path:
-    """As ``render.render``; the job is in ``<out>.parts`` until all is there, and the same call goes on with it.
+    """Render like ``render.render``; the job is in ``<out>.parts`` until complete, and the same call resumes it.
 
     place : where frames are rendered, from the job's folder; progress : (tasks done, known so far)
     Raises what ``render.render`` raises.
@@ -141,7 +141,7 @@ def count(folder: Path, job: Job, index: int) -> int:
 
 
 def input_kind(folder: Path, job: Job, index: int) -> tuple[str, bool, int]:
-    """Of an input that was read: its kind in words, whether it holds height maps, its frames."""
+    """Facts of an input that was read: its kind in words, true if it holds height maps, its frames."""
     found = array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(KIND, HEIGHTS))
     return found[KIND].tobytes().decode(), bool(found[HEIGHTS]), _frames(folder, job, index)
 

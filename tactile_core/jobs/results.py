@@ -1,4 +1,4 @@
-"""What a converted recording leaves behind: the layout of a result folder, and where it may stand.
+"""Layout of a converted recording's result folder, and the check of where it may be written.
 
 <recording>/frames.h5           numbers, T first, SI units; see ``frames_file``
 <recording>/images/%05d.png     DIGIT pictures, 240 wide, 320 high, numbered by the frame's index in the recording
@@ -64,7 +64,7 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
 
 
 def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
-    """Raises TactileError where a result may not stand: one is there (unless `overwrite`), or something else is.
+    """Raise TactileError where a result may not stand: one is there (unless `overwrite`), or something else is.
 
     maker : what its note says of who made it; another verb's result is something else, and so is one among whose files
         there are others
@@ -94,7 +94,7 @@ def check_writable(out: Path) -> None:
 
 
 def is_result(folder: Path, maker: str = "") -> bool:
-    """Whether a folder holds a result of ours, made by `maker`, so that --overwrite may replace it."""
+    """Return true if a folder holds a result of this package, made by `maker`, so that --overwrite may replace it."""
     try:
         note = json.loads((folder / NOTE).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""What the toolkit adds to a translation or a solved contact by itself: rounding, and heights between the nodes."""
+"""Error that the toolkit itself adds to a translation or a solved contact: rounding, and heights between the nodes."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ TABLE = shipped("sampling.json")
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """What ``scripts/benchmarks/measure_sampling.py`` found; bins of depth over thickness, m."""
+    """Read the results of ``scripts/benchmarks/measure_sampling.py``; bins of depth over thickness, m."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
 def height_error(share: float) -> float:
-    """um rms of a height map between nodes that 95 of 100 contacts stay below, up to a depth over the thickness."""
+    """Bound, um rms, on the error of a height map between nodes for 95 of 100 contacts, up to a depth over the
+    thickness.
+    """
     bins = measured()["bins"]
     reached = [each for each in bins if each["depth_share_to"] < share] + [_bin_of(share)]
     return 1e6 * max(each["rms_95_m"] for each in reached)
@@ -35,12 +37,12 @@ def _bin_of(share: float) -> dict[str, float]:
 
 
 def rounding() -> float:
-    """um, largest that float32 changes in a translated gel."""
+    """Largest change, um, that float32 makes in a translated gel."""
     return 1e6 * measured()["float32_m"]
 
 
 def check(bound: float, share: float | None) -> str:
-    """What is added to a gel, in words; share : the depth over the thickness of its heights, None without heights.
+    """Describe the error added to a gel; share : the depth over the thickness of its heights, None without heights.
 
     Raises TactileError where that is more than the bound, um: there is nothing more exact to choose.
     """

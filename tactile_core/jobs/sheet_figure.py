@@ -146,7 +146,7 @@ class SheetFigure:
         z: tuple[float, float],
         contact_center: np.ndarray | None,
     ) -> list[Axes]:
-        """One row of maps of |displacement| over the plan (n, 2) = (x, z) m, with the DIGIT's outline."""
+        """Draw one row of maps of |displacement| over the plan (n, 2) = (x, z) m, with the DIGIT's outline."""
         from matplotlib.tri import Triangulation
 
         height = self._row_height(x, z)

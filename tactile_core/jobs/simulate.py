@@ -93,7 +93,7 @@ def _put_together(folder: Path, job: Job, out: Path) -> None:
 
 
 def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
-    """Nothing: a recording is one shard."""
+    """Return one shard; nothing needs to be prepared."""
     return 1, False
 
 
@@ -118,5 +118,5 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
-    """One shard."""
+    """Return one shard: a recording is not split."""
     return Seen(1)

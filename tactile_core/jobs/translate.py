@@ -65,7 +65,7 @@ def _tools(
 
 
 def check_unit(calibration: str | None, sha256: str) -> None:
-    """Raises TactileError for a calibration that is not the one the job was made with."""
+    """Raise TactileError for a calibration that is not the one the job was made with."""
     if calibration is not None and unit_hash(Path(calibration)) != sha256:
         advice = "Use the calibration that the job was made with"
         raise TactileError(calibration, "another content", f"sha256 {sha256[:12]}..., as in the job", advice)

@@ -1,4 +1,4 @@
-"""What a contact states of its own error: that of its depth, or more where it is sharper or smaller than was measured.
+"""Estimate a contact's own error: that of its depth, or more if it is sharper or smaller than the measured contacts.
 
 The table by depth (``expected_error``) was measured on indenters that the meshes resolve.
 """
@@ -32,7 +32,9 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
-    """Of a contact ``depth`` m from first touch, of touching nodes, under an indenter as sharp as ``radius`` m."""
+    """Errors of a contact ``depth`` m from first touch, of touching nodes, under an indenter as sharp as
+    ``radius`` m.
+    """
     if not nodes:
         return _of_nothing(depth)
     sharper = max(LEARNED_RADIUS / radius, 1.0)
@@ -56,7 +58,7 @@ def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hid
 
 
 def _of_nothing(depth: float) -> Errors:
-    """Nothing is known of the force of a body that stands deeper than first touch, between nodes that it misses."""
+    """Errors without contact of a body deeper than first touch, between nodes that it misses: its force is unknown."""
     return (depth, 1.0) if depth > _ROUNDING else (0.0, 0.0)
 
 

@@ -18,7 +18,7 @@ SUFFIXES = (".ply", ".stl", ".vtu")
 
 
 def check_suffix(path: str | os.PathLike) -> None:
-    """Raises TactileError for a file name that says none of the formats."""
+    """Raise TactileError for a file name that says none of the formats."""
     if Path(path).suffix.lower() not in SUFFIXES:
         raise TactileError(path, f"the ending {Path(path).suffix!r}", " or ".join(SUFFIXES), "It chooses the format")
 

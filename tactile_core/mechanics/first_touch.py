@@ -1,4 +1,4 @@
-"""Where an indenter first touches a sensor's resting surface as it moves in: depth is counted from there."""
+"""Find where an indenter first touches a sensor's resting surface as it moves in: depth is counted from there."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
 
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
-    """How much farther in, m, than at ``pose``, itself at first touch, an indenter touches where it has slid.
+    """Additional distance, m, to first touch of an indenter that has slid, against ``pose``, itself at first touch.
 
     Where it has slid off the sensor, as far as its motion is followed.
     """
@@ -69,7 +69,7 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
 
 
 def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
-    """Where a body's foremost point meets a surface, which it may do between nodes: place (1, 2) and point (1, 3) m.
+    """Find where a body's foremost point meets a surface, also between nodes: place (1, 2) and point (1, 3) m.
 
     axes : (3, rows, columns) m, the surface's nodes; closed : whether its last column joins the first
     None where no node lies near its way.
@@ -91,7 +91,7 @@ def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) 
 
 
 def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far along (n,) and beside (n,) m a line points (n, 3) m lie."""
+    """Coordinates of points (n, 3) m along (n,) and beside (n,) m a line."""
     arm = points - start
     along = arm @ direction
     return along, np.linalg.norm(arm - along[:, None] * direction, axis=1)

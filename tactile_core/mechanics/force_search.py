@@ -67,7 +67,7 @@ def touch_at_force(
 
 
 def unreachable(where: str, force: float, limit: float) -> TactileError:
-    """What is said where no depth within the limit, m, gives a force, N."""
+    """Return the error for a force, N, that no depth within the limit, m, gives."""
     expected = f"a force that is found within {limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
     return TactileError(where, f"force {force:g} N", expected, "Press less, or to a depth")
 

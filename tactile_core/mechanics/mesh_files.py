@@ -23,7 +23,7 @@ _VTK_NAMES = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "int
 
 
 def vtk_order() -> np.ndarray:
-    """(27,) which node of a ``HexMesh`` cell, a + 3 b + 9 c, VTK's triquadratic hexahedron has at each of its places.
+    """Node (27,) of a ``HexMesh`` cell, a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
 
     VTK counts corners, then edges, faces -x +x -y +y -z +z and the middle, bottom before top and the bottom's edges
     before the upright ones last: Schroeder, Martin, Lorensen, The Visualization Toolkit, vtkTriQuadraticHexahedron.
@@ -110,7 +110,7 @@ def write_cells(
     point_data: Data | None = None,
     cell_data: Data | None = None,
 ) -> None:
-    """Any cells of one kind as VTK's XML unstructured grid, base64 inside.
+    """Write cells of one kind as VTK's XML unstructured grid, base64 inside.
 
     nodes : (n, 3) m; cells : (m, k) int in VTK's order; kind : VTK's cell type, such as TRIANGLE
     point_data, cell_data : values (n or m,) or (n or m, k) by name; floats become float32
@@ -133,7 +133,7 @@ def write_cells(
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """One DataArray; VTK wants the number of bytes before them, inside the same base64."""
+    """Format one DataArray; VTK wants the number of bytes before them, inside the same base64."""
     little = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     text = base64.b64encode(struct.pack("<Q", len(little)) + little).decode()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""

@@ -1,4 +1,4 @@
-"""Whether a surface follows the body pressed into it, or has let it through between its nodes.
+"""Check that a surface follows the body pressed into it, and does not let it through between its nodes.
 
 Contact is looked at in nodes. A body narrower than their spacing, or one from whose tip frictionless nodes have slid
 away, sinks in between them; nodes that slide round a wire pressed deeper than its radius come to lie on its back, and
@@ -33,7 +33,7 @@ class PenetrationError(TactileError):
 def penetration_between(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool, share: float = _SHARE
 ) -> float:
-    """How deep, m, a surface (rows, columns, 3) m lies in a body halfway between nodes, wherever some are near it.
+    """Penetration, m, of a surface (rows, columns, 3) m into a body halfway between nodes, wherever some are near it.
 
     Raises PenetrationError for a body ``depth`` m in, where that is too much: also more than a share of the depth.
     """
@@ -52,7 +52,7 @@ def penetration_between(
 
 
 def penetration(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> float:
-    """How deep, m, a body's foremost point lies under a surface (rows, columns, 3) m; 0 where that says nothing."""
+    """Depth, m, of a body's foremost point under a surface (rows, columns, 3) m; 0 where that says nothing."""
     foremost = pose.support(indenter, pose.direction)
     met = None
     if abs(pose.distance(indenter, foremost[None])[0][0]) < _ON_BODY:

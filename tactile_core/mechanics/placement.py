@@ -1,4 +1,4 @@
-"""Where an indenter stands: the same unrolled place and angle on both sensors."""
+"""Placement of an indenter: the same unrolled place and angle on both sensors."""
 
 from __future__ import annotations
 
@@ -44,5 +44,5 @@ def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
 
 
 def on_gel(x: float, z: float, margin: float = 0.0) -> bool:
-    """Whether a place of the DIGIT's plane lies on the gel, at least ``margin`` m inside its outline."""
+    """Return true if a place of the DIGIT's plane lies on the gel, at least ``margin`` m inside its outline."""
     return bool(digit.outline_distance(np.array(x), np.array(z)) > margin)

@@ -10,12 +10,12 @@ _ROUNDING = 1e-12  # m
 
 
 def same_place(first: Pose, second: Pose) -> bool:
-    """Whether two poses are one."""
+    """Return true if two poses are equal."""
     return np.array_equal(first.apex, second.apex) and np.array_equal(first.axes, second.axes)
 
 
 def same_line(first: Pose, second: Pose) -> bool:
-    """Whether two poses differ in depth alone."""
+    """Return true if two poses differ in depth alone."""
     apart = second.apex - first.apex
     sideways = apart - (apart @ first.direction) * first.direction
     return bool(np.abs(sideways).max() < _ROUNDING and np.array_equal(first.axes, second.axes))

@@ -1,4 +1,4 @@
-"""How sharp an indenter is where a surface lies: no correction was learned on edges too fine for the lattices."""
+"""Sharpness of an indenter where a surface lies: no correction was learned on edges too fine for the lattices."""
 
 from __future__ import annotations
 

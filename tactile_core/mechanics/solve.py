@@ -1,4 +1,4 @@
-"""One door to contact mechanics: a sensor, an indenter at a place, a depth or a force, and a tier."""
+"""Solve contact mechanics through one interface: a sensor, an indenter at a place, a depth or a force, and a tier."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ class _Path:
         self.hardest = max((step.force for step in steps if step.force), default=0.0)
 
     def errors(self, depth: float) -> tuple[float, float]:
-        """Of a contact at a depth, m: see ``Solution``."""
+        """Errors of a contact at a depth, m: see ``Solution``."""
         return expected_error(self.tier, self.sensor, depth / self.thickness)
 
 
@@ -280,7 +280,7 @@ class _FiniteStrain(_Path):
         )  # fmt: skip
 
     def _nodes_across(self, touch: ContactState) -> float:
-        """How many nodes of the full tier's mesh lie across the contact where the indenter is sharpest."""
+        """Count the nodes of the full tier's mesh across the contact where the indenter is sharpest."""
         mesh = self.body.solid.mesh
         rest = mesh.nodes[mesh.surface]
         nearest = rest[int(np.argmin(touch.pose.distance(self.indenter, rest)[0]))]

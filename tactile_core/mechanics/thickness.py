@@ -1,4 +1,4 @@
-"""How thick a sensor is where it is touched: the measure of depth in per cent."""
+"""Thickness of a sensor where it is touched: the reference for depth in per cent."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .. import sensors
 from ..geometry.indenters import Indenter, Pose
 from ..sensors import biotac, digit
 
-DEPTH_LIMIT = 0.6  # of the thickness: as deep as MECHANICS is asked to go
+DEPTH_LIMIT = 0.6  # of the thickness: the deepest that contacts are asked for
 _DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
 _STEP = 20e-6  # m, of the march through the BioTac; the last step is divided linearly
 _TOUCHES = 0.1e-3  # m: at first touch a node is mostly this near

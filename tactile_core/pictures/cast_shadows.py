@@ -24,11 +24,11 @@ _TABLE_STEPS = 256
 
 
 class ShadowCaster:
-    """How much of one LED each pixel sees over the gel.
+    """Visible share of one LED at each pixel over the gel.
 
     The mapped field is sampled on rays that leave the LED's foot point, (angle, distance), where a march toward the
-    light is a shift along rows. Gel outside the picture is taken as flat, as high as the picture's edge.
-    Raises TactileError for an LED whose foot point lies in the picture, or that is as high as the camera.
+    light is a shift along rows. Gel outside the picture is taken as flat, as high as the picture's edge. Raises
+    TactileError for an LED whose foot point lies in the picture, or that is as high as the camera.
     """
 
     def __init__(self, camera: Camera, led: Led) -> None:
@@ -76,10 +76,10 @@ class ShadowCaster:
         return self.distance * np.sqrt(rise @ rise - part) / self.led.radius
 
     def sight(self, height: np.ndarray, box: tuple[slice, slice]) -> tuple[np.ndarray, tuple[slice, slice]]:
-        """How far the LED's centre stands above the horizon, in LED radii, cut to -1 (hidden) .. 1 (all seen).
+        """Height of the LED's centre above the horizon, in LED radii, clipped to -1 (hidden) .. 1 (all seen).
 
-        height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may throw shadows
-        Returns sight (h, w) and the box of pixels it is for; it is 1 everywhere else.
+        height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may throw shadows Returns
+            sight (h, w) and the box of pixels it is for; it is 1 everywhere else.
         """
         reach = self._reach(float(height[box].max()), float(height.min()))
         rows = _span(self._row[box], self._polar_shape[0] - 1)
@@ -142,7 +142,7 @@ def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | Non
 
 
 def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
-    """Two whole numbers or more from 0 to ``highest`` that enclose the values wanted, `more` further up."""
+    """Slice of two or more integers from 0 to ``highest`` that encloses the values wanted, `more` further up."""
     first = min(max(int(np.floor(wanted.min())), 0), highest - 1)
     last = min(int(np.ceil(wanted.max())) + more, highest)
     return slice(first, max(last, first + 1) + 1)
@@ -157,7 +157,7 @@ def _disc_tables() -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of a disc of radius 1 cut by a horizon `sight` below its centre: area seen and its first moment upward.
+    """Visible area, and its first moment upward, of a disc of radius 1 cut by a horizon `sight` below its centre.
 
     Both over the whole disc's area (circular segment): share 1/2 + (t sqrt(1 - t^2) + asin t) / pi,
     moment 2 (1 - t^2)^(3/2) / (3 pi).

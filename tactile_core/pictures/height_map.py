@@ -38,7 +38,7 @@ SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area
 
 @contextlib.contextmanager
 def folds_counted() -> Iterator[list[int]]:
-    """For each map made inside that folds over itself, at how many places; it is then not logged."""
+    """Count, for each map made inside that folds over itself, the places where it does; it is then not logged."""
     folded: list[int] = []
     token = _folded.set(folded)
     try:

@@ -20,7 +20,7 @@ TABLE = shipped("optics_presets.json")
 
 @dataclasses.dataclass(frozen=True)
 class Preset:
-    """What Mitsuba is asked for.
+    """Settings of a Mitsuba render.
 
     points : that stand for each LED, a pass; spacing : m between vertices of the gel's mesh
     bounce_step : by LLVM, pixels between the places that one bounce is gathered at; 0 leaves it out
@@ -63,7 +63,7 @@ DEFAULT = STANDARD.name
 
 
 def preset_named(name: str) -> Preset:
-    """One of Mitsuba's presets; raises TactileError for another name."""
+    """Return one of Mitsuba's presets; raises TactileError for another name."""
     if name not in PRESETS:
         raise TactileError("--preset", repr(name), f"one of {', '.join(NAMES)}")
     return PRESETS[name]
@@ -71,7 +71,7 @@ def preset_named(name: str) -> Preset:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """What ``measure_presets.py`` found: how, and by preset error in grey levels and ms by variant."""
+    """Read the results of ``measure_presets.py``: how, and by preset error in grey levels and ms by variant."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
@@ -97,11 +97,11 @@ def fitting(error: float, variant: str | None = None) -> str:
 
 
 def describe_choice(name: str, error: float) -> str:
-    """Why a preset was picked for a bound, in words."""
+    """Explain why a preset was picked for a bound."""
     found = measured()["presets"][name]
     return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"
 
 
 def _ms(ms: dict[str, float], variant: str) -> float:
-    """Of a preset that needs no Mitsuba, or by a variant; one that was not measured counts as slowest."""
+    """Time of a preset without Mitsuba, or by a variant, ms; one that was not measured counts as slowest."""
     return ms.get("numpy", ms.get(variant, float("inf")))

@@ -31,7 +31,7 @@ class Light(Protocol):
     """Gives radiance (H, W, 3) of height maps (H, W) m."""
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """(H, W, 3) of heights (H, W) m."""
+        """Radiance (H, W, 3) of heights (H, W) m."""
 
 
 class Renderer:

@@ -85,7 +85,7 @@ class Shader:
 
 
 class SeenSurface:
-    """What all LEDs need of the gel that the pixels see, all (H, W) float32.
+    """Data of the gel that the pixels see, shared by all LEDs, all (H, W) float32.
 
     With s = 1 - h / H the seen point is (q s, h), and its normal is along (-dh/dq, tilt), where dh/dq are the slopes of
     h over the picture and tilt = s - q . dh/dq / H (from h(q) = height(q s)).
@@ -110,7 +110,7 @@ class SeenSurface:
 
 
 class Lamp:
-    """One LED and what it gives to the gel that the pixels see."""
+    """Light of one LED on the gel that the pixels see."""
 
     def __init__(self, camera: Camera, led: Led) -> None:
         self.led = led
@@ -159,7 +159,7 @@ class Lamp:
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """values as float32; raises TactileError, by their name, for another shape or what is not finite."""
+    """Convert values to float32; raises TactileError, by their name, for another shape or what is not finite."""
     values = np.asarray(values)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")
@@ -169,7 +169,7 @@ def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.nd
 
 
 def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
-    """Raises TactileError for heights (H, W) m that reach an LED's middle or the camera."""
+    """Raise TactileError for heights (H, W) m that reach an LED's middle or the camera."""
     lowest = min(unit.leds, key=lambda led: led.position[2])
     limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
     for what, limit in limits.items():

@@ -1,7 +1,7 @@
-"""Recordings of a BioTac: read any known file layout, find what is wrong with it, and bring its signals to one form.
+"""Recordings of a BioTac: read any known file layout, find what is wrong with it, and convert its signals to one form.
 
 ``read(path)`` gives a :class:`Recording`, the file as it is; ``prepare(recording, options)`` gives :class:`Signals`,
-the change against rest that the networks see. A new file layout is one new file in ``formats/``; see there.
+the change against rest that the networks take. A new file layout is one new file in ``formats/``; see there.
 """
 
 from .readers import layouts, read

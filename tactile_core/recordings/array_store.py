@@ -24,7 +24,7 @@ _NPY_START = 12  # bytes: magic, version, length
 
 @dataclass(frozen=True)
 class Store:
-    """shapes : name -> (shape, dtype) as declared in the file; attributes : of the file's root."""
+    """Named arrays of an open file; shapes : name -> (shape, dtype) as declared; attributes : of the file's root."""
 
     path: str
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]]
@@ -34,7 +34,7 @@ class Store:
     load_rows: Callable[[str, slice], np.ndarray] | None = None
 
     def rows(self, rows: slice, count: int) -> Store:
-        """The same store with only these rows of all arrays that are `count` long; HDF5 alone reads in parts."""
+        """Return the same store with only these rows of all arrays of length `count`; only HDF5 is read in parts."""
         long = {name for name, (shape, _) in self.shapes.items() if shape[:1] == (count,)}
         cut = {name: ((rows.stop - rows.start, *self.shapes[name][0][1:]), self.shapes[name][1]) for name in long}
 
@@ -44,7 +44,7 @@ class Store:
         return replace(self, shapes=self.shapes | cut, load=load)
 
     def array(self, name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> np.ndarray:
-        """The array as floats; shape has None where any length will do. Raises TactileError for all that is wrong."""
+        """Read the array as floats; None in shape allows any length. Raises TactileError for anything wrong."""
         where = f"{self.path}, {name}"
         if name not in self.shapes:
             raise TactileError(where, "this array is missing", advice="Export the recording again with all arrays")
@@ -65,7 +65,7 @@ class Store:
         return self._loaded(name).astype(dtype)
 
     def optional(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
-        """The array, or None where the file does not hold it."""
+        """Read the array, or return None where the file does not hold it."""
         return self.array(name, shape) if name in self.shapes else None
 
     def _loaded(self, name: str) -> np.ndarray:
@@ -117,7 +117,7 @@ def open_hdf5(path: str) -> Iterator[Store]:
 
 @contextmanager
 def damage_told(where: str, what: str) -> Iterator[None]:
-    """Turn whatever a file library raises into a TactileError; see Store._loaded."""
+    """Turn any error of a file library into a TactileError; see Store._loaded."""
     try:
         yield
     except (TactileError, MemoryError):
@@ -129,7 +129,7 @@ def damage_told(where: str, what: str) -> Iterator[None]:
 
 
 def _plain(value: Any) -> Any:
-    """A name or attribute as plain Python: str, int, float, bool or list, fit for JSON."""
+    """Convert a name or attribute to plain Python: str, int, float, bool or list, fit for JSON."""
     if isinstance(value, bytes):  # h5py gives text as bytes where it is not UTF-8
         return value.decode("utf-8", "replace")
     if isinstance(value, np.ndarray | np.generic):
@@ -160,14 +160,16 @@ def open_npz(path: str) -> Iterator[Store]:
 
 
 def _check_packing(path: str, member: zipfile.ZipInfo) -> None:
-    """Other kinds of packing than deflate unpack at once whatever the file says, or ask for gigabytes to begin with."""
+    """Refuse compression other than deflate, which unpacks all at once whatever size is declared, or takes
+    gigabytes.
+    """
     if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         found = f"packed by method {member.compress_type}"
         raise TactileError(f"{path}, {member.filename}", found, "stored or deflated, as numpy does", "Save it again")
 
 
 def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype]:
-    """Shape and type; a header that says it is long is not read: numpy would take it into memory before it looks."""
+    """Read shape and type; a header that declares itself long is refused, as numpy would load it before checking."""
     start = stream.read(_NPY_START)
     length = int.from_bytes(start[8 : 10 if start[6:7] == b"\1" else 12], "little")
     if not start.startswith(b"\x93NUMPY") or length > MAX_HEADER:

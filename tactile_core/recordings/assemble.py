@@ -1,4 +1,4 @@
-"""From columns to a Recording: checks that all layouts share (bad cells, time stamps, sizes)."""
+"""Build a Recording from columns: checks that all layouts share (bad cells, time stamps, sizes)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SHOWN = 8  # problems spelled out one by one; more are counted
 
 @dataclass(frozen=True)
 class Problem:
-    """One bad place in a file: frame index, line in the file, column; essential: an electrode or time is lost."""
+    """Unreadable place in a file: frame index, line in the file, column; essential: an electrode or time is lost."""
 
     frame: int
     row: int
@@ -36,7 +36,7 @@ class Problem:
 
 
 class BadRows(TactileError):
-    """More rows are bad than a recording may have."""
+    """Error for more bad rows than a recording may have."""
 
 
 def check_electrodes(path: str, count: int, source: str) -> None:
@@ -118,7 +118,7 @@ def assemble(
 
 
 def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
-    """Sentences naming row and field of the first few problems and the number of the others."""
+    """Write sentences that name row and field of the first few problems, and the number of the others."""
     told = [
         f"{row_word} {p.row}, {p.field}: {p.found}; "
         + ("interpolated from the frames around it" if p.essential else "left empty")
@@ -145,7 +145,7 @@ def _check_size(path: str, electrodes: np.ndarray) -> None:
 def _unreadable(
     electrodes: np.ndarray, bad: np.ndarray, names: Sequence[str], rows: np.ndarray, known: Sequence[Problem]
 ) -> list[Problem]:
-    """Electrode cells that are not a possible reading and that no reader has reported; bad : (T, 19) bool."""
+    """Find electrode cells that are no possible reading and that no reader has reported; bad : (T, 19) bool."""
     told = {(p.frame, "" if p.field == "row" else p.field) for p in known}
     found = []
     for frame, j in np.argwhere(bad)[:MAX_PROBLEMS]:
@@ -155,7 +155,7 @@ def _unreadable(
 
 
 def _check_share(path: str, bad: np.ndarray, problems: Sequence[Problem], row_word: str) -> None:
-    """bad : (T,) bool, frames with an unreadable electrode."""
+    """Raise BadRows where too many frames are bad; bad : (T,) bool, frames with an unreadable electrode."""
     bad = bad.copy()
     bad[[p.frame for p in problems if p.essential]] = True
     frames, count = len(bad), int(bad.sum())
@@ -170,7 +170,7 @@ def _check_share(path: str, bad: np.ndarray, problems: Sequence[Problem], row_wo
 
 
 def _seconds(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
-    """Time from the first frame (s), unix start time (s, 0.0 if unknown), warnings."""
+    """Return time from the first frame (s), unix start time (s, 0.0 if unknown) and warnings."""
     stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)
     stamps = _fill_stamps(stamps)
     warnings = []
@@ -184,7 +184,7 @@ def _seconds(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
 
 
 def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
-    """Missing stamps by interpolation; at the ends by the median step."""
+    """Interpolate missing stamps; at the ends, extrapolate by the median step."""
     good = np.flatnonzero(np.isfinite(stamps))
     if len(good) == len(stamps):
         return stamps
@@ -199,7 +199,7 @@ def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
 
 
 def _time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, list[str]]:
-    """Frames before which the stamp went back, stood still or left a gap, and sentences about them."""
+    """Find frames before which the stamp went back, stood still or left a gap; and write sentences about them."""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     usual = float(np.median(forward)) if len(forward) else 1.0 / NOMINAL_RATE

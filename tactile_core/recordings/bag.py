@@ -1,6 +1,6 @@
-"""ROS 1 and ROS 2 bags and MCAP files, read without ROS, by our own definitions of the messages.
+"""ROS 1 and ROS 2 bags and MCAP files, read without ROS, by the project's own message definitions.
 
-What a bag says of its messages' layout is compared, never compiled: the library that decodes makes code of it.
+A bag's own message definitions are compared, never compiled: the decoding library generates code from definitions.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PACKED = re.compile(rb"compression_mode:\s*[\"']?(file|message)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Bag:
-    """An open bag. topics : message type -> its connections; finger : asked for as ``path#finger``, or None."""
+    """An open bag. topics : message type -> its connections; finger : requested as ``path#finger``, or None."""
 
     path: str
     ros1: bool
@@ -41,7 +41,7 @@ class Bag:
 
 
 def kind(path: Path) -> str | None:
-    """Which bag a path is: ros1, mcap, sqlite or folder; None for anything else."""
+    """Return the kind of bag at a path: ros1, mcap, sqlite or folder; None for anything else."""
     if path.is_dir():
         return "folder" if (path / MARK).is_file() else None
     with open(path, "rb") as file:
@@ -51,7 +51,7 @@ def kind(path: Path) -> str | None:
 
 @contextmanager
 def open_bag(path: str) -> Iterator[Bag]:
-    """Open for reading; raises TactileError for damage, and for a ROS 2 bag that is packed file by file."""
+    """Open for reading; raises TactileError for damage, and for a ROS 2 bag that is compressed file by file."""
     from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
     from rosbags.rosbag2.storage_mcap import McapReader
@@ -82,7 +82,7 @@ def open_bag(path: str) -> Iterator[Bag]:
 
 
 def _bound_unpacking() -> None:
-    """Have the library unpack no chunk to more than MAX_CHUNK; by itself it unpacks whatever a file asks for."""
+    """Make the library unpack no chunk to more than MAX_CHUNK; by default it unpacks whatever size a file declares."""
     import bz2
 
     import lz4.frame
@@ -106,9 +106,10 @@ def _bound_unpacking() -> None:
 def read_bag(
     bag: Bag, layout: ModuleType, frames: int = MAX_FRAMES + 1, context: int = 0
 ) -> Iterator[tuple[Recording, int]]:
-    """Recordings of `frames` frames, each beginning with the last `context` ones of the one before, and how many.
+    """Yield recordings of `frames` frames, each starting with the last `context` frames of the one before, and their
+    count.
 
-    One finger's: the one asked for, or the first that is not all zeros; a warning names the others.
+    Reads the requested finger, or the first that is not all zeros; a warning names the others.
     """
     rows = np.empty((0, layout.WIDTH + 1))
     finger, warnings, repeated = bag.finger, [], 0
@@ -125,7 +126,7 @@ def read_bag(
 
 
 def fingers_of(bag: Bag, layout: ModuleType) -> tuple[int, ...]:
-    """Numbers of the fingers of a hand whose electrodes are not all zeros, by its first frames."""
+    """Return the numbers of a hand's fingers whose electrodes are not all zeros in its first frames."""
     block = next(_blocks(bag, layout, LOOKED_AT), np.empty((0, 0, ELECTRODES)))
     return tuple(int(number) for number in _live(block))
 
@@ -136,7 +137,7 @@ def _live(block: np.ndarray) -> np.ndarray:
 
 
 def _blocks(bag: Bag, layout: ModuleType, frames: int) -> Iterator[np.ndarray]:
-    """(n, fingers, 1 + WIDTH) float, stamp first, n up to `frames`."""
+    """Yield (n, fingers, 1 + WIDTH) float, stamp first, n up to `frames`."""
     connections = bag.topics[layout.MESSAGE]
     connections = [one for one in connections if one.topic == connections[0].topic]
     rows: list[np.ndarray] = []
@@ -159,7 +160,7 @@ def _blocks(bag: Bag, layout: ModuleType, frames: int) -> Iterator[np.ndarray]:
 
 
 def _messages(bag: Bag, layout: ModuleType, connections: list[Any]) -> Iterator[tuple[float, Any]]:
-    """Stamps (unix s) and decoded messages of one topic; the header's stamp, or the bag's where that is 0."""
+    """Yield stamps (unix s) and decoded messages of one topic; the header's stamp, or the bag's where that is 0."""
     decode = None
     with damage_told(bag.path, "bag"):
         messages = bag.reader.messages(connections)
@@ -172,7 +173,9 @@ def _messages(bag: Bag, layout: ModuleType, connections: list[Any]) -> Iterator[
 
 
 def _decoder(bag: Bag, layout: ModuleType, connection: Any) -> Callable[[bytes], Any]:
-    """What decodes a connection's messages: by the version of our definitions whose hash it carries."""
+    """Return the decoder of a connection's messages: the version of the project's definitions with the
+    connection's hash.
+    """
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     stores = []
@@ -206,7 +209,7 @@ def _decoded(store: Any, layout: ModuleType, data: bytes, ros1: bool) -> Any:
 
 
 def _choose(bag: Bag, block: np.ndarray) -> tuple[int, list[str]]:
-    """The finger to read, and what to say of the others. block : (n, fingers, 1 + WIDTH), electrodes last."""
+    """Choose the finger to read, and warn of the others. block : (n, fingers, 1 + WIDTH), electrodes last."""
     if not block.shape[1]:
         raise TactileError(bag.path, "a hand without fingers", "at least one BioTac")
     live = _live(block)

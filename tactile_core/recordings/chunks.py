@@ -1,4 +1,4 @@
-"""A recording in parts that fit into memory, however long it is; short ones are a single part, as `read` gives them."""
+"""Read a recording in parts that fit into memory; short ones are a single part, equal to the result of `read`."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ CONTEXT = 200  # frames that a part shares with the one before: glitches are loo
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """recording : the frames of a part; repeated : how many of them, at its start, the part before had too."""
+    """Part of a recording; repeated : number of frames at its start that the part before also held."""
 
     recording: Recording
     repeated: int
 
 
 def read_parts(path: str | os.PathLike[str]) -> Iterator[Part]:
-    """The parts of a recording in order, their times counted from the first frame of all. NPZ files are read whole.
+    """Yield the parts of a recording in order, times counted from the first frame of all. NPZ files are read whole.
 
-    Raises TactileError as `readers.read`.
+    Raises TactileError like `readers.read`.
     """
     path = os.fspath(path)
     shift, time = 0.0, None
@@ -73,7 +73,7 @@ def _of_store(store: Store) -> Iterator[Part]:
 
 
 def _frames(store: Store, name: str) -> int:
-    """Length of the electrodes' array, 0 where it is missing or a single number: the layout says so."""
+    """Length of the electrodes' array; 0 where it is missing or a single number, which the layout then reports."""
     shape = store.shapes.get(name, ((), None))[0]
     return shape[0] if shape else 0
 

@@ -1,4 +1,4 @@
-"""Electrodes that cannot tell what they feel: readings at an end of the converter's range, and dead channels."""
+"""Detect faulty electrodes: readings at an end of the converter's range, and dead channels."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """(T,) flags of raw readings at an end of the 12-bit range; other kinds do not show it.
+    """Flags (T,) of raw readings at an end of the 12-bit range; other kinds do not show it.
 
-    readings : (T, 19) counts; what is found is told in the warnings
+    readings : (T, 19) counts; findings are added to the warnings
     """
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
@@ -33,9 +33,9 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
 
 
 def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """(T,) flags where an electrode stands still for 1 s or more; none in recordings that are shorter.
+    """Flags (T,) where an electrode is constant for 1 s or more; none in recordings that are shorter.
 
-    readings : (T, 19) counts; what is found is told in the warnings
+    readings : (T, 19) counts; findings are added to the warnings
     """
     still = _still(readings)
     whole = still.all(axis=0)
@@ -51,10 +51,10 @@ def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.
 
 
 def _still(readings: np.ndarray) -> np.ndarray:
-    """(T, 19) bool: samples of runs of equal readings of ``DEAD_FRAMES`` or more.
+    """Mark (T, 19) bool the samples of runs of ``DEAD_FRAMES`` or more equal readings.
 
-    Runs while nothing moves are no fault, but over the whole recording. An electrode that is quiet elsewhere too has no
-    noise to miss: there only a run over the whole recording counts.
+    Runs while no electrode changes are no fault unless they span the whole recording. For an electrode that is quiet
+    elsewhere too, missing noise shows nothing: only a run over the whole recording counts.
     """
     still = np.zeros(readings.shape, bool)
     changes = np.diff(readings, axis=0) != 0
@@ -70,7 +70,7 @@ def _still(readings: np.ndarray) -> np.ndarray:
 
 
 def _moves(readings: np.ndarray) -> bool:
-    """Whether half of the electrodes of readings (T, 19) move by more than `STEADY`."""
+    """Return true if half of the electrodes of readings (T, 19) change by more than `STEADY`."""
     return bool(np.median(np.ptp(readings, axis=0)) > STEADY)
 
 

@@ -1,4 +1,4 @@
-"""A unit's own rest, gains and offsets: the TOML file of `tactile adapt`, and what it does to signals."""
+"""Rest, gains and offsets of a unit: the TOML file of `tactile adapt`, and its application to signals."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ Row = Annotated[list[float], Meta(min_length=ELECTRODES, max_length=ELECTRODES)]
 
 
 class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
-    """A unit against the simulated one: reading - rest = gain * simulated change + offset, E1 .. E19.
+    """Gains of a unit relative to the simulated one: reading - rest = gain * simulated change + offset, E1 .. E19.
 
     gain : counts a count; offset_counts : counts; note : how it was made
-    rest_counts : what its electrodes read without contact, where that was found; rest_spread_counts : half the range of
-        what the recordings that it was found in give for it; rest_pdc : counts
+    rest_counts : readings without contact, where known; rest_spread_counts : half the range of its estimates from
+        single recordings; rest_pdc : counts
     """
 
     note: str
@@ -45,14 +45,14 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     rest_pdc: float | None = None
 
     def rest(self) -> Rest | None:
-        """The unit's rest as `prepare` takes it."""
+        """Return the unit's rest in the form that `prepare` takes."""
         if self.rest_counts is None:
             return None
         return Rest(tuple(self.rest_counts), tuple(self.rest_spread_counts or [0.0] * ELECTRODES), self.rest_pdc)
 
 
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
-    """One unit, or the units of a hand's fingers, each in a section of its own."""
+    """Calibration of one unit, or of the units of a hand's fingers, each in its own section."""
 
     format: str
     unit: ElectrodeGains | None = None
@@ -63,12 +63,12 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     finger4: ElectrodeGains | None = None
 
     def sections(self) -> dict[str, ElectrodeGains]:
-        """Sections that are there, by name."""
+        """Return the sections present, by name."""
         names = ("unit", *(f"finger{number}" for number in range(FINGERS)))
         return {name: found for name in names if (found := getattr(self, name)) is not None}
 
     def gains_for(self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike) -> ElectrodeGains:
-        """The unit that a recording was made with. Raises TactileError where the file has no section for it."""
+        """Return the unit that made a recording. Raises TactileError where the file has no section for it."""
         name = "unit" if finger is None else f"finger{finger}"
         sections = self.sections()
         if name in sections:
@@ -82,9 +82,9 @@ def _in_words(finger: int | None) -> str:
 
 
 def prepare_unit(recording: Recording, options: PrepareOptions | None, unit: ElectrodeGains | None) -> Signals:
-    """Prepare a recording by its unit's rest, and take its gains and offsets off; None: as `prepare`.
+    """Prepare a recording by its unit's rest, and correct its gains and offsets; None: same as `prepare`.
 
-    Raises TactileError as `prepare`.
+    Raises TactileError like `prepare`.
     """
     if unit is None:
         return prepare(recording, options)
@@ -92,9 +92,9 @@ def prepare_unit(recording: Recording, options: PrepareOptions | None, unit: Ele
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
-    """Signals as the simulated sensor would give them: (change - offset) / gain, in counts of a typical unit.
+    """Convert signals to the simulated sensor's: (change - offset) / gain, in counts of a typical unit.
 
-    The report says so. A rectified change has lost its offset with its sign: it is only divided by the gain.
+    The report records it. A rectified change has lost offset and sign: it is only divided by the gain.
     """
     offset = np.zeros(ELECTRODES) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     told = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
@@ -122,7 +122,7 @@ def read(path: str | os.PathLike) -> SensorFile:
 
 
 def check(sensor: SensorFile, where: str | os.PathLike) -> None:
-    """Raises TactileError naming the field that is out of range."""
+    """Raise TactileError naming the field that is out of range."""
     if sensor.format != FORMAT:
         raise TactileError(f"{where}, format", repr(sensor.format), repr(FORMAT), ADVICE)
     if not sensor.sections():
@@ -161,7 +161,9 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
 
 
 def _quoted(text: str) -> str:
-    """A TOML basic string; JSON's escapes are among TOML's, and its ASCII keeps file names that are no UTF-8."""
+    """Quote text as a TOML basic string: JSON's escapes are valid in TOML, its ASCII keeps file names that are
+    no UTF-8.
+    """
     return json.dumps(text.encode(errors="replace").decode())
 
 

@@ -1,4 +1,4 @@
-"""Files that hold several fingers: each is a recording of its own, asked for as ``path#finger``."""
+"""Name the recordings of files that hold several fingers: each is requested as ``path#finger``."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def split(path: str) -> tuple[str, int | None]:
 
 
 def name_of(path: str | os.PathLike) -> str:
-    """Name of a recording, and of its results: the file's without extension, with ``_finger2`` for ``hand.bag#2``."""
+    """Name a recording and its results: the file's name without extension, with ``_finger2`` for ``hand.bag#2``."""
     file, finger = split(os.fspath(path))
     return Path(file).stem + ("" if finger is None else f"_finger{finger}")
 
 
 def named(recording: Recording, finger: int | None) -> Recording:
-    """A recording under the name of its finger, as `name_of` has it; None: under the file's."""
+    """Rename a recording by its finger, as in `name_of`; None keeps the file's name."""
     if finger is None:
         return recording
     return dataclasses.replace(recording, name=f"{Path(recording.path).stem}_finger{finger}")

@@ -1,4 +1,4 @@
-"""What may be remarkable about one frame, as bits of an integer; a recording's flags are (T,) uint16."""
+"""Flags of single frames as bits of an integer; a recording's flags are (T,) uint16."""
 
 from __future__ import annotations
 
@@ -22,5 +22,5 @@ class Flag(enum.IntFlag):
 
 
 def names() -> dict[str, int]:
-    """Name in lower case -> bit, for attributes and notes."""
+    """Map flag names in lower case to bits, for attributes and notes."""
     return {str(flag.name).lower(): int(flag) for flag in Flag}

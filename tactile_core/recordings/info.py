@@ -1,4 +1,4 @@
-"""What a recording holds, as text for a person."""
+"""Describe a recording as text for users."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from .signals import PrepareOptions, Signals, prepare
 
 
 def describe(path: str | os.PathLike[str], options: PrepareOptions | None = None) -> str:
-    """Sensor, channels, rate, duration, tare state, gaps and suspicious samples with their lines, as a short table.
+    """Describe sensor, channels, rate, duration, tare state, gaps and suspicious samples with their lines, as a short
+    table.
 
     Raises TactileError where the file is no recording.
     """

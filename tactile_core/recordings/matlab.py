@@ -52,7 +52,7 @@ def open_matlab(path: str) -> Iterator[Store]:
     shapes = {name: (tuple(shape), np.dtype(CLASSES.get(kind, "O"))) for name, shape, kind in listed}
 
     def load(name: str) -> np.ndarray:
-        """Read one array; the others are passed over unread."""
+        """Read one array; the others are skipped."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = loadmat(path, variable_names=[name])[name]
@@ -64,7 +64,7 @@ def open_matlab(path: str) -> Iterator[Store]:
 
 
 def _check_unpacked(path: str) -> None:
-    """Raises TactileError for a packed variable of more than MOST_UNPACKED bytes: scipy would take them all."""
+    """Raise TactileError for a compressed variable of more than MOST_UNPACKED bytes, which scipy would load."""
     with damage_told(path, "MATLAB file"), open(path, "rb") as file:
         order = {b"IM": "<", b"MI": ">"}[file.read(HEADER)[-2:]]
         while len(tag := file.read(8)) == 8:

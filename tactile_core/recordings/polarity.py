@@ -1,8 +1,8 @@
-"""Which way a recording's counts go where the fluid film over an electrode thins: down, as raw ones do, or up.
+"""Detect whether a recording's counts fall, as raw ones do, or rise where the fluid film over an electrode thins.
 
-Raw BioTac counts fall (``sensors.COUNT_SIGN``). Files that hold rest minus reading exist, and say so nowhere. A file
-shows its polarity in two ways: the change that goes with the fluid's pressure, and the change against rest, is like
-that of simulated contacts under one sign and unlike it under the other.
+Raw BioTac counts fall (``sensors.COUNT_SIGN``). Some files hold rest minus reading without saying so. Two changes show
+a file's polarity: the change that correlates with the fluid's pressure, and the change against rest. Each resembles
+that of simulated contacts under one sign and not under the other.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ SCALE = 15.0  # counts, of the arcsinh that the networks see changes through
 
 @dataclass(frozen=True)
 class Polarity:
-    """name : "falls" or "rises"; evidence in words; sure : whether the recording shows it, or is known to have it."""
+    """Polarity of a recording: name "falls" or "rises"; evidence in words; sure : true if the recording shows
+    it, or it is known.
+    """
 
     name: str
     evidence: str
@@ -43,17 +45,17 @@ class Polarity:
 
     @property
     def sign(self) -> float:
-        """Factor that turns the recording's changes into those of a raw reading."""
+        """Return the factor that turns the recording's changes into those of raw readings."""
         return 1.0 if self.name == FALLS else -1.0
 
 
 def polarity_of(
     change: np.ndarray, quiet: np.ndarray, electrodes: np.ndarray, pdc: np.ndarray | None, *, rest_known: bool = False
 ) -> Polarity:
-    """Decide by what a signed recording shows; "falls" and not sure where it shows nothing.
+    """Detect the polarity of a signed recording; "falls" and not sure where it shows nothing.
 
     change : (T, 19) counts against rest; quiet : (T,) bool, frames that rest was taken from, none where it is a guess
-    electrodes : (T, 19) counts, repaired; pdc : (T,) counts, or None; rest_known : whether rest is the unit's own
+    electrodes : (T, 19) counts, repaired; pdc : (T,) counts, or None; rest_known : true if rest is the unit's own
     """
     touching = np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
     contacts = by_contacts(change[touching & ~quiet])
@@ -73,14 +75,16 @@ def polarity_of(
 
 
 def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float) -> Polarity:
-    """By the change of the electrodes, (19,) counts, that goes with a swing of the fluid's pressure, counts."""
+    """Decide by the change of the electrodes, (19,) counts, that correlates with a swing of the fluid's
+    pressure, counts.
+    """
     centred = pdc - pdc.mean()
     slope = (electrodes - electrodes.mean(axis=0)).T @ centred / (centred @ centred)
     return _decided(slope[None] * swing, "the change that goes with the fluid's pressure")
 
 
 def by_contacts(touches: np.ndarray) -> Polarity | None:
-    """By changes in contact (n, 19) counts against a rest that is known; None of too few."""
+    """Decide by changes in contact (n, 19) counts against a known rest; None if there are too few."""
     if len(touches) < FEWEST:
         return None
     chosen = np.linspace(0, len(touches) - 1, min(len(touches), MOST)).astype(int)
@@ -95,7 +99,7 @@ def _decided(changes: np.ndarray, what: str) -> Polarity:
 
 
 def _apart(less: float, more: float) -> bool:
-    """Whether the likeness of one sign is clearly more than the other's."""
+    """Return true if the likeness of one sign is clearly larger than the other's."""
     return more - less >= MARGIN or np.sqrt((1 - more**2) / max(1 - less**2, 1e-12)) <= LEFT
 
 

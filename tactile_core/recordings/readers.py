@@ -1,4 +1,4 @@
-"""The registry of file layouts, and the one way in: ``read(path)``."""
+"""Registry of file layouts, and the one function that reads them all: ``read(path)``."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
 
 @cache
 def layouts() -> tuple[ModuleType, ...]:
-    """All modules of ``formats/``, in the order of their names."""
+    """Import all modules of ``formats/``, in the order of their names."""
     names = sorted(info.name for info in pkgutil.iter_modules(formats.__path__))
     return tuple(importlib.import_module(f"{formats.__name__}.{name}") for name in names)
 
 
 def read(path: str | os.PathLike[str]) -> Recording:
-    """Read a recording of any known layout; which one is told from the content, not from the file's name.
+    """Read a recording of any known layout, which is detected from the content, not from the file's name.
 
     Raises TactileError for a file that is not there, not a recording, of another sensor, or mostly unreadable.
     """
@@ -59,7 +59,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
 
 
 def _read_finger(layout: ModuleType, store: Store, finger: int | None) -> Recording:
-    """One finger of a hand: the one asked for, or the first; a warning names the others."""
+    """Read one finger of a hand: the requested one, or the first; a warning names the others."""
     known = layout.fingers(store.shapes)
     chosen = known[0] if finger is None else finger
     if chosen not in known:
@@ -74,9 +74,9 @@ def _read_finger(layout: ModuleType, store: Store, finger: int | None) -> Record
 
 
 def each_finger(path: str | os.PathLike[str]) -> list[str]:
-    """Paths of the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for all others.
+    """List the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for all others.
 
-    Raises TactileError as `read` does for what is no recording at all.
+    Raises TactileError like `read` for a file that is no recording.
     """
     path = os.fspath(path)
     if split(path)[1] is not None:
@@ -94,13 +94,13 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
 
 
 def names(store: Store) -> set[str]:
-    """What an HDF5 file's layout is told from."""
+    """Return the names from which an HDF5 file's layout is detected."""
     return {*store.shapes, f"format={store.attributes.get('format', '')}"}
 
 
 @contextmanager
 def reading(path: str) -> Iterator[None]:
-    """Turn what the system refuses into a TactileError."""
+    """Turn errors of the operating system into a TactileError."""
     try:
         yield
     except OSError as error:
@@ -112,7 +112,7 @@ def reading(path: str) -> Iterator[None]:
 
 
 def container_of(path: str) -> str:
-    """csv, hdf5, npz, mat or bag. Raises TactileError for what is no file."""
+    """Detect the container: csv, hdf5, npz, mat or bag. Raises TactileError for what is no file."""
     path, finger = split(path)
     if os.path.isdir(path) and kind(Path(path)) is None:
         scene = os.path.isfile(os.path.join(path, "scene.toml"))
@@ -136,7 +136,7 @@ def container_of(path: str) -> str:
 
 
 def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
-    """The layout that knows most of the file's columns, arrays or messages. Raises TactileError for none."""
+    """Return the layout that knows most of the file's columns, arrays or messages. Raises TactileError if none does."""
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
     best, layout = max(scored, key=lambda pair: pair[0])
     if best < RECOGNISED:

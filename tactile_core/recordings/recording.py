@@ -14,7 +14,7 @@ NOMINAL_RATE = 100.0  # Hz: 44-word frames of a BioTac (SynTouch)
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What a simulated recording knows about itself; real ones have none. None is what its file was made without.
+    """True values of a simulated recording; real ones have none. None marks arrays that its file was made without.
 
     displacement_biotac : (T, N, 3) float32, m, of the outer skin's nodes
     displacement_digit : (T, M, 3) float32, m, of the gel surface's nodes
@@ -30,7 +30,7 @@ class Truth:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A recording as its file holds it: one frame a data row, in file order, nothing resampled or dropped.
+    """Content of a recording's file, unchanged: one frame a data row, in file order, nothing resampled or dropped.
 
     name : file name without its extension
     layout : which layout the file has, in words
@@ -43,7 +43,7 @@ class Recording:
     pac : (T, P) float or None, counts; P = 22 at 2,200 Hz, or what the file holds
     position, force : (T, 3) float or None, in the file's own frame and unit
     warnings : sentences for the user
-    about : what else the file says of itself (simulated: sensor, scene, seed, made_by, note)
+    about : other information in the file (simulated: sensor, scene, seed, made_by, note)
     """
 
     name: str
@@ -70,17 +70,17 @@ class Recording:
 
     @property
     def rate(self) -> float:
-        """Frames a second: one over the median step between stamps; the nominal 100 Hz for a single frame."""
+        """Frames per second: one over the median step between stamps; the nominal 100 Hz for a single frame."""
         steps = np.diff(self.time)
         steps = steps[steps > 0]
         return 1.0 / max(float(np.median(steps)), LEAST_STEP) if len(steps) else NOMINAL_RATE
 
     @property
     def duration(self) -> float:
-        """s from the first frame to the last one."""
+        """Time from the first frame to the last, s."""
         return float(self.time[-1] - self.time[0])
 
     @property
     def row_word(self) -> str:
-        """How a frame's row is called in messages."""
+        """Word for a frame's row in messages."""
         return "line" if self.layout.startswith("CSV") else "frame"

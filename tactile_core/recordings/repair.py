@@ -18,7 +18,7 @@ MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothin
 
 
 def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
-    """Linear interpolation over the bad samples of each column; the nearest good one at the ends.
+    """Interpolate linearly over the bad samples of each column; the nearest good one at the ends.
 
     values : (T, C) float; bad : (T, C) bool. A column without any good sample becomes 0.
     """
@@ -31,19 +31,19 @@ def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
 
 
 def find_glitches(values: np.ndarray) -> np.ndarray:
-    """(T, C) bool: samples that left the signal's level for a moment and came back.
+    """Mark (T, C) bool samples that left the signal's level for a moment and came back.
 
     values : (T, C) float, counts, finite.
 
     A run of samples is a glitch when all of these hold:
     it begins with a jump of more than 30 counts in one sample and ends with one in the opposite direction; the level
-    after it is the one before it, and its own samples lie on one level, both within a third of the jump; the jumps
-    are three times as steep as the calmer of the two steps just outside; it is not itself the return, between two
-    glitches, to the level of the second around it. It lasts at most 5 samples, or at most 50
-    where no more than 3 electrodes jump with it (a bit stuck in one channel; seen in mat5_50 of the slide set).
-    A press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of
-    20-50 ms is not flat; a contact that comes and goes within one single sample (10 ms) cannot be told from a glitch.
-    At the start and end of a recording only one jump can be seen; there it must exceed 100 counts, within 3 samples.
+    after it is the one before it, and its own samples lie on one level, both within a third of the jump; the jumps are
+    three times as steep as the calmer of the two steps just outside; it is not itself the return, between two glitches,
+    to the level of the second around it. It lasts at most 5 samples, or at most 50
+    where no more than 3 electrodes jump with it (a bit stuck in one channel; seen in mat5_50 of the slide set). A
+    press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of 20-50 ms
+    is not flat; a contact that comes and goes within one single sample (10 ms) cannot be told from a glitch. At the
+    start and end of a recording only one jump can be seen; there it must exceed 100 counts, within 3 samples.
     """
     found = np.zeros(values.shape, bool)
     for _ in range(ROUNDS):
@@ -58,7 +58,7 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
 
 
 def is_time_series(glitches: np.ndarray) -> bool:
-    """False where so many frames look like glitches that neighbouring rows cannot belong together."""
+    """Return false where so many frames look like glitches that neighbouring rows cannot belong together."""
     return float(glitches.any(axis=1).mean()) <= MAX_SHARE
 
 
@@ -84,7 +84,7 @@ def _short_runs(values: np.ndarray) -> np.ndarray:
 
 
 def _is_run(column: np.ndarray, first: int, last: int, neighbour_step: float) -> bool:
-    """Whether the samples between first (level before) and last (level after) are a glitch."""
+    """Return true if the samples between first (level before) and last (level after) are a glitch."""
     samples = column[first : last + 1]
     jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
     run = samples[1:-1]

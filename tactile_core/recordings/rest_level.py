@@ -1,4 +1,4 @@
-"""Find the parts of a recording without contact, wherever they lie, and the rest level they give."""
+"""Find the parts of a recording without contact, wherever they lie, and the rest level from them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is
 
 @dataclass(frozen=True, eq=False)
 class Quiet:
-    """mask : (T,) bool; parts : first and one-past-last frame of each quiet part; evidence in words."""
+    """Quiet parts; mask : (T,) bool; parts : first and one-past-last frame of each quiet part; evidence in words."""
 
     mask: np.ndarray
     parts: tuple[tuple[int, int], ...]
@@ -39,7 +39,7 @@ class Quiet:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Figures of all windows of n frames, by start frame: mean (W, 19), calm, pdc or None, middle (s) (W,)."""
+    """Statistics of all windows of n frames, by start frame: mean (W, 19), calm, pdc or None, middle (s) (W,)."""
 
     n: int
     mean: np.ndarray
@@ -49,19 +49,19 @@ class _Windows:
 
 
 def window_frames(rate: float) -> int:
-    """Frames of the tare window at this rate (Hz)."""
+    """Return the number of frames of the tare window at this rate (Hz)."""
     return max(FEWEST, round(WINDOW * rate))
 
 
 def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind: str) -> Quiet:
-    """Quiet parts: calm in every electrode, at the rest level, and with the fluid pressure (PDC) of rest.
+    """Find quiet parts: calm in every electrode, at the rest level, and with the fluid pressure (PDC) of rest.
 
     electrodes : (T, 19) float, counts, repaired; pdc : (T,) float, counts, or None; rate in Hz.
 
-    A held press is calm too. PDC tells it from rest: the fluid pressure is lowest without contact. Without PDC, calm
-    parts near the start or end are taken for rest, and others must agree with them. In tared recordings rest is near
-    zero.
-    Known limit: a raw recording that holds one even contact from its first frame to its last looks like rest.
+    A held press is calm too. PDC separates it from rest: the fluid pressure is lowest without contact. Without PDC,
+    calm parts near the start or end are taken for rest, and others must agree with them. In tared recordings rest is
+    near zero.
+    Known limit: a raw recording of one steady contact from its first frame to its last looks like rest.
     """
     n = window_frames(rate)
     if len(electrodes) < n:
@@ -80,7 +80,9 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
 
 
 def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:
-    """The window to guess rest from where nothing is quiet: lowest PDC if there is one, else least movement."""
+    """Return the window to estimate rest from where nothing is quiet: lowest PDC if there is one, else least
+    movement.
+    """
     n = min(window_frames(rate), len(electrodes))
     windows = _running(electrodes, pdc if pdc is not None and np.isfinite(pdc).all() else None, n, rate)
     if windows.pdc is not None:
@@ -91,7 +93,7 @@ def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slic
 
 
 def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
-    """(T, 19) counts: what the electrodes would read without contact.
+    """Estimated readings (T, 19) counts without contact.
 
     Level of each quiet part, linear between their middles, constant before the first and after the last: nothing is
     known there, and contact is never taken for drift. Without drift: one level over all quiet frames.
@@ -105,7 +107,7 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
-    """PDC at rest, counts: 0 of a file that was tared; else of the quiet frames, or the lowest where there are none."""
+    """PDC at rest, counts: 0 for a tared file; else from the quiet frames, or the lowest where there are none."""
     finite = pdc[np.isfinite(pdc)]
     if not len(finite) or (kind != "raw" and np.median(finite) < TARED_PDC):
         return 0.0
@@ -114,7 +116,7 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 
 
 def level(samples: np.ndarray) -> np.ndarray:
-    """(19,) mean of the middle half of (n, 19) samples: robust as a median, but not rounded to whole counts."""
+    """Mean (19,) of the middle half of (n, 19) samples: robust as a median, but not rounded to whole counts."""
     cut = len(samples) // 4
     return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0)
 
@@ -125,7 +127,7 @@ def _sums(values: np.ndarray, n: int) -> np.ndarray:
 
 
 def _spread(values: np.ndarray, n: int) -> np.ndarray:
-    """(W, C) standard deviation within each window."""
+    """Standard deviation (W, C) within each window."""
     centred = values - np.median(values, axis=0)  # keeps the squares small
     mean = _sums(centred, n) / n
     return np.sqrt(np.maximum(_sums(centred**2, n) / n - mean**2, 0.0))
@@ -142,7 +144,7 @@ def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float
 
 
 def _rest_rectified(windows: _Windows) -> np.ndarray:
-    """(W,) bool. Rectified readings are zero at the tare, so quiet is small and calm."""
+    """Mark windows (W,) bool at rest. Rectified readings are zero at the tare, so rest is small and calm."""
     largest = windows.mean.max(axis=1)
     if windows.pdc is None:
         return windows.calm & (largest <= RECTIFIED_LEVEL)
@@ -150,7 +152,7 @@ def _rest_rectified(windows: _Windows) -> np.ndarray:
 
 
 def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
-    """(W,) bool. One calm window is taken as rest, and all calm ones that agree with it."""
+    """Mark windows (W,) bool at rest: one calm window is chosen, with all calm ones that agree with it."""
     possible = windows.calm
     if kind != "raw":
         possible = possible & (np.abs(windows.mean).max(axis=1) <= TARED_LEVEL)
@@ -174,8 +176,10 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
 def _tracked(
     values: np.ndarray, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
 ) -> np.ndarray:
-    """(W,) bool, windows whose values (W, C) lie near a level that follows them from the anchor on, at ``rate`` a
-    second at most: what drift may have done in an hour is more than a press."""
+    """Mark windows (W,) bool whose values (W, C) lie near a level that follows them from the anchor on.
+
+    The level moves at ``rate`` a second at most: drift over an hour can exceed a press.
+    """
     accepted = np.ones(len(values), bool)
     if np.abs(middle - middle[anchor]).max() <= TRACKED:
         return accepted

@@ -1,4 +1,4 @@
-"""What was done to the counts before they were written: nothing (raw), tared, tared and scaled, or rectified."""
+"""Detect the processing of counts before they were written: none (raw), tared, tared and scaled, or rectified."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WHOLE_SHARE = 0.99
 
 
 def detect(electrodes: np.ndarray) -> tuple[str, str]:
-    """Kind and the evidence for it in words. electrodes : (T, 19) float, finite, as in the file."""
+    """Return kind and the evidence for it in words. electrodes : (T, 19) float, finite, as in the file."""
     levels = np.median(electrodes, axis=0)
     low, high = np.percentile(electrodes, [0.5, 99.5])
     whole = float(np.mean(np.abs(electrodes - np.rint(electrodes)) < 1e-9))

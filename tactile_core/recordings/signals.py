@@ -1,4 +1,4 @@
-"""From a Recording to the signals that the networks see: repaired, tared, drift removed, everything reported."""
+"""Prepare a Recording's signals for the networks: repaired, tared, drift removed, everything reported."""
 
 from __future__ import annotations
 
@@ -29,16 +29,17 @@ SHOWN = 8  # bad places spelled out one by one in the warnings
 
 @dataclass(frozen=True)
 class Rest:
-    """A unit's rest, found in other recordings of it. counts, spread : of E1..E19; pdc : counts, or None"""
+    """Rest of a unit, found in other recordings of it. counts, spread : of E1..E19; pdc : counts, or None"""
 
     counts: tuple[float, ...]
     spread: tuple[float, ...]
     pdc: float | None = None
 
     def agrees(self, level: np.ndarray, pdc: float) -> bool:
-        """Whether a calm level (19,) counts is a rest of this unit: under its PDC at rest, counts.
+        """Return true if a calm level (19,) counts with this PDC, counts, is a rest of this unit: PDC near that at
+        rest.
 
-        Where one of them has no PDC, or one of another zero: near its own counts.
+        Where either has no PDC, or PDC of another zero, the level must be near the unit's counts at rest.
         """
         if self.pdc is not None and abs(pdc - self.pdc) < TARED_PDC:
             return abs(pdc - self.pdc) < SAME_PRESSURE
@@ -47,15 +48,15 @@ class Rest:
 
 @dataclass(frozen=True)
 class PrepareOptions:
-    """What to override; None is automatic.
+    """Options that override the automatic choices; None is automatic.
 
     kind : "raw", "tared", "scaled" or "rectified"
     tare : frames to take rest from, a slice or "A:B"; "none" takes the file's own zero; None finds quiet parts
     drift : remove drift between quiet parts
     repair : remove glitches (unreadable samples are always interpolated)
     counts_per_unit : factor from a scaled recording's unit to counts
-    smooth : frames, odd, that the changes are averaged over round each; None: 3 of a rectified recording, else 1
-    polarity : "falls" or "rises": what counts do where a film thins; "auto": as the file says, or the recording shows
+    smooth : frames, odd, centred window over which the changes are averaged; None: 3 of a rectified recording, else 1
+    polarity : "falls" or "rises": direction of counts where a film thins; "auto": as the file states, or as detected
     rest : the unit's own, for raw recordings that hold no calm part near it
     """
 
@@ -69,7 +70,7 @@ class PrepareOptions:
     rest: Rest | None = None
 
     def check(self) -> None:
-        """Raises TactileError for what no recording can meet; whether `tare` fits, a recording must say."""
+        """Raise TactileError for options that suit no recording; `tare` can only be checked against a recording."""
         if self.kind is not None and self.kind not in KINDS:
             raise TactileError("option kind", repr(self.kind), ", ".join(KINDS))
         if self.counts_per_unit is not None and not 0 < self.counts_per_unit < 1e9:
@@ -84,10 +85,10 @@ class PrepareOptions:
 class Signals:
     """Signals ready for the networks.
 
-    change : (T, 19) float, counts, plain reading minus rest, drift removed, smoothed as told; with the sign of a raw
-        reading, which falls where a film thins, whatever the file's own polarity is. Rectified: |change| minus its
+    change : (T, 19) float, counts, plain reading minus rest, drift removed, smoothed as reported; with the sign of a
+        raw reading, which falls where a film thins, whatever the file's own polarity is. Rectified: |change| minus its
         quiet level
-    rest : (19,) float, counts, what the electrodes read without contact at the first frame
+    rest : (19,) float, counts, readings without contact at the first frame
     drift : (19,) float, counts/s, mean slope of the rest level over the recording
     electrodes : (T, 19) float, counts: the readings after repair, before the tare
     kind : "raw", "tared", "scaled" or "rectified"
@@ -111,9 +112,9 @@ class Signals:
 
     @property
     def typical(self) -> np.ndarray:
-        """(T, 19) counts, the change as a unit that rests at ``sensors.REST_COUNT`` has it: what the networks know.
+        """Change (T, 19) counts, converted to a unit that rests at ``sensors.REST_COUNT``, the networks' input.
 
-        Only raw readings tell where their unit rests; other changes are taken as they are.
+        Only raw readings show their unit's rest counts; other changes are not converted.
         """
         return divider.typical(self.change, self.rest) if self.kind == "raw" else self.change
 
@@ -173,7 +174,7 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
 def _unit_rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Rest | None:
-    """The unit's rest where it is known and nothing calm lies near it: a steady grip is calm, too."""
+    """Return the unit's rest if it is known and no calm level lies near it: a steady grip is calm, too."""
     if options.rest is None or kind != "raw" or options.tare is not None:
         return None
     told = "no quiet part"
@@ -198,7 +199,7 @@ def _pressure_change(recording: Recording, kind: str, quiet: Quiet, unit_rest: R
 
 
 def _is_tared(pdc: np.ndarray, rest: float) -> bool:
-    """Whether a recording's PDC is of another zero than the unit's: far below its rest, as pressure never is."""
+    """Return true if PDC has another zero than the unit's: far below its rest, where pressure cannot be."""
     finite = pdc[np.isfinite(pdc)]
     return bool(len(finite)) and rest - float(np.median(finite)) > TARED_PDC
 
@@ -207,7 +208,7 @@ def _polarity(
     recording: Recording, readings: np.ndarray, change: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions,
     *, rest_known: bool,
 ) -> Polarity:  # fmt: skip
-    """What counts do where a film thins: as the user says, else the file, else as the recording shows."""
+    """Return the polarity given by the user, else by the file, else detected in the recording."""
     if kind == "rectified":
         return Polarity(FALLS, "the sign is lost", True)
     shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known)
@@ -219,7 +220,7 @@ def _polarity(
 
 
 def _doubts(polarity: Polarity, warnings: list[str]) -> int:
-    """Flag of every frame, told in the warnings; 0 where nothing is in doubt."""
+    """Return the flag of every frame for a doubtful polarity, with a warning; 0 where nothing is in doubt."""
     if polarity.sure:
         return 0
     if not polarity.evidence.startswith("assumed"):
@@ -241,7 +242,9 @@ def _smoothed_over(options: PrepareOptions, kind: str) -> int:
 def _counts_per_unit(
     recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions, warnings: list[str]
 ) -> float:
-    """Factor to counts: 1, the user's, or for scaled recordings one that gives the usual size of a press (assumed)."""
+    """Return the factor to counts: 1, the user's, or for scaled recordings one that gives the usual size of a
+    press (assumed).
+    """
     if options.counts_per_unit is not None:
         return float(options.counts_per_unit)
     if kind != "scaled":
@@ -257,7 +260,7 @@ def _counts_per_unit(
 
 
 def _glitches(recording: Recording, readings: np.ndarray, options: PrepareOptions, warnings: list[str]) -> np.ndarray:
-    """(T, 19) bool, samples to repair, told in the warnings."""
+    """Mark samples (T, 19) bool to repair, and report them in the warnings."""
     none = np.zeros(readings.shape, bool)
     if not options.repair:
         return none
@@ -299,7 +302,7 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
 
 
 def _frames(tare: slice | str, count: int) -> slice:
-    """The tare frames as a plain slice. Raises TactileError where they are not inside the recording."""
+    """Convert the tare frames to a plain slice. Raises TactileError where they are not inside the recording."""
     asked = tare
     if isinstance(tare, str):
         ends = tare.split(":")
@@ -324,7 +327,7 @@ def _frames(tare: slice | str, count: int) -> slice:
 def _rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> np.ndarray:
-    """(T, 19) counts that are subtracted."""
+    """Rest (T, 19) counts to subtract."""
     if quiet.parts:
         return baseline(
             readings, quiet, options.drift and kind != "rectified"

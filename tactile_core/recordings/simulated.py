@@ -92,7 +92,7 @@ def _fill(
     steps: dict[str, np.ndarray],
     forces: dict[str, np.ndarray],
 ) -> None:
-    """The datasets of a file, always in this order, so that the same arrays give the same bytes."""
+    """Write the datasets of a file, always in this order, so that the same arrays give the same bytes."""
     for key, value in attributes.items():
         file.attrs[key] = value
     packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "track_times": False}
@@ -107,7 +107,7 @@ def _fill(
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
-    """The Recording of an opened file of this format, with its truth as float32 in m.
+    """Read the Recording of an opened file of this format, with its truth as float32 in m.
 
     Raises TactileError for what does not belong together, and for a file that was made without electrodes.
     """
@@ -133,7 +133,7 @@ def read_simulated(store: Store, layout: str) -> Recording:
 
 
 def read_truth(path: str | os.PathLike) -> tuple[np.ndarray, Truth]:
-    """Stamps (T,) s and truth of a file of this format, with electrodes or without. Raises TactileError."""
+    """Read stamps (T,) s and truth of a file of this format, with electrodes or without. Raises TactileError."""
     with open_hdf5(os.fspath(path)) as store:
         if store.attributes.get("format") != FORMAT:
             raise TactileError(path, f"format {store.attributes.get('format')!r}", repr(FORMAT))
@@ -191,7 +191,7 @@ def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
 
 
 def _write_whole(path: Path, fill: Any) -> None:
-    """Let fill write a file that appears whole or not at all.
+    """Write a file by calling ``fill``; it appears whole or not at all.
 
     It is made in memory: HDF5 keeps a file open whose writing failed on a full disk, and crashes at the process's end.
     """

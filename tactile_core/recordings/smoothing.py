@@ -1,4 +1,4 @@
-"""The mean over a few frames round each: less noise without delay, for recordings that are whole."""
+"""Average over a few frames around each: less noise without delay, for complete recordings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ RECTIFIED, SIGNED = 3, 1
 
 
 def smooth(values: np.ndarray, frames: int) -> np.ndarray:
-    """(T, k) -> the mean over each frame and (frames - 1) / 2 to each side, fewer at the ends; ``frames`` is odd."""
+    """Average values (T, k) over each frame and (frames - 1) / 2 to each side, fewer at the ends; ``frames`` is odd."""
     if frames == 1:
         return values
     total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0, dtype=np.float64)])

@@ -1,4 +1,4 @@
-"""A text table with one header line, parsed so that every bad cell is known by line and column."""
+"""Parse a text table with one header line; every bad cell is reported by line and column."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ MAX_BLANK = 8  # blank lines that a message names
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, the header is line 1."""
+    """Parsed table; header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, header is
+    line 1.
+    """
 
     path: str
     header: tuple[str, ...]
@@ -30,7 +32,7 @@ class Table:
     warnings: tuple[str, ...] = ()
 
     def columns(self, names: list[str]) -> np.ndarray:
-        """(T, len(names)) float. Raises TactileError for a column that is not there, naming it."""
+        """Values (T, len(names)) float of the columns. Raises TactileError naming a column that is missing."""
         missing = [name for name in names if name not in self.header]
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
@@ -43,18 +45,20 @@ class Table:
         return self.values[:, [self.header.index(name) for name in names]]
 
     def column(self, name: str) -> np.ndarray:
-        """(T,) float."""
+        """Values (T,) float of a column."""
         return self.columns([name])[:, 0]
 
     def essential(self, names: list[str]) -> list[Problem]:
-        """The table's problems, with those outside these columns marked as not essential."""
+        """Return the table's problems, with those outside these columns marked as not essential."""
         keep = {*names, "row"}
         return [p if p.field in keep else Problem(p.frame, p.row, p.field, p.found, False) for p in self.problems]
 
 
 @dataclass(frozen=True)
 class Header:
-    """names : of the columns, lower case; lines : up to and with the header; separator : between cells"""
+    """Header of a table; names : of the columns, lower case; lines : up to and with the header; separator :
+    between cells
+    """
 
     names: tuple[str, ...]
     lines: int
@@ -62,12 +66,12 @@ class Header:
 
     @classmethod
     def parse(cls, path: str, start: bytes) -> Header:
-        """Of a text that starts with these whole lines. Raises TactileError."""
+        """Parse the header of a text that starts with these whole lines. Raises TactileError."""
         return cls(*_header(path, _text(path, start)))
 
 
 def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | None:
-    """The rows of some whole lines of a file that grows, `before` lines of which came earlier; None where none is."""
+    """Parse whole lines of a growing file, `before` lines of which came earlier; None if no data row is among them."""
     lines = _text(path, data)
     skipped = max(0, header.lines - before)
     if not any(line.strip(" \t") for line in lines[skipped:]):
@@ -81,7 +85,7 @@ def read_header(path: str) -> tuple[str, ...]:
 
 
 def read_header_of_start(path: str) -> tuple[str, ...]:
-    """As `read_header`, of a file of any length."""
+    """Read the header like `read_header`, from a file of any length."""
     with open(path, "rb") as file:
         return _header(path, _text(path, _whole_lines(path, file, file.read(MAX_LINE))))[0]
 
@@ -94,9 +98,9 @@ def read_table(path: str) -> Table:
 
 
 def read_tables(path: str, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
-    """The file in parts of about `part_bytes` of text; each begins with the last `context` rows of the one before.
+    """Read the file in parts of about `part_bytes` of text; each begins with the last `context` rows of the one before.
 
-    Yields each part and how many of its rows were in the one before. Raises TactileError as `read_table`.
+    Yields each part and how many of its rows were in the one before. Raises TactileError like `read_table`.
     """
     with open(path, "rb") as file:
         data = _whole_lines(path, file, file.read(part_bytes))
@@ -116,7 +120,7 @@ def read_tables(path: str, part_bytes: int, context: int) -> Iterator[tuple[Tabl
 
 
 def _whole_lines(path: str, file: BinaryIO, data: bytes) -> bytes:
-    """The bytes read from a file, and those up to the end of their last line."""
+    """Return the bytes already read from a file, and those up to the end of their last line."""
     if data and not data.endswith(b"\n"):
         data += file.readline(MAX_LINE)
         if not data.endswith(b"\n") and file.read(1):
@@ -127,7 +131,7 @@ def _whole_lines(path: str, file: BinaryIO, data: bytes) -> bytes:
 def _parsed(
     path: str, header: tuple[str, ...], separator: str, lines: list[str], first: int, last: bool = True
 ) -> Table:
-    """The table of the lines after line `first`; last : the file ends with them."""
+    """Parse the lines after line `first` to a table; last : the file ends with them."""
     ended = not lines or not lines[-1]
     if ended:
         lines = lines[:-1]
@@ -156,7 +160,7 @@ def _parsed(
 
 
 def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
-    """A sentence on lines without text between the header and the last row: a frame may be missing there."""
+    """Write a sentence on blank lines between the header and the last row: a frame may be missing there."""
     count = int(rows[-1]) - header_line - len(rows)
     if count == 0:
         return ()
@@ -182,7 +186,7 @@ def _lines(path: str) -> list[str]:
 
 
 def _text(path: str, data: bytes) -> list[str]:
-    """The lines of a text, an empty one after its last newline."""
+    """Split a text into lines, with an empty one after its last newline."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise TactileError(path, "UTF-16 text", "UTF-8 text", "Save the file as UTF-8 (in a spreadsheet: CSV UTF-8)")
     if b"\0" in data:
@@ -200,7 +204,7 @@ def _text(path: str, data: bytes) -> list[str]:
 
 
 def _header(path: str, lines: list[str]) -> tuple[tuple[str, ...], int, str]:
-    """Column names, number of lines up to and with the header, separator."""
+    """Return column names, number of lines up to and with the header, and separator."""
     first = next((i for i, line in enumerate(lines) if line.strip()), None)
     if first is None:
         raise TactileError(path, "no text", "a header line", "Check that the recording was written to its end")
@@ -223,7 +227,7 @@ def _header(path: str, lines: list[str]) -> tuple[tuple[str, ...], int, str]:
 
 
 def _number(cell: str) -> float | None:
-    """The cell as a finite number; None for text, NaN, infinity and Python's 1_000."""
+    """Parse the cell as a finite number; None for text, NaN, infinity and Python's 1_000."""
     if "_" in cell:
         return None
     try:
@@ -236,7 +240,7 @@ def _number(cell: str) -> float | None:
 def _row(
     line: str, header: tuple[str, ...], separator: str, frame: int, number: int, problems: list[Problem]
 ) -> list[float]:
-    """The row's values; what is wrong with it is added to problems."""
+    """Parse the row's values; its errors are added to problems."""
     cells = line.split(separator)
     if len(cells) > len(header) and not "".join(cells[len(header) :]).strip():
         cells = cells[: len(header)]  # a separator at the end of each row, as the slide set has

@@ -1,4 +1,4 @@
-"""The last cell of a text file that does not end in a newline: it may be cut off."""
+"""Check the last cell of a text file that does not end in a newline: it may be cut off."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ SHOWN = 40  # characters of a cell or header that a message repeats
 
 
 def shown(text: str) -> str:
-    """The text as a message repeats it: quoted, and cut when long."""
+    """Quote the text for a message, cut when long."""
     return repr(text if len(text) <= SHOWN else text[:SHOWN] + "…")
 
 
 def doubt_last_cell(
     kept: list[tuple[int, str]], header: tuple[str, ...], separator: str, values: np.ndarray, problems: list[Problem]
 ) -> None:
-    """The last number of a file that does not end in a newline may be cut off.
+    """Report the last number of a file without final newline as a problem where it may be cut off.
 
-    It is where every other row is closed by a separator and this one is not. Else it is doubted where the value tells:
-    see `_looks_cut`; complete files that merely lack the last newline are common.
+    It is cut off where every other row ends in a separator and this one does not. Else its value decides, see
+    `_looks_cut`; complete files that merely lack the last newline are common.
     """
     number, line = kept[-1]
     if len(kept) < 2 or line.count(separator) != len(header) - 1 or not np.isfinite(values[-1, -1]):
@@ -34,10 +34,10 @@ def doubt_last_cell(
 
 
 def _looks_cut(column: np.ndarray) -> bool:
-    """Whether the last value of a column (T,) looks like the first digits of a longer number.
+    """Return true if the last value of a column (T,) looks like the first digits of a longer number.
 
-    A digit less makes a count ten times smaller: it is doubted below half of the last value before it (assumed), if
-    no step in the column is as large, so that a signal that swings around 0 is not. Lost decimals change little.
+    A digit less makes a count ten times smaller: it is doubted below half of the last value before it (assumed), if no
+    step in the column is as large, so that a signal that swings around 0 is not. Lost decimals change little.
     """
     before = column[:-1][np.isfinite(column[:-1])]
     if not len(before) or abs(column[-1]) >= 0.5 * abs(before[-1]):

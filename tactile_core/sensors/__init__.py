@@ -63,7 +63,9 @@ def electrodes() -> np.ndarray:
 
 
 def from_syntouch(points: np.ndarray) -> np.ndarray:
-    """Points (n, 3) m of SynTouch's frame -> shared: x = -x_e - 13.97 mm, y = z_e, z = +-y_e (docs/sources.md)."""
+    """Transform points (n, 3) m of SynTouch's frame to the shared one: x = -x_e - 13.97 mm, y = z_e, z = +-y_e
+    (docs/sources.md, Frame).
+    """
     x, y, z = np.asarray(points).T
     return np.column_stack([-x - 13.97e-3, z, _LATERAL_SIGN * y])
 

@@ -38,7 +38,7 @@ def _mean_of_known(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _table() -> dict[str, np.ndarray]:
-    """x (60,) m, theta (72,) rad and radii (60, 72) m of outer skin, inner skin and core, made even in theta."""
+    """Read x (60,) m, theta (72,) rad and radii (60, 72) m of outer skin, inner skin and core, made even in theta."""
     rows = load_profile("biotac_profile.csv").reshape(60, 72, 5)
     mirror = (-np.arange(72)) % 72  # the table starts at -180 degrees in 5 degree steps
     radii = _mean_of_known(rows[..., 2:], rows[:, mirror, 2:]) * 1e-3
@@ -62,7 +62,7 @@ def _piece(x: np.ndarray, r: np.ndarray, low: float, high: float, fractions: np.
 
 
 def _meridian(layer: str, column: int) -> np.ndarray:
-    """(rows, 2) = (x, r) in m along one meridian of the table, from the tip pole to the base pole."""
+    """Points (rows, 2) = (x, r) in m along one meridian of the table, from the tip pole to the base pole."""
     table = _table()
     known = np.isfinite(table[layer][:, column])
     x, r = table["x"][known], table[layer][known, column]

@@ -1,8 +1,8 @@
-"""The BioTac SP of an independent COMSOL model as sensor data; each constant with its source.
+"""Dimensions and constants of the BioTac SP in an independent COMSOL model; each constant with its source.
 
-Frame of that model, metres: x along the finger, y across, z away from the pad, which looks toward -z. The model is a
-skin between two half ellipsoids z <= 0, clamped at its rim, filled with an incompressible fluid, over a rigid core
-that it does not touch. Sources: *config*, the ``config.csv`` beside each press of
+Frame of that model, metres: x along the finger, y across, z away from the pad, which faces -z. The model is a skin
+between two half ellipsoids z <= 0, clamped at its rim, filled with an incompressible fluid, over a rigid core that it
+does not touch. Sources: *config*, the ``config.csv`` beside each press of
 github.com/bsadr/biotac; *model*, the model exported as text in ``comsol/model/biotac.m`` there (July 2020).
 """
 
@@ -40,7 +40,7 @@ def radius_along(skin: np.ndarray, rays: np.ndarray) -> np.ndarray:
     """Distance (n,) m from the origin to the skin along rays (n, 3); nan beside the skin.
 
     skin : (k, 3) m, nodes of the whole outer skin, deformed or not
-    Once differentiable (Clough-Tocher) over the stereographic picture of the skin seen from the origin.
+    Once differentiable (Clough-Tocher) over the skin's stereographic projection from the origin.
     """
     import scipy.interpolate
 

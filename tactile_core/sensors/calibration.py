@@ -1,8 +1,9 @@
-"""What a DIGIT unit's pictures depend on: camera, lights, colours, gel and background, as one frozen set of numbers.
+"""Parameters of a DIGIT unit's pictures: camera, lights, colours, gel and background, in frozen dataclasses.
 
-A picture is ``response(right, down) L + ambient(right, down)`` in raw 8-bit values, where L is the radiance that the
-coating shows of each LED's light. Each LED's light is a band of its own, and radiance in it is counted in grey levels
-of the channel of that colour in the picture's middle. The fast picture (``shading``) and Mitsuba's share all numbers.
+A picture is ``response(right, down) L + ambient(right, down)`` in raw 8-bit values, where L is the radiance of each
+LED's light that the coating reflects. Each LED's light is a spectral band of its own; radiance in it is measured in
+grey levels of that colour's channel in the picture's middle. The fast renderer (``shading``) and Mitsuba use the same
+parameters.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ LARGEST_LEVEL = 255.0
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """The matrix (channel, led) of what the camera makes of radiance, linear over the picture.
+    """Matrix (channel, led) from radiance to the camera's grey levels, linear over the picture.
 
     centre : (3, 3) levels a level in the picture's middle, a row a channel of the picture, a column an LED's colour
     along_right, along_down : (3, 3) levels a level and metre of the plane of height zero
@@ -56,20 +57,21 @@ class Response:
         return centre + camera.right[None, :, None, None] * right + camera.down[:, None, None, None] * down
 
     def times(self, led: np.ndarray) -> Response:
-        """The matrix with each LED's column times led (3,)."""
+        """Return the matrix with each LED's column multiplied by led (3,)."""
         parts = (np.asarray(getattr(self, field.name)) * led for field in dataclasses.fields(self))
         return Response(*(tuple(map(tuple, part.tolist())) for part in parts))
 
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """What a calibration was fitted on, and how well.
+    """Data and errors of a calibration's fit.
 
     photographs : names of the files; the folder is the user's
     ball_diameter : m
     errors : on those photographs, by the names of ``tactile calibrate --test``
     standard_errors : by parameter, in its unit in the file
-    not_identified : parameters that the photographs tell too little of; held near the start's by how units differ
+    not_identified : parameters that the photographs do not determine; held near the start values by a prior of how
+        units differ
     """
 
     note: str
@@ -82,18 +84,18 @@ class Fit:
 
 @dataclasses.dataclass(frozen=True)
 class Calibration:
-    """One unit. Raises TactileError for a number out of its range.
+    """Calibration of one unit. Raises TactileError for a number out of its range.
 
     unit : its name, free text
     leds : red, green, blue
-    response : of the camera to each LED's light
-    ambient : (3, 21) a row a LED: of its light that gel and acrylic hold, in what it gives on a coating that faces it
-        from ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i + j, then by j
+    response : the camera's response to each LED's light
+    ambient : (3, 21), a row a LED: its light scattered in gel and acrylic, in units of its radiance on a coating that
+        faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i + j, then by j
     coating : the paint on the gel
-    gel_index : refractive index of gel and acrylic, taken as one
+    gel_index : refractive index of gel and acrylic, taken as equal
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
     photograph : path of a photograph of the untouched gel, which then is the picture at rest; "" for none
-    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for it
+    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for
     """
 
     unit: str
@@ -128,7 +130,7 @@ class Calibration:
 
     @property
     def facing(self) -> np.ndarray:
-        """Radiance (3,) that each LED's light has on a coating that faces it, levels.
+        """Radiance (3,) of each LED's light on a coating that faces it, levels.
 
         At the distance from the LED to the picture's centre: a matte coating of albedo a shows a radiance r^2 / d^2 of
         a sphere of even brightness (Lambert's law).
@@ -137,7 +139,7 @@ class Calibration:
 
     @property
     def ambient_unit(self) -> np.ndarray:
-        """Radiance (3,) that the ambient light's polynomials count in, levels."""
+        """Unit of radiance (3,) of the ambient light's polynomials, levels."""
         return self._lit([AMBIENT_DISTANCE**2] * 3)
 
     def _lit(self, squares: list[float]) -> np.ndarray:
@@ -146,11 +148,15 @@ class Calibration:
 
     @property
     def gain(self) -> Response:
-        """Levels a unit of ``facing``: what the three LEDs' radiance times the response comes to."""
+        """Response to radiance in units of ``facing``, in levels: each LED's column of the response times its
+        ``facing``.
+        """
         return self.response.times(self.facing)
 
     def with_gain(self, gain: Response) -> Calibration:
-        """The unit whose LEDs shine so that its ``gain`` is that; each LED's own channel responds 1 in the middle."""
+        """Return the unit with LEDs bright enough for this ``gain``; each LED's own channel responds 1 in the
+        middle.
+        """
         if not min(self.coating.albedo) > 0:
             raise TactileError("coating, albedo", "0", "more than 0, or no LED's light is seen")
         own = np.diag(gain.centre)
@@ -161,7 +167,10 @@ class Calibration:
         return dataclasses.replace(self, leds=leds, response=gain.times(1 / own))
 
     def at_size(self, width: int, height: int) -> Calibration:
-        """The same view in other pixels: px/mm grow with the picture. Raises TactileError for another aspect ratio."""
+        """Return the same view in other pixels: px/mm grow with the picture.
+
+        Raises TactileError for another aspect ratio.
+        """
         return dataclasses.replace(self, camera=self.camera.at_size(width, height))
 
 

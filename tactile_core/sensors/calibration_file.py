@@ -41,7 +41,7 @@ _TABLES = {
 
 
 def load_calibration(path: str | os.PathLike | None = None) -> Calibration:
-    """The calibration in a TOML file; None for the one that ships.
+    """Load the calibration in a TOML file; None for the one that ships.
 
     A background's photograph is looked for beside the file. Raises TactileError naming file and field for what cannot
     be read, is unknown, missing or out of its range.
@@ -71,7 +71,7 @@ def _read(file: Path) -> Calibration:
 
 
 def _finite(value: Any) -> Iterator[float]:
-    """All finite numbers in tables and lists."""
+    """Yield all finite numbers in nested tables and lists."""
     if isinstance(value, dict | list):
         for each in value.values() if isinstance(value, dict) else value:
             yield from _finite(each)
@@ -80,7 +80,7 @@ def _finite(value: Any) -> Iterator[float]:
 
 
 class _Reader:
-    """Takes a parsed file apart; errors name the field."""
+    """Reader of a parsed file; errors name the field."""
 
     def __init__(self, content: dict[str, Any]) -> None:
         self._content = content
@@ -302,12 +302,14 @@ def _named(values: Mapping[str, float]) -> list[str]:
 
 
 def _quoted(text: str) -> str:
-    """A TOML basic string; JSON's escapes are among TOML's, and its ASCII keeps file names that are no UTF-8."""
+    """Quote text as a TOML basic string: JSON's escapes are valid in TOML, its ASCII keeps file names that are no
+    UTF-8.
+    """
     return json.dumps(text.encode(errors="replace").decode())
 
 
 def _digits(value: float) -> str:
-    """Six digits, as TOML's float or integer."""
+    """Format a number with six digits as TOML's float or integer."""
     return f"{value + 0.0:.6g}"
 
 

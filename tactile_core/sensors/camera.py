@@ -1,7 +1,7 @@
-"""A camera and lights as data: one camera model, used for every step between pixels and gel.
+"""Data of a camera and lights: one camera model, used for every step between pixels and gel.
 
-Image frame, used by camera and lights: right and down along the picture, toward the camera as third axis,
-metres, origin in the picture's centre at height zero (``HEIGHT_ZERO_Y``). A unit's own camera and lights are in its
+Image frame, used by camera and lights: right and down along the picture, toward the camera as third axis, metres,
+origin in the picture's centre at height zero (``HEIGHT_ZERO_Y``). A unit's own camera and lights are in its
 calibration, see ``calibration_file``.
 """
 
@@ -26,13 +26,13 @@ LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a c
 class Camera:
     """A pinhole camera that looks at the coating along -y, from inside the gel, over the picture's middle.
 
-    It stands where refraction by gel and acrylic makes it appear. A gel point is seen where its central projection
-    onto the plane of height zero falls: (right, down, h) at (right, down) / (1 - h / apparent_height).
+    It stands where refraction by gel and acrylic makes it appear. A gel point appears at its central projection onto
+    the plane of height zero: (right, down, h) at (right, down) / (1 - h / apparent_height).
 
     width, height : pixels
     px_per_mm_x, px_per_mm_y : pixels a millimetre of gel at height zero, along the picture's rows (x) and columns (y)
     centre_x, centre_z : m, the place on the gel, shared frame, in the middle of the picture
-    apparent_height : m, of the pinhole above the plane of height zero
+    apparent_height : m, height of the pinhole above the plane of height zero
     right_z, down_x : +1 or -1, the way z goes to the right and x goes down the picture
     """
 
@@ -69,11 +69,11 @@ class Camera:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(height, width) of arrays that hold a picture."""
+        """Shape (height, width) of arrays that hold a picture."""
         return self.height, self.width
 
     def at_size(self, width: int, height: int) -> Camera:
-        """The same view in other pixels; raises TactileError for another aspect ratio."""
+        """Return the same view in other pixels; raises TactileError for another aspect ratio."""
         if width * self.height != height * self.width:
             expected = f"the aspect ratio of {self.width} x {self.height}"
             raise TactileError("camera, size", f"{width} x {height} pixels", expected)
@@ -83,7 +83,7 @@ class Camera:
 
     @property
     def pixel_size(self) -> tuple[float, float]:
-        """(right, down), m of gel from one pixel to the next."""
+        """Size (right, down) of a pixel, m of gel at height zero."""
         return 1e-3 / self.px_per_mm_x, 1e-3 / self.px_per_mm_y
 
     @property
@@ -98,16 +98,16 @@ class Camera:
 
     @property
     def gel_x(self) -> np.ndarray:
-        """x (height,) m at height zero of each row of pixels: the rows of a height map."""
+        """Coordinate x (height,) m at height zero of each row of pixels: the rows of a height map."""
         return self.centre_x + self.down_x * self.down
 
     @property
     def gel_z(self) -> np.ndarray:
-        """z (width,) m at height zero of each column of pixels: the columns of a height map."""
+        """Coordinate z (width,) m at height zero of each column of pixels: the columns of a height map."""
         return self.centre_z + self.right_z * self.right
 
     def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """(row, column), fractional, where gel points at x, z and height, m, are seen; whole numbers: pixel centres."""
+        """Project gel points at x, z and height, m, to fractional (row, column); whole numbers are pixel centres."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         row = self.down_x * (np.asarray(x) - self.centre_x) * nearer / down + self.height / 2 - 0.5
@@ -115,12 +115,12 @@ class Camera:
         return row, column
 
     def sees(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Whether places x, z (n,) m of the gel at height zero lie in the picture; false for NaN."""
+        """Return true where places x, z (n,) m of the gel at height zero lie in the picture; false for NaN."""
         row, column = self.to_pixel(x, z)
         return (row > -0.5) & (row < self.height - 0.5) & (column > -0.5) & (column < self.width - 0.5)
 
     def to_gel(self, row: np.ndarray, column: np.ndarray, height: np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """(x, z) m of the points at a height, m, that fractional pixels see: the inverse of ``to_pixel``."""
+        """Return (x, z) m of the points at a height, m, that fractional pixels see: the inverse of ``to_pixel``."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         x = self.centre_x + self.down_x * (np.asarray(row) + 0.5 - self.height / 2) * down / nearer
@@ -130,12 +130,12 @@ class Camera:
 
 @dataclasses.dataclass(frozen=True)
 class Led:
-    """One light of one colour: a sphere, equally bright from all sides.
+    """Light of one colour: a sphere, equally bright from all sides.
 
     colour : "red", "green" or "blue"; its light is a band of radiance of its own
     position : (right, down, toward the camera), m, image frame
     radius : m, its apparent size, which makes shadows soft
-    radiance : of its surface, grey levels of its own channel in the picture's middle; 0 is off
+    radiance : radiance of its surface, grey levels of its own channel in the picture's middle; 0 is off
     """
 
     colour: str
@@ -155,7 +155,7 @@ class Led:
 
     @property
     def channel(self) -> int:
-        """Index of its colour in a picture's last axis."""
+        """Index of the LED's colour in a picture's last axis."""
         return COLOURS.index(self.colour)
 
 

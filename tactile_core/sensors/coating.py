@@ -1,4 +1,4 @@
-"""The paint on the gel, as a material: how much light it scatters back, and how evenly."""
+"""Material of the paint on the gel: share of light that it scatters back, and roughness."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ DIFFUSE, ROUGH_PLASTIC, PRINCIPLED = MATERIALS = ("diffuse", "roughplastic", "pr
 
 @dataclasses.dataclass(frozen=True)
 class Coating:
-    """One of three of Mitsuba's materials. Raises TactileError for a number out of its range.
+    """Material of the coating, one of three of Mitsuba's. Raises TactileError for a number out of its range.
 
     bsdf : "diffuse" (Lambert), "roughplastic" (Lambert under a rough clear coat) or "principled" (Burley 2012)
     albedo : 0..1 share of each LED's light that it scatters back
     roughness : 0.02..1, width of highlights: GGX's alpha of roughplastic, Burley's roughness; not of diffuse
     gloss : 0..1, size of highlights; not of diffuse
-    metallic : 0..1, of principled alone: 1 reflects as metal of that albedo does
+    metallic : 0..1, of principled alone; 1 reflects like metal of that albedo
     """
 
     bsdf: str = DIFFUSE

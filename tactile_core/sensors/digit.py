@@ -1,4 +1,4 @@
-"""The DIGIT's gel as a domed, structured solid: outline, dome and the lattice that carries surface and mesh."""
+"""The DIGIT's gel as a domed, structured solid: outline, dome and the lattice of surface and mesh nodes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How an electrode's impedance becomes counts, and how the changes of one unit become those of another.
+"""Convert between an electrode's impedance and counts, and between the changes of units with different rest counts.
 
-Each electrode shares a voltage with a load, over which is read, so that counts fall as its film thins (SynTouch, BioTac
-SP manual): E = COUNT_MAX / (1 + Z / load). With the impedance grown by a factor g since rest that is
+Each electrode forms a voltage divider with a load, over which counts are read, so that they fall as its film thins
+(SynTouch, BioTac SP manual): E = COUNT_MAX / (1 + Z / load). With the impedance grown by a factor g since rest that is
 COUNT_MAX / (1 + (COUNT_MAX / E_rest - 1) g): neither load nor conductivity matters, only the counts at rest.
 """
 
@@ -18,7 +18,9 @@ _RESTS = 500.0, 3900.0
 
 
 def reading(growth: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
-    """Counts (..., 19), not rounded, where impedances have grown by factors (..., 19) since counts at rest (19,)."""
+    """Counts (..., 19), not rounded, after impedances have grown by factors (..., 19) since rest, counts at
+    rest (19,).
+    """
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 
 
@@ -29,15 +31,19 @@ def growth(counts: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
 
 
 def typical(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Changes (..., 19) counts of a unit that rests at counts (..., 19) as one that rests at ``REST_COUNT`` has them.
+    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of a unit that rests at
+    ``REST_COUNT``.
 
-    A unit at 3,500 counts answers a contact with four fifths, one at 2,800 with seven fifths of what that one does.
+    A unit at 3,500 counts responds to a contact with four fifths, one at 2,800 with seven fifths of the latter's
+    change.
     """
     rest = np.clip(rest, *_RESTS)
     return reading(growth(rest + change, rest), REST_COUNT) - REST_COUNT
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Inverse of ``typical``: changes of a unit at rest counts (19,) for those of one that rests at ``REST_COUNT``."""
+    """Convert changes of a unit that rests at ``REST_COUNT`` to one at rest counts (19,): the inverse of
+    ``typical``.
+    """
     rest = np.clip(rest, *_RESTS)
     return reading(growth(REST_COUNT + change, REST_COUNT), rest) - rest

@@ -8,6 +8,8 @@ from ..files.shipped import shipped
 
 
 def load_profile(name: str) -> np.ndarray:
-    """Rows of ``data/<name>`` as floats, millimetres and degrees as the table's header says, nan where a ray missed."""
+    """Read rows of ``data/<name>`` as floats, millimetres and degrees as the table's header says, nan where a ray
+    missed.
+    """
     with shipped(name).open("r", encoding="ascii") as lines:
         return np.loadtxt(lines, delimiter=",", skiprows=1)

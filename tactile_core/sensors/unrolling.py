@@ -47,7 +47,7 @@ def _rolled_x() -> np.ndarray:
 
 
 def unrolled_nodes() -> np.ndarray:
-    """Where each node of ``sensors.biotac_surface()`` comes to lie on the DIGIT's plane, (n_nodes, 2) = (x, z) m.
+    """Positions (n_nodes, 2) = (x, z) m of the nodes of ``sensors.biotac_surface()``, unrolled onto the DIGIT's plane.
 
     The BioTac rolls on the plane: z = R theta across, arc length of the lowest line along (docs/sources.md).
     NaN for nodes on the back, beyond 90 degrees, and for the poles, which never touch the plane.
@@ -61,15 +61,15 @@ def unrolled_nodes() -> np.ndarray:
 
 @functools.cache
 def _skin_axes() -> np.ndarray:
-    """The outer skin's stations axis by axis, (3, stations, columns) m."""
+    """Coordinates of the outer skin's stations axis by axis, (3, stations, columns) m."""
     return np.ascontiguousarray(np.moveaxis(biotac.skin_grid("outer"), 2, 0))
 
 
 def roll_up(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The place on the BioTac's resting skin that an unrolled point (x, z) m belongs to.
+    """Find the place on the BioTac's resting skin that corresponds to an unrolled point (x, z) m.
 
-    Returns the surface point (3,) m and the outward unit normal there (3,). The point is clamped to the pad:
-    unrolled x between the poles, angle within 90 degrees.
+    Returns the surface point (3,) m and the outward unit normal there (3,). The point is clamped to the pad: unrolled x
+    between the poles, angle within 90 degrees.
     """
     stations, angles = _rolled_x(), biotac.angles()
     row = np.interp(point[0], stations, np.arange(len(stations)))

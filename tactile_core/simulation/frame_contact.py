@@ -1,4 +1,6 @@
-"""One frame of a scene on one sensor: a force at a place, in any tier, and what a recording keeps of it."""
+"""Solve a frame of a scene on one sensor: a force at a place, in any tier; and extract what a recording stores
+of it.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,7 @@ class FrameContact:
 
     @property
     def displacement(self) -> np.ndarray:
-        """(n, 3) m, of the sensor's surface nodes."""
+        """Displacement (n, 3) m of the sensor's surface nodes."""
         solved = self._solved
         return solved.corrected.displacement if isinstance(solved, FastContact) else solved.displacement
 

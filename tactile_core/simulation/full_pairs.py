@@ -1,4 +1,4 @@
-"""One press of the test set: paired contacts, the same force on both sensors, solved by the full tier of mechanics.
+"""Solve a press of the test set: paired contacts, the same force on both sensors, by the full tier of mechanics.
 
 The rows are those of ``pair_sampling``, but for what only the full tier knows: it needs no correction, and the film
 over the electrodes is that of its own deformed inner skin. Press i draws all it needs from (seed, i).
@@ -38,7 +38,9 @@ _SPARE = 1.1  # of the depth guessed for the DIGIT, on which its mesh is fine
 
 @dataclasses.dataclass(frozen=True)
 class TestPress:
-    """What press ``number`` is: an indenter of the scene at a place, how deep (m) on the BioTac, its last slide."""
+    """Press ``number`` of the test set: an indenter of the scene at a place, its depth (m) on the BioTac, its
+    last slide.
+    """
 
     __test__ = False  # not a test, whatever pytest takes its name for
 
@@ -95,7 +97,7 @@ def _fast(sensor: str, indenter: Indenter, place: Placement, friction: float) ->
 
 
 def _turn(scene: Scene, number: int) -> int:
-    """Whose turn it is: balanced however few presses there are."""
+    """Index of the indenter whose turn it is: balanced for any number of presses."""
     built = [spec.build() for spec in scene.indenters]
     boxes, rings = ([i for i, one in enumerate(built) if isinstance(one, kind)] for kind in (Box, Ring))
     others = [i for i in range(len(built)) if i not in boxes + rings]

@@ -146,7 +146,7 @@ Single = SphereSpec | CylinderSpec | LyingCylinderSpec | BoxSpec | RingSpec | Ed
 
 
 class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """One body of a group: moved along the group's axes, then its lower end is ``z_mm`` above the plane of contact."""
+    """Part of a group: moved along the group's axes, then its lower end is ``z_mm`` above the plane of contact."""
 
     body: Single
     x_mm: float = 0.0

@@ -76,7 +76,7 @@ def simulate_isaac_like(
 
 
 def _motion(where: str | os.PathLike, spec: RecordingSpec) -> tuple[np.ndarray, list[Placement], np.ndarray]:
-    """time (T,) s, places, force (T,) N: linear between the scene's points."""
+    """Interpolate time (T,) s, places, force (T,) N linearly between the scene's points."""
     points = np.array([[p.time_s, p.x_mm * 1e-3, p.z_mm * 1e-3, p.force_n] for p in spec.points])
     time = np.arange(np.ceil(points[0, 0] * RATE - 1e-9), np.floor(points[-1, 0] * RATE + 1e-9) + 1) / RATE
     if not len(time):
@@ -91,7 +91,7 @@ def _motion(where: str | os.PathLike, spec: RecordingSpec) -> tuple[np.ndarray, 
 
 
 def _frames(press: Press, mesh: TetMesh, poses: list[Pose], forces: np.ndarray) -> Iterator[Solution]:
-    """One solution a frame, each found from the one before."""
+    """Yield one solution a frame, each started from the one before."""
     depth: float | None = None  # of the frame before, where it touched
     for pose, force in zip(poses, forces, strict=True):
         if force == 0:

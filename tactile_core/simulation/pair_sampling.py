@@ -104,7 +104,7 @@ def _press(sensor: str, indenter: Indenter, place: Placement, spec: PairSpec) ->
 
 
 def draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
-    """Where and how a press stands: evenly over the gel inside its rim, leaning evenly over directions."""
+    """Draw the place and tilt of a press: evenly over the gel inside its rim, leaning evenly over directions."""
     while True:
         x = random.uniform(digit_shape.X_TIP, digit_shape.X_BASE)
         z = random.uniform(-digit_shape.HALF_WIDTH, digit_shape.HALF_WIDTH)
@@ -115,7 +115,7 @@ def draw_place(random: np.random.Generator, spec: PairSpec) -> Placement:
 
 
 def pair_row(biotac: FastContact, digit: FastContact, electrodes: str = SHEET) -> dict[str, np.ndarray]:
-    """What one paired contact stores; arrays as in the file, see ``DATASETS``. Electrodes' films are not corrected."""
+    """Arrays stored of one paired contact, as in the file, see ``DATASETS``. Electrodes' films are not corrected."""
     skin, gel = biotac_compliance(), digit_compliance()
     return {
         "displacement_biotac": quantise(biotac.corrected.displacement),
@@ -142,7 +142,7 @@ def contact_center(digit: Contact) -> np.ndarray:
 
 
 def beyond_digit(touched: np.ndarray) -> np.bool_:
-    """Whether these nodes of the BioTac (indices or a mask) reach beside what rolls onto the DIGIT's gel.
+    """Return true if these nodes of the BioTac (indices or a mask) reach beside what rolls onto the DIGIT's gel.
 
     No contact of the gel is their equal.
     """

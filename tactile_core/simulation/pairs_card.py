@@ -44,7 +44,7 @@ def card(path: str | os.PathLike) -> dict:
 
 
 def card_path(path: str | os.PathLike) -> pathlib.Path:
-    """Where the card of a file of pairs lies: ``<file>.card.json``."""
+    """Path of the card of a file of pairs: ``<file>.card.json``."""
     path = pathlib.Path(path)
     return path.with_name(path.name + ".card.json")
 

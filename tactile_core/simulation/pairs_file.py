@@ -94,7 +94,7 @@ class Pairs:
 
     @property
     def indenter_names(self) -> list[str]:
-        """By number, as in ``indenter``."""
+        """Names of the indenters by number, as in ``indenter``."""
         return json.loads(self.attributes["indenters"])
 
 
@@ -148,7 +148,7 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
 
 
 def _dataset(file: object, name: str, path: str | os.PathLike) -> np.ndarray:
-    """One dataset, its kind and trailing shape checked."""
+    """Read one dataset, and check its kind and trailing shape."""
     place = f"{os.fspath(path)}, {name}"
     if name not in file:
         raise TactileError(place, "no such dataset", f"the datasets {', '.join(DATASETS)}", ADVICE)
@@ -176,7 +176,7 @@ def _scale(data: object, place: str) -> float:
 
 
 def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> None:
-    """As many rows everywhere, and only finite numbers."""
+    """Check that all arrays have equally many rows, and only finite numbers."""
     count = len(arrays["press"])
     for name, array in arrays.items():
         if len(array) != count:
@@ -229,7 +229,7 @@ def merge(
     files: list[pathlib.Path], count: int, out: pathlib.Path, text: str, seed: int, names: list[str],
     electrodes: str = SHEET,
 ) -> None:  # fmt: skip
-    """One HDF5 file from the blocks in order, cut to ``count`` contacts; written beside and renamed."""
+    """Join the blocks in order into one HDF5 file, cut to ``count`` contacts; written beside and renamed."""
     try:
         _write_merged(files, count, out, text, seed, names, electrodes)
     except (OSError, RuntimeError) as error:  # h5py reports a full disk as either
@@ -281,6 +281,6 @@ def quantise(displacement: np.ndarray, scale: float = SCALE) -> np.ndarray:
 
 
 def no_room(path: pathlib.Path, error: OSError | RuntimeError) -> TactileError:
-    """What is said where a file cannot be written."""
+    """Return the error for a file that cannot be written."""
     reason = getattr(error, "strerror", None) or str(error).split("\n")[0]
     return TactileError(path, f"cannot be written ({reason})", "room for it", "Make room, then give the command again")

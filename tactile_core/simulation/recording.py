@@ -97,7 +97,7 @@ def _tiers_told(tiers: Mapping[str, str] | None) -> str:
 
 
 def check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
-    """Raises TactileError for a point that presses beside the DIGIT's gel."""
+    """Raise TactileError for a point that presses beside the DIGIT's gel."""
     for number, point in enumerate(spec.points, 1):
         if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3):
             raise TactileError(
@@ -107,7 +107,7 @@ def check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
 
 
 def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """time (T,) s, place (T, 2) m and force (T,) N at 100 Hz."""
+    """Compute time (T,) s, place (T, 2) m and force (T,) N at 100 Hz."""
     points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
     time = np.arange(round(points[0, 0] * sensors.SAMPLE_RATE), round(points[-1, 0] * sensors.SAMPLE_RATE) + 1)
     time = time / sensors.SAMPLE_RATE

@@ -19,7 +19,9 @@ LARGEST = 1e9  # of any number: none that means something comes near, squares of
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """How paired contacts are drawn: places evenly over the gel, tilts evenly over a cone, force growing by a ratio."""
+    """Distribution of paired contacts: places evenly over the gel, tilts evenly over a cone, force growing by a
+    ratio.
+    """
 
     force_min_n: Positive = 0.02
     force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5
@@ -54,7 +56,7 @@ class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """One scene file."""
+    """Content of a scene file."""
 
     format: str
     name: str
@@ -87,7 +89,7 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
 
 
 def check(file: str | os.PathLike, scene: Scene) -> None:
-    """Raises TactileError for what the fields' types do not say: finite numbers, names, growing times."""
+    """Raise TactileError for what the fields' types do not say: finite numbers, names, growing times."""
     if scene.format != FORMAT:
         raise TactileError(f"{file}, format", repr(scene.format), repr(FORMAT))
     numbers = list(_numbers(msgspec.to_builtins(scene)))

@@ -26,7 +26,7 @@ Value = float | str
 
 
 def combinations(words: Sequence[str]) -> list[dict[str, Value]]:
-    """All of them, the last name's values changing fastest. Raises TactileError for a bad or doubled word."""
+    """List all combinations, the last name's values changing fastest. Raises TactileError for a bad or doubled word."""
     axes: dict[str, list[Value]] = {}
     for word in words:
         name, mark, text = word.partition("=")
@@ -71,7 +71,7 @@ def _number(word: str, text: str) -> float:
 
 
 def name_of(values: dict[str, Value]) -> str:
-    """A file's name that tells the values: ``force_n-0.2_tilt_deg-10``."""
+    """Make a file name from the values: ``force_n-0.2_tilt_deg-10``."""
     parts = [
         f"{name.rpartition('.')[2]}-{value:g}" if isinstance(value, float) else value for name, value in values.items()
     ]

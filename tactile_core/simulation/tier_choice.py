@@ -1,4 +1,4 @@
-"""Which tier of contact is exact enough for a scene, by the measured table and how deep the scene goes."""
+"""Choose the tier of contact that is exact enough for a scene, from the measured table and the scene's depth."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class TierChoice(NamedTuple):
     share: float
 
     def describe(self, sensor: str) -> str:
-        """In words, and why."""
+        """Explain the choice in words."""
         which = "BioTac" if sensor == "biotac" else "DIGIT"
         return (
             f"{which}: {self.tier} tier, to {self.share:.0%} of the thickness within {self.error:.3g} um of the exact "
@@ -37,7 +37,7 @@ class TierChoice(NamedTuple):
 
 
 def tier_errors(sensor: str, share: float) -> list[Candidate]:
-    """Each tier's error, um, at a depth over the thickness, as 95 of 100 contacts stay below, and ms a contact.
+    """Return each tier's error, um, at a depth over the thickness, a bound on 95 of 100 contacts, and ms a contact.
 
     The fast tier was measured against the full one, whose own error is added to it.
     """
@@ -63,7 +63,10 @@ def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
 
 
 def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: float | None) -> Mapping[str, TierChoice]:
-    """For each sensor of a scene's [recording]. Raises TactileError: a bad scene, a bound that no tier meets."""
+    """Choose a tier for each sensor of a scene's [recording].
+
+    Raises TactileError: a bad scene, a bound that no tier meets.
+    """
     from .recording import check_places, recording_of
 
     scene, _ = load_scene(path)
@@ -74,7 +77,7 @@ def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: floa
 
 
 def depth_share(sensor: str, indenter, spec: RecordingSpec) -> float:  # noqa: ANN001
-    """How deep a scene goes at its points, over the thickness there, by the fast tier.
+    """Depth of a scene at its points, over the thickness there, by the fast tier.
 
     The most that a scene may, where a point is beyond it, or where the sensor's matrices are yet to be built.
     """

@@ -21,7 +21,7 @@ ADVICE = "Remove the file to start again, or train into another folder"
 
 @dataclass
 class State:
-    """Where a training stands.
+    """State of a training.
 
     identity : what must be the same for the training to go on: data, seed, options, versions
     stage, epoch : the next to run           log : rows (stage, epoch, train, validation)

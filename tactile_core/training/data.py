@@ -39,7 +39,7 @@ class Batch:
 
 
 class Contacts:
-    """All contacts, their split, both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror.
+    """Contacts with their split and both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror.
 
     device : where batches go; the contacts themselves stay in the host's memory
     """
@@ -65,13 +65,13 @@ class Contacts:
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
-        """What an epoch trains on, in its order: contacts of the split or their mirror images, and silence."""
+        """Draw the contacts of an epoch, in its order: contacts of the split or their mirror images, and silence."""
         rows = rng.permutation(self.with_silence(self.split.train))
         turned = (rng.random(len(rows)) < self.options.mirrored) & (rows != SILENT)
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """(B, 20) the signals of the contacts as a sensor would give them: see `noise_model.measured`."""
+        """Signals (B, 20) of the contacts as a sensor would give them: see `noise_model.measured`."""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes()]
@@ -98,5 +98,5 @@ class Contacts:
 
 
 def _depth(pairs: Pairs) -> np.ndarray:
-    """(C,) float32 m, how deep each contact's deepest node of the gel lies."""
+    """Depth (C,) float32 m of each contact's deepest node of the gel."""
     return pairs.displacement_digit[:, :, 1].max(1) * np.float32(pairs.scale_digit)

@@ -1,4 +1,4 @@
-"""Where networks are trained: on a GPU when torch sees one, else on the processor."""
+"""Choose the device for training: a GPU when torch sees one, else the processor."""
 
 from __future__ import annotations
 

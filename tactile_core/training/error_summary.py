@@ -31,7 +31,7 @@ def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median:
 def figure_rows(
     columns: Columns, pairs: Pairs, rows: np.ndarray, set_name: str, targets: dict[str, float]
 ) -> list[Row]:
-    """A row for each figure over the contacts in these rows that press without sliding, averaged as `in_bins`."""
+    """Make a row for each metric over the contacts in these rows that press without sliding, averaged as `in_bins`."""
     still = ~pairs.slide[rows].any(-1)
     depth, indenter = pairs.depth_biotac[rows], pairs.indenter[rows]
     found = []
@@ -45,7 +45,7 @@ def figure_rows(
 
 
 def is_median(name: str) -> bool:
-    """Whether a figure is summed up by its median: distances of places and shares of forces and peaks."""
+    """Return true if a metric is summarised by its median: distances of places and shares of forces and peaks."""
     return name.endswith(MEDIANS)
 
 
@@ -56,7 +56,7 @@ def _null(columns: Columns, name: str) -> np.ndarray:
 
 
 def figure_row(name: str, value: float | None, null: float | None, target: float | None, set_name: str) -> Row:
-    """One row of a report; the unit is the name's last word. Larger is better for an intersection over union."""
+    """Make one row of a report; the unit is the name's last word. Larger is better for an intersection over union."""
     unit = name.rsplit("_", 1)[1].replace("percent", "%").replace("iou", "1")
     target = None if value is None else target
     return row(name, value, unit, target, null=null, of=set_name, at_least=name.endswith("iou"))

@@ -1,4 +1,4 @@
-"""From a trained model to the weights folder: rounding, hashes, the distance to training signals, the card."""
+"""Export a trained model to the weights folder: rounding, hashes, the distance to training signals, the card."""
 
 from __future__ import annotations
 
@@ -111,7 +111,9 @@ def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
 
 
 def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, np.ndarray]:
-    """What `Networks.signal_distance` needs: mean and whitening of training latents, SVB's residual an electrode."""
+    """Compute the inputs of `Networks.signal_distance`: mean and whitening of training latents, SVB's residual
+    an electrode.
+    """
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)
@@ -133,7 +135,7 @@ def assemble(tensors: dict, sizes: dict) -> Networks:
 
 
 def versions(device: torch.device) -> dict[str, str]:
-    """What the numbers depend on besides data, seed and options."""
+    """Return versions that the numbers depend on besides data, seed and options."""
     return {
         "device": label(device),
         "tactile": __version__,
@@ -155,7 +157,7 @@ def write_nets(folder: Path, tensors: dict, sizes: dict) -> dict[str, dict[str, 
 
 
 def pairs_entry(contacts: Contacts) -> dict[str, object]:
-    """Where the training data came from, and how it was split."""
+    """Return the origin of the training data, and its split."""
     pairs, split = contacts.pairs, contacts.split
     parts = {"train": split.train, "validation": split.validation, "test": split.test}
     return {

@@ -77,7 +77,7 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
 
 
 def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
-    """(F, 2) places on the lattice, in its units, of contacts (F, 3); and which lie off the skin (F,)."""
+    """Places (F, 2) on the lattice, in its units, of contacts (F, 3); and which lie off the skin (F,)."""
     if not len(position):
         return np.zeros((0, 2)), np.zeros(0, bool)
     metres = position if np.abs(position).max() < METRES_BELOW else 1e-3 * position
@@ -99,6 +99,6 @@ def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) 
 
 
 def _presses(used: np.ndarray) -> np.ndarray:
-    """(F,) number of the press each frame belongs to: runs of contact, or equal parts where there are too few runs."""
+    """Press number (F,) of each frame: runs of contact, or equal parts where there are too few runs."""
     runs = np.cumsum(np.diff(used, prepend=used[0]) > 1)
     return runs if runs[-1] + 1 >= BLOCKS else np.arange(len(used)) * BLOCKS // len(used)

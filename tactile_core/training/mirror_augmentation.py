@@ -14,7 +14,7 @@ SAME = 1e-4  # rad: angles closer than this are one
 
 
 def image_of_nodes(frame: ContactFrame) -> np.ndarray:
-    """(n,) the node that is each node's image; nodes behind the lattice (poles) are their own.
+    """Mirror image (n,) of each node; nodes behind the lattice (poles) are their own.
 
     Raises ValueError for a lattice whose columns have no images.
     """
@@ -32,7 +32,7 @@ def image_of_nodes(frame: ContactFrame) -> np.ndarray:
 
 @functools.cache
 def image_of_electrodes() -> np.ndarray:
-    """(19,) the electrode that is each electrode's image."""
+    """Mirror image (19,) of each electrode."""
     at = electrodes()
     return np.square(at[:, None] * [1, 1, -1] - at).sum(-1).argmin(axis=1)
 

@@ -21,14 +21,14 @@ class Plain(nn.ModuleList):
         super().__init__(nn.Linear(*pair) for pair in zip(sizes[:-1], sizes[1:], strict=True))
 
     def forward(self, x: Tensor) -> Tensor:
-        """x (B, sizes[0]) -> (B, sizes[-1])."""
+        """Map x (B, sizes[0]) to (B, sizes[-1])."""
         for index, layer in enumerate(self):
             x = layer(torch.relu(x) if index else x)
         return x
 
 
 class Block(nn.Module):
-    """x + down(silu(up(norm(x))))."""
+    """Residual block: x + down(silu(up(norm(x))))."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
@@ -37,7 +37,7 @@ class Block(nn.Module):
         self.down = nn.Linear(width, width)
 
     def forward(self, x: Tensor) -> Tensor:
-        """x (B, width) -> (B, width)."""
+        """Map x (B, width) to (B, width)."""
         return x + self.down(nn.functional.silu(self.up(self.norm(x))))
 
 
@@ -53,7 +53,7 @@ class Residual(nn.Module):
         self.skip = nn.Linear(inputs, outputs, bias=False)
 
     def forward(self, x: Tensor) -> Tensor:
-        """x (B, inputs) -> (B, outputs)."""
+        """Map x (B, inputs) to (B, outputs)."""
         hidden = self.first(x)
         for block in self.blocks:
             hidden = block(hidden)
@@ -74,28 +74,28 @@ class ContactPosterior(nn.Module):
         self.components = components
 
     def mixture(self, latent: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """latent_signal (B, K) -> logarithm of the weights (B, C), means and spreads (B, C, STATE)."""
+        """Map latent_signal (B, K) to the logarithm of the weights (B, C), means and spreads (B, C, STATE)."""
         raw = self.posterior(latent)
         weight, rest = raw[:, : self.components], raw[:, self.components :].view(len(raw), 2, self.components, STATE)
         return weight.log_softmax(-1), rest[:, 0], LEAST_SPREAD + rest[:, 1].clamp(*SPREAD_LIMITS).exp()
 
     def surprise(self, latent: Tensor, state: Tensor) -> Tensor:
-        """(B,) nats, negative logarithm of the density that the mixture gives to the true state (B, STATE)."""
+        """Negative logarithm (B,), nats, of the mixture's density at the true state (B, STATE)."""
         weight, mean, spread = self.mixture(latent)
         away = (state[:, None] - mean) / spread
         density = -0.5 * away.square().sum(-1) - spread.log().sum(-1)
         return -(weight + density).logsumexp(-1)
 
     def given(self, latent: Tensor, state: Tensor) -> Tensor:
-        """latent_signal (B, K) and a state (B, STATE) -> latent_biotac (B, L)."""
+        """Map latent_signal (B, K) and a state (B, STATE) to latent_biotac (B, L)."""
         return torch.cat([state[:, :PLACE], self.code(torch.cat([latent, state], -1))], -1)
 
     def forward(self, latent: Tensor) -> Tensor:
-        """latent_signal (B, K) -> latent_biotac (B, L) of the most plausible contact."""
+        """Map latent_signal (B, K) to latent_biotac (B, L) of the most plausible contact."""
         return self.given(latent, self.contact(latent))
 
     def contact(self, latent: Tensor) -> Tensor:
-        """latent_signal (B, K) -> state (B, STATE), mean of the heaviest component."""
+        """Map latent_signal (B, K) to the state (B, STATE), mean of the heaviest component."""
         weight, mean, _ = self.mixture(latent)
         return mean[torch.arange(len(mean)), weight.argmax(-1)]
 
@@ -108,16 +108,16 @@ class Vae(nn.Module):
         self.encoder, self.decoder = encoder, decoder
 
     def posterior(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """x -> mean (B, L) and log variance (B, L) of the latent."""
+        """Map x to mean (B, L) and log variance (B, L) of the latent."""
         mean, logvar = self.encoder(x).chunk(2, -1)
         return mean, logvar.clamp(-12.0, 6.0)  # keeps exp() finite in the first steps; trained values lie well inside
 
     def mean(self, x: Tensor) -> Tensor:
-        """x -> mean of the posterior, which is what inference uses."""
+        """Map x to the mean of the posterior, which is used at inference."""
         return self.posterior(x)[0]
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """x -> a latent drawn from the posterior (reparameterised), and its KL divergence from N(0, 1), mean over B.
+        """Draw a latent from the posterior of x (reparameterised); also its KL divergence from N(0, 1), mean over B.
 
         Kingma and Welling 2014, appendix B.
         """
@@ -142,11 +142,11 @@ class MeshVae(Vae):
         self.surface, self.modes = surface, modes
 
     def mean(self, x: Tensor) -> Tensor:
-        """What the encoder reads (B, K + 4) -> latent (B, L)."""
+        """Map the encoder's input (B, K + 4) to the latent (B, L)."""
         return torch.cat([x[:, self.modes : self.modes + PLACE], super().mean(x)], -1)
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """As `Vae.sample`; the place is not noisy."""
+        """Sample like `Vae.sample`; the place is not noisy."""
         code, divergence = super().sample(x, generator)
         return torch.cat([x[:, self.modes : self.modes + PLACE], code], -1), divergence
 
@@ -160,11 +160,11 @@ class MeshVae(Vae):
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
 
     def shape_loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """As `loss`, of the code (B, L - 2) at the contacts' true places."""
+        """Compute `loss` of the code (B, L - 2) at the contacts' true places."""
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """How far, in cells, the places of latents (B, L) are from the contacts': see `Surface.astray`."""
+        """Distance, in cells, of the places of latents (B, L) from the contacts': see `Surface.astray`."""
         return self.surface.astray(latent[:, :PLACE], rows)
 
     def field(self, latent: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""What can be chosen about a training; all of it is written into the card."""
+"""Options of a training; all of them are written into the card."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class Options:
         return self.rectified_decay if net.startswith("R2MPN") else self.weight_decay
 
     def settings(self) -> dict[str, object]:
-        """All options that change the result, as JSON gives them back."""
+        """Return all options that change the result, as JSON gives them back."""
         settings = asdict(self) | {"without": list(self.without), "left_out": list(self.left_out)}
         settings.pop("checkpoint_seconds")
         return settings

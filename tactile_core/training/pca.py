@@ -33,7 +33,7 @@ def principal_basis(fields: Fields, rows: np.ndarray, modes: int, generator: tor
 
 
 def _covariance(fields: Fields, rows: np.ndarray, basis: Tensor) -> Tensor:
-    """(X^T X) basis with X (rows, size)."""
+    """Compute (X^T X) basis with X (rows, size)."""
     total = torch.zeros_like(basis)
     for start in range(0, len(rows), ROWS):
         part = fields(rows[start : start + ROWS])

@@ -1,4 +1,4 @@
-"""What a training achieved on presses it never saw, and its loss curves."""
+"""Report the errors of a training on presses it never saw, and its loss curves."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ class Measure:
         self.change = self.read(self.rows, 2)
 
     def read(self, rows: np.ndarray, stream: int) -> np.ndarray:
-        """(C, 19) counts as read, signed."""
+        """Signals (C, 19) counts as read, signed."""
         return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
 
 def error_rows(measure: Measure, model: Model) -> list[Row]:
-    """All rows of the card: each step of the chain, the chain, the direct network, each beside its null answer."""
+    """Make all rows of the card: each step of the chain, the chain, the direct network, each beside its baseline."""
     pairs, rows = measure.contacts.pairs, measure.rows
     columns = translation_figures(measure.networks, pairs, rows, measure.change, measure.bodies)
     columns |= direct_columns(model, measure)
@@ -88,7 +88,7 @@ def signal_rows(measure: Measure) -> list[Row]:
 
 
 def silence(measure: Measure) -> dict[str, np.ndarray]:
-    """What signals of noise alone are translated to, frame by frame: largest displacements (m) and the force (N)."""
+    """Translate signals of noise alone, frame by frame: largest displacements (m) and the force (N)."""
     nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
     signal = nets.encode_signal(change)
     state = nets.contact(signal)
@@ -114,7 +114,7 @@ def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
 
 
 def quantiles(values: np.ndarray) -> list[float]:
-    """At QUANTILES, six digits."""
+    """Compute the values at QUANTILES, six digits."""
     return [float(f"{quantile:.6g}") for quantile in np.quantile(values, QUANTILES)]
 
 
@@ -158,7 +158,7 @@ def write_log(path: Path, history: list[list]) -> None:
 
 
 def draw_losses(path: Path, history: list[list]) -> None:
-    """One small picture a stage: training and validation loss over epochs, logarithmic."""
+    """Draw one small picture a stage: training and validation loss over epochs, logarithmic."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

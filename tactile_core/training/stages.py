@@ -45,31 +45,33 @@ class Model(nn.Module):
         initialise(self, generator)
 
     def from_signal(self, signal: Tensor) -> Tensor:
-        """signal (B, 20) -> latent_biotac."""
+        """Map signal (B, 20) to latent_biotac."""
         latent = self.SVB.mean(compress(signal))
         return torch.where(signal[:, ELECTRODES:] > 0, self.R2MPN(latent), self.S2MPN(latent))
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """signal (B, 20) and its contact's state (B, STATE) -> latent_biotac, and the surprise (B,) at the state."""
+        """Map signal (B, 20) and its contact's state (B, STATE) to latent_biotac, and the surprise (B,) at the
+        state.
+        """
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, ELECTRODES:] > 0
         biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
         surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))
         return biotac, torch.where(rectified[:, 0], *surprises)
 
     def across(self, latent_biotac: Tensor) -> Tensor:
-        """latent_biotac -> latent_digit."""
+        """Map latent_biotac to latent_digit."""
         return self.M2MPN(self.MVB.placed(latent_biotac))
 
     def back(self, latent_digit: Tensor) -> Tensor:
-        """latent_digit -> latent_biotac."""
+        """Map latent_digit to latent_biotac."""
         return self.D2BPN(self.MVD.placed(latent_digit))
 
     def to_signal(self, latent_biotac: Tensor) -> Tensor:
-        """latent_biotac -> compressed changes (B, 19)."""
+        """Map latent_biotac to compressed changes (B, 19)."""
         return self.SVB.decoder(self.B2SPN(self.MVB.placed(latent_biotac)))
 
     def expected_error(self, signal: Tensor) -> Tensor:
-        """signal (B, 20) -> (B, 2) logarithm of the largest node error on BioTac and DIGIT, over ERROR_UNIT."""
+        """Map signal (B, 20) to the logarithm (B, 2) of the largest node error on BioTac and DIGIT, over ERROR_UNIT."""
         seen = compress(signal)
         latent = self.SVB.mean(seen)
         change = seen[:, :ELECTRODES]
@@ -78,7 +80,7 @@ class Model(nn.Module):
         return self.error(torch.cat([latent, left, size, seen[:, ELECTRODES:]], -1))
 
     def directly(self, signal: Tensor) -> Tensor:
-        """signal (B, 20) -> latent of `direct_decoder`, past all latents that mean anything."""
+        """Map signal (B, 20) to the latent of `direct_decoder`, bypassing the physical latents."""
         return self.direct(compress(signal))
 
 
@@ -87,7 +89,7 @@ Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage: the networks it changes, or parts of them, and its loss."""
+    """Stage of the training: the networks it changes, or parts of them, and its loss."""
 
     name: str
     nets: tuple[str, ...]
@@ -145,8 +147,9 @@ def latent_loss(found: Tensor, target: Tensor) -> Tensor:
 
 
 def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Everything together: a frozen chain is 23-26 % worse than signal -> DIGIT directly (docs/sources.md).
+    """Compute the loss of the whole chain: a frozen chain is 23-26 % worse than signal -> DIGIT directly.
 
+    docs/sources.md, Networks, has the figure.
     Shapes are held against the truth where the contact truly is, places by themselves: a dent that is told beside its
     place would be paid for with being faint. The autoencoders' own losses stay in at half, so that latents keep their
     meaning and meshes can be encoded. What the signal says of the contact is learned before and stays as it is.
@@ -184,7 +187,7 @@ def pressure_loss(
 
 
 def length(vectors: Tensor) -> Tensor:
-    """(B, 3) -> (B,), with a gradient at zero."""
+    """Length (B,) of vectors (B, 3), with a gradient at zero."""
     return (vectors.square().sum(-1) + 1e-12).sqrt()
 
 
@@ -198,7 +201,7 @@ def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
-    """(B,) m, largest node error of what a latent decodes to, at least ERROR_FLOOR."""
+    """Largest node error (B,) m of a decoded latent, at least ERROR_FLOOR."""
     error = vae.field(latent) - vae.surface.true(rows)
     return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR).to(latent.device)
 

@@ -1,4 +1,4 @@
-"""Each step of the translation on paired contacts, against the simulated truth, contact by contact."""
+"""Measure each step of the translation on paired contacts, against the simulated truth, contact by contact."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class Bodies:
 
 
 def our_bodies() -> Bodies:
-    """Those of this version's sensors."""
+    """Return the bodies of this version's sensors."""
     return Bodies(sensors.digit_surface(), unrolling.unrolled_nodes())
 
 
 def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:
-    """(B, n, 3) float32 m of the contacts in these rows."""
+    """Displacement (B, n, 3) float32 m of the contacts in these rows."""
     return getattr(pairs, f"displacement_{sensor}")[rows].astype(np.float32) * np.float32(
         getattr(pairs, f"scale_{sensor}")
     )
@@ -61,7 +61,7 @@ def parts(count: int) -> list[slice]:
 
 
 def joined(columns: Iterator[Columns]) -> Columns:
-    """One table from those of parts."""
+    """Join the tables of parts into one."""
     found = list(columns)
     return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
 
@@ -128,7 +128,7 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
-    """rms over moving nodes, largest node error, error of the core's height (um), error of the peak (per cent)."""
+    """RMS over moving nodes, largest node error, error of the core's height (um), error of the peak (per cent)."""
     figures = accuracy.mesh_figures(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
     figures["peak_depth_percent"] = np.where(deep, figures["peak_depth_percent"], np.nan)
@@ -150,7 +150,7 @@ def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodie
 
 
 def _skin_offset(found: np.ndarray, true: np.ndarray, bodies: Bodies) -> np.ndarray:
-    """(C,) m between the middles of two dents of the BioTac on the unrolled pad."""
+    """Distance (C,) m between the middles of two dents of the BioTac on the unrolled pad."""
     on_pad = np.isfinite(bodies.unrolled[:, 0])
     places = bodies.unrolled[on_pad]
     first, second = (accuracy.core_center(accuracy.lengths(each[:, on_pad]), places, 0.0) for each in (found, true))

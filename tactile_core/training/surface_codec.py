@@ -1,4 +1,4 @@
-"""One sensor's displacements as training sees them: in the nodes' own frames, in coefficients, with a loss."""
+"""Represent one sensor's displacements for training: in the nodes' own frames, in coefficients, with a loss."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, bu
 
 
 class SurfaceCodec:
-    """One sensor's displacements, the frame that moves over them and their linear bases, in the host's memory.
+    """Displacements of one sensor, the frame that moves over them and their linear bases, in the host's memory.
 
     data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i seen in a mirror
     wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
@@ -55,11 +55,11 @@ class SurfaceCodec:
 
     @property
     def nodes(self) -> int:
-        """n."""
+        """Number n of nodes."""
         return self.data.shape[1]
 
     def _local(self, rows: np.ndarray) -> np.ndarray:
-        """(B, n, 3) float32 of contacts, in whole units and in the nodes' own frames."""
+        """Displacements (B, n, 3) float32 of contacts, in whole units and in the nodes' own frames."""
         values, turned = self.data[rows % len(self.data)].astype(np.float32), rows >= len(self.data)
         if turned.any():
             values[turned] = across(values[turned][:, self._image])
@@ -78,7 +78,7 @@ class SurfaceCodec:
         return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
 
     def _tapered(self, rows: np.ndarray) -> Tensor:
-        """What the near basis is drawn from: it fades toward the window's edge, where decoded gel would have a step."""
+        """Input of the near basis: it fades toward the window's edge, where decoded gel would have a step."""
         fade = torch.from_numpy(self.frame.fade())
         return (self._rest_in_window(rows).view(len(rows), *fade.shape, 3) * fade[:, :, None]).flatten(1)
 
@@ -90,20 +90,22 @@ class SurfaceCodec:
         return torch.stack([squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()], -1)
 
     def inputs(self, rows: np.ndarray) -> Tensor:
-        """(B, K + K' + 4) what the encoder reads: coefficients, place, what is left of it; zero for silent ones."""
+        """Input (B, K + K' + 4) of the encoder: coefficients, place, what is left of it; zero for silent ones."""
         at = np.maximum(rows, 0)
         place = torch.from_numpy(np.concatenate([self.place[at], self.left[at]], -1))
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """As `MovingFrame.cells`: whole cells (B, 2) and what is left, through which gradients flow to the place."""
+        """Compute `MovingFrame.cells`: whole cells (B, 2) and what is left, through which gradients flow to the
+        place.
+        """
         middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
         at = place * PLACE_UNIT + middle
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
     def true_place(self, rows: np.ndarray) -> Tensor:
-        """(B, 2) of the contacts' dents; 0 for silent ones."""
+        """Places (B, 2) of the contacts' dents; 0 for silent ones."""
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
@@ -135,12 +137,12 @@ class SurfaceCodec:
         return torch.from_numpy(self.frame.add(whole, near, cell.cpu().numpy()))
 
     def true(self, rows: np.ndarray) -> Tensor:
-        """(B, n, 3) m, in the nodes' own frames."""
+        """Displacements (B, n, 3) m, in the nodes' own frames."""
         values = torch.from_numpy(self._local(np.maximum(rows, 0)))
         return values * (self.unit * touching(rows)[:, :, None])
 
     def _at_cells(self, rows: np.ndarray, cells: Tensor) -> Tensor:
-        """(B, K + K') m, the coefficients of contacts in windows round other cells (B, 2) than their own."""
+        """Coefficients (B, K + K') m of contacts in windows round other cells (B, 2) than their own."""
         metres, cell = self.modes[rows] * self.scale, cells.cpu().numpy()
         moved = (cell != self.cell[rows]).any(-1)
         if moved.any():
@@ -153,7 +155,9 @@ class SurfaceCodec:
 
 
 def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """(C, n, 3) int16 in the nodes' own frames; where none is turned the data themselves, which are large."""
+    """Displacements (C, n, 3) int16 in the nodes' own frames; where none is turned the data themselves, which
+    are large.
+    """
     if not frame.turn.any():
         return data
     local = np.empty_like(data)
@@ -178,5 +182,5 @@ def _parts(count: int) -> list[slice]:
 
 
 def touching(rows: np.ndarray) -> Tensor:
-    """(B, 1): 1 for contacts, 0 for silent samples."""
+    """Mask (B, 1): 1 for contacts, 0 for silent samples."""
     return torch.from_numpy((rows != SILENT).astype(np.float32))[:, None]

@@ -99,7 +99,7 @@ def without(split: Split, pairs: Pairs, options: Options, path: str | os.PathLik
 
 
 def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
-    """Raises TactileError if the pairs were made on other surfaces than this version's."""
+    """Raise TactileError if the pairs were made on other surfaces than this version's."""
     for sensor in ("biotac", "digit"):
         surface, key = sensor_surface(sensor), f"{sensor}_nodes_sha256"
         found = pairs.attributes[key]
@@ -121,7 +121,7 @@ def prepare_folder(out: Path, overwrite: bool) -> None:
 
 @contextmanager
 def deterministic() -> Iterator[None]:
-    """One thread and deterministic algorithms inside, the caller's settings after."""
+    """Use one thread and deterministic algorithms inside, the caller's settings after."""
     threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     torch.set_num_threads(1)
     torch.use_deterministic_algorithms(True)
@@ -185,7 +185,7 @@ def share_done(options: Options, state: checkpoint.State) -> float:
 def epoch_losses(
     stage: Stage, model: Model, contacts: Contacts, seed: int, index: int, epoch: int
 ) -> list[Callable[[], torch.Tensor]]:
-    """One function a step: called in order, each gives the loss of its batch."""
+    """Return one function a step: called in order, each gives the loss of its batch."""
     options = contacts.options
     rng = np.random.default_rng([seed, index, epoch])
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
@@ -203,7 +203,10 @@ def epoch_losses(
 def train_epoch(
     losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
 ) -> float:
-    """One pass over the data; returns the mean loss. The rate rises over the first steps, then falls as a cosine."""
+    """Train for one pass over the data; returns the mean loss.
+
+    The rate rises over the first steps, then falls as a cosine.
+    """
     total = 0.0
     for step, loss in enumerate(losses):
         share = (epoch * len(losses) + step + 1) / (epochs * len(losses))

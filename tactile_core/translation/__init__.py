@@ -1,1 +1,1 @@
-"""Recordings to deformation: the networks, their weights, bounds of their error, and units of their own."""
+"""Translate recordings to deformation: networks, their weights, error bounds, and calibration of units."""

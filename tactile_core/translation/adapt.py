@@ -1,4 +1,4 @@
-"""Fit rest, gains and offsets of an unknown sensor from its own recordings, of which nothing need be known."""
+"""Fit rest, gains and offsets of an unknown sensor from its own recordings, without known loads."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LARGEST_OFFSET = 30.0  # counts; more is no tare error but a match gone wrong (a
 
 @dataclass(frozen=True)
 class Adapted:
-    """A fitted sensor and what the user should know of the fit. fitted : (19,) bool, the electrodes with a gain."""
+    """Fitted sensor with warnings for the user. fitted : (19,) bool, the electrodes with a gain."""
 
     sensor: ElectrodeGains
     fitted: np.ndarray
@@ -43,9 +43,8 @@ def adapt(
 ) -> Adapted:
     """Fit one sensor from its recordings, all together.
 
-    Where recordings hold no calm part near the rest that all of them together show, that rest is taken. Raises
-    TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames in
-    contact.
+    Recordings without a calm part near the rest estimated from all together use that estimate. Raises TactileError: a
+    recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames in contact.
     """
     parts, kinds, restless = [], set(), []
     recordings = [read(path) for path in paths]
@@ -73,9 +72,9 @@ def adapt(
 def adapt_hand(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None
 ) -> tuple[SensorFile, tuple[str, ...]]:
-    """Fit each unit of a set of recordings: one, or one a finger where the files hold hands; and what to tell of them.
+    """Fit each unit of a set of recordings: one, or one a finger where the files hold hands; with warnings.
 
-    Raises TactileError as `adapt`, and for files of hands and of single fingers together.
+    Raises TactileError like `adapt`, and for files of hands and of single fingers together.
     """
     units: dict[int | None, list[str]] = {}
     for path in paths:
@@ -94,7 +93,7 @@ def adapt_hand(
 
 
 def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
-    """The unit's rest, None where the recordings are too few, or not raw."""
+    """Find the unit's rest; None where the recordings are too few, or not raw."""
     try:
         return find_rest(recordings)
     except TactileError:
@@ -102,7 +101,7 @@ def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
 
 
 def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
-    """A unit of which rest alone is known."""
+    """Return a unit of which only rest is known."""
     if rest is None:
         return None
     counts, spread = ([round(value, 4) for value in each.tolist()] for each in (rest.counts, rest.spread))
@@ -114,7 +113,7 @@ def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
 def _fitted(
     parts: list[np.ndarray], rectified: bool, typical: ReferenceSignals, note: str, bare: ElectrodeGains | None
 ) -> Adapted:
-    """Gains and offsets, beside the unit's rest; rest alone where there is too little contact to tell gains."""
+    """Fit gains and offsets, and add the unit's rest; rest alone where there is too little contact to fit gains."""
     change = np.concatenate(parts)
     if bare is None:
         return fit(change, rectified, typical, note)
@@ -127,12 +126,12 @@ def _fitted(
 
 
 def _listed(names: list[str]) -> str:
-    """The names, or the first few and the number of the others."""
+    """List the names, or the first few and the number of the others."""
     return ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
 
 
 def _contacts(signals: Signals) -> np.ndarray:
-    """(n, 19) counts of the frames in contact, absolute where the recording is."""
+    """Return (n, 19) counts of the frames in contact, absolute where the recording is rectified."""
     change = np.abs(signals.typical) if signals.kind == "rectified" else signals.typical
     return change[reference_signals.touching(change) & ~signals.quiet]
 
@@ -158,7 +157,9 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Gains with 1 in place of what the frames do not tell, which of them were fitted, and why the others not."""
+    """Replace gains that the frames do not determine by 1; returns gains, which were fitted, and warnings for
+    the others.
+    """
     wild = touched & ~((gain >= LEAST) & (gain <= MOST))
     warnings = []
     if not touched.all():

@@ -1,4 +1,4 @@
-"""How signals are to be answered, of which a posterior knows more than one contact."""
+"""Options for estimating a contact from the posterior of each frame's signals."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ LIKELY, MEAN = "likely", "mean"
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """How each frame is answered.
+    """Options of the estimate for each frame.
 
-    kind : by the most plausible contact, or by the mean of all that are plausible, which no contact need be like
-    frames_apart : each frame by its own signals; the contact is followed through all frames otherwise
-    mount_shift_mm : (x, z), by which contacts are moved on the DIGIT's gel: how the BioTac lies on it
-    samples : contacts drawn for each frame from what its signals say
+    kind : the most plausible contact, or the mean of all plausible ones, which may resemble none of them
+    frames_apart : estimate each frame from its own signals; otherwise the contact is tracked through all frames
+    mount_shift_mm : (x, z), shift of contacts on the DIGIT's gel: the position of the BioTac on it
+    samples : number of contacts drawn for each frame from its posterior
     """
 
     kind: Literal["likely", "mean"] = LIKELY
@@ -31,7 +31,7 @@ class Answer:
     samples: int = 0
 
     def __post_init__(self) -> None:
-        """Raises ValueError for a shift longer than the gel, or for more samples than there can be."""
+        """Raise ValueError for a shift longer than the gel, or for too many samples."""
         if not all(abs(one) <= FARTHEST for one in self.mount_shift_mm):
             raise ValueError(f"mount_shift_mm {self.mount_shift_mm}: within {FARTHEST:g} mm")
         if not 0 <= self.samples <= MOST_SAMPLES:
@@ -39,16 +39,16 @@ class Answer:
 
     @property
     def follows(self) -> bool:
-        """Whether contacts are followed through the frames."""
+        """Return true if contacts are tracked through the frames."""
         return self.kind == LIKELY and not self.frames_apart
 
     @property
     def mount_shift(self) -> np.ndarray:
-        """(2,) m."""
+        """Shift (2,) m of contacts on the gel."""
         return 1e-3 * np.array(self.mount_shift_mm)
 
     def describe_shift(self) -> tuple[str, ...]:
-        """What the user of a result should know of it."""
+        """Return sentences for the user of a result about these options."""
         if not any(self.mount_shift_mm):
             return ()
         x, z = self.mount_shift_mm
@@ -56,7 +56,7 @@ class Answer:
 
 
 def parse_shift(text: str) -> tuple[float, float]:
-    """``"4,-1.5"`` -> (4.0, -1.5) mm; raises TactileError for anything else, or a shift longer than the gel."""
+    """Parse ``"4,-1.5"`` to (4.0, -1.5) mm; raises TactileError for anything else, or a shift longer than the gel."""
     number = r"\s*([+-]?\d{1,3}(?:\.\d{0,6})?)\s*"
     found = re.fullmatch(f"{number},{number}", text)
     shift = tuple(float(part) for part in found.groups()) if found else ()

@@ -1,8 +1,8 @@
-"""The frame that moves with a contact: a window of the surface's lattice round the dent, by whole cells.
+"""Frame that moves with a contact: a window of the surface's lattice around the dent, in whole cells.
 
-A dent keeps its shape where it moves, which a fixed linear basis cannot say: a frame that moves with the contact is
-worth a factor of three (docs/sources.md, Networks). Whole cells need no interpolation, so nothing is lost; what is
-left of the place, within half a cell, is told to the networks.
+A dent keeps its shape as it moves, which a fixed linear basis cannot represent: a frame that moves with the contact is
+worth a factor of three (docs/sources.md). Whole cells need no interpolation, so nothing is lost; the remaining offset,
+within half a cell, is an input of the networks.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class ContactFrame:
 
     rows, columns : of the lattice; nodes behind them (poles) lie in no window
     half : cells from the window's middle to its edge
-    turn : (n,) rad, by which each node's frame is turned about x against the shared one
+    turn : (n,) rad, rotation of each node's frame about x against the shared one
     """
 
     rows: int
@@ -45,7 +45,7 @@ class ContactFrame:
         return np.cos(self.turn).astype(np.float32), np.sin(self.turn).astype(np.float32)
 
     def to_local(self, displacement: np.ndarray) -> np.ndarray:
-        """(T, n, 3) m in the shared frame -> the same in each node's frame: along, inward, around."""
+        """Rotate (T, n, 3) m from the shared frame to each node's: along, inward, around."""
         cosine, sine = self._cosine_sine
         local = np.array(displacement, np.float32)
         local[..., 1] = cosine * displacement[..., 1] - sine * displacement[..., 2]
@@ -53,7 +53,7 @@ class ContactFrame:
         return local
 
     def to_shared(self, local: np.ndarray) -> np.ndarray:
-        """Inverse of `to_local`, in place."""
+        """Rotate back in place: inverse of `to_local`."""
         if self.turn.any():
             cosine, sine = self._cosine_sine
             inward, around = local[..., 1].copy(), local[..., 2]
@@ -62,9 +62,9 @@ class ContactFrame:
         return local
 
     def place(self, displacement: np.ndarray) -> np.ndarray:
-        """(T, n, 3) -> (T, 2) float32, where the dent lies: PLACE_UNIT cells from the lattice's middle, row and column.
+        """Locate the dent of (T, n, 3): (T, 2) float32, in PLACE_UNIT cells from the lattice's middle, row and column.
 
-        The mean of the nodes that move more than `CORE` of the largest, weighted with how far they move.
+        The mean of the nodes that move more than `CORE` of the largest, weighted with their displacement.
         """
         grid = displacement[:, : self.rows * self.columns].astype(np.float32)
         moved = np.sqrt(np.square(grid).sum(-1))
@@ -78,7 +78,7 @@ class ContactFrame:
         return np.where(total[:, None] > 0, place, 0).astype(np.float32)
 
     def cells(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (T, 2) -> the cell (T, 2) int of each, inside the lattice, and what is left of the place, in cells."""
+        """Round places (T, 2) to cells (T, 2) int inside the lattice; also returns the remainders, in cells."""
         at = np.where(np.isfinite(place), place, 0) * np.float32(PLACE_UNIT) + self._middle
         cell = np.rint(np.minimum(np.maximum(at, 0), 2 * self._middle))
         left = np.minimum(np.maximum(at - cell, -1), 1)  # a place off the lattice counts as its edge
@@ -89,13 +89,13 @@ class ContactFrame:
         return np.array([self.rows - 1, self.columns - 1], np.float32) / 2
 
     def fade(self) -> np.ndarray:
-        """(width, width) float32: 1 in the window's middle, falling over FADE cells to 0 beyond its edge."""
+        """Weights (width, width) float32: 1 in the window's middle, falling over FADE cells to 0 beyond its edge."""
         inside = 1 + self.half - np.abs(np.arange(-self.half, self.half + 1))
         along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(inside / (FADE + 1), 1))
         return np.outer(along, along).astype(np.float32)
 
     def windows(self, local: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Field (T, n, 3) -> what lies in the window round each cell, (T, width, width, 3); 0 beyond the lattice."""
+        """Cut the window (T, width, width, 3) around each cell out of a field (T, n, 3); 0 beyond the lattice."""
         grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)
         out = np.zeros((len(local), self.width, self.width, 3), local.dtype)
         for frame, cell in enumerate(cells):
@@ -132,13 +132,13 @@ def frame_of(sensor: str, half: int) -> ContactFrame:
 
 
 def on_skin(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
-    """(F, 3) m on the resting skin of places (F, 2) on its lattice, between nodes by bilinear interpolation."""
+    """Points (F, 3) m on the resting skin at places (F, 2) on its lattice, by bilinear interpolation."""
     rest = sensors.biotac_surface().rest[: frame.rows * frame.columns].reshape(frame.rows, frame.columns, 3)
     return between_nodes(rest, place)
 
 
 def between_nodes(grid: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """(F, k), bilinear interpolation of what is known at a lattice's nodes (rows, columns, k), at places (F, 2)."""
+    """Interpolate values at a lattice's nodes (rows, columns, k) bilinearly at places (F, 2); returns (F, k)."""
     size = np.array(grid.shape[:2])
     at = np.clip(place * PLACE_UNIT + (size - 1) / 2, 0, size - 1)
     cell = np.minimum(at.astype(int), size - 2)

@@ -1,4 +1,4 @@
-"""Where a gel is touched, read off its deformation: the one rule by which predicted contact patches are made."""
+"""Find the contact patch of a gel from its deformation: the one rule for all predicted patches."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ DEEP = 0.1  # of the largest depth; all three chosen together on 1,500 contacts 
 
 
 def contact_patch(displacement: np.ndarray, surface: Lattice) -> np.ndarray:
-    """(T, n, 3) m of a surface that is one lattice -> (T, n) bool, nodes that are touched.
+    """Mark (T, n) bool the nodes in contact from displacements (T, n, 3) m of a surface that is one lattice.
 
-    A pressed surface bends like the thing that presses it and bends back beside it: the patch is where the smoothed
-    Laplacian of the depth is negative. (The pressure on a half-space is |k| times the depth over wave numbers k; k^2
-    in its place is the local form, and measured better: thin gels damp long waves.)
+    A surface takes the indenter's curvature in contact and the opposite one beside it: the patch is where the smoothed
+    Laplacian of the depth is negative. (The pressure on a half-space is |k| times the depth over wave numbers k; k^2 in
+    its place is the local form, and measured better: thin gels damp long waves.)
     """
     rows, columns = surface.shape
     inward = -np.einsum("tni,ni->tn", displacement, node_normals(surface.rest, surface.faces))

@@ -1,12 +1,12 @@
-"""A contact followed through time: of what each frame's signals say, the course that all of them together say.
+"""Track a contact through time: the most plausible path given the posteriors of all frames.
 
 A finger's contact moves little in 10 ms, so a frame whose signals leave two places open is decided by its neighbours.
-Each frame's posterior is a mixture; first the best course through its components is found, by their weights less the
-price of each step (Viterbi 1967), then the places on it are smoothed both ways (Kalman filter; Rauch, Tung and Striebel
-1965). Force and depth may change within a frame, so they are not smoothed: they are what the frame's own signals say,
-given its place. `Follower` does the filter alone, frame by frame, for what is being recorded.
+Each frame's posterior is a mixture; first the best path through its components is found, by their weights less the cost
+of each step (Viterbi 1967), then the places on it are smoothed both ways (Kalman filter; Rauch, Tung and Striebel
+1965). Force and depth may change within a frame, so they are not smoothed: they are the frame's own estimates, given
+its place. `Follower` runs the filter alone, frame by frame, on live signals.
 
-A course is free to jump where nothing touches, where frames are missing, and, at a price, anywhere.
+A path may jump without contact, where frames are missing, and, at a cost, anywhere.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ Read = Callable[[int, int], tuple[np.ndarray, Posterior]]
 
 
 class _Course(NamedTuple):
-    """The places on the best course.
+    """Places on the best path.
 
-    mean, variance : (T, PLACE); touched : (T,), whether something does; free : (T,), whether it begins anew there
+    mean, variance : (T, PLACE); touched : (T,), true in contact; free : (T,), true where the path starts again
     """
 
     mean: np.ndarray
@@ -46,7 +46,9 @@ class _Course(NamedTuple):
 
 
 def track(posterior: Posterior, time: np.ndarray) -> np.ndarray:
-    """Posterior of T frames at times (T,) s -> (T, STATE) float32, the state of the contact in each, both ways."""
+    """Estimate the state (T, STATE) float32 of the contact in T frames at times (T,) s from their posterior,
+    smoothed both ways.
+    """
     if len(time) == 0:
         return np.zeros(posterior.mean.shape[::2], np.float32)
     course = _best_course(posterior, time)
@@ -55,15 +57,17 @@ def track(posterior: Posterior, time: np.ndarray) -> np.ndarray:
 
 
 class Tracked:
-    """States of the contact in a whole recording, worked out where they are asked for."""
+    """States of the contact in a whole recording, computed on demand."""
 
     def __init__(self, read: Read, count: int) -> None:
-        """read(start, stop) gives the times and the posterior of these frames; count : frames in all."""
+        """Take read(start, stop), which gives times and posterior of these frames; count : frames in all."""
         self._read, self._count = read, count
         self._kept: tuple[int, np.ndarray] | None = None
 
     def __call__(self, frames: np.ndarray) -> np.ndarray:
-        """States (n, STATE) of frames (n,), in rising order; a frame's is the same whichever others are asked for."""
+        """States (n, STATE) of frames (n,), in rising order; a frame's state does not depend on the other
+        frames requested.
+        """
         blocks = frames // BLOCK
         parts = [self._block(int(block))[frames[blocks == block] - block * BLOCK] for block in np.unique(blocks)]
         return np.concatenate(parts)
@@ -78,14 +82,14 @@ class Tracked:
 
 
 class Follower:
-    """The filter alone: one frame after another, no later one needed."""
+    """Forward filter alone: one frame after another, without later ones."""
 
     def __init__(self) -> None:
         self._score: np.ndarray | None = None
         self._place = np.zeros(PLACE)
 
     def __call__(self, posterior: Posterior, time: float) -> np.ndarray:
-        """Posterior of one frame at `time` s -> (1, STATE) float32, the state of its contact."""
+        """Estimate the state (1, STATE) float32 of a contact from the posterior of one frame at `time` s."""
         now = _Frame(*(each[0] for each in _components(posterior)))
         score, before = now.weight, np.full(PLACE, ANYWHERE**2)
         if self._score is not None and 0 <= time - self._time < GAP:
@@ -119,23 +123,24 @@ def _components(posterior: Posterior) -> _Frame:
 
 
 def _step(seconds: np.ndarray | float) -> np.ndarray:
-    """Variance (..., STATE) of what a state changes by meanwhile."""
+    """Variance (..., STATE) of the change of a state in that time."""
     return np.square(STEP) * np.asarray(seconds)[..., None] / FRAME
 
 
 def _steps(time: np.ndarray) -> np.ndarray:
-    """The same from each frame's one before (T, STATE); free at the first and after gaps."""
+    """Variance (T, STATE) of the change since the frame before; free at the first frame and after gaps."""
     seconds = np.diff(time, prepend=-np.inf)
     close = (seconds >= 0) & (seconds < GAP)  # a clock that runs backwards tells nothing
     return np.where(close[:, None], _step(np.where(close, seconds, 0)), ANYWHERE**2)
 
 
 def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Minus the price (..., C, C) of going from each component of one frame to each of the next, and which are free.
+    """Negative cost (..., C, C) of the step from each component of one frame to each of the next, and true where it is
+    free.
 
-    The price is half the squared distance in standard deviations, without a density's normalisation: neighbours err
-    together, by gains and rest, so that two frames that agree prove less than they would if each erred for itself
-    (with it, the 90 % quantile of place is 6.1 cells for 3.3, on the recording that the steps were chosen by).
+    The cost is half the squared distance in standard deviations, without a density's normalisation: neighbours err
+    together, by gains and rest, so that two frames that agree prove less than with independent errors (with it, the 90
+    % quantile of place is 6.1 cells for 3.3, on the recording that the steps were chosen by).
     """
     far = now.mean[..., None, :, :] - before.mean[..., :, None, :]
     known = np.square(now.spread[..., None, :, :]) + np.square(before.spread[..., :, None, :])
@@ -148,7 +153,7 @@ def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _best_course(posterior: Posterior, time: np.ndarray) -> _Course:
-    """The best course through the components of each frame."""
+    """Find the best path through the components of each frame."""
     all_frames = _components(posterior)
     before, now = (_Frame(*(each[part] for each in all_frames)) for part in (slice(None, -1), slice(1, None)))
     moves, free = _moves(before, now, _steps(time)[1:])
@@ -172,9 +177,10 @@ def _touched(mean: np.ndarray) -> np.ndarray:
 
 
 def _given(place: np.ndarray, touched: np.ndarray, components: _Frame) -> np.ndarray:
-    """States (T, STATE) at places (T, PLACE): force and depth are the components' mean, as far as they lie there.
+    """States (T, STATE) at places (T, PLACE): force and depth are means over components, weighted by their nearness to
+    the place.
 
-    touched : (T,), which components count: without contact the place told is the middle one, where contacts lie too
+    touched : (T,), which components count: without contact the place is zero, where contacts lie too
     """
     far = (place[:, None] - components.mean[..., :PLACE]) / components.spread[..., :PLACE]
     share = components.weight - (0.5 * np.square(far) + np.log(components.spread[..., :PLACE])).sum(axis=-1)
@@ -185,7 +191,7 @@ def _given(place: np.ndarray, touched: np.ndarray, components: _Frame) -> np.nda
 
 
 def _smoothed(course: _Course, steps: np.ndarray) -> np.ndarray:
-    """Means (T, PLACE) of a random walk that was measured, given all measurements."""
+    """Means (T, PLACE) of a random walk given all its measurements."""
     mean, variance, expected = (np.empty_like(course.mean) for _ in range(3))
     now, spread = course.mean[0], np.zeros(PLACE)
     for frame, step in enumerate(steps):

@@ -1,8 +1,8 @@
-"""What an expected error is multiplied by so that 95 of 100 largest errors stay below: a factor for each place.
+"""Factors on expected errors that give bounds on 95 of 100 largest errors: one for each region.
 
 Split conformal prediction in groups with the ratio of the errors as score (Lei et al. 2018, section 5.2; Vovk 2012).
-The groups are places along the finger where the answer lies, and silent answers: with one factor for all, bounds were
-too wide over the electrodes and too narrow beyond them.
+The groups are regions along the finger in which the contact lies, and results without contact: with one factor for all,
+bounds were too wide over the electrodes and too narrow beyond them.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ KINDS = ("signed", "rectified")
 
 
 def place(x: np.ndarray) -> np.ndarray:
-    """(T,) int, which factor counts. x : (T,) m, of the answer's middle along the finger, NaN where it is silent."""
+    """Index (T,) int of the region's factor. x : (T,) m, contact's middle along the finger, NaN without contact."""
     return np.where(np.isnan(x), 0, 1 + np.searchsorted(EDGES, x, side="right"))
 
 
 def fit(ratio: np.ndarray, x: np.ndarray) -> list[float]:
-    """The PLACES factors that cover LEVEL of the contacts of each place, four digits.
+    """Fit the PLACES factors that cover LEVEL of the contacts of each region, four digits.
 
     ratio : (C,) largest error over expected error; x : (C,) m, as in `place`
     """
@@ -42,12 +42,12 @@ def _factor(ratio: np.ndarray) -> float:
 
 
 def bound(expected: np.ndarray, x: np.ndarray, factors: list[float]) -> np.ndarray:
-    """(T,) float32 m, what 95 of 100 largest errors stay below. expected : (T,) m; x : (T,) m, as in `place`."""
+    """Bound (T,) float32 m on 95 of 100 largest errors. expected : (T,) m; x : (T,) m, as in `place`."""
     return (np.asarray(factors)[place(x)] * expected).astype(np.float32)
 
 
 def check(card: Mapping[str, object], where: str) -> None:
-    """Raises TactileError unless the card has PLACES positive factors a surface for signed and rectified signals."""
+    """Raise TactileError unless the card has PLACES positive factors a surface for signed and rectified signals."""
     bounds = card.get("error_bounds")
     for kind in KINDS:
         for name in SURFACES:

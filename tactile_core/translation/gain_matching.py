@@ -1,9 +1,9 @@
-"""Gains and offsets of an unknown sensor: what lies between its signals and the simulated ones that are most like them.
+"""Fit gains and offsets of an unknown sensor by matching its signals to the simulated ones most like them.
 
-In turn, every frame is given the typical signal nearest to it, and every electrode the gain that brings its readings
-to those of the typical signals, until nothing changes (as in k-means and iterated closest points). Frames are matched
-as wholes, so that a recording may hold any mixture of contacts: to match the distribution of one electrode alone would
-take a finger that is touched in one place for a finger with wrong gains.
+Alternately, every frame is assigned its nearest typical signal, and every electrode the gain that fits its readings to
+them, until nothing changes (as in k-means and iterated closest points). Frames are matched as wholes, so that a
+recording may hold any mixture of contacts: matching the distribution of one electrode alone would confuse a finger
+touched in one place with a finger of wrong gains.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ PRIOR = (
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """log_gain : (19,) natural logarithm; offset : (19,) counts; contacts : (19,) how many of them told the gain.
+    """log_gain : (19,) natural logarithm; offset : (19,) counts; contacts : (19,) number that determined the gain.
 
-    alike : how many different typical signals were met; settled : whether the last turn changed nothing
+    alike : number of different typical signals matched; settled : true if the last iteration changed nothing
     """
 
     log_gain: np.ndarray
@@ -60,16 +60,16 @@ def match(change: np.ndarray, typical: np.ndarray, rectified: bool, prior: float
 
 
 def _nearest(frames: np.ndarray, typical: np.ndarray) -> np.ndarray:
-    """(n,) index of the nearest row of typical (P, 19) for each of frames (n, 19)."""
+    """Index (n,) of the nearest row of typical (P, 19) for each of frames (n, 19)."""
     return (np.square(typical).sum(axis=1) - 2 * frames @ typical.T).argmin(axis=1)
 
 
 def _log_gain(
     change: np.ndarray, typical: np.ndarray, near: np.ndarray, before: np.ndarray, rectified: bool, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(19,) log gains, and of how many contacts each comes.
+    """Log gains (19,), and the number of contacts behind each.
 
-    A mean of log ratios, which noise on both sides leaves alone, where least squares would shrink the gain.
+    A mean of log ratios is unbiased by noise on both sides, where least squares would shrink the gain.
     """
     wanted = typical[near]
     size = np.square(wanted * np.exp(before))
@@ -81,7 +81,7 @@ def _log_gain(
 
 
 def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: float) -> np.ndarray:
-    """(19,) counts, of the readings that should be small: there the gain says little."""
+    """Offsets (19,) counts, from readings that should be small: the gain matters little there."""
     wanted = typical[near]
     weight = SURE**2 / (np.square(wanted) + SURE**2)
     return _over_contacts(change - wanted, weight, near, prior)[0]
@@ -90,10 +90,10 @@ def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: fl
 def _over_contacts(
     values: np.ndarray, weight: np.ndarray, near: np.ndarray, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(19,) weighted means of (n, 19), shrunk towards 0 by `prior`, and the weights' sums.
+    """Weighted means (19,) of (n, 19), shrunk towards 0 by `prior`, and the weights' sums.
 
-    All frames with the same match count as one contact: a finger that rests on a table for a minute tells as much
-    about its gains as one that does so for a second.
+    All frames with the same match count as one contact: a finger that rests on a table for a minute counts as much as
+    one that does so for a second.
     """
     groups, index, count = np.unique(near, return_inverse=True, return_counts=True)
     weights, sums = (np.zeros((len(groups), values.shape[1])) for _ in range(2))

@@ -1,4 +1,4 @@
-"""Where on the DIGIT's gel a place of its latent lies, and back: so that contacts can be laid elsewhere."""
+"""Convert between places of the DIGIT's latent and positions on its gel, so that contacts can be shifted."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SMALL = 1e-3  # cells, over which a slope is taken
 
 
 def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
-    """(T, 2) = (x, z) m on the resting gel of places (T, 2) of a latent, between nodes by bilinear interpolation."""
+    """Positions (T, 2) = (x, z) m on the resting gel of places (T, 2) of a latent, by bilinear interpolation."""
     return between_nodes(_grid(frame.rows, frame.columns), place)
 
 
 def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
-    """(T, 2), inverse of `on_gel`; points (T, 2) m beside the gel have places at its rim."""
+    """Places (T, 2) of points (T, 2) m, inverse of `on_gel`; points beside the gel have places at its rim."""
     grid = _grid(frame.rows, frame.columns)
     size = np.array(grid.shape[:2])
     apart = np.square(grid.reshape(-1, 2)[None] - point[:, None]).sum(axis=-1).argmin(axis=1)
@@ -39,10 +39,10 @@ def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
 
 
 class Shift:
-    """What is known at the gel's nodes, moved over it: the gel is thought to be as thick wherever the BioTac lies."""
+    """Shift of fields at the gel's nodes; the gel is assumed equally thick wherever the BioTac lies."""
 
     def __init__(self, frame: ContactFrame, shift: np.ndarray) -> None:
-        """shift : (2,) = (x, z) m, by which contacts move."""
+        """Take the shift (2,) = (x, z) m of contacts."""
         came = _grid(frame.rows, frame.columns).reshape(-1, 2) - shift
         place = place_on(frame, came)
         self._frame, self._place = frame, place
@@ -51,7 +51,7 @@ class Shift:
         self._share = np.maximum(1 - beside / FADE, 0)[:, None].astype(np.float32)
 
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
-        """(T, n, 3) m -> the same, moved; fading out where the gel ended."""
+        """Shift a field (T, n, 3) m; it fades out where the gel ended."""
         rows, columns, count = self._frame.rows, self._frame.columns, len(displacement)
         grid = np.moveaxis(displacement, 0, 1).reshape(rows, columns, count * 3)
         found = between_nodes(grid, self._place) * self._share
@@ -60,5 +60,5 @@ class Shift:
 
 @functools.cache
 def _grid(rows: int, columns: int) -> np.ndarray:
-    """(rows, columns, 2) m, (x, z) of the gel's nodes at rest."""
+    """Coordinates (x, z), (rows, columns, 2) m, of the gel's nodes at rest."""
     return sensors.digit_surface().rest[: rows * columns, [0, 2]].reshape(rows, columns, 2)

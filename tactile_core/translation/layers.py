@@ -9,36 +9,36 @@ NORM_EPSILON = 1e-5  # torch.nn.LayerNorm's default
 
 
 def linear(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
-    """x (T, inputs) -> (T, outputs); weight (outputs, inputs) as torch keeps it."""
+    """Map x (T, inputs) to (T, outputs); weight (outputs, inputs) as in torch."""
     return x @ tensors[f"{name}.weight"].T + tensors[f"{name}.bias"]
 
 
 def layer_norm(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
-    """Ba et al. 2016 over the last axis, biased variance as torch."""
+    """Normalise the last axis (Ba et al. 2016), biased variance as in torch."""
     centred = x - _mean(x)
     spread = np.sqrt(_mean(np.square(centred)) + np.float32(NORM_EPSILON))
     return centred / spread * tensors[f"{name}.weight"] + tensors[f"{name}.bias"]
 
 
 def _mean(x: np.ndarray) -> np.ndarray:
-    """Over the last axis; `np.mean` without its checks, which cost a single frame more than the sum does."""
+    """Average over the last axis; `np.mean`'s checks cost more than the sum for a single frame."""
     return np.add.reduce(x, axis=-1, keepdims=True) / np.float32(x.shape[-1])
 
 
 def silu(x: np.ndarray) -> np.ndarray:
-    """x * sigmoid(x), written with tanh because exp overflows for large negative x."""
+    """Compute x * sigmoid(x), written with tanh because exp overflows for large negative x."""
     return x * (np.float32(0.5) * (np.float32(1.0) + np.tanh(np.float32(0.5) * x)))
 
 
 def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray:
-    """Linear layers with ReLU between them."""
+    """Apply linear layers with ReLU between them."""
     for layer in range(layers):
         x = linear(np.maximum(x, 0) if layer else x, tensors, f"{name}.{layer}")
     return x
 
 
 def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndarray:
-    """Residual MLP with a linear skip from input to output (docs/sources.md, Networks)."""
+    """Apply a residual MLP with a linear skip from input to output (docs/sources.md, Networks)."""
     hidden = linear(x, tensors, f"{name}.first")
     for block in range(blocks):
         inner = layer_norm(hidden, tensors, f"{name}.blocks.{block}.norm")

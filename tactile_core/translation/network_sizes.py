@@ -1,4 +1,4 @@
-"""What the networks' sizes in a card must be, and the tensors that follow from them: names and shapes of each."""
+"""Check the networks' sizes in a card, and derive the names and shapes of their tensors."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ SIZE_NAMES = {net: _OWN.get(net, _MAP) for net in NETS}
 
 
 def card_entry(card: dict, net: str, path: Path) -> dict:
-    """The card's entry for one network: its sha256 and sizes."""
+    """Return the card's entry for one network: its sha256 and sizes."""
     nets = card.get("nets")
     entry = nets.get(net) if isinstance(nets, dict) else None
     sizes = entry.get("sizes") if isinstance(entry, dict) else None
@@ -64,7 +64,7 @@ def card_entry(card: dict, net: str, path: Path) -> dict:
 
 
 def check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
-    """The networks fit together: the latent one writes is the latent the next one reads."""
+    """Check that the networks fit together: each latent's size is the same in all networks that share it."""
     links = [
         ("S2MPN", "inputs", sizes["SVB"]["latent"]),
         ("S2MPN", "outputs", sizes["MVB"]["latent"]),

@@ -48,10 +48,11 @@ SHIPPED_CARD_SHA256 = "e80a1e32a7ddd6b0a39fa6cf328eba48a4a2f73f36e410b544e4b4ee8
 
 @dataclass(frozen=True)
 class SignalDistance:
-    """How far signals lie from those the networks were trained on; the card holds quantiles of each.
+    """Distances of signals from the training signals; the card holds quantiles of each.
 
     mahalanobis : (T,) float32, distance of the signal latent to the training latents in their standard deviations
-    residual : (T,) float32, what SVB cannot reproduce, rms over the electrodes in units of its residual in validation
+    residual : (T,) float32, error of SVB's reconstruction, rms over the electrodes in units of its residual in
+        validation
     largest : (T,) float32, counts, largest absolute change of an electrode
     """
 
@@ -64,7 +65,7 @@ DISTANCES = tuple(field.name for field in fields(SignalDistance))
 
 
 def compress(change: np.ndarray) -> np.ndarray:
-    """Counts -> the scale the networks see: arcsinh(change / 15 counts).
+    """Convert counts to the networks' scale: arcsinh(change / 15 counts).
 
     A reading s has a noise variance of 1.5^2 + (0.1 s)^2 counts^2 (training augmentation); arcsinh(s / 15) is the
     variance-stabilising transform of that law (Bartlett 1947), so a light touch weighs as much as a firm one.
@@ -73,13 +74,13 @@ def compress(change: np.ndarray) -> np.ndarray:
 
 
 def expand(compressed: np.ndarray) -> np.ndarray:
-    """Inverse of `compress`, in counts."""
+    """Convert back to counts: inverse of `compress`."""
     return np.sinh(np.clip(compressed, -COMPRESSED_LIMIT, COMPRESSED_LIMIT)) * np.float32(COUNT_SCALE)
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """What signals say of contacts: a mixture of Gaussians over their state.
+    """Posterior of a contact's state given the signals: a mixture of Gaussians.
 
     A state (STATE,) is the place of the BioTac's dent, as in its latent, asinh(force / 0.1 N) and asinh(depth of the
     gel's dent / 20 um); all zero without contact.
@@ -92,12 +93,12 @@ class Posterior:
 
     @property
     def heaviest(self) -> np.ndarray:
-        """(T, STATE), mean of the component that weighs most: one contact, not the average of all."""
+        """Mean (T, STATE) of the component of largest weight: one contact, not the average of all."""
         return self.mean[np.arange(len(self.mean)), self.weight.argmax(-1)]
 
     @property
     def average(self) -> np.ndarray:
-        """(T, STATE), mean over all components: the least squares, where there is one component."""
+        """Mean (T, STATE) over all components: the least-squares estimate where there is one component."""
         return (self.weight[..., None] * self.mean).sum(1)
 
 
@@ -106,7 +107,7 @@ class Networks:
 
     tensors : network -> tensor name -> array
     card : the model card (see `training/export.py` for its fields)
-    sha256 : hash of the card, which pins every file: the name of these weights
+    sha256 : hash of the card, which fixes every file; names these weights
     """
 
     def __init__(self, tensors: dict[str, Tensors], card: dict, sha256: str = "") -> None:
@@ -122,25 +123,26 @@ class Networks:
         return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"])
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """change (T, 19) counts against rest, that fall (`sensors.COUNT_SIGN`), rectified (T,) or one ->
-        latent_signal (T, K), SVB's mean."""
+        """Encode change (T, 19) counts against rest, falling (`sensors.COUNT_SIGN`), rectified (T,) or one, as
+        SVB's mean (T, K).
+        """
         return self._blocks(self._encode_signal, *_signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
-        """latent_signal (T, K) -> change (T, 19) counts as SVB understood them."""
+        """Decode latent_signal (T, K) to change (T, 19) counts: SVB's reconstruction."""
         size = self.sizes["SVB"]["latent"]
         return self._blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
 
     def s2m(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """latent_signal (T, K), rectified (T,) or one -> latent_biotac (T, L) of the most plausible contact."""
+        """Map latent_signal (T, K), rectified (T,) or one, to latent_biotac (T, L) of the most plausible contact."""
         return self.given(latent_signal, self.contact(latent_signal, rectified), rectified)
 
     def contact(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """latent_signal (T, K), rectified (T,) or one -> state (T, STATE) of the most plausible contact."""
+        """Map latent_signal (T, K), rectified (T,) or one, to the state (T, STATE) of the most plausible contact."""
         return self.posterior(latent_signal, rectified).heaviest
 
     def posterior(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> Posterior:
-        """latent_signal (T, K), rectified (T,) or one -> what signals say of contacts."""
+        """Map latent_signal (T, K), rectified (T,) or one, to the posterior of the contact."""
         raw = self._either("posterior", latent_signal, rectified)
         count = self.sizes["S2MPN"]["components"]
         weight = raw[:, :count] - raw[:, :count].max(-1, keepdims=True)
@@ -149,59 +151,59 @@ class Networks:
         return Posterior(np.exp(weight) / np.exp(weight).sum(-1, keepdims=True), mean, spread)
 
     def given(self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """latent_signal (T, K), states of contacts (T, STATE), rectified (T,) or one -> latent_biotac (T, L)."""
+        """Map latent_signal (T, K), states of contacts (T, STATE), rectified (T,) or one, to latent_biotac (T, L)."""
         code = self._either("code", np.concatenate([latent_signal, state], -1), rectified)
         return np.concatenate([state[:, :PLACE], code], -1)
 
     def m2m(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """latent_biotac (T, L) -> latent_digit (T, L')."""
+        """Map latent_biotac (T, L) to latent_digit (T, L')."""
         return self._map_placed("M2MPN", "MVB", latent_biotac)
 
     def m2m_back(self, latent_digit: np.ndarray) -> np.ndarray:
-        """latent_digit (T, L') -> latent_biotac (T, L)."""
+        """Map latent_digit (T, L') to latent_biotac (T, L)."""
         return self._map_placed("D2BPN", "MVD", latent_digit)
 
     def m2s(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """latent_biotac (T, L) -> latent_signal (T, K)."""
+        """Map latent_biotac (T, L) to latent_signal (T, K)."""
         return self._map_placed("B2SPN", "MVB", latent_biotac)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """change (T, 19) counts, rectified (T,) or one -> (T, 2) m, expected largest node error on BioTac and DIGIT."""
+        """Expected largest node error (T, 2) m on BioTac and DIGIT, of change (T, 19) counts, rectified (T,) or one."""
         return self._blocks(self._expected_error, *_signal(change, rectified), "expected_error")
 
     def encode_biotac(self, displacement: np.ndarray) -> np.ndarray:
-        """displacement (T, N, 3) m of the BioTac's outer skin -> latent_biotac (T, L)."""
+        """Encode displacement (T, N, 3) m of the BioTac's outer skin as latent_biotac (T, L)."""
         return self._encode_mesh("MVB", displacement)
 
     def encode_digit(self, displacement: np.ndarray) -> np.ndarray:
-        """displacement (T, M, 3) m of the DIGIT's gel -> latent_digit (T, L')."""
+        """Encode displacement (T, M, 3) m of the DIGIT's gel as latent_digit (T, L')."""
         return self._encode_mesh("MVD", displacement)
 
     def decode_biotac(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """latent_biotac (T, L) -> displacement (T, N, 3) m of the BioTac's outer skin."""
+        """Decode latent_biotac (T, L) to displacement (T, N, 3) m of the BioTac's outer skin."""
         return self._decode_mesh("MVB", latent_biotac)
 
     def decode_digit(self, latent_digit: np.ndarray) -> np.ndarray:
-        """latent_digit (T, L') -> displacement (T, M, 3) m of the DIGIT's gel."""
+        """Decode latent_digit (T, L') to displacement (T, M, 3) m of the DIGIT's gel."""
         return self._decode_mesh("MVD", latent_digit)
 
     def force(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """latent_biotac (T, L) -> force (T, 3) N exerted by the object, sensor frame."""
+        """Force (T, 3) N exerted by the object, sensor frame, from latent_biotac (T, L)."""
         return self._blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
 
     def force_in(self, state: np.ndarray, latent_biotac: np.ndarray) -> np.ndarray:
-        """states (T, STATE) and their latent_biotac (T, L) -> force (T, 3) N, as large as the states say."""
+        """Force (T, 3) N, of the states' size, from states (T, STATE) and their latent_biotac (T, L)."""
         told = self.force(latent_biotac)
         length = np.sqrt(np.square(told).sum(-1))
         size = np.float32(FORCE_SCALE) * np.sinh(np.clip(state[:, PLACE], 0, COMPRESSED_LIMIT))
         return told * (size / np.where(length > 0, length, 1))[:, None]
 
     def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """change (T, 19) counts, rectified (T,) or one -> (T,) Pa, by which the fluid's pressure has risen."""
+        """Rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one."""
         return self._blocks(self._pressure, *_signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
-        """change (T, 19) counts, rectified (T,) or one -> how far each frame lies from the training signals."""
+        """Distances of each frame from the training signals, of change (T, 19) counts, rectified (T,) or one."""
         distances = self._blocks(self._distance, *_signal(change, rectified), "signal_distance")
         return SignalDistance(*np.ascontiguousarray(distances.T))
 
@@ -238,7 +240,7 @@ class Networks:
         return np.float32(PRESSURE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
     def _either(self, part: str, seen: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """A part of S2MPN, for rectified frames of R2MPN."""
+        """Apply a part of S2MPN, or of R2MPN to rectified frames."""
         which = np.broadcast_to(np.asarray(rectified, bool), len(seen))
         if which.all() and len(which):
             return self._map("R2MPN", seen, part)
@@ -253,13 +255,15 @@ class Networks:
         return self._blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)
 
     def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
-        """Through a map that is told, beside the latent, what the whole cell leaves of its place."""
+        """Apply a map whose input is the latent and the remainder of its place after rounding to whole cells."""
         tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = self.sizes[vae]["latent"]
         return self._blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
 
     def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Latent (B, L) with what the whole cell leaves of its place (B, L + 2), and the cells (B, 2)."""
+        """Append to a latent the remainder of its place after rounding to cells: (B, L + 2); also returns the
+        cells (B, 2).
+        """
         cells, left = self.frames[net].cells(latent[:, :PLACE])
         return np.concatenate([latent, left], -1), cells
 
@@ -313,7 +317,7 @@ class Networks:
 
 
 def _signal(change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarray, tuple[int]]:
-    """What SVB reads (T, 20) and the shape of a frame of it; wrong shapes are told by `_blocks`."""
+    """Build SVB's input (T, 20) and the shape of one frame of it; `_blocks` reports wrong shapes."""
     change = np.asarray(change, np.float32)
     if change.shape[1:] != (ELECTRODES,):
         return change, (ELECTRODES,)

@@ -1,4 +1,4 @@
-"""Contacts drawn from what a frame's signals say: how sure an answer is of its place and force, frame by frame."""
+"""Draw contacts from a frame's posterior, which shows the uncertainty of its place and force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NAMES = "sample_center", "sample_force"
 
 
 def draw(posterior: Posterior, frames: np.ndarray, count: int) -> np.ndarray:
-    """States (T, count, STATE) drawn from a posterior of frames (T,), whose numbers alone seed what is drawn."""
+    """Draw states (T, count, STATE) from a posterior of frames (T,), whose numbers are the only seeds."""
     drawn = np.empty((len(frames), count, STATE), np.float32)
     for row, frame in enumerate(frames):
         random = np.random.default_rng([SEED, int(frame)])
@@ -28,7 +28,7 @@ def draw(posterior: Posterior, frames: np.ndarray, count: int) -> np.ndarray:
 def contacts(
     nets: Networks, latent_signal: np.ndarray, states: np.ndarray, rectified: np.ndarray, shift: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """What states (T, count, STATE) of frames' signals (T, K) are on the DIGIT, by ``NAMES``.
+    """Map states (T, count, STATE) of frames' signals (T, K) to the DIGIT, by ``NAMES``.
 
     sample_center : (T, count, 2) = (x, z) m, moved by shift (2,) m, NaN without contact; sample_force : (T, count) N
     """

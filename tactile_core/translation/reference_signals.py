@@ -1,4 +1,4 @@
-"""A few hundred simulated signals that stand for all contacts of the training: what `tactile adapt` matches to.
+"""Store a few hundred simulated signals that represent all contacts of the training, for `tactile adapt` to match.
 
 They ship with the weights as ``signals.safetensors``, whose hash is in the card under "signals".
 """
@@ -29,9 +29,10 @@ TRIES = 2_000  # readings made up to find the match's own bias
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSignals:
-    """typical : (P, 19) counts, signed; bias : what a match finds on the simulated signals themselves, log gain (19,).
+    """Typical signals (P, 19) counts, signed; bias : log gain (19,) that a match of the simulated signals themselves
+    gives.
 
-    The bias of signed and of rectified readings; a typical signal is a mean of signals, and so smaller than they are.
+    There is a bias for signed and for rectified readings: a typical signal is a mean of signals, so it is smaller.
     """
 
     typical: np.ndarray
@@ -39,17 +40,17 @@ class ReferenceSignals:
     bias_rectified: np.ndarray
 
     def bias(self, rectified: bool) -> np.ndarray:
-        """(19,) log gain to take off a match."""
+        """Log gain (19,) to subtract from a match."""
         return self.bias_rectified if rectified else self.bias_signed
 
 
 def touching(change: np.ndarray) -> np.ndarray:
-    """(n,) bool: frames (n, 19) counts that say something of the gains."""
+    """Mark (n,) bool the frames (n, 19) counts that are large enough to determine gains."""
     return np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
 
 
 def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
-    """Typical signals of simulated changes (C, 19) counts without noise: k-means in the networks' scale.
+    """Compute typical signals of simulated changes (C, 19) counts without noise: k-means in the networks' scale.
 
     Raises TactileError where too few of them are contacts.
     """
@@ -69,7 +70,9 @@ def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
 
 
 def _k_means(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """(p, 19) centres of points (n, 19), beginning at some of them (Lloyd); at most COUNT, and half the points."""
+    """Centres (p, 19) of points (n, 19) by Lloyd's k-means, started at some of them; at most COUNT, and half
+    the points.
+    """
     count = min(COUNT, len(points) // 2)
     centres = points[random.choice(len(points), count, replace=False)]
     for _ in range(TURNS):
@@ -82,7 +85,7 @@ def _k_means(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 
 def write(folder: str | os.PathLike, signals: ReferenceSignals) -> dict:
-    """Write ``signals.safetensors`` into a weights folder; returns what the card says of it under "signals"."""
+    """Write ``signals.safetensors`` into a weights folder; returns the card's entry "signals"."""
     arrays = {
         "typical": signals.typical.astype(np.float16),
         "bias.signed": signals.bias_signed.astype(np.float32),
@@ -94,7 +97,7 @@ def write(folder: str | os.PathLike, signals: ReferenceSignals) -> dict:
 
 
 def read(folder: str | os.PathLike) -> ReferenceSignals:
-    """The typical signals of a weights folder.
+    """Read the typical signals of a weights folder.
 
     Raises TactileError: a card without them, or a file that is missing, changed or of another shape.
     """

@@ -1,4 +1,4 @@
-"""The three steps as one pure function: signals to BioTac deformation to DIGIT deformation, force and confidence."""
+"""Translate in one pure function: signals to BioTac deformation to DIGIT deformation, force and confidence."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ IN_RANGE = 0.99
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Translation:
-    """What a recording becomes; T frames first, float32, SI units.
+    """Result of a translation; T frames first, float32, SI units.
 
     latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents, before a mount's shift
     displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
     force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, as displacements are
-    pressure : (T,) Pa, by which the fluid's has risen, told from the electrodes alone; zero as the force is
+    pressure : (T,) Pa, rise of the fluid's pressure, estimated from the electrodes alone; zero where the force is
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
     confidence : (T,), 1 as in training, 0 far from it
     expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
@@ -66,19 +66,21 @@ def _rectified(signals: Signals) -> np.ndarray:
 
 
 def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
-    """The most that 99 of 100 frames of noise without contact make of a quantity of a card's ``silence``."""
+    """Return the 99 % quantile of a quantity of a card's ``silence``: its value over frames of noise without
+    contact.
+    """
     return float(np.interp(0.99, silence["levels"], silence[quantity]))
 
 
 def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
-    """(T, 2) float32 m, (x, z) of the dent in a gel at ``rest``; NaN where no node moves by ``silent`` m."""
+    """Centre (T, 2) = (x, z) float32 m of the dent in a gel at ``rest``; NaN where no node moves by ``silent`` m."""
     center = accuracy.dent_center(displacement, rest).astype(np.float32)
     center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
     return center
 
 
 class Translator:
-    """Verified networks, ready to translate. card : what they are; sha256 : of the card, which names all weights."""
+    """Verified networks, ready to translate. card : their model card; sha256 : of the card, which names all weights."""
 
     def __init__(self, nets: Networks, answer: Answer | None = None) -> None:
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
@@ -88,15 +90,17 @@ class Translator:
         self._unrolled = surface.unrolled_nodes()
 
     def posterior(self, signals: Signals) -> Posterior:
-        """What each frame's signals say of its contact, each frame alone; ``contact_track`` follows it through time."""
+        """Return each frame's posterior of its contact, from that frame alone; ``contact_track`` tracks it
+        through time.
+        """
         return self.nets.posterior(self._latent_signal(signals), _rectified(signals))
 
     def followed(self, signals: Signals, time: np.ndarray) -> Translation:
-        """Translate a recording in one piece: frames at times (T,) s, each decided by its neighbours too."""
+        """Translate a recording at once: frames at times (T,) s, each estimated with its neighbours."""
         return self(signals, track(self.posterior(signals), time) if self.answer.follows else None)
 
     def plausible(self, signals: Signals, frames: np.ndarray) -> dict[str, np.ndarray]:
-        """Contacts drawn for each frame, as many as the answer asks for, by ``plausible.NAMES``; frames : (T,)."""
+        """Draw contacts for each frame, the number given by the options, by ``plausible.NAMES``; frames : (T,)."""
         rectified, latent = _rectified(signals), self._latent_signal(signals)
         states = plausible.draw(self.nets.posterior(latent, rectified), frames, self.answer.samples)
         return plausible.contacts(self.nets, latent, states, rectified, self.answer.mount_shift)
@@ -107,7 +111,8 @@ class Translator:
     def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
         """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours.
 
-        state : (T, STATE) of the contacts, found by more than a frame each; None: as ``answer`` says, of each frame
+        state : (T, STATE) of the contacts, estimated from several frames; None: from each frame alone, as ``answer``
+            says
         """
         nets = self.nets
         rectified = _rectified(signals)
@@ -139,11 +144,13 @@ class Translator:
         )  # fmt: skip
 
     def silent(self, quantity: str) -> float:
-        """As `silent_level`, of the card."""
+        """Apply `silent_level` to the card."""
         return silent_level(self.card["silence"], quantity)
 
     def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
-        """Expected largest errors and their bounds by the names of `Translation`; x : (T,) m of the contact's middle"""
+        """Compute expected largest errors and their bounds, by the names of `Translation`; x : (T,) m of the
+        contact's middle.
+        """
         expected, found = self.nets.expected_error(change, rectified), {}
         for index, name in enumerate(SURFACES):
             kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
@@ -152,18 +159,18 @@ class Translator:
         return found
 
     def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
-        """(T,) m, what 95 of 100 largest errors stay below, by `error_bounds.bound`."""
+        """Bound (T,) m on 95 of 100 largest errors, by `error_bounds.bound`."""
         return error_bounds.bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """(T,) bool, whether changes (T, 19) counts lie outside those of the training, by any distance's quantile."""
+        """Mark (T,) bool the changes (T, 19) counts outside those of the training, by any distance's quantile."""
         return (self._distances(change, rectified) > self._quantile(IN_RANGE, rectified)).any(axis=0)
 
     def _confidence(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> np.ndarray:
-        """(T,), 1 for signals like those of the training, 0 far from them.
+        """Confidence (T,): 1 for signals like those of the training, 0 far from them.
 
-        Each distance to the training signals counts against its quantiles in validation: all is well up to the 95 %
-        quantile, nothing at the outermost. Not a calibrated probability: that is what bounds are for.
+        Each distance to the training signals counts against its quantiles in validation: it is 1 up to the 95 %
+        quantile, 0 at the outermost. Not a calibrated probability: that is what bounds are for.
         """
         usual, far = self._quantile(0.95, rectified), self._quantile(1.0, rectified)
         confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
@@ -172,12 +179,12 @@ class Translator:
         return confidence.astype(np.float32)
 
     def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """(distances, T) of `networks.SignalDistance`."""
+        """Stack the distances (distances, T) of `networks.SignalDistance`."""
         distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
         return np.stack([getattr(distance, name) for name in networks.DISTANCES])
 
     def _quantile(self, level: float, rectified: np.ndarray | bool) -> np.ndarray:
-        """(distances, T) or (distances, 1), what as many of validation's frames of the same kind lay within."""
+        """Quantile (distances, T) or (distances, 1) at this level over validation frames of the same kind."""
         table = self.card["distance"]
         limits = {
             kind: np.array([[np.interp(level, table["levels"], table[kind][name])] for name in networks.DISTANCES])
@@ -186,7 +193,7 @@ class Translator:
         return np.where(rectified, limits["rectified"], limits["signed"])
 
     def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
-        """Whether the BioTac is touched (T,) where the gel has no counterpart: the dent's centre rolls off the gel."""
+        """Mark (T,) contacts of the BioTac without counterpart on the gel: the dent's centre unrolls beyond it."""
         moved = accuracy.lengths(displacement)
         peak = moved.max(axis=1, keepdims=True)
         core = (moved > accuracy.CORE * peak) & (peak > self.silent("biotac_m"))
@@ -199,7 +206,7 @@ class Translator:
 
 
 def _check_quantiles(card: dict, where: str) -> None:
-    """What confidence and silence are measured by: growing finite numbers, as many as there are levels."""
+    """Check the quantiles behind confidence and silence: growing finite numbers, one a level."""
     _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
     distance = card.get("distance") if isinstance(card.get("distance"), dict) else {}
     for kind in KINDS:
@@ -222,7 +229,7 @@ def _grows(values: object) -> bool:
 
 
 def load_translator(folder: str | os.PathLike | None = None, answer: Answer | None = None) -> Translator:
-    """The networks of a weights folder, the shipped ones by default, and how they answer.
+    """Load the networks of a weights folder, the shipped ones by default, with options of the estimate.
 
     Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces.
     """

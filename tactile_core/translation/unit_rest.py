@@ -1,4 +1,4 @@
-"""What a unit's electrodes read without contact, from a set of its recordings that may hold no quiet part at all."""
+"""Estimate a unit's readings without contact from recordings that may hold no quiet part at all."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ SPREAD_OVER = 0.5  # share of the recordings whose range tells how far rest may 
 
 @dataclass(frozen=True)
 class UnitRest:
-    """counts : (19,), rest; spread : (19,) counts, half the range of the less pressed half of the recordings' levels,
-    or of their middle half.
+    """Rest of a unit; counts : (19,); spread : (19,) counts, half the range of the less pressed half of the recordings'
+    levels, or of their middle half.
 
-    pdc : counts, None where the recordings have none; recordings : how many rest was taken from
+    pdc : counts, None where the recordings have none; recordings : number that rest was averaged over
     """
 
     counts: np.ndarray
@@ -36,8 +36,8 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
     """Find one unit's rest in recordings that may all be of contacts.
 
     Each gives the level of the window of its lowest fluid pressure; the least pressed quarter of the levels is
-    averaged. Where one of them has no PDC, each electrode's median over the recordings is taken instead: it holds as
-    long as different contacts leave different electrodes alone (on two real fingers, trials 01 to 03 of the PHAC set,
+    averaged. Where one of them has no PDC, each electrode's median over the recordings is taken instead: this works
+    while different contacts leave different electrodes unloaded (on two real fingers, trials 01 to 03 of the PHAC set,
     17 and 34 counts rms from what pressure gives; the least squeezed recordings by the sum of counts: 32 and 49).
     Raises TactileError for fewer than three recordings, and for recordings that are not raw.
     """
@@ -69,7 +69,7 @@ def _least_pressed(recording: Recording) -> tuple[np.ndarray, float]:
 
 
 def _raw(recording: Recording) -> np.ndarray:
-    """Counts (T, 19) without gaps. Raises TactileError for a recording of another kind."""
+    """Repaired counts (T, 19). Raises TactileError for a recording of another kind."""
     electrodes = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = detect(electrodes)
     if kind != "raw":

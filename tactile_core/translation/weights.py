@@ -1,4 +1,4 @@
-"""Network weights on disk: safetensors files without the safetensors library, and the model card beside them.
+"""Read and write network weights: safetensors files, without the safetensors library, and their model card.
 
 Format: https://github.com/huggingface/safetensors#format. Nothing in it is executed:
 a hostile file can only be refused.
@@ -42,7 +42,7 @@ def sha256(data: bytes) -> str:
 
 
 def to_safetensors(tensors: dict[str, np.ndarray]) -> bytes:
-    """The bytes of a safetensors file: float32 and float16 arrays by name, in the order of their names."""
+    """Encode float32 and float16 arrays by name as a safetensors file, in the order of their names."""
     names = {dtype: name for name, dtype in DTYPES.items()}
     header, offset = {}, 0
     arrays = [(name, np.asarray(array, order="C")) for name, array in sorted(tensors.items())]
@@ -60,7 +60,7 @@ def to_safetensors(tensors: dict[str, np.ndarray]) -> bytes:
 
 
 def from_safetensors(data: bytes, where: str | os.PathLike) -> dict[str, np.ndarray]:
-    """Arrays by name, in the dtype of the file, from the bytes of a safetensors file.
+    """Decode arrays by name, in the dtype of the file, from the bytes of a safetensors file.
 
     where : name of the file for the message
     raises: TactileError if anything about the file is not as the format says
@@ -79,7 +79,7 @@ def from_safetensors(data: bytes, where: str | os.PathLike) -> dict[str, np.ndar
 
 
 def _split(data: bytes, where: str | os.PathLike) -> tuple[dict, bytes]:
-    """Header (JSON object) and body of the file."""
+    """Split the file into header (JSON object) and body."""
     if len(data) < 8:
         raise TactileError(where, f"{len(data)} bytes", "a safetensors file", ADVICE)
     length = struct.unpack("<Q", data[:8])[0]
@@ -97,7 +97,7 @@ def _split(data: bytes, where: str | os.PathLike) -> tuple[dict, bytes]:
 
 
 def _unique(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """A JSON object whose keys are all different."""
+    """Build a JSON object; raises ValueError for a repeated key."""
     if len({key for key, _ in pairs}) != len(pairs):
         raise ValueError("a name is given twice")
     return dict(pairs)
@@ -128,12 +128,12 @@ def _entry(
 
 
 def _counts(values: object) -> bool:
-    """Whether this is a list of whole numbers from 0 (JSON's true is no number)."""
+    """Return true for a list of integers from 0 (JSON's true is not one)."""
     return isinstance(values, list) and all(type(value) is int and value >= 0 for value in values)
 
 
 def _check_spans(spans: list[tuple[int, int, str]], body: int, where: str | os.PathLike) -> None:
-    """The tensors fill the data without overlap or hole."""
+    """Check that the tensors fill the data without overlap or hole."""
     position = 0
     for begin, end, name in spans:
         if begin != position:
@@ -146,7 +146,7 @@ def _check_spans(spans: list[tuple[int, int, str]], body: int, where: str | os.P
 
 
 def read_bytes(path: str | os.PathLike) -> bytes:
-    """The bytes of a weights file.
+    """Read the bytes of a weights file.
 
     raises: TactileError if it is not there, cannot be read or is far too large
     """
@@ -161,10 +161,10 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 def read_verified(
     path: str | os.PathLike, expected_sha256: str, shapes: dict[str, tuple[int, ...]]
 ) -> dict[str, np.ndarray]:
-    """Arrays of a safetensors file whose hash and tensor shapes are known.
+    """Read arrays of a safetensors file whose hash and tensor shapes are known.
 
-    A file that is whole but holds other shapes is told by its shapes, as that says more than the hash.
-    raises: TactileError naming the file or tensor, what was found and what was expected
+    For an intact file of other shapes the error names the shapes, which says more than the hash. raises: TactileError
+    naming the file or tensor, what was found and what was expected
     """
     data = read_bytes(path)
     found = sha256(data)
@@ -182,7 +182,7 @@ def read_verified(
 def check_shapes(
     tensors: dict[str, np.ndarray], shapes: dict[str, tuple[int, ...]], where: str | os.PathLike
 ) -> dict[str, np.ndarray]:
-    """The tensors, if their names and shapes are the expected ones; TactileError naming the first that is not."""
+    """Return the tensors if their names and shapes are as expected; else TactileError naming the first that is not."""
     for name in sorted(tensors.keys() | shapes.keys()):
         found = f"shape {tensors[name].shape}" if name in tensors else "nothing"
         expected = f"shape {tuple(shapes[name])}" if name in shapes else "no such tensor"
@@ -192,12 +192,13 @@ def check_shapes(
 
 
 def card_bytes(card: dict) -> bytes:
-    """The card as it is written: readable JSON, sorted, no NaN."""
+    """Encode the card as written: readable JSON, sorted, no NaN."""
     return (json.dumps(card, indent=1, sort_keys=True, allow_nan=False) + "\n").encode()
 
 
 def read_card(folder: str | os.PathLike) -> tuple[dict, str]:
-    """The model card of a weights folder and the SHA-256 of its bytes (it pins every file, so it names the weights).
+    """Read the model card of a weights folder and the SHA-256 of its bytes (it pins every file, so it names the
+    weights).
 
     raises: TactileError if it is missing, not JSON, or of another format
     """

@@ -12,7 +12,7 @@ from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Solution, solve
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
 
-PENETRATION = 1e-6  # m, what MECHANICS allows at any node
+PENETRATION = 1e-6  # m, the target at any node
 BALANCE = 1e-3  # of the whole force, where iterations end at 1e-7 to 3e-6 of the largest nodal force
 PULL = 1e-4  # of the largest nodal force: likewise
 MIDDLE = Placement(-8.2e-3, 1.13e-3)  # no node of either lattice, and off the plane of symmetry

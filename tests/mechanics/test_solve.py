@@ -61,11 +61,11 @@ def test_the_full_tier_agrees_with_the_fast_one_at_a_tenth_of_the_thickness(sens
     full = solve(sensor, BALL, PLACE, depth=0.4e-3, friction=0.0, tier="full")
     assert full.tier == "full" and full.converged and full.penetration < 1e-6
     assert full.volume is not None and (full.pressure > 0) == (sensor == "biotac")
-    # 5 %: what MECHANICS allows the fast tier's force after correction
+    # 5 %: the target allows the fast tier's force after correction
     assert np.linalg.norm(full.force) == pytest.approx(np.linalg.norm(fast.force), rel=0.05)
     error = np.linalg.norm(full.displacement - fast.displacement, axis=1)
     moves = np.linalg.norm(full.displacement, axis=1) > 10e-6
-    assert np.sqrt((error[moves] ** 2).mean()) < 5e-6  # MECHANICS, up to 20 % depth
+    assert np.sqrt((error[moves] ** 2).mean()) < 5e-6  # the target up to 20 % depth
 
 
 def test_a_path_keeps_what_is_solved_when_a_later_step_is_refused():

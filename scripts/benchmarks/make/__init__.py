@@ -1,1 +1,3 @@
-"""What makes tables and weights that ship: the correction of the fast tier, the test contacts, the print of a ball."""
+"""Scripts that make tables and weights that ship: the fast tier's correction, the test contacts, the print of a
+ball.
+"""

@@ -29,8 +29,9 @@ WHOLE = np.array([[0.0, 1.0, 1.0]])  # all of what is predicted is trusted
 
 
 class Known(NamedTuple):
-    """Of n samples: features x (n, f), logarithms of the forces' ratios (n,), fields (n, g, 3), folds (n,) and whether
-    they rub (n,)."""
+    """Samples, n of them: features x (n, f), logarithms of the forces' ratios (n,), fields (n, g, 3), folds
+    (n,) and whether they rub (n,).
+    """
 
     x: np.ndarray
     log_ratio: np.ndarray
@@ -39,7 +40,7 @@ class Known(NamedTuple):
     rubbing: np.ndarray
 
     def select_rows(self, which: np.ndarray) -> Known:
-        """Those of them."""
+        """Select some of the samples."""
         return Known(*(values[which] for values in self))
 
 
@@ -50,7 +51,9 @@ def mirrored(field: np.ndarray) -> np.ndarray:
 
 
 class Choice(NamedTuple):
-    """Of a kernel regression: width in standard deviations of a feature, ridge over the kernel's mean diagonal."""
+    """Parameters of a kernel regression: width in standard deviations of a feature, ridge over the kernel's
+    mean diagonal.
+    """
 
     width: float
     ridge: float
@@ -60,7 +63,7 @@ class Choice(NamedTuple):
         return kernel(a, b, squares(b), self.width) * alike(a_rubs[:, None], b_rubs)
 
     def weights(self, scaled: np.ndarray, rubbing: np.ndarray, goals: np.ndarray) -> np.ndarray:
-        """Of supports (n, f), for goals (n, k)."""
+        """Weights of supports (n, f), for goals (n, k)."""
         near = self.near(scaled, scaled, rubbing, rubbing)
         return np.linalg.solve(near + self.ridge * np.eye(len(near)) * np.trace(near) / len(near), goals)
 
@@ -91,8 +94,9 @@ def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
 
 
 def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
-    """What leaves the least error on presses of one kind kept apart, for forces by all features and by the essential
-    ones, whose mean counts, and for fields."""
+    """Choose the parameters of least error on held-out presses of one kind, for forces by all features and by
+    the essential ones, whose mean counts, and for fields.
+    """
     coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
     forces = np.clip(known.log_ratio, -MOST, MOST)[:, None]
     every = [Choice(width, ridge) for width in _WIDTHS for ridge in _RIDGES]
@@ -116,6 +120,6 @@ def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.
 
 
 def _size(error: np.ndarray) -> float:
-    """Of errors (m, k): the median and the mean of their root mean squares."""
+    """Median and mean of the root mean squares of errors (m, k), added."""
     size = np.sqrt((error**2).mean(axis=1))
     return float(np.median(size) + size.mean())

@@ -38,7 +38,7 @@ _SIGNIFICANT = 10e-6  # m, nodes that move less do not count: they belong to no 
 
 @dataclasses.dataclass(frozen=True)
 class Sample:
-    """One contact in the full and the fast tier.
+    """Contact in the full and the fast tier.
 
     press : number of its press; friction : Coulomb's coefficient; features (f,); frame; depth m
     ratio : force of the full tier over that of the fast
@@ -105,7 +105,7 @@ def paired(
 
 
 def _holds(problem: ContactProblem, contact: Contact) -> bool:
-    """Whether a contact is one, with the indenter in front of the surface."""
+    """Return true if a contact is valid, with the indenter in front of the surface."""
     if not contact.converged:
         return False
     try:
@@ -180,7 +180,7 @@ def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.nda
 
 
 def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> list[float]:
-    """rms and largest shape error m, relative force error; each after the correction, then before."""
+    """RMS and largest shape error m, relative force error; each after the correction, then before."""
     truth = sample.full.astype(float)
     counts = np.linalg.norm(truth, axis=1) > _SIGNIFICANT
     after = sample.fast + sample.depth * correction.spread_field(sensor, sample.frame, field) - truth

@@ -31,7 +31,7 @@ SENSORS = "digit", "biotac"
 
 
 def file_of(folder: pathlib.Path, sensor: str, seed: int, number: int, friction: float) -> pathlib.Path:
-    """Where a press's contacts in the full tier are kept."""
+    """Path of a press's contacts in the full tier."""
     return folder / f"{sensor}_{seed}_{number:05d}_friction_{friction:g}.npz"
 
 

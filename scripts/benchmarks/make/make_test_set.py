@@ -33,7 +33,7 @@ Job = tuple[pathlib.Path, int, int]  # folder, seed, number
 
 
 def file_of(folder: pathlib.Path, seed: int, number: int) -> pathlib.Path:
-    """Where a press's contacts are kept."""
+    """Path of a press's contacts."""
     return folder / f"press_{seed}_{number:05d}.h5"
 
 
@@ -53,7 +53,7 @@ def solve_one(job: Job) -> str:
 
 
 def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
-    """All solved presses of a folder as one file of pairs of the full tier, and its card; returns the card."""
+    """Join all solved presses of a folder into one file of pairs of the full tier, and its card; returns the card."""
     files = sorted(folder.glob(f"press_{seed}_*.h5"))
     counts, wanted, lost = [], 0, {}
     for path in files:

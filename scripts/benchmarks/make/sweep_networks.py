@@ -110,7 +110,7 @@ def prototype_rows(options: argparse.Namespace) -> list[Row]:
 
 
 def own_error(folder: Path, figure: str) -> Row:
-    """A figure of a training on its own test presses."""
+    """Metric of a training on its own test presses."""
     errors = translate.load_translator(folder / "weights").card["errors"]
     return next(row for row in errors if row["name"] == figure)
 

@@ -34,7 +34,7 @@ class QuadMesh:
 
     @property
     def fixed(self) -> np.ndarray:
-        """(3 n,) bool: clamped nodes, the hoop, and the radius on the axis."""
+        """Mask (3 n,) bool: clamped nodes, the hoop, and the radius on the axis."""
         fixed = np.repeat(self.clamped, 3).reshape(-1, 3)
         fixed[:, 2] = True
         fixed[self.nodes[:, 0] == 0, 0] = True
@@ -95,7 +95,7 @@ class AxisymmetricSolid:
         self.pattern = BlockPattern(mesh.cells, mesh.clamped)
 
     def rest(self) -> State:
-        """No displacement, no pressure."""
+        """Return the state without displacement and pressure."""
         return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 3)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

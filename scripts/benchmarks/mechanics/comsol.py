@@ -28,7 +28,7 @@ _RAYS_DOWN = 32  # rays of the skin from rim to pole
 
 
 def published_volume(intervals: tuple[int, int, int] = INTERVALS) -> Row:
-    """How far the fluid that the published pressure holds under the published skin is from the published volume.
+    """Compare the fluid's volume at the published pressure under the published skin with the published volume.
 
     No number is fitted here: COMSOL and we inflate one ellipsoid of one material.
     """
@@ -41,7 +41,8 @@ def published_volume(intervals: tuple[int, int, int] = INTERVALS) -> Row:
 
 @dataclasses.dataclass(frozen=True)
 class Press:
-    """One case. point : (3,) m of the plate at the first step; into : (3,) its normal; advances : (steps,) m along it.
+    """Data of one case. point : (3,) m of the plate at the first step; into : (3,) its normal; advances : (steps,) m
+        along it.
 
     force : (steps,) N; electrodes : (steps, 24, 3) m, the outer skin on their rays; skin : (steps, rays, 3) m
     """
@@ -56,7 +57,7 @@ class Press:
 
 
 def rows(quick: bool, data: Path) -> Iterator[Row]:
-    """All presses of the outside data; without it, and in the quick form, what needs none of them."""
+    """Yield the rows of all presses of the outside data; without it, and in the quick form, those that need none."""
     folder = data / "biotac_comsol"
     if quick or not folder.is_dir():
         yield published_volume(COARSE)
@@ -79,7 +80,7 @@ def comsol(folder: Path, intervals: tuple[int, int, int] = INTERVALS) -> Iterato
 
 
 def read(case: Path) -> Press:
-    """One case from its folder; raises TactileError where a file is missing or no table of numbers."""
+    """Read one case from its folder; raises TactileError where a file is missing or no table of numbers."""
     keys = ("itheta", "iphi", "ix", "iy", "iz", "itx", "ity", "itz", "istep")
     try:
         with (case / "config.csv").open(newline="", encoding="utf-8") as file:
@@ -164,13 +165,15 @@ def force_ratios(press: Press, steps: list[Pressed]) -> np.ndarray:
 
 
 def _cut(press: Press, points: np.ndarray) -> np.ndarray:
-    """Where rays through resting points (n, 3) end, (steps, n, 3) m, if the plate only cuts the skin off."""
+    """Ends (steps, n, 3) m of rays through resting points (n, 3), if the plate only cuts the skin off."""
     reach = (press.point @ press.into + press.advances)[:, None] / (points @ press.into)
     return np.where((points @ press.into < 0) & (reach < 1), reach, 1.0)[..., None] * points
 
 
 def _volume(points: np.ndarray) -> float:
-    """Of the pyramids between the origin and a grid of points, ``_RAYS_DOWN`` of them a meridian, closed around."""
+    """Volume of the pyramids between the origin and a grid of points, ``_RAYS_DOWN`` of them a meridian, closed
+    around.
+    """
     grid = points.reshape(-1, _RAYS_DOWN, 3)
     grid = np.concatenate([grid, grid[:1]])
     a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
@@ -178,7 +181,7 @@ def _volume(points: np.ndarray) -> float:
 
 
 def _other_mesh(press: Press, steps: list[Pressed]) -> Iterator[Row]:
-    """How far a coarser mesh is from the one used: an upper bound of the error that is left."""
+    """Compare with a coarser mesh: an upper bound of the remaining error."""
     other = SpPress(press.point, press.into, COARSE).steps(press.advances)
     of = f"press {press.name}, {COARSE} node intervals instead"
     both = [found.force for found in other], [found.force for found in steps]

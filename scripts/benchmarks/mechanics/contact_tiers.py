@@ -1,4 +1,4 @@
-"""How far each tier of contact mechanics is from a finer one, contact by contact, and as a table by depth."""
+"""Compare each tier of contact mechanics with a finer one, contact by contact, and as a table by depth."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Bin = dict[str, float | int]
 
 @dataclass(frozen=True)
 class Miss:
-    """How far one contact is from the truth at the same depth.
+    """Error of one contact against the truth at the same depth.
 
     press : of contacts that follow each other, none in two; share : depth from first touch over the thickness there
     shape : rms m over nodes that truly move more than 10 um; force : relative; null : rms m of no displacement
@@ -43,7 +43,7 @@ class Miss:
 
 
 def miss(press: int, share: float, found: np.ndarray, force: float, true: np.ndarray, true_force: float) -> Miss:
-    """Of displacements (n, 3) m and forces N."""
+    """Compute the error from displacements (n, 3) m and forces N."""
     error, null = (float(accuracy.rms_in_contact(moved[None], true[None])[0]) for moved in (found, np.zeros_like(true)))
     return Miss(press, share, error, abs(force / true_force - 1), null)
 

@@ -22,7 +22,7 @@ _DEPTHS = np.arange(1, 10) * 0.2e-3  # m, to 60 % of the disc
 
 
 def on_disc(poisson: float, depths: np.ndarray = _DEPTHS) -> tuple[int, int, float]:
-    """Most iterations of a step, steps, and smallest det F down the golden disc."""
+    """Return the most iterations of a step, steps, and smallest det F down the golden disc."""
     mesh = disc_mesh(GOLDEN_RADIUS, GOLDEN_THICKNESS, 4e-3, 0.1e-3, 0.4e-3)
     contact = pressed(mesh, Material(1e6, poisson), Sphere(GOLDEN_BALL), 4e-3)
     touch, most, steps = None, 0, 0

@@ -29,7 +29,7 @@ class HugeBall(Sphere):
     """A ball of any radius, m, whose distance is free of the cancellation that kilometres bring."""
 
     def __post_init__(self) -> None:
-        """Nothing is refused."""
+        """Refuse nothing."""
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""

@@ -80,7 +80,7 @@ class _Other:
         self._assemble(self.basis.interpolate(field).grad)
 
     def _numbering(self) -> np.ndarray:
-        """(n, 3) scikit-fem's degree of freedom of each of our nodes, found by place."""
+        """Degree of freedom (n, 3) in scikit-fem of each of our nodes, found by place."""
         places = self.basis.doflocs.T
         axes, dofs = np.empty(self.basis.N, int), self.basis.dofs
         for table in (dofs.nodal_dofs, dofs.edge_dofs, dofs.facet_dofs, dofs.interior_dofs):
@@ -134,7 +134,7 @@ class _Other:
 
 
 def _determinant(f: np.ndarray) -> np.ndarray:
-    """Of (3, 3, ...), by cofactors of the first row; complex steps go through it."""
+    """Determinant of (3, 3, ...), by cofactors of the first row; complex steps go through it."""
     minors = [f[1, (k + 1) % 3] * f[2, (k + 2) % 3] - f[1, (k + 2) % 3] * f[2, (k + 1) % 3] for k in range(3)]
     return sum(f[0, k] * minors[k] for k in range(3))
 
@@ -152,7 +152,7 @@ def _stress(f: np.ndarray, p: np.ndarray, shear: float) -> np.ndarray:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """One a quantity; none where scikit-fem is not installed."""
+    """Yield one row a quantity; none where scikit-fem is not installed."""
     try:
         found = differences()
     except ImportError:

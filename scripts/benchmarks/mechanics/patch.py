@@ -43,7 +43,7 @@ def patch_error(size: float) -> tuple[float, float]:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """At small and at finite strain."""
+    """Yield rows at small and at finite strain."""
     for size in (1e-4, 0.2):
         moved, pressure = patch_error(size)
         of = f"8 distorted cells, F = 1 + {size:g}, nu .49"

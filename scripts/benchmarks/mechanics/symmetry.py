@@ -39,7 +39,9 @@ def turned(rotation: np.ndarray, place: np.ndarray = _PLACE, friction: float = 0
 
 
 def turning_error(friction: float = 0.0) -> tuple[float, float]:
-    """Largest difference between the turned answer and the answer turned: displacement over depth, force relative."""
+    """Largest difference between the result of the turned problem and the turned result: displacement over
+    depth, force relative.
+    """
     cosine, sine = np.cos(0.7), np.sin(0.7)
     about_x = np.array([[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]])
     rotation = about_x @ np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
@@ -50,7 +52,7 @@ def turning_error(friction: float = 0.0) -> tuple[float, float]:
 
 
 def mirror_error() -> tuple[float, float]:
-    """Likewise between the mirrored place's answer and the answer mirrored."""
+    """Largest difference between the result at the mirrored place and the mirrored result."""
     flip = np.array([-1.0, 1.0, 1.0])
     there, here = turned(np.eye(3), _PLACE * flip), turned(np.eye(3))
     grid = here.state.displacement.reshape(_ACROSS, _ACROSS, 5, 3)

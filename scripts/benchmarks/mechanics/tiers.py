@@ -69,7 +69,7 @@ def _sensor(sensor: Sensor, depths: list[float], friction: float) -> Iterator[Ro
 
 
 def _timed(sensor: Sensor, tier: Tier, depths: list[float], friction: float) -> Iterator[tuple[Solution, float]]:
-    """Each depth on its own, from rest: a mesh is made for its contact."""
+    """Solve each depth on its own, from rest: a mesh is made for its contact."""
     for depth in depths:
         began = time.process_time()
         yield next(solve_path(sensor, _BALL, _PLACE, [Step(depth)], tier, friction)), time.process_time() - began

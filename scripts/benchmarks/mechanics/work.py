@@ -1,4 +1,4 @@
-"""Without friction the indenter's work is the stored energy, and all of it comes back."""
+"""Check the energy balance: without friction the indenter's work is the stored energy, and all of it comes back."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def measure(name: str, quick: bool, truth: str) -> Method | None:
 
 
 def _contacts(count: int) -> Pairs:
-    """Some test contacts in the picture, the same in every run."""
+    """Select test contacts in the picture, the same in every run."""
     pairs, camera = read_pairs(TEST_SET), load_calibration().camera
     deep = np.abs(pairs.displacement_digit[..., 1]).max(axis=1) * pairs.scale_digit > LEAST
     row, column = camera.to_pixel(pairs.contact_center[:, 0], pairs.contact_center[:, 1])

@@ -22,7 +22,7 @@ REPEATS = {"fast": 3, "full": 1}
 
 
 def measure(name: str, quick: bool) -> Method:
-    """One tier on one sensor: median time and error of the contacts."""
+    """Measure one tier on one sensor: median time and error of the contacts."""
     sensor, tier = name.split("_")
     if tier == "reference":
         return _reference(sensor, quick)
@@ -52,7 +52,9 @@ def _solved(sensor, contact, tier):  # noqa: ANN001, ANN202 (as `solved`)
 
 
 def _reference(sensor: str, quick: bool) -> Method:
-    """As `measure_tiers.py` found it, for a contact takes a minute or more; a whole run solves the quickest."""
+    """Return the results of `measure_tiers.py`, for a contact takes a minute or more; a whole run solves the
+    quickest.
+    """
     truths = read_truth(TRUTH, sensor)
     if not quick:
         _solved(sensor, min(truths, key=lambda truth: truth.seconds).contact, "reference")

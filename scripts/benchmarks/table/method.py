@@ -1,4 +1,4 @@
-"""What is measured of a method, and how: CPU time, peak memory, error beside doing nothing."""
+"""Measure a method: CPU time, peak memory, error beside the baseline."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TEST_SET = TRAINING / "test_contacts.h5"
 
 @dataclass(frozen=True)
 class Method:
-    """One method of a stage.
+    """Method of a stage.
 
     ms : CPU a frame on one core; mb : peak memory of a process that does this alone, without what measures the error
     error, null : in ``unit``, of this method and of doing nothing; of : on what set the error was measured

@@ -31,7 +31,7 @@ UNITS = {"roi_l1": "levels", "roi_psnr": "dB", "roi_ssim": "1", "frame_l1": "lev
 
 
 def measure(name: str, quick: bool, presses: str) -> Method:
-    """One way of drawing the photographs in the folder ``presses``; a quick run takes no fewer.
+    """Measure one way of drawing the photographs in the folder ``presses``; a quick run takes no fewer.
 
     Raises TactileError for photographs that cannot be read, ModuleNotFoundError where mitsuba is missing.
     """

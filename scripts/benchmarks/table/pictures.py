@@ -22,7 +22,7 @@ OF_FIELDS = 7  # seed of the contacts: others than the presets' table was made f
 
 
 def measure(name: str, quick: bool, truth: str) -> Method:
-    """One preset, at 240 x 320.
+    """Measure one preset, at 240 x 320.
 
     truth : where the reference leaves its pictures, changes in grey levels, for the other presets
     Raises ModuleNotFoundError where mitsuba is missing.
@@ -47,7 +47,7 @@ def measure(name: str, quick: bool, truth: str) -> Method:
 
 
 def _reference(unit, heights, quick, truth) -> Method:  # noqa: ANN001
-    """Its own error is its noise: half of the squared difference between two seeds."""
+    """Measure the reference, whose error is its noise: half of the squared difference between two seeds."""
     import time
 
     preset = dataclasses.replace(preset_named(REFERENCE.name), passes=QUICK_PASSES) if quick else REFERENCE

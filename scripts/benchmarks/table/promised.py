@@ -165,7 +165,7 @@ def scene_rows(translator: Translator, name: str) -> tuple[list[Row], str]:
 
 
 def plot(promises: Sequence[Promise]) -> bytes:
-    """PNG: found over promised, both logarithmic, one panel a promise; on the line they are equal."""
+    """Draw a PNG: found over promised, both logarithmic, one panel a promise; on the line they are equal."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator

@@ -54,7 +54,7 @@ def table(methods: Sequence[Method]) -> str:
 
 
 def named(method: Method, name: str) -> bool:
-    """Whether a method is the one; pictures' end in the variant of Mitsuba that drew them."""
+    """Return true if the method has this name; pictures' names end in the variant of Mitsuba that drew them."""
     return f"{method.stage} {re.sub('_(llvm|scalar|cuda)_.*', '', method.name)}" == name
 
 
@@ -65,10 +65,10 @@ def joined(methods: Sequence[Method], of: Callable[[Method], float | None]) -> s
 
 
 def short(value: float | None) -> str:
-    """Two digits, hundreds whole."""
+    """Format with two digits, hundreds whole."""
     return "-" if value is None else f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
 
 
 def unit(methods: Sequence[Method]) -> str:
-    """Of their errors."""
+    """Unit of the methods' errors."""
     return methods[0].unit.replace("um", "µm")

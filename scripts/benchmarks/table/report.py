@@ -1,4 +1,4 @@
-"""What a whole run leaves in docs: the rows as JSON, a table for people, the plot of error over time."""
+"""Write the results of a whole run to docs: the rows as JSON, a table for readers, the plot of error over time."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def as_line(method: Method) -> str:
 
 
 def short(value: float | None) -> str:
-    """Three digits."""
+    """Format with three digits."""
     return "" if value is None else f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
@@ -88,7 +88,9 @@ def same_pairs() -> str:
 
 
 def plot(methods: Sequence[Method]) -> bytes:
-    """PNG: error over time, both logarithmic, one panel a stage; the Pareto front, and doing nothing, as lines."""
+    """Draw a PNG: error over time, both logarithmic, one panel a stage; the Pareto front, and doing nothing, as
+    lines.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -113,7 +115,7 @@ def split(stage: str, methods: Sequence[Method]) -> list[list[Method]]:
 
 
 def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
-    """One panel."""
+    """Draw one panel."""
     front = pareto([(each.ms, each.error) for each in methods])
     axes.plot(*zip(*steps(front), strict=True), color="tab:orange", linewidth=1, zorder=1, label="Pareto front")
     nulls = {each.null for each in methods if each.null}
@@ -135,7 +137,7 @@ def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
 
 
 def label(method: Method) -> str:
-    """Without what all methods of a panel share."""
+    """Label of a method, without what all methods of a panel share."""
     name = method.name.split("_", 1)[1] if method.stage == "mechanics" else method.name
     return name.removesuffix("_llvm_ad_rgb").removesuffix("_scalar_rgb").replace("_", " ")
 

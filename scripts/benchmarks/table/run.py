@@ -1,4 +1,4 @@
-"""Each method in a process of its own, so that its memory and its first call are its own."""
+"""Run each method in its own process, so that its memory and its first call are its own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WITH_FILE = ("pictures", "chain", "photographs")  # which are told a file or a f
 
 
 def measured(stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()) -> Iterator[Method]:
-    """Every method of a stage; what cannot run here is put down in ``missing``.
+    """Measure every method of a stage; those that cannot run here are noted in ``missing``.
 
     file : where the first method of pictures and chain leaves the others' truth; the photographs
     only : words that name a stage, or a stage and a method; none for all
@@ -37,6 +37,6 @@ def measured(stage: str, quick: bool, file: str, missing: dict[str, str], only: 
 
 
 def one(stage: str, name: str, quick: bool, file: str) -> Method | None:
-    """What a process of its own does."""
+    """Measure one method; it is run in a process of its own."""
     measure = importlib.import_module(f"benchmarks.table.{stage}").measure
     return measure(name, quick, file) if stage in WITH_FILE else measure(name, quick)

@@ -50,7 +50,7 @@ def our_rows(weights: Path) -> list[Row]:
 
 
 def write(pairs: Path, ours: list[Row], across: list[Row]) -> None:
-    """What was measured, how, when and where."""
+    """Write the measurements with how, when and where they were made."""
     count = len(read_pairs(pairs).press)
     how = f"scripts/benchmark.py --across {pairs.name}: both trained on the same pairs, split by press"
     told = {

@@ -76,7 +76,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[Method]:
-    """Every method of every stage that is asked for."""
+    """Measure every method of every requested stage."""
     methods = []
     with tempfile.TemporaryDirectory() as scratch:
         for stage in STAGES:

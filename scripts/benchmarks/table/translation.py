@@ -34,7 +34,7 @@ Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
 
 
 def measure(name: str, quick: bool) -> Method:
-    """One way of calculating; raises ModuleNotFoundError where torch is missing."""
+    """Measure one way of calculating; raises ModuleNotFoundError where torch is missing."""
     kind, batch = name.rsplit("_", 1)
     pairs = read_pairs(TEST_SET)
     if quick:
@@ -68,7 +68,9 @@ def _numpy() -> Surfaces:
 
 
 def _numpy_confidence() -> Surfaces:
-    """With force, contact place, expected errors, confidence and flags: all that `tactile convert` takes from it."""
+    """Translate with force, contact place, expected errors, confidence and flags: everything that `tactile
+    convert` uses.
+    """
     translator = load_translator()
 
     def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:

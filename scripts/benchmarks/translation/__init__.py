@@ -1,1 +1,1 @@
-"""How good a translation is: against recordings of real sensors, with the figures of doing nothing beside it."""
+"""Measure the quality of a translation: against recordings of real sensors, beside the baseline."""

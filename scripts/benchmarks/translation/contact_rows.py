@@ -74,7 +74,7 @@ def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
 
 
 def draw_places(posterior: Posterior, count: int, rng: np.random.Generator) -> np.ndarray:
-    """(count, T, PLACE) places of contacts drawn from a posterior."""
+    """Draw places (count, T, PLACE) of contacts from a posterior."""
     edges = np.cumsum(posterior.weight, -1)
     which = (rng.random((count, len(edges), 1)) > edges / edges[:, -1:]).sum(-1)
     frames = np.arange(len(edges))
@@ -83,7 +83,7 @@ def draw_places(posterior: Posterior, count: int, rng: np.random.Generator) -> n
 
 
 def _density(posterior: Posterior, places: np.ndarray) -> np.ndarray:
-    """(D, T) of places (D, T, PLACE), up to a factor."""
+    """Density (D, T) of places (D, T, PLACE), up to a factor."""
     mean, spread = (each[..., :PLACE].astype(float) for each in (posterior.mean, posterior.spread))
     away = (places[:, :, None] - mean) / spread
     return (posterior.weight / spread.prod(-1) * np.exp(-0.5 * np.square(away).sum(-1))).sum(-1)

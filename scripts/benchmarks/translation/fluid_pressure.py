@@ -59,7 +59,7 @@ def grip_row(prepared: Iterable[Signals], network: Translator) -> Row:
 
 
 def _frames(path: Path, network: Translator, sensor: ElectrodeGains | None) -> np.ndarray:
-    """(T, 3) of frames surely in contact: pressure measured and told, Pa, and the electrodes' sum, counts."""
+    """Frames surely in contact, (T, 3): pressure measured and estimated, Pa, and the electrodes' sum, counts."""
     signals = prepare_unit(read(path), None, sensor)
     measured = PRESSURE_PER_COUNT * signals.pdc
     columns = np.column_stack([measured, network(signals).pressure, np.abs(signals.change).sum(axis=1)])

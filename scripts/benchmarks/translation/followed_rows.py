@@ -1,6 +1,7 @@
-"""What following a contact through its recording is worth: the recording that ships, read by units of other gains.
+"""Measure the gain by tracking a contact through its recording: the one that ships, read by units of other gains.
 
-The null of each row is the same networks, each frame alone. Truth is the fast tier's, as the recording is simulated.
+The baseline of each row is the same networks, each frame alone. Truth is the fast tier's, as the recording is
+simulated.
 """
 
 from __future__ import annotations

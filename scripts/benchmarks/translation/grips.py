@@ -99,7 +99,7 @@ def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> li
 
 
 def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
-    """Where simulated contacts are found, read with the noise of real ones; null: always at their middle place."""
+    """Locate simulated contacts, read with the noise of real ones; baseline: always their middle place."""
     nets = network.nets
     deep = (pairs.depth_biotac > DEEP) & ~pairs.slide.any(axis=1) & (pairs.place[:, 0] > digit.X_TIP)
     gel = nets.decode_digit(nets.m2m(nets.s2m(nets.encode_signal(as_read(pairs.signal[deep], SEED)))))
@@ -115,7 +115,7 @@ def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
 def _judged(
     recording: Recording, unit: ElectrodeGains, network: Translator, order: np.ndarray | slice = slice(None)
 ) -> tuple[float, float, float]:
-    """Whether the median place lies in the box; shares of frames with a place, and of those out of range."""
+    """Return whether the median place lies in the box; shares of frames with a place, and of those out of range."""
     signals = prepare_unit(recording, None, unit)
     signals = dataclasses.replace(signals, change=signals.change[:, order], rest=signals.rest[order])
     state = track(network.posterior(signals), recording.time)[::EVERY]
@@ -127,13 +127,13 @@ def _judged(
 
 
 def in_box(place: np.ndarray) -> bool:
-    """Whether a place (2,) m = (x, z) lies over the electrodes that a flat object squeezes."""
+    """Return true if a place (2,) m = (x, z) lies over the electrodes that a flat object squeezes."""
     x = electrodes()[SQUEEZED, 0]
     return bool(x.min() - MARGIN <= place[0] <= x.max() + MARGIN and abs(place[1]) <= LARGEST_Z)
 
 
 def _rest_rows(files: list[Path]) -> list[Row]:
-    """How far rest is off when it is found in other trials, and with each soft object left out."""
+    """Measure the error of rest found in other trials, and with each soft object left out."""
     soft = [path for path in files if not path.name.startswith(HARD)]
     names = sorted({_object(path) for path in soft})
     for finger, _ in enumerate(each_finger(soft[0])):

@@ -111,7 +111,7 @@ def _apart(trainings: list[dict]) -> str:
 
 
 def _cases(translator: Translator, pairs: Pairs) -> bytes:
-    """PNG: true, translated and difference of the gel's depth, for three contacts."""
+    """Draw a PNG: true, translated and difference of the gel's depth, for three contacts."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,4 +1,5 @@
-"""How visible real contacts are in the translated pictures: the strongest change of grey levels in a small window.
+"""Measure how visible real contacts are in the translated pictures: the strongest change of grey levels in a small
+window.
 
 A translation that answers every contact with the same shallow average passes where places and ranks are judged; its
 pictures stay empty.
@@ -55,7 +56,7 @@ def _over(figure: Callable[[np.ndarray], float], values: np.ndarray) -> float | 
 
 
 def _frames(signals: Signals, network: Translator) -> np.ndarray:
-    """(T, 3) of every 20th frame: pressure Pa, whether the contact lies in the picture, levels of `strongest`."""
+    """Rows (T, 3) of every 20th frame: pressure Pa, whether the contact lies in the picture, levels of `strongest`."""
     render, state = Renderer(preset="fast"), track(network.posterior(signals), np.arange(len(signals.change)) * FRAME)
     return np.concatenate([_drawn(signals, network, state, render, rows) for rows in _chunks(len(signals.change))])
 

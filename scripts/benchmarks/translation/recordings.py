@@ -40,7 +40,7 @@ NO_LARGER = 1.0  # a repaired sample may step as far as the recording does elsew
 
 @dataclass(frozen=True, eq=False)
 class Translated:
-    """What of a translated recording is judged; T frames, all of the recording's.
+    """Parts of a translated recording that are evaluated; T frames, all of the recording's.
 
     time : (T,) unix s; force : (T,) N, magnitude; volume : (T,) mm3 of displaced gel
     centre : (T, 2) mm, (x, z) on the DIGIT, interpolated where there is no contact; missed : (T,) bool, where that was
@@ -89,7 +89,7 @@ def _part(signals: Signals, rows: slice) -> Signals:
 def _translate(
     signals: Signals, network: Translate, state: np.ndarray | list[None]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
-    """force N, volume mm3, centre mm, latent, count of numbers that are none."""
+    """Translate to force N, volume mm3, centre mm, latent, and the count of NaN."""
     found = network(signals, state) if isinstance(state, np.ndarray) else network(signals)
     arrays = (found.force, found.displacement_biotac, found.displacement_digit, found.latent_digit, found.confidence)
     not_finite = sum(int(np.count_nonzero(~np.isfinite(array))) for array in arrays)
@@ -98,7 +98,7 @@ def _translate(
 
 
 def displaced_volume(displacement: np.ndarray) -> np.ndarray:
-    """(T,) m3 by which the gel gives way, for displacements (T, M, 3) m of its surface; bulges do not count."""
+    """Volume (T,) m3 of the gel's dent, for displacements (T, M, 3) m of its surface; bulges do not count."""
     digit = sensors.digit_surface()
     areas = unrolling.node_areas(np.asarray(digit.rest), np.asarray(digit.faces))
     return np.maximum(accuracy.height(displacement), 0) @ areas
@@ -113,7 +113,7 @@ def write(folder: Path, name: str, translated: Translated) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """One recording's figures. figures : None where wrench or pose are missing
+    """Metrics of one recording. figures : None where wrench or pose are missing
 
     missed : share of the frames surely in contact for which no contact is found, NaN where there are none
     step, step_unrepaired : see `largest_step`; the second with the bad samples left in; NaN where there are none
@@ -219,7 +219,7 @@ def _row(
     at_least: bool = False,
     over: Callable[[np.ndarray], float] = np.median,
 ) -> list[Row]:
-    """One row, `over` the recordings that have the figure; none where no recording has it."""
+    """Make one row, `over` the recordings that have the metric; none where no recording has it."""
     value, nothing = (
         float(over(numbers[np.isfinite(numbers)])) if np.isfinite(numbers).any() else None
         for numbers in (np.asarray(values, float), np.asarray(null, float))

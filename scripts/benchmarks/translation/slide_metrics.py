@@ -1,4 +1,4 @@
-"""What is measured on one sliding recording: the protocol's figures, of a translation and of what needs none."""
+"""Metrics of one sliding recording: the protocol's, of a translation and of methods without one."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def largest_step(strength: np.ndarray, repaired: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Figures:
-    """All figures of one recording. ranks, silences, roughs : by the strength's name; spreads : by the place's, mm."""
+    """Metrics of one recording. ranks, silences, roughs : by the strength's name; spreads : by the place's, mm."""
 
     ranks: dict[str, float]
     silences: dict[str, float]

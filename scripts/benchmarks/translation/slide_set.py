@@ -56,7 +56,8 @@ def find(folder: str | os.PathLike) -> list[Path]:
 
 
 def reporting(folder: str | os.PathLike) -> list[Path]:
-    """Those of `find` by which nothing is chosen: all but sample 7 of each material; these too where there is no other.
+    """List the recordings of `find` by which nothing is chosen: all but sample 7 of each material; these too where
+    there is no other.
 
     Raises TactileError where there is none.
     """
@@ -70,7 +71,7 @@ def name_of(path: Path) -> str:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether wrench and pose lie beside a recording; without them its strength cannot be judged."""
+    """Return true if wrench and pose lie beside a recording; without them its strength cannot be evaluated."""
     return all(path.with_name(name_of(path) + topic).exists() for topic in (WRENCH, POSE))
 
 
@@ -98,7 +99,7 @@ def load(path: Path) -> Slide:
 
 
 def _table(path: Path, columns: int) -> np.ndarray:
-    """(n, columns) numbers of a comma-separated file with a header; raises TactileError."""
+    """Read numbers (n, columns) of a comma-separated file with a header; raises TactileError."""
     try:
         values = np.atleast_2d(np.genfromtxt(path, delimiter=",", skip_header=1, usecols=range(columns)))
     except (OSError, ValueError, UnicodeDecodeError) as error:
@@ -109,20 +110,20 @@ def _table(path: Path, columns: int) -> np.ndarray:
 
 
 def replace_glitches(electrodes: np.ndarray) -> np.ndarray:
-    """(T, 19) counts with the samples further than 30 counts from their median of 11 interpolated."""
+    """Interpolate the samples of (T, 19) counts that are further than 30 counts from their median of 11."""
     padded = np.pad(electrodes, ((HALF_MEDIAN, HALF_MEDIAN), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * HALF_MEDIAN + 1, axis=0)
     return fill(electrodes, np.abs(electrodes - np.median(windows, axis=-1)) > GLITCH)
 
 
 def lowpass(values: np.ndarray) -> np.ndarray:
-    """(T, ...) at 100 Hz -> what lies below 5 Hz, without delay."""
+    """Keep what lies below 5 Hz of (T, ...) at 100 Hz, without delay."""
     from scipy.signal import butter, filtfilt
 
     return filtfilt(*butter(4, CUT / (RATE / 2)), values, axis=0)
 
 
 def without_pose(values: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """(T,) less the cubic in the arm's place (T,) that fits it best."""
+    """Subtract from (T,) the cubic in the arm's place (T,) that fits it best."""
     powers = np.vander((arm - arm.mean()) / (arm.std() + 1e-12), DEGREE + 1)
     return values - powers @ np.linalg.lstsq(powers, values, rcond=None)[0]

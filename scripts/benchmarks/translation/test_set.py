@@ -35,7 +35,7 @@ SEED = 7  # of the readings' noise
 
 
 def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Everything on all contacts: the figures with their targets, the slices without, how good expected errors are."""
+    """Measure all contacts: the metrics with their targets, the slices without, how good expected errors are."""
     rows = np.arange(len(pairs.press))
     change = as_read(pairs.signal, SEED)
     columns = translation_figures(translator.nets, pairs, rows, change, bodies)
@@ -58,7 +58,7 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
 
 
 def window_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """What a short causal window gains over single frames, and how much later its answer comes."""
+    """Measure what a short causal window gains over single frames, and how much later its result comes."""
     rows, name = np.arange(len(pairs.press)), f"causal mean over {WINDOW} frames"
     columns = translation_figures(translator.nets, pairs, rows, as_read(pairs.signal, SEED, WINDOW), bodies)
     found = figure_rows({figure: columns[figure] for figure in (*FROM_SIGNALS, *NULL_FIGURES)}, pairs, rows, name, {})
@@ -115,7 +115,7 @@ def _share_row(name: str, value: float, low: float | None, high: float | None, s
 
 
 def speed_rows(translator: Translator, pairs: Pairs) -> list[Row]:
-    """ms a frame, from changes to both displacements, and with expected errors and confidence."""
+    """Measure ms a frame, from changes to both displacements, and with expected errors and confidence."""
     nets, found = translator.nets, []
 
     def surfaces(change: np.ndarray) -> None:

@@ -26,7 +26,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="+", metavar="RECORDING", help="of one sensor, in any known layout")
     verb.add_argument("--out", required=True, metavar="FILE", help="new TOML file to write")
     polarity_argument(verb)

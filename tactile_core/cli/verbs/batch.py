@@ -51,7 +51,7 @@ RECIPE = (  # option, its value where it is not given
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; none: go on with the job in DIR")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder of the job")
     verb.add_argument(

@@ -31,7 +31,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("presses", metavar="PRESSES", help="folder of photographs of one unit, fingertip up")
     verb.add_argument("--out", metavar="FILE", help="new TOML file to write")
     verb.add_argument("--ball-diameter", type=float, metavar="MM", help="of the ball (with --test: as fitted)")
@@ -46,7 +46,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit and write, or try and tell."""
+    """Fit and write, or evaluate and report."""
     from ...pictures.calibrate.photographs import chosen, read_photographs
 
     _check_options(options)

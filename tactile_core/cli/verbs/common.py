@@ -1,4 +1,4 @@
-"""What several verbs share."""
+"""Arguments and helpers that several verbs share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def progress_argument(verb: argparse.ArgumentParser) -> None:
 
 
 def prepare_arguments(verb: argparse.ArgumentParser) -> None:
-    """How readings become signals."""
+    """Add the arguments that control how readings become signals."""
     verb.add_argument(
         "--tare",
         default="auto",
@@ -67,7 +67,7 @@ def electrodes_argument(verb: argparse.ArgumentParser) -> None:
 
 
 def answer_arguments(verb: argparse.ArgumentParser) -> None:
-    """What a frame is answered by; see ``translation.answer``."""
+    """Add the arguments that control the estimate for a frame; see ``translation.answer``."""
     verb.add_argument(
         "--answer",
         choices=("likely", "mean"),
@@ -106,7 +106,7 @@ def answer_words(options: argparse.Namespace) -> Answer:
 
 
 def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
-    """``--error``; what : the units that mean something here, in words."""
+    """Add ``--error``; what : the units that mean something here, in words."""
     verb.add_argument("--error", metavar="BOUND", help=f"the largest error that the toolkit itself may add: {what}")
 
 
@@ -116,13 +116,13 @@ def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
 
 
 def check_seed(seed: int) -> None:
-    """Raises TactileError for a seed that the generators do not take."""
+    """Raise TactileError for a seed that the generators do not take."""
     if not 0 <= seed <= MAX_SEED:
         raise TactileError("--seed", str(seed), f"0 to {MAX_SEED}", "Give another one")
 
 
 def prepare_words(options: argparse.Namespace) -> dict[str, Any]:
-    """What ``recordings.PrepareOptions`` is told, from the arguments of a verb that prepares recordings."""
+    """Return the fields of ``recordings.PrepareOptions`` from the arguments of a verb that prepares recordings."""
     return {
         "kind": options.kind,
         "tare": None if options.tare == "auto" else options.tare,

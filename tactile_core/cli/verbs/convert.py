@@ -46,7 +46,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument(
         "recordings", nargs="+", metavar="RECORDING", help="CSV, HDF5, NPZ, MAT or bag files, in any known layout"
     )
@@ -112,7 +112,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _fingers(recordings: list[str]) -> list[str]:
-    """Each recording, each finger of those that hold a hand; what is no recording is told of when its turn comes."""
+    """List each recording, or each finger of those that hold a hand; a file that is no recording is reported
+    when its turn comes.
+    """
     from ...recordings.readers import each_finger
 
     found = []

@@ -18,11 +18,11 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb: none."""
+    """Add no arguments: this verb has none."""
 
 
 def run(options: argparse.Namespace) -> int:
-    """Look and tell."""
+    """Check this machine and report."""
     from .. import doctor
 
     for line in doctor.report():

@@ -1,4 +1,4 @@
-"""What the verbs that run jobs share: where the work is done."""
+"""Arguments and helpers of the verbs that run jobs: where the work is done."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def place_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def parts_arguments(verb: argparse.ArgumentParser) -> None:
-    """As `place_arguments`, for a verb whose job is in a folder beside its result."""
+    """Add `place_arguments` for a verb whose job is in a folder beside its result."""
     place_arguments(verb)
     verb.add_argument(
         "--plan",
@@ -35,7 +35,7 @@ def parts_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def check_counts(options: argparse.Namespace, *names: str) -> None:
-    """Raises TactileError for a number of workers or the like below 1."""
+    """Raise TactileError for a number of workers or the like below 1."""
     for name in names:
         value = getattr(options, name)
         if value is not None and value < 1:
@@ -53,7 +53,7 @@ def part(text: str | None) -> tuple[int, int] | None:
 
 
 def place(folder: Path, options: argparse.Namespace) -> Place:
-    """Where the tasks of the job in `folder` are done."""
+    """Return the executor of the tasks of the job in `folder`."""
     if options.cluster is not None:
         from ...jobs.engine.dask_cluster import Cluster
 

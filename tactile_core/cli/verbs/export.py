@@ -23,7 +23,7 @@ LAYOUTS = ("npz", "png", "exr", "lerobot")
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("job", metavar="JOB", help="folder of the job")
     verb.add_argument("--to", required=True, choices=LAYOUTS, help="layout")
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder")

@@ -17,7 +17,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="+", metavar="FILE")
     polarity_argument(verb)
 

@@ -38,7 +38,7 @@ _EDGE_MM = 0.5  # of a cylinder's rim, as in scenes
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("sensor", choices=("biotac", "digit"))
     verb.add_argument("--out", required=True, metavar="FILE", help="new file to write: .ply, .stl or .vtu")
     frame = verb.add_argument_group("deformed by a frame")

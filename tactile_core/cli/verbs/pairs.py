@@ -23,7 +23,7 @@ LEAVES = RESUMES
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("scene", metavar="SCENE", help="scene.toml: indenters and their range of places, angles, depths")
     verb.add_argument("--count", type=int, required=True, metavar="N", help="number of paired contacts")
     seed_argument(verb, "file")

@@ -23,7 +23,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("input", metavar="INPUT", help="scene (scene.toml or its folder), or a recording")
     verb.add_argument(
         "--keep",
@@ -37,7 +37,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Plan and tell."""
+    """Plan and report."""
     import json
 
     from ... import accuracy

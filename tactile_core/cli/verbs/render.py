@@ -50,7 +50,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("input", metavar="INPUT")
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
     verb.add_argument("--preset", choices=PRESETS, help="how exactly (default: standard)")

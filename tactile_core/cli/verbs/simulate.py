@@ -34,7 +34,7 @@ LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("scene", metavar="SCENE", help="scene.toml with a [recording]")
     seed_argument(verb, "file")
     verb.add_argument("--out", required=True, metavar="FILE", help="HDF5 file to write")

@@ -26,7 +26,7 @@ MAX_EFFORT = 1000.0
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("pairs", metavar="PAIRS", help="HDF5 file of `tactile pairs`, or the word s2mpn")
     verb.add_argument("--real", metavar="FILE", help="of s2mpn: the labelled recording")
     verb.add_argument("--weights", metavar="DIR", help="of s2mpn: where it starts (default: the shipped weights)")

@@ -37,7 +37,7 @@ TOLD = 1.0  # s between two lines of figures
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
-    """Of this verb."""
+    """Add the arguments of this verb."""
     verb.add_argument("recording", nargs="?", metavar="PATH", help="a CSV file that grows; with --play any recording")
     verb.add_argument("--play", action="store_true", help="play a finished recording, of any layout, bags too")
     verb.add_argument("--rosbag-play", metavar="FILE", help="play this ROS 1 or 2 bag or MCAP file (bag#2: a finger)")
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Raises TactileError for words that do not go together."""
+    """Raise TactileError for words that do not go together."""
     if (options.recording is None) == (options.rosbag_play is None):
         raise TactileError("tactile watch", "no recording, or two", "PATH or --rosbag-play FILE")
     if options.speed is not None:

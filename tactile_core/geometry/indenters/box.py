@@ -62,5 +62,5 @@ class Box(Indenter):
 
     @functools.cached_property
     def _inner(self) -> np.ndarray:
-        """Half the sizes (3,) m of the smaller box."""
+        """Half-sizes (3,) m of the smaller box."""
         return np.array(self.sizes) / 2 - self.edge

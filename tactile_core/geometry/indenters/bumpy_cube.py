@@ -94,7 +94,9 @@ class BumpyCube(Indenter):
         return Box((self.size, self.size, 2 * self.size), self.edge), Pose(apex, np.eye(3))
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """What is nearest (n,), its distance (n,) m and gradient (n, 3); points in the nearest bump's frame (n, 3)."""
+        """Find the nearest part (n,), its distance (n,) m and gradient (n, 3); and points in the nearest bump's frame
+        (n, 3).
+        """
         outer = np.copysign(self.spacing, points[:, :2])
         outer[np.abs(points[:, 0]) + np.abs(points[:, 1]) <= self.spacing] = 0.0
         at_bump = points.copy()
@@ -113,7 +115,7 @@ class BumpyCube(Indenter):
         return branch, distance, gradient, at_bump
 
     def _above(self, points, at_bump, of_ball, from_ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # noqa: ANN001
-        """What is nearest to points in the cube above a bump, its distance and gradient."""
+        """Find the part nearest to points in the cube above a bump, its distance and gradient."""
         reach, toward = circle_distance(at_bump - [0.0, 0.0, self.bump_height], self._foot)
         shaft, pose = self._shaft
         of_shaft, from_shaft = shaft.distance(points - pose.apex)

@@ -1,4 +1,4 @@
-"""What every indenter answers, and the checks that all of them share."""
+"""Base class of indenters, and the checks that all of them share."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Indenter(Protocol):
     def support(self, direction: np.ndarray) -> np.ndarray:
         """The point (3,) m of the body's convex hull farthest along a unit vector (3,), in the own frame.
 
-        The middle of it where a whole flat, circle or line lies farthest.
+        Where a whole flat, circle or line lies farthest, its middle.
         """
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -47,7 +47,7 @@ class Indenter(Protocol):
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """Lengths (n,) of vectors (n, 3): ``np.linalg.norm`` takes twice as long for the few that a contact has."""
+    """Lengths (n,) of vectors (n, 3); ``np.linalg.norm`` takes twice as long for the few vectors of a contact."""
     return np.sqrt(np.einsum("ai,ai->a", vectors, vectors))
 
 
@@ -63,5 +63,5 @@ def check_length(kind: str, name: str, value: float) -> None:
 
 
 def sign_of(component: np.ndarray | float) -> np.ndarray:
-    """-1, 0 or 1; 0 for components of a direction that are zero but for rounding."""
+    """Return -1, 0 or 1; 0 for components of a direction that are zero up to rounding."""
     return np.where(np.abs(component) > SQUARE, np.sign(component), 0.0)

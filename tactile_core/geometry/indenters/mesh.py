@@ -1,4 +1,4 @@
-"""Any closed triangle mesh, through a smooth grid of its signed distance."""
+"""Indenter of any closed triangle mesh, through a smooth grid of its signed distance."""
 
 from __future__ import annotations
 
@@ -49,11 +49,12 @@ class MeshIndenter(Indenter):
     def from_file(
         cls, path: str | os.PathLike, scale: float = 1e-3, up: str = "z", spacing: float = 0.1e-3
     ) -> MeshIndenter:
-        """The body in an STL, PLY, OBJ or OFF file; its grid is built once (seconds to a minute) and kept on disk.
+        """Load the body in an STL, PLY, OBJ or OFF file; its grid is built once (seconds to a minute) and cached on
+        disk.
 
         scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
         spacing : m, of the grid; the body's lowest point, or the middle of its lowest flat, becomes the own origin.
-        Raises TactileError for anything that is no closed, outward, uncrossed surface of an indenter's size.
+            Raises TactileError for anything that is no closed, outward, uncrossed surface of an indenter's size.
         """
         _check(path, scale, up, spacing)
         content = mesh_file.read_bytes(path)
@@ -83,14 +84,14 @@ class MeshIndenter(Indenter):
         return value, _unit(slope)[1]
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``: how the unit normal turns along the level surface."""
+        """See ``Indenter.curvature``: the derivative of the unit normal along the level surface."""
         slope, bend = self.grid.gradient_and_hessian(points)
         steepness, normal = _unit(slope)
         along = np.eye(3) - normal[:, :, None] * normal[:, None, :]
         return along @ bend @ along / steepness[:, None, None]
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``; that of the mesh itself."""
+        """See ``Indenter.support``; computed from the mesh itself."""
         reach = self.hull @ direction
         return self.hull[reach > reach.max() - _LEVEL].mean(axis=0)
 

@@ -13,7 +13,7 @@ _COARSER = 4
 def signed(triangles: np.ndarray, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
     """Signed distance (shape) mm of grid nodes at ``origin`` + spacing * (i, j, k) to triangles (m, 3, 3) mm.
 
-    within : bool (shape), which nodes are inside
+    within : bool (shape), true for nodes inside
     Triangles are cut into pieces of two spacings; a node looks at the triangles of its nearest pieces. Beyond 2 mm a
     grid four times coarser is interpolated by a cubic spline. What this costs in accuracy is measured when an indenter
     is made.
@@ -57,7 +57,9 @@ def _unsigned(triangles, tree, owner, origin, spacing, shape, bound: float) -> n
 
 
 def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Middles (k, 3) of triangles halved across their longest edge until it is short, and whose parts they are (k,)."""
+    """Halve triangles across their longest edge until it is short; returns middles (k, 3) and each one's
+    triangle (k,).
+    """
     owner, middles, owners = np.arange(len(triangles)), [], []
     while len(triangles):
         sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)

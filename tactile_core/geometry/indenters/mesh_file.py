@@ -1,4 +1,4 @@
-"""Triangle meshes as indenters: read without running or fetching anything, and refused unless they bound a solid.
+"""Read triangle meshes as indenters without running or fetching anything; refuse those that bound no solid.
 
 Meshes are in mm here and wherever trimesh works on them: its tolerances are absolute, made for numbers of that size.
 """
@@ -26,7 +26,7 @@ _LOWEST_MM = 1e-4  # vertices this near to the lowest one belong to one flat
 
 
 def read_bytes(path: str | os.PathLike) -> bytes:
-    """The content of a mesh file. Raises TactileError for a kind that is not read, and for what cannot be read."""
+    """Read a mesh file. Raises TactileError for an unknown kind of file, and for one that cannot be read."""
     path = pathlib.Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise TactileError(path, f"a {path.suffix or 'nameless'} file", f"a triangle mesh: {', '.join(SUFFIXES)}")
@@ -67,7 +67,7 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
 
 
 def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) in the file's unit and faces (m, 3)."""
+    """Parse vertices (n, 3) in the file's unit and faces (m, 3)."""
     import trimesh
 
     _check_length(content, path)
@@ -92,7 +92,7 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
 
 
 def _check_length(content: bytes, path: pathlib.Path) -> None:
-    """Refuse what holds far more than MAX_FACES triangles before a parser unfolds it."""
+    """Refuse a file of far more than MAX_FACES triangles before it is parsed."""
     words = sum(content.count(mark) for mark in b" \t\r\n")
     if words > MAX_WORDS or (b"\0" in content and len(content) > MAX_BINARY):
         raise TactileError(path, f"{len(content) / 1e6:.0f} MB", f"at most {MAX_FACES} triangles", "Simplify it")

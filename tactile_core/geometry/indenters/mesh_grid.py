@@ -1,4 +1,4 @@
-"""The smooth grid of a mesh's signed distance, and how far an indenter is from its mesh."""
+"""Build the smooth grid of a mesh's signed distance, and measure an indenter's error against its mesh."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _signed(
 
 
 def error_of(mesh: Any, distance: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """rms and largest error (2,) m of an indenter's ``distance`` against its mesh (mm) near the surface.
+    """RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (mm) near the surface.
 
     Measured at random places over its area, up to 0.3 mm inside and outside. The signs are checked by counting how
     often a ray from there meets the mesh.

@@ -1,4 +1,4 @@
-"""Which nodes of a regular grid lie inside a closed triangle mesh, by the crossings of the grid's columns."""
+"""Find the nodes of a regular grid that lie inside a closed triangle mesh, by the crossings of the grid's columns."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ _BESIDE = ((1.234e-4, 0.876e-4), (-0.543e-4, 1.567e-4), (0.987e-4, -1.654e-4))
 
 
 class OverlapError(Exception):
-    """The mesh overlaps itself: a column enters it twice before it leaves."""
+    """Error for a mesh that overlaps itself: a column enters it twice before it leaves."""
 
 
 def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]) -> np.ndarray:
-    """Bool (shape): grid nodes at ``origin`` + spacing * (i, j, k) inside the mesh of triangles (m, 3, 3), one unit.
+    """Mark (shape) bool the grid nodes at ``origin`` + spacing * (i, j, k) inside the mesh of triangles (m, 3, 3), one
+    unit.
 
-    Along each column the crossings must alternate between entering and leaving. Raises OverlapError where they do
-    not; where a column grazes an edge, others beside it are tried first.
+    Along each column the crossings must alternate between entering and leaving. Raises OverlapError where they do not;
+    where a column grazes an edge, others beside it are tried first.
     """
     for beside in _BESIDE:
         column, height, entering = _crossings(triangles, origin + spacing * np.array([*beside, 0]), spacing, shape)
@@ -34,7 +35,7 @@ def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tup
 def _crossings(
     triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where columns meet triangles: column (k,) int, height (k,), whether going up enters the body (k,)."""
+    """Crossings of columns and triangles: column (k,) int, height (k,), true (k,) where going up enters the body."""
     flat = (triangles[:, :, :2] - origin[:2]) / spacing
     low = np.clip(np.ceil(flat.min(axis=1)), 0, None).astype(int)
     high = np.minimum(np.floor(flat.max(axis=1)).astype(int), np.array(shape[:2]) - 1)

@@ -1,4 +1,4 @@
-"""Whether a closed triangle mesh crosses itself."""
+"""Check whether a closed triangle mesh crosses itself."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _PAIRS = 200_000  # candidate pairs looked at together: about 150 MB
 
 
 def first_crossing(mesh: Any) -> np.ndarray | None:
-    """A place (3,) mm where an edge goes through a triangle that it does not touch, or None.
+    """Find a place (3,) mm where an edge goes through a triangle that is not its own, or None.
 
-    Pairs come from an R-tree of the triangles' boxes. Pairs that share an edge cannot cross, but for folding flat onto
-    each other, which is not looked for.
+    Pairs come from an R-tree of the triangles' boxes. Pairs that share an edge can only cross by folding flat onto each
+    other, which is not checked.
     """
     triangles, faces = mesh.triangles, mesh.faces
     for first, second in _near_pairs(mesh):
@@ -46,7 +46,9 @@ def _near_pairs(mesh: Any):  # noqa: ANN202 (batches of two arrays of face numbe
 
 
 def _goes_through(start: np.ndarray, end: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Which segments (n, 3), (n, 3) pass strictly through the inside of triangles (n, 3, 3), by signed volumes."""
+    """Mark the segments (n, 3), (n, 3) that pass strictly through the inside of triangles (n, 3, 3), by signed
+    volumes.
+    """
     a, b, c = np.moveaxis(triangles, 1, 0)
     longest = np.max([np.linalg.norm(v, axis=1) for v in (end - start, b - a, c - b, a - c)], axis=0)
     least = _FLAT * longest**3

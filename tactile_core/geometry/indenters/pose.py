@@ -1,4 +1,4 @@
-"""Where an indenter stands, and how it is set onto a surface."""
+"""Pose of an indenter, and its placement on a surface."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .indenter import Indenter
 
 @dataclasses.dataclass(frozen=True)
 class Pose:
-    """Where an indenter stands: its own origin at ``apex`` (3,) m, its own axes as the columns of ``axes`` (3, 3).
+    """Position and orientation of an indenter: own origin at ``apex`` (3,) m, own axes as columns of ``axes`` (3, 3).
 
     Raises TactileError for a number that is nan or infinite.
     """
@@ -39,11 +39,11 @@ class Pose:
         return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes)
 
     def to_own(self, points: np.ndarray) -> np.ndarray:
-        """Sensor points (n, 3) m in the indenter's frame: where they stay as it moves, if they stick."""
+        """Transform sensor points (n, 3) m to the indenter's frame, in which sticking points stay put as it moves."""
         return (points - self.apex) @ self.axes
 
     def from_own(self, points: np.ndarray) -> np.ndarray:
-        """The inverse of ``to_own``."""
+        """Transform points (n, 3) m from the indenter's frame to the sensor's: the inverse of ``to_own``."""
         return points @ self.axes.T + self.apex
 
     def distance(self, indenter: Indenter, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +63,7 @@ class Pose:
 def pose_on(
     indenter: Indenter, point: np.ndarray, outward: np.ndarray, tilt: float = 0.0, tilt_heading: float = 0.0
 ) -> Pose:
-    """An indenter that just touches ``point`` (3,) m of a surface with unit normal ``outward`` (3,).
+    """Pose in which the indenter just touches ``point`` (3,) m of a surface with unit normal ``outward`` (3,).
 
     tilt : rad, between its axis (the way it moves) and that normal
     tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z

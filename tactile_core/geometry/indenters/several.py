@@ -1,4 +1,4 @@
-"""Several bodies that move as one."""
+"""Several bodies that move together."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
 class Several(Indenter):
     """A rigid group of indenters, for several contacts at once: the nearest part counts.
 
-    Exact outside. Inside where parts overlap, the distance is at least as deep as said.
+    Exact outside. Inside, where parts overlap, the true depth is at least the one returned.
 
     parts : pairs of an indenter and its ``Pose`` in the group's frame; the lowest of them touches z = 0
     """
@@ -56,7 +56,7 @@ class Several(Indenter):
         return places[reach > reach.max() - SQUARE].mean(axis=0)
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Distance (n,) m and gradient (n, 3) of the nearest part, and which one that is (n,)."""
+        """Distance (n,) m and gradient (n, 3) of the nearest part, and that part's index (n,)."""
         answers = [pose.distance(indenter, points) for indenter, pose in self.parts]
         nearest = np.argmin([distance for distance, _ in answers], axis=0)
         row = np.arange(len(points))

@@ -15,7 +15,7 @@ class SplineGrid:
     """The spline sum_ijk c_ijk B(x - i) B(y - j) B(z - k), in units of ``spacing`` m from ``origin`` (3,) m.
 
     coefficients : (nx, ny, nz), 4 or more each way, in the unit of the values
-    It is known in the box that leaves out the outermost nodes. Beyond it the distance to the box is added: continuous
+    It is defined in the box that leaves out the outermost nodes. Beyond it the distance to the box is added: continuous
     and, for a body well inside of it, larger than zero, but its slope jumps at the box.
     """
 
@@ -48,7 +48,9 @@ class SplineGrid:
         return np.where(beyond == 0, inner, beyond / np.where(away > 0, away, 1)[:, None])
 
     def _split(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Nearest place (n, 3) in the known box, in spacings; way (n, 3) m and distance (n,) m from there."""
+        """Nearest place (n, 3) in the box of definition, in spacings; vector (n, 3) m and distance (n,) m from
+        there.
+        """
         place = (points - self.origin) / self.spacing
         known = np.clip(place, 1, np.array(self.coefficients.shape) - 2)
         beyond = (place - known) * self.spacing

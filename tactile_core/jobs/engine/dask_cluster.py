@@ -44,7 +44,7 @@ class Cluster:
     """
 
     def __init__(self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None) -> None:
-        """Raises TactileError for an address or a file that is neither."""
+        """Raise TactileError for an address or a file that is neither."""
         self._say = say
         self._folder = str(folder.resolve())
         self._address = address

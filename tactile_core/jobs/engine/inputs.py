@@ -1,4 +1,4 @@
-"""From what the user names (files, folders, globs, ``@list``) to recordings with names and hashes."""
+"""Expand what the user names (files, folders, globs, ``@list``) to recordings with names and hashes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SLIDE, BESIDE = "_bio.csv", ("_cw.csv", "_cp.csv")  # of the slide set; its wren
 
 
 class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """One recording of a job.
+    """Recording of a job.
 
     name : of its files in the job folder, different for each; path : absolute; sha256, bytes : of its content
     """
@@ -59,7 +59,7 @@ def find(words: Sequence[str], out: Path) -> list[Path]:
 
 
 def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Each path or glob, those of lists among them, and where it stands: "list.txt, line 3, " or nothing."""
+    """Yield each path or glob, those of lists among them, and its source: "list.txt, line 3, " or nothing."""
     for word in words:
         if word.startswith("@"):
             for number, line in _lines(Path(word[1:])):
@@ -80,7 +80,7 @@ def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
 
 
 def _globbed(word: str) -> list[str]:
-    """What a glob names, by name; one that may look into the same folders again and again is refused."""
+    """Expand a glob, sorted by name; one that may look into the same folders again and again is refused."""
     parts = word.replace(os.sep, "/").split("/")
     wild = next(place for place, part in enumerate(parts) if glob.has_magic(part))
     if ".." in parts[wild:] or parts.count("**") > MOST_STARS or len(parts) > MOST_PARTS:
@@ -112,7 +112,7 @@ def _of_folder(folder: Path) -> Iterator[Path]:
     """
 
     def refused(error: OSError) -> None:
-        """What `os.walk` passes over without a word."""
+        """Log a warning for a folder that `os.walk` would skip silently."""
         log.warning("%s: cannot be looked into (%s), passed over", error.filename, error.strerror)
 
     if _is_bag(folder):
@@ -128,7 +128,7 @@ def _of_folder(folder: Path) -> Iterator[Path]:
 
 
 def _is_bag(folder: Path) -> bool:
-    """Whether a folder is a ROS 2 bag; one that may not be read is none."""
+    """Return true if a folder is a ROS 2 bag; one that may not be read is none."""
     return os.path.isfile(folder / MARK)
 
 
@@ -145,7 +145,7 @@ def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[
 
 
 def _fingers(path: Path) -> list[str]:
-    """Each finger of a file of several; what cannot be read as a recording is told of when its turn comes."""
+    """List each finger of a file of several; a file that is no readable recording is reported when its turn comes."""
     try:
         return each_finger(path)
     except TactileError:
@@ -153,7 +153,7 @@ def _fingers(path: Path) -> list[str]:
 
 
 def unit_hash(calibration: Path) -> str:
-    """Of a DIGIT's calibration file and the photograph that it names. Raises TactileError for a bad one."""
+    """Hash of a DIGIT's calibration file and the photograph that it names. Raises TactileError for a bad one."""
     photograph = load_calibration(calibration).photograph
     digests = [content_hash(Path(file))[0] for file in (calibration, photograph) if file]
     return hashlib.sha256(" ".join(digests).encode()).hexdigest() if photograph else digests[0]

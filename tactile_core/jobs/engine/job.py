@@ -67,14 +67,14 @@ def write(folder: Path, job: Job) -> None:
 
 
 def check_empty(folder: Path, advice: str) -> None:
-    """Raises TactileError for a folder, without a job, that holds something of others; hidden files do not count."""
+    """Raise TactileError for a folder, without a job, that holds something of others; hidden files do not count."""
     others = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     if others:
         raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", advice)
 
 
 def exists(folder: Path) -> bool:
-    """Whether the folder holds a job."""
+    """Return true if the folder holds a job."""
     return (folder / FILE).exists()
 
 
@@ -109,7 +109,7 @@ def read(folder: Path) -> Job:
 
 
 def _encodes(name: str) -> bool:
-    """Whether it can be a path of this machine's."""
+    """Return true if the name can be a path on this machine."""
     try:
         os.fsencode(name)
     except UnicodeEncodeError:
@@ -118,10 +118,10 @@ def _encodes(name: str) -> bool:
 
 
 def prepared_file(folder: Path, name: str) -> Path:
-    """Of the recording of that name."""
+    """Path of the prepared recording of that name."""
     return folder / PREPARED / f"{name}.h5"
 
 
 def shard_file(folder: Path, name: str, number: int) -> Path:
-    """Of the shard of that number in the recording, from 0."""
+    """Path of the shard of that number in the recording, from 0."""
     return folder / SHARDS / f"{name}-{number:06d}.h5"

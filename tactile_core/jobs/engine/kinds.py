@@ -29,7 +29,7 @@ MODULES = {
 
 @dataclasses.dataclass(frozen=True)
 class Seen:
-    """What is known of an input. shards : how many it has; frames : of a recording; warnings : to tell of it"""
+    """Facts known of an input. shards : their number; frames : of a recording; warnings : to report"""
 
     shards: int
     frames: int = 0

@@ -103,13 +103,13 @@ class Local:
 
 
 def _search_path() -> str:
-    """Where a worker finds this package under its name, which is a long one inside Blender."""
+    """Search path on which a worker finds this package under its name, which is a long one inside Blender."""
     root = Path(__file__).parents[__package__.count(".") + 1]
     return os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
 class _Worker:
-    """One process after another."""
+    """Worker that runs one process after another."""
 
     def __init__(self, start: Start, restart: int) -> None:
         self._start, self._restart = start, restart

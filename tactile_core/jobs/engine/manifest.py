@@ -1,4 +1,4 @@
-"""What a job folder holds, told from its files alone."""
+"""Determine the state of a job folder from its files alone."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class Status:
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is missing."""
+        """Return true if nothing is missing."""
         return self.prepared == self.recordings and self.there == self.shards
 
 
 def status(folder: Path, job: Job) -> Status:
-    """How far a job is. Reads names and lengths, no content: `damaged` checks that."""
+    """Return the progress of a job. Reads names and lengths, no content: `damaged` checks that."""
     found = Status(len(job.inputs), aside=_aside(folder))
     there = {path.name for path in (folder / jobs.SHARDS).glob("*.h5")}
     for index, one in enumerate(job.inputs):

@@ -1,4 +1,4 @@
-"""What is made of each input: all that decides a shard's bytes beside the input itself. One struct a kind of job."""
+"""Recipes, one struct a kind of job: everything that decides a shard's bytes besides the input itself."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PICTURE_FRAMES = 50  # rendered frames a shard: some seconds of work, and 80 MB 
 
 
 class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """As recordings.PrepareOptions, whose meanings these are."""
+    """Options of ``recordings.PrepareOptions``, with the same meanings."""
 
     kind: str | None = None
     tare: str | None = None
@@ -28,7 +28,7 @@ class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     polarity: str = "auto"
 
     def options(self) -> PrepareOptions:
-        """For ``recordings.prepare``."""
+        """Return the options for ``recordings.prepare``."""
         return PrepareOptions(**msgspec.structs.asdict(self))
 
 

@@ -16,7 +16,7 @@ from .job import Job
 
 
 def folder_of(out: Path) -> Path:
-    """Of the job whose result `out` is."""
+    """Folder of the job whose result `out` is."""
     return out.with_name(out.name + ".parts")
 
 
@@ -54,7 +54,7 @@ def finished(folder: Path) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Remove what is ours, the job last, and the folder where nothing of others is left in it."""
+    """Remove the job's own files, the job last, and the folder where no third-party file is left in it."""
     for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
         shutil.rmtree(folder / name, ignore_errors=True)
     for file in (jobs.MANIFEST, jobs.FILE, lock.FILE, DONE):
@@ -66,7 +66,7 @@ def _remove(folder: Path) -> None:
 
 
 def check(done: runs.Done) -> None:
-    """Raises TactileError for the first task that could not be done."""
+    """Raise TactileError for the first task that could not be done."""
     for name, why in sorted(done.aside.items()):
         where, _, found = why.partition(": ")
         raise TactileError(where, found) if found else TactileError(name, why)

@@ -20,7 +20,7 @@ Progress = Callable[[int, int], None]
 
 
 class Place(Protocol):
-    """Where tasks are done; a context manager."""
+    """Executor of tasks; a context manager."""
 
     def submit(self, task: Task) -> None:
         """Have a task done, some time."""
@@ -35,7 +35,7 @@ class Place(Protocol):
 
 @dataclasses.dataclass
 class Done:
-    """What a run did. made, kept : shards; aside : sentence on each task that could not be done."""
+    """Outcome of a run. made, kept : shards; aside : sentence on each task that could not be done."""
 
     made: int = 0
     kept: int = 0
@@ -84,7 +84,7 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
 
 
 def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:
-    """As `run`; raises OSError."""
+    """Run like `run`; raises OSError."""
     work = _Work(folder, job, part)
     for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
         (folder / name).mkdir(exist_ok=True)
@@ -101,7 +101,7 @@ def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, pro
 
 
 class _Work:
-    """Which tasks there are, and what became of them."""
+    """Tasks of a run and their outcome."""
 
     def __init__(self, folder: Path, job: Job, part: tuple[int, int] | None) -> None:
         self._folder, self._job = folder, job
@@ -142,7 +142,7 @@ class _Work:
         return follow
 
     def _shards(self, recording: int, count: int) -> list[Task]:
-        """Those of the first `count` shards of a recording that are this part's and were not asked for yet."""
+        """List this part's shards among the first `count` of a recording that were not requested yet."""
         if self._grows:
             count = max(count, self._parts)  # each part makes one, from which it learns how many there are
         numbers = range(self._asked[recording], count)

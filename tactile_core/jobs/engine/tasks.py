@@ -14,14 +14,14 @@ from . import kinds
 
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """What input `recording` of the job needs first (shard None), or one of its shards; see ``kinds``."""
+    """First step for input `recording` of the job (shard None), or one of its shards; see ``kinds``."""
 
     recording: int
     shard: int | None = None
 
 
 class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """What became of a task.
+    """Outcome of a task.
 
     made : False where it was there already; shards : that follow, of an input's first task
     error : why it cannot be done, as the user reads it; stop : no other task can be done either
@@ -34,7 +34,7 @@ class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def name(job: jobs.Job, task: Task) -> str:
-    """Of the task in files and messages."""
+    """Name of the task in files and messages."""
     recording = job.inputs[task.recording].name
     return recording if task.shard is None else f"{recording}-{task.shard:06d}"
 
@@ -66,7 +66,7 @@ def _run(folder: Path, task: Task) -> Reply:
 
 
 def _stamp(folder: Path) -> tuple[int, int]:
-    """What tells one job file from another in the same place, for a worker that serves several jobs."""
+    """Stamp that distinguishes job files in the same place, for a worker that serves several jobs."""
     try:
         found = (folder / jobs.FILE).stat()
     except OSError as error:

@@ -1,4 +1,4 @@
-"""From a finished job to the layouts that others read.
+"""Export a finished job to third-party layouts.
 
 A new layout is one new file in ``formats/``, with ``BRIEF`` and ``write``; see there.
 """

@@ -37,14 +37,14 @@ def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
 
 @dataclasses.dataclass(frozen=True)
 class Recorded:
-    """One recording. name : of it in the job; frames : of it; shards : its files, in order."""
+    """Recording of a finished job. name : its name in the job; frames : their number; shards : its files, in order."""
 
     name: str
     frames: int
     shards: tuple[Path, ...]
 
     def blocks(self) -> Iterator[dict[str, np.ndarray]]:
-        """All arrays of some frames after another, by the names of ``frames_file``."""
+        """Yield all arrays of blocks of frames in order, by the names of ``frames_file``."""
         import h5py
 
         for path in self.shards:
@@ -67,7 +67,7 @@ class Finished:
 
     @property
     def frames(self) -> int:
-        """Of all recordings."""
+        """Number of frames of all recordings."""
         return sum(one.frames for one in self.recordings)
 
 
@@ -96,7 +96,7 @@ def load(folder: Path) -> Finished:
 
 
 def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
-    """Raises TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
+    """Raise TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
     if checksummed.verified_checksum(path) is None:
         raise TactileError(path, "damaged", "a whole shard", ADVICE)
     if not frame_shard.is_of(path, job, index, number, frames):
@@ -114,7 +114,7 @@ def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
 
 
 def _check_alike(paths: list[Path]) -> None:
-    """Raises TactileError where an array's frames are not of one shape and type in all shards."""
+    """Raise TactileError where an array's frames are not of one shape and type in all shards."""
     first: dict[str, str] = {}
     for path in paths:
         for name, found in _kinds(path).items():

@@ -47,7 +47,7 @@ def export(
 
 
 def needed(source: finished_job.Finished, array: str, word: str) -> None:
-    """Raises TactileError where the job did not keep an array."""
+    """Raise TactileError where the job did not keep an array."""
     if array not in source.recordings[0].arrays():
         advice = f"Make the job with --keep {word}"
         raise TactileError("the job", f"holds no {array}", f"one that kept {word}", advice)

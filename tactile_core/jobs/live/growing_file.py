@@ -22,7 +22,7 @@ class Growing:
     """A CSV recording that another program is writing, in any of the text layouts."""
 
     def __init__(self, path: str | os.PathLike) -> None:
-        """Raises TactileError where there is no such file."""
+        """Raise TactileError where there is no such file."""
         self._path = Path(path)
         self._place, self._rest, self._lines = 0, b"", 0
         self._header: Header | None = None
@@ -77,12 +77,12 @@ class Growing:
 
 
 def _identity(found: os.stat_result) -> tuple[int, int]:
-    """What a file keeps while it grows."""
+    """Identity of a file that does not change while it grows."""
     return found.st_dev, found.st_ino
 
 
 def newest(recording: Recording) -> np.ndarray:
-    """(19,) counts of the last row that is whole; its NaN cells filled from the rows before, 0 where there are none."""
+    """Counts (19,) of the last row that is whole; its NaN cells filled from the rows before, 0 where there are none."""
     found = np.full(recording.electrodes.shape[1], np.nan)
     for row in recording.electrodes[::-1]:
         found = np.where(np.isfinite(found), found, row)

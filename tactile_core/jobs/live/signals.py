@@ -88,7 +88,7 @@ class LiveSignals:
 
 
 def _stated_polarity(polarity: str, who: str) -> Polarity:
-    """What somebody says of the counts; an assumption where nobody does."""
+    """Return the polarity stated by ``who``; an assumed one where nobody states it."""
     if polarity in POLARITIES:
         return Polarity(polarity, who, True)
     return Polarity(FALLS, "assumed: no contact has shown it yet", False)

@@ -44,12 +44,12 @@ class View:
 
     @property
     def polarity(self) -> Polarity:
-        """What counts do where a film thins, as far as the frames have shown."""
+        """Direction of counts where a film thins, as far as the frames have shown."""
         return self._signals.polarity
 
     @property
     def rest_found(self) -> str:
-        """Where rest was taken from; empty while it is not known."""
+        """Source of the rest level; empty while it is not known."""
         return self._signals.found
 
     def show(self, rows: Recording, came: float) -> Shown | None:
@@ -70,7 +70,7 @@ class View:
         return shown
 
     def _translation(self, signals: Signals) -> Translation:
-        """Of the newest frame, decided by those before it too, without delay."""
+        """Translate the newest frame, with the help of those before it, without delay."""
         if self._tools.posterior is None:
             return self._tools.translate(signals)
         state = self._follow(self._tools.posterior(signals), self.frames / self._rate)

@@ -1,1 +1,1 @@
-"""From the fluid film to the counts of the electrodes."""
+"""Compute the electrodes' counts from the fluid film."""

@@ -68,7 +68,7 @@ class BiotacSheet:
         return np.maximum(self.film + change[self.sensing], FILM_FLOOR)
 
     def near(self, films: np.ndarray) -> np.ndarray:
-        """What the grid misses of each electrode's resistance (23,) ohm in films (k,) m."""
+        """Part of each electrode's resistance (23,) ohm in films (k,) m that the grid does not resolve."""
         return self.unresolved / (CONDUCTIVITY * self.sheet.mean_over_electrodes(films))
 
     def resistances(self, films: np.ndarray) -> np.ndarray:

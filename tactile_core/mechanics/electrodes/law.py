@@ -1,4 +1,4 @@
-"""From a contact to the changes of the electrodes' counts, by the law that is chosen."""
+"""Compute the changes of the electrodes' counts from a contact, by the chosen law."""
 
 from __future__ import annotations
 

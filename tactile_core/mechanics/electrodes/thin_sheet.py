@@ -57,7 +57,7 @@ class ThinSheet:
         return (self.prolong @ film) @ self.patches
 
     def unresolved(self, refine: int) -> np.ndarray:
-        """What this grid misses of each electrode's own resistance against one refined, (k,) ohm for 1 m and 1 S/m.
+        """Error of each electrode's own resistance on this grid against a refined one, (k,) ohm for 1 m and 1 S/m.
 
         Near an electrode the current spreads in a film of nearly one thickness h, so the miss is this over sigma h.
         """

@@ -1,4 +1,6 @@
-"""What lies between the electrodes and the numbers in a file: rest, gains, drift, noise, the converter."""
+"""Model of the electronics between the electrodes and the numbers in a file: rest, gains, drift, noise, the
+converter.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from ...sensors import divider
 
 @dataclasses.dataclass(frozen=True)
 class Wiring:
-    """What lies between the film over an electrode and the number in a file; raises TactileError out of range.
+    """Electronics between the film over an electrode and the number in a file; raises TactileError out of range.
 
     rest_spread : counts; each electrode rests at ``sensors.REST_COUNT`` and up to this much more or less (assumed)
     gain_error : 1, standard deviation of the logarithm of each electrode's gain (assumed none)
@@ -39,7 +41,7 @@ class Wiring:
 
 
 def readings(change: np.ndarray, time: np.ndarray, wiring: Wiring, seed: int) -> np.ndarray:
-    """What the 12-bit converter delivers, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
+    """Readings of the 12-bit converter, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
 
     Changes are those of a unit that rests at ``sensors.REST_COUNT``; this one reads them by its own rest, as its
     divider does. Rounded and held within 0..4095, then less the count at rest where ``wiring.tared``. Rest, gain, drift

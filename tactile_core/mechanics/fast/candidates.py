@@ -1,4 +1,4 @@
-"""Which nodes enter a contact's solve, and how a solved contact shows that others must."""
+"""Choose the nodes that enter a contact's solve, and find from a solved contact those that must be added."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ class Candidates:
 
     @property
     def faced(self) -> np.ndarray:
-        """(k,) bool, nodes that need no further look: they stand twice, or ``split`` found only one face each time."""
+        """Mark (k,) bool the nodes that need no further check: they are doubled, or ``split`` found only one
+        face each time.
+        """
         return self.looks >= _MOST_LOOKS
 
     def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:

@@ -79,7 +79,7 @@ class Compliance:
 
 
 class Arrays(NamedTuple):
-    """What is computed and cached of a ``Compliance``."""
+    """Arrays of a ``Compliance`` that are computed and cached."""
 
     move: np.ndarray
     watch: np.ndarray
@@ -103,12 +103,12 @@ def digit_compliance() -> Compliance:
 
 
 def compliance_of(sensor: str) -> Compliance:
-    """That of ``"biotac"`` or ``"digit"``."""
+    """Return the compliance of ``"biotac"`` or ``"digit"``."""
     return biotac_compliance() if sensor == "biotac" else digit_compliance()
 
 
 class _Solid(NamedTuple):
-    """What a compliance is made of; touchable : (m,) surface nodes."""
+    """Solid from which a compliance is computed; touchable : (m,) surface nodes."""
 
     name: str
     lattice: Lattice
@@ -125,7 +125,7 @@ def _solid(sensor: str) -> _Solid:
 
 
 class Stored(NamedTuple):
-    """Where a sensor's matrices are kept, or will be: bytes on disk, 0 before they are built.
+    """Cache entry of a sensor's matrices: path, and bytes on disk, 0 before they are built.
 
     surface, touchable, volume : how many nodes the surface has, can be touched, and the solid has
     """
@@ -138,7 +138,7 @@ class Stored(NamedTuple):
 
 
 def stored(sensor: str) -> Stored:
-    """Of ``"biotac"`` or ``"digit"``; builds and loads nothing."""
+    """Return the cache entry of ``"biotac"`` or ``"digit"``; builds and loads nothing."""
     solid = _solid(sensor)
     folder = _folder(solid)
     files = [folder / f"{array}.npy" for array in Arrays._fields]
@@ -254,5 +254,5 @@ def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -
 
 
 def _volume_gradient(mesh: HexMesh) -> np.ndarray:
-    """d(fluid volume) / d(node) (3 n_nodes,), m2, at rest."""
+    """Gradient d(fluid volume) / d(node) (3 n_nodes,), m2, at rest."""
     return FluidCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)

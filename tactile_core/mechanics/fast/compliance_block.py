@@ -80,8 +80,9 @@ class ComplianceBlock:
 
 
 def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """sum over axes i, j of source[a, i] block[a i, b j] target[b, j]; sums over strides are faster than einsum
-    here."""
+    """Contract sum over axes i, j of source[a, i] block[a i, b j] target[b, j]; sums over strides are faster
+    than einsum here.
+    """
     half = block[:, 0::3] * target[:, 0]
     half += block[:, 1::3] * target[:, 1]
     half += block[:, 2::3] * target[:, 2]

@@ -10,7 +10,7 @@ from .surface_response import runs
 
 
 class ComplianceRows:
-    """What nodes near an indenter do under forces on some of them. ``near`` (n,) are sorted touchable indices."""
+    """Response of nodes near an indenter to forces on some of them. ``near`` (n,) are sorted touchable indices."""
 
     def __init__(self, compliance: Compliance, near: np.ndarray) -> None:
         self.compliance, self.near = compliance, near

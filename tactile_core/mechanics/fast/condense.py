@@ -73,7 +73,7 @@ def condense(mesh: HexMesh, material: Material, keep: np.ndarray, loads: np.ndar
 
 
 class _Elimination:
-    """One half of the solid on its way to the kept nodes."""
+    """Elimination of one half of the solid down to the kept nodes."""
 
     def __init__(self, mesh: HexMesh, material: Material, keep: np.ndarray, loads: np.ndarray, parity: int) -> None:
         image = mirror_nodes(mesh.nodes)

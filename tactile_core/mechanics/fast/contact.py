@@ -25,7 +25,7 @@ from .friction import Friction
 from .frictionless import Frictionless, Try
 from .projection import first_contact, project
 
-PENETRATION = 1e-6  # m, what MECHANICS allows at any node
+PENETRATION = 1e-6  # m, the target at any node
 _REACH = 0.8e-3  # m, nodes this far outside the indenter at the end of a solve may come to touch it
 _SPARE = 0.15e-3  # m, by which more nodes are followed than that, so that a deeper contact needs no others (assumed)
 _LARGE = 2.5  # times what is wanted: so many nodes followed cost more than a fresh start (assumed)
@@ -38,7 +38,7 @@ _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest ov
 
 
 class _Around(NamedTuple):
-    """What a contact does to the nodes near it: displacement (n, 3) m, gaps (n,) m; gaps (g,) m of skin and core."""
+    """Effect of a contact on the nodes near it: displacement (n, 3) m, gaps (n,) m; gaps (g,) m of skin and core."""
 
     moved: np.ndarray
     gap: np.ndarray
@@ -62,7 +62,7 @@ class ContactProblem:
         self._look_near(pose.moved(reach))
 
     def _resting(self) -> np.ndarray:
-        """Where what may touch rests: the touchable nodes (m, 3) m."""
+        """Rest positions (m, 3) m of the touchable nodes."""
         return self.compliance.surface.rest[self.compliance.touchable]
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
@@ -82,7 +82,7 @@ class ContactProblem:
         return self._walk(pose, axial_force, start)
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise PenetrationError where the indenter has sunk in between the surface's nodes."""
+        """Raise PenetrationError where the indenter has penetrated between the surface's nodes."""
         surface, deformed = self.compliance.surface, contact.deformed
         _, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable[contact.nodes]])
         where, grid = f"fast tier, {self.compliance.name}", surface.grid(deformed)
@@ -109,7 +109,7 @@ class ContactProblem:
 
     @property
     def near(self) -> np.ndarray:
-        """(n,) sorted touchable indices of the nodes that are followed."""
+        """Sorted touchable indices (n,) of the nodes that are followed."""
         return self._rows.near
 
     @property
@@ -210,7 +210,9 @@ class ContactProblem:
         return Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
 
     def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
-        """Where nodes (k,) stick on the indenter, (k, 3) m in its frame: where they were, or where they meet it."""
+        """Sticking points (k, 3) m of nodes (k,), in the indenter's frame: their old ones, or where they meet
+        the indenter.
+        """
         points = self._rest[nodes] + moved[np.searchsorted(self.near, nodes)]
         spots, new = before.pose.to_own(points), ~_among(nodes, before.nodes)
         if pose is not before.pose:
@@ -233,7 +235,7 @@ class ContactProblem:
         return found
 
     def _nothing(self, pose: Pose, *, converged: bool = True, iterations: int = 0) -> Contact:
-        """No contact, or one that was not found."""
+        """Return a result without contact, or one that was not found."""
         none, depth = np.empty(0, int), float((pose.apex - self.pose.apex) @ pose.direction)
         return Contact(
             self.compliance, pose, depth, np.zeros(3), 0.0, none, np.zeros((0, 3)), np.zeros(0, bool), converged,
@@ -296,7 +298,7 @@ def _borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Which of the nodes (k,) are among sorted others (j,): (k,) bool; a few times quicker than ``np.isin``."""
+    """Mark (k,) bool the nodes (k,) that are among sorted others (j,); a few times quicker than ``np.isin``."""
     if not len(others):
         return np.zeros(len(nodes), bool)
     return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes

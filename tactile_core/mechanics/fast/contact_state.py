@@ -1,4 +1,4 @@
-"""One solved contact of an indenter with a sensor's surface."""
+"""State of a solved contact of an indenter with a sensor's surface."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .compliance import Compliance
 
 @dataclasses.dataclass(frozen=True)
 class Contact:
-    """One solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
+    """Solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
 
     pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
     force : (3,); axial_force : its part along the motion
@@ -44,24 +44,24 @@ class Contact:
 
     @functools.cached_property
     def displacement(self) -> np.ndarray:
-        """(n, 3) float32, of the whole surface; computed where it is first asked for."""
+        """Displacement (n, 3) float32, m, of the whole surface; computed on first use."""
         return surface_response.displacement(
             self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
         )
 
     @property
     def deformed(self) -> np.ndarray:
-        """(n, 3) m, where the surface's nodes are."""
+        """Deformed positions (n, 3) m of the surface's nodes."""
         return self.compliance.surface.rest + self.displacement
 
     @property
     def sensing_gaps(self) -> np.ndarray:
-        """(w,) m, of the sensing points: 19 electrodes, then inner skin over the core, then beside it."""
+        """Gaps (w,) m of the watched points: 19 electrodes, then inner skin over the core, then beside it."""
         return self._gaps(len(self.compliance.watch_gap))
 
     @property
     def electrode_gaps(self) -> np.ndarray:
-        """(19,) m, film over each electrode; none on the DIGIT."""
+        """Film (19,) m over each electrode; none on the DIGIT."""
         return self._gaps(self.compliance.feet)
 
     def _gaps(self, count: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What the fast tier's linear model leaves out, learned from the full tier: a factor of force and a field of shape.
+"""Correct the fast tier's linear model by the full tier: a learned factor of force and a field of shape.
 
 Both are smooth functions of what a fast contact looks like (depth, patch, place, lean, fluid), found by kernel ridge
 regression; nothing depends on which indenter it was. The field is a sum of a few learned fields in a frame that moves
@@ -92,7 +92,9 @@ class Learned:
 
 @dataclasses.dataclass(frozen=True)
 class Correction:
-    """One sensor's: ``still`` without friction, ``rubbing`` with the coefficient of 0.78, between them in between."""
+    """Correction of one sensor: ``still`` without friction, ``rubbing`` with the coefficient of 0.78,
+    interpolated between.
+    """
 
     still: Learned
     rubbing: Learned
@@ -131,7 +133,7 @@ def kernel(a: np.ndarray, b: np.ndarray, b_squares: np.ndarray, width: float) ->
 
 
 def rubs(features: np.ndarray) -> np.ndarray:
-    """Whether contacts of features (..., f) have friction: 0 without it, 1 with as much as was learned from."""
+    """Share of friction in contacts of features (..., f): 0 without it, 1 with as much as was learned from."""
     return np.clip((features[..., _SIDEWAYS] - _STILL) / (_RUBS - _STILL), 0.0, 1.0)
 
 
@@ -165,7 +167,7 @@ def node_frames(sensor: str) -> np.ndarray:
 
 
 def frame(compliance: Compliance, contact: Contact) -> Frame:
-    """Where a contact's fields lie: about the centre of its forces, with its patch's radius."""
+    """Frame of a contact's fields: about the centre of its forces, scaled with its patch's radius."""
     places = plane(compliance.name)[compliance.touchable[contact.nodes]]
     load = np.linalg.norm(contact.nodal_force, axis=1)
     share = load / load.sum()
@@ -175,7 +177,7 @@ def frame(compliance: Compliance, contact: Contact) -> Frame:
 
 
 def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
-    """What a fast contact looks like: (f,) numbers without a unit, lengths over the thickness, stresses over E.
+    """Features (f,) of a fast contact, without units: lengths over the thickness, stresses over E.
 
     All are continuous in the nodal forces, so that a force can be searched for.
     """
@@ -255,7 +257,7 @@ class Corrected:
 
 
 def force_factor(compliance: Compliance, contact: Contact) -> float:
-    """By how much a fast contact's forces are too small."""
+    """Factor by which a fast contact's forces are too small."""
     if not len(contact.nodes):
         return 1.0
     return learned()[compliance.name].factor(features(compliance, contact, frame(compliance, contact)))

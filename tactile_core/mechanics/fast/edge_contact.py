@@ -36,7 +36,7 @@ _DETOUR = 9  # steps, where that does not settle
 
 
 class _Sprung(Frictionless):
-    """With ``slack`` (k,) m, by which points may lie in the indenter before they push."""
+    """Contact with ``slack`` (k,) m, by which points may lie in the indenter before they push."""
 
     most_curved = 10_000  # all of them: along wires every point feels the turn of its normal
     slack: np.ndarray

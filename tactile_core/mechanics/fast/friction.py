@@ -43,7 +43,7 @@ class _Guess:
 
 @dataclasses.dataclass(frozen=True)
 class _Seen:
-    """What guessed forces do, linearised about a place (k, 3) m: gaps (k,) m at nodes and (c,) m at the core.
+    """Effect of guessed forces, linearised about a place (k, 3) m: gaps (k,) m at nodes and (c,) m at the core.
 
     normal, lean : (k, 3), of the indenter and of slipping nodes' friction; slip : (k, 3) m, from the spots
     moves : (k, 3) m, from the place; curved, bend : of the slipping nodes, see ``Slipping``
@@ -73,7 +73,10 @@ class Friction:
         self.indenter, self.pose, self.spots, self.friction = indenter, pose, spots, friction
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """From a first guess to the contact at its depth, or at a force along the motion, N. Raises UnsolvedError."""
+        """Solve from a first guess for the contact at its depth, or at a force along the motion, N.
+
+        Raises UnsolvedError.
+        """
         guess = _Guess(begin.force, begin.core_force, begin.active, begin.slipping, begin.shift)
         state, place, pace, k = begin, begin.displacement, Pace(), self.block.k
         there, calm, left, stuck_again = self.pose.moved(guess.shift), False, np.zeros(k, bool), np.zeros(k, int)
@@ -115,7 +118,7 @@ class Friction:
         return state
 
     def _evaluate_forces(self, guess: _Guess, place, off, there: Pose, gap, normal, *, curved: bool) -> _Seen:  # noqa: ANN001
-        """What the forces do once brought within Coulomb's law at the normals (k, 3) of the place (k, 3) m."""
+        """Effect of the forces after reduction to Coulomb's law at the normals (k, 3) of the place (k, 3) m."""
         k = self.block.k
         guess.force = np.where(guess.active[:k, None], guess.force, 0.0)
         guess.core = np.where(guess.active[k:], np.maximum(guess.core, 0), 0.0)
@@ -139,11 +142,11 @@ class Friction:
         return _Seen(normal, lean, slip, gap + onto, self.core_gap + core_moved, moves, *bend)
 
     def _off(self, points: np.ndarray, there: Pose) -> np.ndarray:
-        """How far points (k, 3) m stand from their spots."""
+        """Offset of points (k, 3) m from their sticking points."""
         return points - there.from_own(self.spots)
 
     def _bend(self, guess: _Guess, place: np.ndarray, there: Pose) -> tuple[np.ndarray, np.ndarray]:
-        """Which slipping nodes (c,) feel the indenter's curvature most, and that (c, 3, 3) 1/m."""
+        """Find the slipping nodes (c,) most affected by the indenter's curvature, and that curvature (c, 3, 3) 1/m."""
         at = np.flatnonzero(guess.slips)
         if not len(at):
             return _FLAT
@@ -177,7 +180,9 @@ class Friction:
         return _Guess(force, core, guess.active, guess.slips, guess.shift + step)
 
     def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap, beyond):  # noqa: ANN001, ANN202
-        """Which points (k + c,) touch and which nodes (k,) slip after a step, and whether that is another answer."""
+        """Update which points (k + c,) touch and which nodes (k,) slip after a step; also returns whether
+        either changed.
+        """
         k = len(gap)
         pressing = dot(guess.force, seen.normal)
         opening = np.concatenate([gap, core_gap])

@@ -18,7 +18,7 @@ from .active_set import Pressing, complement
 from .compliance_block import ComplianceBlock
 from .node_vectors import weighted
 
-GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that MECHANICS allows
+GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that the target allows
 SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up
 FORCE_TOLERANCE = 1e-7  # relative, of the force along the motion where one is asked for
 MAX_ITERATIONS = 60
@@ -39,7 +39,7 @@ _PROGRESS, _SHRINK, _GROW, _LEAST_TRUST = 0.8, 0.6, 1.3, 0.1
 
 @dataclasses.dataclass
 class Try:
-    """One iterate: displacement (k, 3) m, nodal force (k, 3) N, core force (c,) N, shift m along the motion.
+    """Iterate of the solver: displacement (k, 3) m, nodal force (k, 3) N, core force (c,) N, shift m along the motion.
 
     active : (k + c,) bool; settled : whether it fulfils the tolerances; iterations : so far
     slipping : (k,) bool, nodes whose friction is spent
@@ -70,7 +70,7 @@ class _Model(NamedTuple):
 
 
 class Pace:
-    """How far to go along each step: nodes at edges and in creases may swing from one side to the other."""
+    """Length of each step: nodes at edges and in creases may swing from one side to the other."""
 
     def __init__(self) -> None:
         self._trust, self._last, self._calls = 1.0, np.inf, 0
@@ -78,7 +78,7 @@ class Pace:
 
     @property
     def stalled(self) -> bool:
-        """Whether the last iterations have hardly come nearer to the contact than those before them."""
+        """Return true if the last iterations have hardly come nearer to the contact than those before them."""
         best = self._best
         return len(best) >= _HOPE + _WINDOW and best[-1] > _NEARER * best[-1 - _WINDOW]
 
@@ -123,7 +123,10 @@ class Frictionless:
         return gap - np.einsum("ai,ai->a", self.probe, normal), normal
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """From a first guess to the contact at its depth, or at a force along the motion, N. Raises UnsolvedError."""
+        """Solve from a first guess for the contact at its depth, or at a force along the motion, N.
+
+        Raises UnsolvedError.
+        """
         state, place, pace, model, solved = begin, begin.displacement, Pace(), None, None
         gap, normal = self.distance(place, state.shift)
         flips = np.zeros(len(gap), int)

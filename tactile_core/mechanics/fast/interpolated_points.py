@@ -25,7 +25,7 @@ class InterpolatedPoints(NamedTuple):
 
 
 def interpolated_points(lattice: Lattice, touchable: np.ndarray) -> InterpolatedPoints:
-    """Those halfway along the lattice's lines and amid its cells, as far as all their nodes are touchable."""
+    """Points halfway along the lattice's lines and amid its cells, if all their nodes are touchable."""
     rows, columns = lattice.shape
     halves = np.mgrid[: 2 * rows - 1, : 2 * columns - (not lattice.closed)].reshape(2, -1)
     between = halves[:, (halves % 2).any(axis=0)] / 2

@@ -74,8 +74,11 @@ class CorrectedPress:
             return None
 
     def _guarded_if_needed(self, solve: Callable[[], FastContact | None]) -> FastContact | None:
-        """What ``solve`` finds; where frictionless nodes do not hold the indenter, with points between them, from the
-        start and from then on."""
+        """Solve; where frictionless nodes do not hold the indenter, solve again from the start with points between
+        them, kept from then on.
+
+        between them, solved from the start, and from then on.
+        """
         try:
             found = solve()
             if found is None or found.linear.converged or not self._may_be_guarded():
@@ -88,7 +91,7 @@ class CorrectedPress:
         return solve()
 
     def _may_be_guarded(self) -> bool:
-        """Whether nodes may slide off the indenter, and the surface between them can bend round it."""
+        """Return true if nodes may slide off the indenter, and the surface between them can bend round it."""
         if self.problem.friction or isinstance(self.problem, EdgeContactProblem):
             return False
         rest = self.compliance.surface.rest[self.compliance.touchable[self.problem.nodes_near]]
@@ -154,7 +157,7 @@ class CorrectedPress:
         return found
 
     def _power(self, before: tuple[float, float] | None, found: tuple[float, float]) -> float:
-        """By which power the corrected force grows with the linear one, between two contacts; kept for the next."""
+        """Power by which the corrected force grows with the linear one, between two contacts; kept for the next."""
         if before is not None and min(*before, *found) > 0:
             linear, corrected = np.log(found) - np.log(before)
             if abs(linear) > _POWER_FROM:

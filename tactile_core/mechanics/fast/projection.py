@@ -1,4 +1,4 @@
-"""Where surface nodes meet an indenter that moves onto them."""
+"""Find where surface nodes meet an indenter that moves onto them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
 
 
 def first_contact(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Where points that move straight from ``first`` to ``last`` (n, 3) m first meet an indenter, in its frame (n, 3).
+    """Points (n, 3) where nodes that move straight from ``first`` to ``last`` (n, 3) m first meet an indenter, in its
+    frame.
 
     Points that it does not meet are given as they stand at the end.
     """

@@ -1,4 +1,4 @@
-"""What is watched inside a solid while its surface is pressed: electrodes' feet, nodes over the core and beside it."""
+"""Watched points inside a solid while its surface is pressed: electrodes' feet, nodes over the core and beside it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 
 
 class SensingPoints(NamedTuple):
-    """What turns a displacement into the change of w gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
+    """Map from a displacement to the change of w watched gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
 
     rows, columns : (k,) int; weights : (k,); gap : (w,) m
     """
@@ -58,7 +58,7 @@ def sensing_nodes() -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class ElectrodeFeet:
-    """Where the film over each electrode ends on the inner skin: face, weights, direction (19, 3), gap (19,) m."""
+    """Ends of the film over each electrode on the inner skin: face, weights, direction (19, 3), gap (19,) m."""
 
     face: np.ndarray
     weights: np.ndarray
@@ -94,7 +94,7 @@ def _beside_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _right_images(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Whether nodes (n,) of the inner skin lie on the side z < 0, (n,) bool, and the one of each pair with z >= 0."""
+    """Mark nodes (n,) of the inner skin on the side z < 0, (n,) bool, and return the one of each pair with z >= 0."""
     rest = biotac.skin_surface("inner").rest
     mirrored = rest[nodes, 2] < -ON_PLANE
     return mirrored, np.where(mirrored, mirror_nodes(rest)[nodes], nodes)
@@ -116,8 +116,9 @@ def facing_nodes(mesh: HexMesh) -> np.ndarray:
 
 
 def images(mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """For each of ``count`` sensing points the one whose mirror image it is, else itself; and whether it is an
-    image."""
+    """Index, for each of ``count`` watched points, of the one whose mirror image it is, else itself; true for
+    images.
+    """
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count
     for nodes in (_beside(mesh), facing_nodes(mesh)) if count else ():

@@ -1,4 +1,4 @@
-"""One Newton step of a contact with Coulomb friction, in the forces of all touching points at once.
+"""Newton step of a contact with Coulomb friction, in the forces of all touching points at once.
 
 A sticking node bears any force and may not move. A slipping node has two unknowns: its normal force, on which friction
 leans, and the turn of friction across that; its gap closes, and friction stays opposite to the slip. Where the normal
@@ -44,12 +44,12 @@ class Slipping:
 
     @functools.cached_property
     def across(self) -> np.ndarray:
-        """(s, 3), unit vectors across the normal and friction."""
+        """Unit vectors (s, 3) across the normal and friction."""
         return cross(self.normal, self.lean)
 
     @functools.cached_property
     def limit(self) -> np.ndarray:
-        """(s,) N, of friction."""
+        """Limit (s,) N of friction."""
         return self.friction * np.maximum(self.pressing, LEAST_FORCE)
 
     def turning(self) -> np.ndarray:
@@ -107,7 +107,7 @@ class Step:
         self._answer = _solved(matrix, right, symmetric=not s)
 
     def step_for(self, missing: float) -> float:
-        """By how far, m, the indenter moves for ``missing`` N more along its motion. Raises UnsolvedError."""
+        """Distance, m, that the indenter moves for ``missing`` N more along its motion. Raises UnsolvedError."""
         carried, per_step = self._carry @ self._answer
         if not per_step > 0:
             raise UnsolvedError("no node can carry the force")
@@ -154,14 +154,16 @@ class Step:
         return among[:total], reduced, carry
 
     def _add_motion(self, among: np.ndarray, on_slips: np.ndarray) -> None:
-        """What the motion of curved nodes does, by the turn of their forces, as the last columns of ``among``."""
+        """Add the effect of the motion of curved nodes, by the turn of their forces, as the last columns of
+        ``among``.
+        """
         at, turning = self._slipping.curved, self._slipping.turning()
         felt = weighted(on_slips[:, :, at, None], turning.swapaxes(0, 1)[:, None])
         among[: on_slips.shape[1], -3 * len(at) :].reshape(-1, len(at), 3)[:] = felt
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray, *, symmetric: bool) -> np.ndarray:
-    """What solves (j, j) for ``right`` (j, 2); overwrites the matrix."""
+    """Solve the system (j, j) for ``right`` (j, 2); overwrites the matrix."""
     from scipy.linalg import lapack
 
     if not len(matrix):

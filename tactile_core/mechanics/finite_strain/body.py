@@ -27,7 +27,7 @@ Sensor = Literal["biotac", "digit"]
 
 # m of a load step: without friction one is enough from rest, unless it fails and is halved; friction follows a path.
 ONE_STEP, FRICTION_STEP = 5e-3, 0.25e-3
-# Gaps to 1/100 of the penetration that MECHANICS allows. A last step of 0.15 um left forces in balance to 1e-6.
+# Gaps to 1/100 of the penetration that the target allows. A last step of 0.15 um left forces in balance to 1e-6.
 _FULL = Tolerance(10e-9, 1e-7, 0.15e-6)
 _FIRST_SHARE = {"biotac": 0.7, "digit": 0.5}  # a ball on a half-space touches where it overlaps by half of the depth
 _REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth may come to touch it
@@ -72,7 +72,9 @@ class Body:
         return faces[np.isin(faces, near).all(axis=1)]
 
     def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
-        """Depth, m, of the surface in the indenter between nodes; PenetrationError where it does not follow."""
+        """Penetration, m, of the surface into the indenter between nodes; raises PenetrationError where it does not
+        follow it.
+        """
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"
@@ -86,7 +88,7 @@ class Body:
         return self.graded.on_lattice(moved)
 
     def contact_patch(self, touch: ContactState) -> np.ndarray:
-        """(n,) bool, lattice nodes that carry force."""
+        """Mark (n,) bool the lattice nodes that carry force."""
         flags = np.isin(self.solid.mesh.surface, touch.nodes[touch.pressing > 0])
         return self.graded.nearest_on_lattice(flags)
 

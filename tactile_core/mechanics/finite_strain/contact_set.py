@@ -52,23 +52,23 @@ class ContactSet:
 
     @classmethod
     def none(cls) -> ContactSet:
-        """Nothing touches."""
+        """Return the state without contact."""
         flags = np.zeros(0, bool)
         return cls(np.empty(0, int), flags, flags, _NO_WAY, np.empty(0), _NO_WAY, _NO_WAY)
 
     @property
     def nodes(self) -> np.ndarray:
-        """(k,) mesh nodes that touch."""
+        """Mesh nodes (k,) that touch."""
         return self.candidates[self.active]
 
     @property
     def forces(self) -> np.ndarray:
-        """(k, 3) N, of the obstacle on ``nodes``."""
+        """Forces (k, 3) N of the obstacle on ``nodes``."""
         return self.pressing[:, None] * self.normals + self.rubbing
 
     @property
     def slips(self) -> bool:
-        """Whether any touching node slips against friction."""
+        """Return true if any touching node slips against friction."""
         return self.friction > 0 and bool((self.active & self.slipping).any())
 
     def gaps(self, at: np.ndarray) -> np.ndarray:
@@ -143,7 +143,7 @@ class ContactSet:
         self.rubbing, self.slipping[self.active] = self._capped(self._trial)
 
     def _capped(self, trial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What is left (k, 3) of pulls (k, 3) N, and which (k,) slip."""
+        """Limit pulls (k, 3) N by friction; returns what is left (k, 3), and which (k,) slip."""
         bound, size = self.friction * np.maximum(self.pressing, 0), np.linalg.norm(trial, axis=1)
         slips = size > bound
         return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips
@@ -213,7 +213,7 @@ class ContactSet:
         return held, step
 
     def rubbing_in_frames(self) -> np.ndarray:
-        """(k, 3) N, friction in the frames of ``begin``."""
+        """Friction (k, 3) N in the frames of ``begin``."""
         if not self.friction:
             return np.zeros((int(self.active.sum()), 3))
         return np.einsum("kji,kj->ki", self._frames, self.rubbing)

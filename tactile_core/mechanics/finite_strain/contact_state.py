@@ -34,17 +34,17 @@ class ContactState:
 
     @property
     def nodes(self) -> np.ndarray:
-        """(k,) mesh nodes that the indenter touches."""
+        """Mesh nodes (k,) that the indenter touches."""
         return self.outer.nodes
 
     @property
     def pressing(self) -> np.ndarray:
-        """(k,) N, normal forces of the indenter on ``nodes``."""
+        """Normal forces (k,) N of the indenter on ``nodes``."""
         return self.outer.pressing
 
     @property
     def normals(self) -> np.ndarray:
-        """(k, 3), of the indenter at ``nodes``."""
+        """Normals (k, 3) of the indenter at ``nodes``."""
         return self.outer.normals
 
     @property

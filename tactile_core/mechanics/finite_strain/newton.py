@@ -92,7 +92,7 @@ class FiniteStrainContact:
             self._cavity_places = solid.pattern.find(rows, columns)
 
     def start(self) -> ContactState:
-        """Nothing is deformed; a pre-inflated skin finds its shape in the first step."""
+        """Return the undeformed state; a pre-inflated skin finds its shape in the first step."""
         return ContactState(0.0, self.pose, self.solid.rest(), ContactSet.none(), ContactSet.none(), NO_PUSH)
 
     def press(self, depth: float, start: ContactState | None = None, step: float = 0.1e-3) -> ContactState:
@@ -152,7 +152,7 @@ class FiniteStrainContact:
         return dataclasses.replace(self._stiffened(touch), steps=steps)
 
     def _solve(self, pose: Pose, start: ContactState, spring: float = _SPRING) -> ContactState:
-        """One load step, from a solved contact; spring : stiffness of those between nodes, over a node's own."""
+        """Solve one load step, from a solved contact; spring : stiffness of those between nodes, over a node's own."""
         state, fluid = start.state.copy(), start.fluid
         at = self._at(state)
         outer = start.outer.carried(
@@ -185,7 +185,9 @@ class FiniteStrainContact:
         raise _NotConvergedError
 
     def _share(self, state: State, step: np.ndarray) -> float:
-        """How much of a step leaves every Gauss point a good part of its volume; FloatingPointError where none does."""
+        """Share of a step that leaves every Gauss point a good part of its volume; FloatingPointError where
+        none does.
+        """
         before = self.solid.deformation(state.displacement)[1]
         for share in _SHARES:
             if (self.solid.deformation(state.displacement + share * step)[1] > _KEPT_VOLUME * before).all():
@@ -193,13 +195,13 @@ class FiniteStrainContact:
         raise FloatingPointError("a cell would be turned inside out")
 
     def _push(self, start: ContactState, outer: ContactSet, at: np.ndarray, spring: float) -> Push:
-        """Of the indenter on the surface between nodes, where that is guarded."""
+        """Push of the indenter on the surface between nodes, where that is guarded."""
         if not (start.guarded and outer.obstacle):
             return NO_PUSH
         return self._between.push(outer.obstacle, at, spring * self._factor.stiffness)
 
     def _lets_through(self, touch: ContactState) -> bool:
-        """Whether the indenter has come in between nodes."""
+        """Return true if the indenter has come in between nodes."""
         obstacle, at = touch.outer.obstacle, self._at(touch.state)
         return bool(self._between and obstacle and self._between.deepest(obstacle, at) > LET_THROUGH)
 

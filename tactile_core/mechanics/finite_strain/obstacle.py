@@ -1,4 +1,4 @@
-"""What a solid may touch: a rigid body with a distance, its normal and its curvature."""
+"""Obstacle that a solid may touch: a rigid body with a distance, its normal and its curvature."""
 
 from __future__ import annotations
 

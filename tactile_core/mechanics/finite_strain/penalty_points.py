@@ -1,9 +1,9 @@
-"""What keeps an indenter out between the nodes of a surface, where it is sharper than they are dense.
+"""Penalty points that keep an indenter out between the nodes of a surface, where it is sharper than they are dense.
 
 Nodes touch exactly (``contact_set``). Without friction they slide off edges, which would then cut in between them and
-find no equilibrium. Where a contact lets the indenter through, or is not found, points halfway between nodes push
-back, each by a stiff spring (a penalty: P. Wriggers, Computational Contact Mechanics, 2006, chapter 6). All other
-contacts are left to the nodes alone.
+find no equilibrium. Where a contact lets the indenter through, or is not found, points halfway between nodes push back,
+each by a stiff spring (a penalty: P. Wriggers, Computational Contact Mechanics, 2006, chapter 6). All other contacts
+are left to the nodes alone.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NEAR = 100e-6
 
 
 def _weights() -> np.ndarray:
-    """(16, 9), of a face's nodes, for its points halfway between them."""
+    """Weights (16, 9) of a face's nodes, for its points halfway between them."""
     line, _ = quadratic(np.array([-1.0, -0.5, 0.0, 0.5, 1.0]))
     every = np.einsum("ib,ja->ijba", line, line).reshape(25, 9)
     return every[every.max(axis=1) < 1]
@@ -48,11 +48,11 @@ class Push:
 
     @property
     def total(self) -> np.ndarray:
-        """(3,) N."""
+        """Total force (3,) N."""
         return self.force.sum(axis=0)
 
     def loads(self, n: int) -> np.ndarray:
-        """(n, 3) N, on a mesh's n nodes."""
+        """Loads (n, 3) N on a mesh's n nodes."""
         loads = np.zeros((n, 3))
         np.add.at(loads, self.nodes, self.weights[:, :, None] * self.force[:, None])
         return loads
@@ -72,14 +72,14 @@ class PenaltyPoints:
         self._nodes, self._weights = np.repeat(faces, len(_WEIGHTS), axis=0), np.tile(_WEIGHTS, (len(faces), 1))
 
     def deepest(self, obstacle: Obstacle, at: np.ndarray) -> float:
-        """How deep, m, the deepest point lies in an obstacle."""
+        """Penetration, m, of the deepest point into an obstacle."""
         return max(-float(obstacle.distance(self._points(at))[0].min(initial=0.0)), 0.0)
 
     def _points(self, at: np.ndarray) -> np.ndarray:
         return np.einsum("pa,pai->pi", self._weights, at[self._nodes])
 
     def push(self, obstacle: Obstacle, at: np.ndarray, stiffness: float) -> Push:
-        """What an obstacle does to the points.
+        """Push of an obstacle on the points.
 
         at : (n, 3) m, the mesh's nodes; stiffness : N/m, of each point's spring
         """

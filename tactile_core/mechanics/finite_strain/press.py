@@ -104,12 +104,12 @@ class FullPress:
         raise TactileError(f"full tier, {self.sensor}", f"{found.axial_force:.4g} N", f"{force:.4g} N", "Another force")
 
     def surface_drop(self, pose: Pose) -> float:
-        """How much farther in, m, than at the press's own pose the resting surface lies under a slid one."""
+        """Additional distance, m, to the resting surface under a slid pose, against the press's own pose."""
         return surface_drop(sensors.sensor_surface(self.sensor), self.indenter, self.pose, pose)
 
 
 def full_contact(body: Body, touch: ContactState) -> FullContact:
-    """What a paired contact needs of a solved one."""
+    """Extract from a solved contact the values that a paired contact needs."""
     mesh = body.solid.mesh
     weight = np.linalg.norm(touch.outer.forces, axis=1)
     centre = weight @ mesh.nodes[touch.nodes][:, [0, 2]] / max(weight.sum(), 1e-30)

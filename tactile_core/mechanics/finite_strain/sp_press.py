@@ -40,7 +40,8 @@ class Plate(Indenter):
 
 @dataclasses.dataclass(frozen=True)
 class Pressed:
-    """One step. advance : m, of the plate past the place where it first touches the resting skin (negative: before).
+    """Step of a press. advance : m, of the plate past the place where it first touches the resting skin (negative:
+        before).
 
     skin : (k, 3) m, nodes of the whole deformed outer skin; force : N, normal, ``FORCE_SCALE`` in it
     pressure : Pa, of the fluid, likewise; volume : m3, of the fluid; core_gap : m, least between inner skin and core
@@ -76,7 +77,7 @@ class SpPress:
 
     @property
     def fluid_volume(self) -> float:
-        """m3 of fluid, which the initial pressure sets and no press changes."""
+        """Volume of the fluid, m3, which the initial pressure sets and no press changes."""
         return (2 if self.mirrored else 1) * self.contact.volume
 
     def steps(self, advances: np.ndarray) -> list[Pressed]:

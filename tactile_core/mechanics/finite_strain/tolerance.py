@@ -1,4 +1,4 @@
-"""When Newton's iteration for a contact of finite strain ends."""
+"""Criteria that end Newton's iteration for a contact of finite strain."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import dataclasses
 
 @dataclasses.dataclass(frozen=True)
 class Tolerance:
-    """When an iteration ends.
+    """Criteria that end an iteration.
 
     gap : m, of every touching node; balance : of the largest nodal force and of the fluid's volume, before the last
-    step; step : m, a last step so small that, Newton's method being quadratic, the balance after it is good
+        step; step : m, a last step so small that, Newton's method being quadratic, the balance after it is good
     """
 
     gap: float

@@ -51,7 +51,7 @@ class Solution:
 
 
 def attached_to(sensor: str, mesh: TetMesh) -> np.ndarray:
-    """Which nodes (n,) bool of a mesh in the sensors' frame are glued to the BioTac's core or to the DIGIT's back.
+    """Mark nodes (n,) bool of a mesh in the sensors' frame that are glued to the BioTac's core or to the DIGIT's back.
 
     The core is our own table of it: on the public mesh 354 nodes, of which 294 are among the 532 that ``near_body``
     finds with the core's own mesh; the others lie on the far side and at the base.
@@ -68,7 +68,7 @@ def attached_to(sensor: str, mesh: TetMesh) -> np.ndarray:
 
 
 def near_body(mesh: TetMesh, path: str | os.PathLike) -> np.ndarray:
-    """Which nodes (n,) bool lie in or within 0.02 mm of a rigid body, a closed triangle mesh in metres (OBJ, STL, PLY).
+    """Mark nodes (n,) bool in or within 0.02 mm of a rigid body, a closed triangle mesh in metres (OBJ, STL, PLY).
 
     Raises TactileError for a file that is no such mesh, or that touches too few nodes or all.
     """

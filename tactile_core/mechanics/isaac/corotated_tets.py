@@ -42,11 +42,11 @@ class CorotatedTets:
 
     @functools.cached_property
     def pattern(self) -> BlockPattern:
-        """Where the stiffness matrix has entries."""
+        """Sparsity pattern of the stiffness matrix."""
         return BlockPattern(self.mesh.cells, self.mesh.clamped)
 
     def rest(self) -> State:
-        """No displacement; this solid has no pressure unknowns."""
+        """Return the state without displacement; this solid has no pressure unknowns."""
         return State(np.zeros_like(self.mesh.nodes), np.zeros(0))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +101,7 @@ class Linearised:
     stiffness: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """(3 n,) N; there is nothing to condense."""
+        """Internal force (3 n,) N; there is nothing to condense."""
         size = self.solid.mesh.nodes.size
         return np.bincount(self.solid.dofs.ravel(), self.force.ravel(), minlength=size)
 
@@ -114,5 +114,5 @@ class Linearised:
         return self.solid.pattern.sparse(self.blocks()).tocsc()
 
     def pressure_step(self, step: np.ndarray) -> np.ndarray:
-        """Nothing: the pressures are no unknowns here."""
+        """Do nothing: the pressures are no unknowns here."""
         return np.zeros(0)

@@ -34,7 +34,7 @@ class TetMesh:
 
     @property
     def surface(self) -> np.ndarray:
-        """(n_faces, 3) int, the triangles of the boundary, normals outward."""
+        """Triangles (n_faces, 3) int of the boundary, normals outward."""
         faces = self.cells[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
         _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
         return faces[np.sort(first[count == 1])]

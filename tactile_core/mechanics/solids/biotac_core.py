@@ -63,7 +63,7 @@ def _spline():  # noqa: ANN202 (scipy is imported only where it is needed)
 
 
 def facing_core(nodes: np.ndarray) -> np.ndarray:
-    """Which of the resting inner-skin nodes (n, 3) m may come to touch the core: (n,) bool.
+    """Mark the resting inner-skin nodes (n, 3) m that may come to touch the core: (n,) bool.
 
     Under the pad, within the table, and clear of the core by 0.1 mm: nearer ones lie beside it and hardly move.
     """

@@ -1,4 +1,4 @@
-"""Where the 3 x 3 blocks of a stiffness matrix lie: worked out once for a mesh, filled in every iteration."""
+"""Pattern of the 3 x 3 blocks of a stiffness matrix: computed once for a mesh, filled in every iteration."""
 
 from __future__ import annotations
 

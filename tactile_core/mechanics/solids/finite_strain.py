@@ -61,11 +61,11 @@ class FiniteStrainSolid:
 
     @functools.cached_property
     def pattern(self) -> BlockPattern:
-        """Where the stiffness matrix has entries."""
+        """Sparsity pattern of the stiffness matrix."""
         return BlockPattern(self.mesh.cells, self.mesh.clamped)
 
     def rest(self) -> State:
-        """No displacement, no pressure."""
+        """Return the state without displacement and pressure."""
         return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 4)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,7 +134,7 @@ class Linearised:
     pressure_gap: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """(3 n,) N; ``condensed`` as the Newton step needs it."""
+        """Internal force (3 n,) N; ``condensed`` as the Newton step needs it."""
         values = self.condensed if condensed else self.residual
         size = 3 * len(self.solid.mesh.nodes)
         return np.bincount(self.solid.dofs.ravel(), values.ravel(), minlength=size)

@@ -21,11 +21,11 @@ class FluidCavity:
         self.faces, self.n_nodes = faces, n_nodes
 
     def volume(self, nodes: np.ndarray) -> float:
-        """m3, for node positions (n_nodes, 3) m."""
+        """Volume, m3, for node positions (n_nodes, 3) m."""
         return float((nodes.ravel() @ self.gradient(nodes)) / 3)
 
     def gradient(self, nodes: np.ndarray) -> np.ndarray:
-        """dV / d(node) (3 n_nodes,), m2."""
+        """Gradient dV / d(node) (3 n_nodes,), m2."""
         corners = nodes[self.faces]
         parts = 3 * np.cross(corners[:, None], self._arms(corners)).sum(axis=2)
         gradient = np.zeros((self.n_nodes, 3))
@@ -33,7 +33,9 @@ class FluidCavity:
         return gradient.ravel()
 
     def hessian(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """d2V / d(node)2: node pairs (k,), (k,) and the sum's 3 x 3 blocks (k, 3, 3), m, of each; pairs come again."""
+        """Hessian d2V / d(node)2: node pairs (k,), (k,) and the 3 x 3 blocks (k, 3, 3), m, of each; repeated
+        pairs add up.
+        """
         arms = self._arms(nodes[self.faces])
         rows, columns = np.repeat(self.faces, 9, axis=1).ravel(), np.tile(self.faces, (1, 9)).ravel()
         return rows, columns, -6 * _cross_matrix(arms.reshape(-1, 3))

@@ -115,7 +115,7 @@ def skin_mesh() -> HexMesh:
 
 @functools.cache
 def glued_skin() -> np.ndarray:
-    """Which inner points of the skin's grid (stations, columns) lie on or in the core."""
+    """Mark the inner points of the skin's grid (stations, columns) that lie on or in the core."""
     inner = biotac.skin_grid("inner")
     return _on_core(inner.reshape(-1, 3)).reshape(inner.shape[:2])
 

@@ -32,7 +32,9 @@ class NeoHookean:
 
     @classmethod
     def from_material(cls, material: Material) -> NeoHookean:
-        """mu = E / (2 (1 + nu)), kappa = E / (3 (1 - 2 nu)): the linear material at small strain."""
+        """Return the material with mu = E / (2 (1 + nu)), kappa = E / (3 (1 - 2 nu)): the linear one at small
+        strain.
+        """
         shear = material.youngs / (2 * (1 + material.poisson))
         return cls(shear, material.youngs / (3 * (1 - 2 * material.poisson)))
 

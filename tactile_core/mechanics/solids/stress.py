@@ -44,7 +44,7 @@ def _points(solid: FiniteStrainSolid, state: State):  # noqa: ANN202 (batches of
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """sqrt(3/2 s : s) (...,) Pa of stresses (..., 3, 3), s their deviator."""
+    """Von Mises stress sqrt(3/2 s : s) (...,) Pa of stresses (..., 3, 3), s their deviator."""
     mean = np.einsum("...ii->...", stress) / 3
     deviator = stress - mean[..., None, None] * np.eye(3)
     return np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator))
@@ -77,6 +77,6 @@ def _trilinear(points: np.ndarray) -> np.ndarray:
 
 
 def _node_places() -> np.ndarray:
-    """(27, 3) of a cell's nodes in its own coordinates, ``HexMesh``'s order."""
+    """Coordinates (27, 3) of a cell's nodes in its own frame, ``HexMesh``'s order."""
     c, b, a = np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij")
     return np.stack([a, b, c], -1).reshape(-1, 3)

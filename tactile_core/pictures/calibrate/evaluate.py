@@ -1,6 +1,6 @@
 """A calibration tried on photographs: three numbers a press are fitted, and the picture is held against the photograph.
 
-The null answer stands beside each figure: the background alone, as if nothing had touched the gel.
+The baseline stands beside each metric: the background alone, as if nothing had touched the gel.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ TARGETS = {
 
 @dataclasses.dataclass(frozen=True)
 class Evaluation:
-    """One photograph's trial.
+    """Result of a calibration on one photograph.
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
     picture : (H, W, 3) uint8, rendered; figures, null : by the names of FIGURES; flags : in words
@@ -52,7 +52,7 @@ def evaluate_unit(
     search_radius: bool = True,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Each press of the photographs under a calibration; radius : m, of the ball.
+    """Evaluate a calibration on each press of the photographs; radius : m, of the ball.
 
     Raises TactileError for photographs of another shape than the calibration's pictures.
     """
@@ -97,7 +97,7 @@ def _try_press(
 
 
 def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
-    """What is wrong with a photograph, in words; now that the ball's place is known, whether the edge cuts it."""
+    """Describe what is wrong with a photograph; as the ball's place is known by now, also whether the edge cuts it."""
     camera = bench.camera
     contact = CONTACT_SHARE * np.sqrt(2 * ball.radius * ball.depth)
     over_right = abs(ball.right) + contact > camera.width / 2 * camera.pixel_size[0]
@@ -106,7 +106,7 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
 
 
 def mean_figures(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
-    """Means over presses of the figures and of the null's; NaN ones left out, NaN where all are."""
+    """Means over presses of the metrics and of the baseline's; NaN ones left out, NaN where all are."""
     means = []
     for which in ("figures", "null"):
         rows = [getattr(each, which) for each in tried]

@@ -38,7 +38,7 @@ class Calibrated:
 
 
 def check_diameter(ball_diameter: float) -> None:
-    """Raises TactileError for a ball, m, that does not fit on the gel."""
+    """Raise TactileError for a ball, m, that does not fit on the gel."""
     if not MM_LIMITS[0] <= 1e3 * ball_diameter <= MM_LIMITS[1]:
         expected = f"{MM_LIMITS[0]:g} to {MM_LIMITS[1]:g}"
         raise TactileError("ball diameter, mm", f"{1e3 * ball_diameter:g}", expected)
@@ -167,7 +167,7 @@ class _Search:
         return self._problem.unit(self._x)
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Standard errors by name, and the names of what the photographs tell too little of.
+        """Standard errors by name, and the names of parameters that the photographs do not determine.
 
         The errors count what is assumed of units as one more measurement; misfits of the model as MODEL_ERROR.
         """

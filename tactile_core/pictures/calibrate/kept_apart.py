@@ -1,4 +1,4 @@
-"""What a calibration is worth on presses that it was not fitted on, and how photographs lie."""
+"""Evaluate a calibration on presses that it was not fitted on, and check the layout of photographs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CLEARLY = 0.8  # of what is unexplained as they are given, that another way may 
 
 
 def check_orientation(photographs: Photographs, ball_diameter: float, start: Calibration) -> None:
-    """Raises TactileError for photographs that another way of laying them explains clearly better; ball_diameter : m.
+    """Raise TactileError for photographs that another way of laying them explains clearly better; ball_diameter : m.
 
     The other four of the eight ways change the pictures' shape, and are told by that.
     """
@@ -55,7 +55,9 @@ def tried_apart(
     start: Calibration,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Each press under a calibration fitted on the others, by thirds; none for a single press. ball_diameter : m."""
+    """Evaluate each press with a calibration fitted on the others, by thirds; none for a single press.
+    ball_diameter : m.
+    """
     names = [press.name for press in photographs.presses]
     folds = min(FOLDS, len(names))
     tried = []
@@ -69,7 +71,7 @@ def tried_apart(
 
 
 def check_worth(tried: list[Evaluation]) -> None:
-    """Raises TactileError for a calibration that explains its presses no better than the background."""
+    """Raise TactileError for a calibration that explains its presses no better than the background."""
     ours, null = mean_figures(tried)
     if not ours["roi_l1"] <= WORTH * null["roi_l1"]:
         found = f"{ours['roi_l1']:.1f} levels off in the region of the press, the background alone {null['roi_l1']:.1f}"

@@ -15,7 +15,7 @@ class Problem(Protocol):
     """A sum of squares over parameters x (n,)."""
 
     def cost(self, x: np.ndarray) -> float:
-        """Half the sum at x; infinity where x means nothing."""
+        """Return half the sum of squares at x; infinity where x is meaningless."""
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gauss-Newton's matrix (n, n) and the gradient (n,) of the cost, at the x of the last cost that was taken."""

@@ -1,4 +1,4 @@
-"""How the light drifts between photographs: a smooth change of the whole picture, which is no press."""
+"""Drift of the light between photographs: a smooth change of the whole picture, which is no press."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SOFTNESS = 3.0  # grey levels: what lies farther from the drift than twice that 
 
 
 def lighting_drift(change: np.ndarray) -> np.ndarray:
-    """(H, W, 3) float32 grey levels: the quadratic nearest most of a photograph's change (H, W, 3).
+    """Drift (H, W, 3) float32 grey levels: the quadratic nearest most of a photograph's change (H, W, 3).
 
     By iteratively reweighted least squares with Geman and McClure's weights, from the median; a press that covers less
     than half of the picture counts for next to nothing.
@@ -37,6 +37,6 @@ def _middles(count: int, step: int, size: int) -> np.ndarray:
 
 
 def _terms(down: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """(H, W, 6): 1, right, down and their products."""
+    """Terms (H, W, 6): 1, right, down and their products."""
     down, right = np.meshgrid(down, right, indexing="ij")
     return np.stack([np.ones_like(down), right, down, right * right, right * down, down * down], axis=-1)

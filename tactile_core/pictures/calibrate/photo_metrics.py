@@ -1,4 +1,4 @@
-"""How far a picture is from a photograph of a press: the figures of ``tactile calibrate --test``, grey levels."""
+"""Metrics of a picture against a photograph of a press, as in ``tactile calibrate --test``, grey levels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _C1, _C2 = (0.01 * PEAK) ** 2, (0.03 * PEAK) ** 2
 
 
 def figures(picture: np.ndarray, photograph: np.ndarray, background: np.ndarray, region: np.ndarray) -> dict:
-    """roi_l1, roi_psnr, roi_ssim, frame_l1, lobe_iou of a picture (H, W, 3) against a photograph (H, W, 3).
+    """Compute roi_l1, roi_psnr, roi_ssim, frame_l1, lobe_iou of a picture (H, W, 3) against a photograph (H, W, 3).
 
     region : (H, W) bool; background : (H, W, 3). lobe_iou is NaN where neither of the two has a lobe.
     """

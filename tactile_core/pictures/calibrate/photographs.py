@@ -26,7 +26,7 @@ NOISE_LIMIT = 15  # grey levels; more is dust or the rim of a press
 
 @dataclasses.dataclass(frozen=True)
 class Press:
-    """One photograph of a press.
+    """Photograph of a press.
 
     picture : (H, W, 3) uint8; drift : (H, W, 3) float32, grey levels, by which the light had drifted
     change : (H, W, 3) float32, grey levels, picture less background and drift; touched : (H, W) bool, near large ones
@@ -44,7 +44,7 @@ class Press:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """(row, column) of the change's centre of mass."""
+        """Centre of mass (row, column) of the change."""
         weight = np.abs(self.change).max(-1) * self.touched
         rows, columns = np.indices(weight.shape)
         return float((weight * rows).sum() / weight.sum()), float((weight * columns).sum() / weight.sum())
@@ -65,12 +65,12 @@ class Photographs:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(H, W) of each photograph, pixels."""
+        """Shape (H, W) of each photograph, pixels."""
         return self.background.shape[:2]
 
 
 def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | None = None) -> Photographs:
-    """All pictures of a folder, by name; without a background photograph it is estimated.
+    """Read all pictures of a folder, by name; without a background photograph it is estimated.
 
     Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
     pictures to tell the background.
@@ -104,7 +104,7 @@ def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | 
 
 
 def chosen(photographs: Photographs, names: list[str]) -> Photographs:
-    """Some presses of a set, with the whole set's background; raises TactileError for a name that is none."""
+    """Select presses of a set, with the whole set's background; raises TactileError for an unknown name."""
     by_name = {press.name: press for press in photographs.presses}
     for name in names:
         if name not in by_name:
@@ -150,13 +150,13 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """(H, W) bool: some channel differs by more than 18 levels within 9 px; from the photograph alone."""
+    """Mask (H, W) bool where some channel differs by more than 18 levels within 9 px; from the photograph alone."""
     changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
     return dilated(changed, DILATION)
 
 
 def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
-    """mask (H, W) grown by a disc of a radius in px."""
+    """Grow a mask (H, W) by a disc of a radius in px."""
     height, width = mask.shape
     padded = np.zeros((height + 2 * radius, width + 2 * radius + 1), np.int32)
     padded[radius : radius + height, radius + 1 : radius + 1 + width] = mask

@@ -1,4 +1,4 @@
-"""Where and how deep the ball of a photograph was pressed, under a known calibration."""
+"""Fit the place and depth at which the ball of a photograph was pressed, under a known calibration."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Ball:
 
     @property
     def numbers(self) -> tuple[float, float, float, float]:
-        """right, down, depth, radius, all m."""
+        """Parameters right, down, depth, radius, all m."""
         return self.right, self.down, self.depth, self.radius
 
 
 class Sight:
-    """What a fit looks at: a photograph's change (h, w, 3) in working pixels, and which of them count (h, w)."""
+    """Data of a fit: a photograph's change (h, w, 3) in working pixels, and which of them count (h, w)."""
 
     def __init__(self, press: Press) -> None:
         factor = working_factor(press.picture.shape[1], press.picture.shape[0])
@@ -83,7 +83,9 @@ class _PressProblem:
         return (self._bench.change(ball) - self._sight.change)[self._sight.counts].ravel()
 
     def cost(self, x: np.ndarray) -> float:
-        """Half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off the picture and the table."""
+        """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off the picture
+        and the table.
+        """
         radius = x[3] if len(x) > 3 else self._radius
         inside = np.abs(x[0]) < -2 * self._bench.right[0, 0] and np.abs(x[1]) < -2 * self._bench.down[0, 0]
         if not (inside and SHALLOWEST <= x[2] <= DEEPEST * radius / 3e-3 and SMALLEST_BALL <= radius <= LARGEST_BALL):

@@ -1,4 +1,4 @@
-"""What a trial of a calibration leaves: rows with the null beside them, and a sheet to look at."""
+"""Report an evaluation of a calibration: rows with the baseline beside them, and a sheet of pictures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round gr
 
 
 def rows_of(tried: list[Evaluation], name: str) -> list[Row]:
-    """One row a figure, means over presses; name : of the set of photographs."""
+    """Make one row a metric, means over presses; name : of the set of photographs."""
     ours, null = mean_figures(tried)
     rows = []
     for figure, (unit, target, better) in TARGETS.items():
@@ -29,7 +29,7 @@ def rows_of(tried: list[Evaluation], name: str) -> list[Row]:
 
 
 def rows_by_press(tried: list[Evaluation]) -> list[Row]:
-    """One row a figure and press, and where the ball was found."""
+    """Make one row a metric and press, and rows of where the ball was found."""
     rows = []
     for each in tried:
         name = each.press.name

@@ -69,7 +69,7 @@ class UnitResiduals:
         return x[self._free.sum() :].reshape(-1, 3)
 
     def cost(self, x: np.ndarray) -> float:
-        """Half the sum of squares, the gain at its best; infinity where a number means nothing."""
+        """Return half the sum of squares, with the best gain; infinity where a number is meaningless."""
         if not self._sensible(x):
             return np.inf
         try:
@@ -116,7 +116,7 @@ class UnitResiduals:
         return np.concatenate([changes, right * changes, down * changes])
 
     def _missed(self) -> list[np.ndarray]:
-        """What the pictures miss (3, p) of each press."""
+        """Residuals (3, p) of the pictures of each press."""
         return [self.gain @ lights.terms - seen for lights, seen in zip(self._last, self._seen, strict=True)]
 
     def _solve_gain(self) -> None:

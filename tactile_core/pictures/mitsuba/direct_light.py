@@ -30,14 +30,16 @@ class Hits:
 
     @classmethod
     def from_slopes(cls, place: np.ndarray, slope_right: np.ndarray, slope_down: np.ndarray) -> Hits:
-        """place : (..., 3) m, image frame; slopes : (...) there."""
+        """Make hits; place : (..., 3) m, image frame; slopes : (...) there."""
         right, down, height = np.ascontiguousarray(np.moveaxis(place, -1, 0))
         level = 1 / np.sqrt(1 + slope_right**2 + slope_down**2)
         return cls(right, down, height, slope_right, slope_down, level)
 
     @classmethod
     def on_map(cls, place: np.ndarray, slopes: tuple[np.ndarray, np.ndarray], camera: Camera) -> Hits:
-        """place : (H, W, 3) m, image frame; slopes : (H, W) each of the height map, by ``perspective.slopes``."""
+        """Make hits on a height map; place : (H, W, 3) m, image frame; slopes : (H, W) each, by
+        ``perspective.slopes``.
+        """
         look_up = map_lookup(place[..., 0], place[..., 1], camera)
         return cls.from_slopes(place, look_up(slopes[0]), look_up(slopes[1]))
 

@@ -99,7 +99,7 @@ class GelLight:
         return found if self._coarse is None else found + self._bounced(mi)
 
     def _hit(self, ray: Any) -> Any:
-        """What rays meet; the gel's shading normals are of the map's own slopes."""
+        """Intersect rays with the scene; the gel's shading normals are of the map's own slopes."""
         mi = activate(LLVM)
         import drjit as dr
 

@@ -63,7 +63,7 @@ class GelMesh:
 
 
 def _kept(count: int, step: int) -> np.ndarray:
-    """Every step-th of count pixels, the last one too."""
+    """Indices of every step-th of count pixels, and of the last one."""
     kept = np.arange(0, count, step)
     return kept if kept[-1] == count - 1 else np.r_[kept, count - 1]
 
@@ -73,7 +73,7 @@ def _extended(values: np.ndarray) -> np.ndarray:
 
 
 def check_mesh(vertices: np.ndarray, faces: np.ndarray, count: int) -> None:
-    """What Mitsuba would crash on or leave holes for.
+    """Refuse a mesh on which Mitsuba would crash or leave holes.
 
     vertices (n, 3), faces (m, 3) ; count : how many vertices the scene was made with
     Raises TactileError for another number of vertices, values that are not finite, or a face of a missing vertex.

@@ -20,7 +20,7 @@ REACH = 16e-3  # m: across a bowl every distance gives as much, so the whole pic
 
 @dataclasses.dataclass(frozen=True)
 class Gather:
-    """How finely. step : pixels between places; azimuths : directions round each
+    """Resolution of the gathering. step : pixels between places; azimuths : directions round each
 
     growth : of the steps outward, each that share of the way, one place at least; bounces : 1 or more
     """

@@ -20,7 +20,7 @@ DIRECTIONS = RINGS * SPOKES
 
 
 class Lit(NamedTuple):
-    """Of one emitter: radiance that it gives where nothing is in the way, and the share that arrives."""
+    """Light of one emitter: its unoccluded radiance, and the share that arrives."""
 
     open: Any
     share: Any

@@ -21,7 +21,7 @@ MOST_MISSED = 1e-3  # share of rays; measured: 1e-6 slip through
 
 
 class Tracer(Protocol):
-    """One scene of one variant."""
+    """Renderer of one scene in one variant."""
 
     def load(self, height: np.ndarray) -> None:
         """Give the gel other heights (H, W) m."""
@@ -53,7 +53,7 @@ class _Scene:
         self.values = self.mi.traverse(self.scene)
 
     def around(self) -> dict[str, Any]:
-        """What stands in the scene beside the gel."""
+        """Return the scene's objects other than the gel."""
         return {}
 
     def load(self, height: np.ndarray) -> None:
@@ -95,7 +95,7 @@ class _LlvmTracer(_Scene):
 
 
 class _ScalarTracer(_Scene):
-    """One render for the places and one for each point: loops over pixels stay inside Mitsuba."""
+    """Renderer with one render for the places and one for each point: loops over pixels stay inside Mitsuba."""
 
     def __init__(self, mesh: GelMesh, height: np.ndarray, variant: str) -> None:
         super().__init__(mesh, height, variant)

@@ -1,4 +1,6 @@
-"""Which of Mitsuba's variants this machine runs: compiled for vectors by LLVM, or one ray at a time without it."""
+"""Choose the variant of Mitsuba that this machine runs: compiled for vectors by LLVM, or one ray at a time
+without it.
+"""
 
 from __future__ import annotations
 
@@ -69,7 +71,7 @@ def variant_for(preset: str, wanted: str | None = None) -> str:
 
 @functools.cache
 def llvm_trouble(library: str) -> str:
-    """What keeps LLVM from working, in words; "" where it works. library : DRJIT_LIBLLVM_PATH, "" where unset"""
+    """Describe why LLVM does not work; "" where it works. library : DRJIT_LIBLLVM_PATH, "" where unset"""
     try:
         command = [sys.executable, "-P", "-c", _PROBE]  # -P: nothing is imported from the current folder
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=PROBE_SECONDS)
@@ -87,7 +89,9 @@ def llvm_trouble(library: str) -> str:
 
 
 def _too_old(told: str) -> str:
-    """Of the probe's lines, as "LLVM 19 /usr/lib/libLLVM.so"; a major version of 0 is older than 16."""
+    """Describe an LLVM that is too old, from the probe's lines, as "LLVM 19 /usr/lib/libLLVM.so"; a major
+    version of 0 is older than 16.
+    """
     for line in told.splitlines():
         word, _, rest = line.partition(" ")
         major, _, file = rest.partition(" ")

@@ -24,7 +24,8 @@ def air_over_window(camera: Camera, index: float) -> float:
 
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
-    """Where the pinhole appears, m above height zero, to pixels that look at that plane a distance, m, off its axis.
+    """Apparent height of the pinhole, m above height zero, for pixels that look at that plane a distance, m, off its
+    axis.
 
     Snell's law through a flat window. A camera too near for its window to fit in keeps its height.
     """

@@ -1,10 +1,10 @@
-"""One file a layout. Each module here is found by itself and has four names:
+"""Layouts of recordings, one file each. Every module here is found automatically and has four names:
 
 ``CONTAINER``  "csv", "hdf5", "npz", "mat" or "bag"
 ``NAME``       the layout in words, for messages
-``score(keys) -> float``  share (0..1) of the layout's own columns or arrays among those of the file
-``read(source) -> Recording``  source is a ``table.Table`` for CSV, a ``array_store.Store`` for HDF5 and NPZ;
-               it picks its columns and hands them to ``assemble.assemble``, which checks them.
+``score(keys) -> float``  share (0..1) of the layout's own columns or arrays among those of the file ``read(source) ->
+Recording``  source is a ``table.Table`` for CSV, a ``array_store.Store`` for HDF5 and NPZ; it picks its columns and
+hands them to ``assemble.assemble``, which checks them.
 Those of bags have no ``read``, but the message they know: see ``bag_biotac_hand``; those of MATLAB also have
 ``fingers(keys)``, and ``read(store, finger)``. Those of HDF5 have
 ``ELECTRODES_NAME`` too, the array whose length is the number of frames: see ``chunks``.
@@ -23,14 +23,14 @@ from ..table import Table
 
 
 def share(keys: Collection[str], wanted: Collection[str]) -> float:
-    """Share of the wanted names that are among the keys."""
+    """Return the share of the wanted names that are among the keys."""
     return sum(name in keys for name in wanted) / len(wanted)
 
 
 def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
-    """The recording of a table with pdc, tac and tdc; time, electrodes, channels : the names of their columns.
+    """Build the recording of a table with pdc, tac and tdc; time, electrodes, channels : the names of their columns.
 
-    Raises TactileError for a column that is missing, and what ``assemble`` raises.
+    Raises TactileError for a missing column, and the errors of ``assemble``.
     """
     return assemble(
         table.path,
@@ -50,7 +50,7 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
 
 
 def electrodes_of(store: Store, name: str) -> np.ndarray:
-    """(T, 19), the array of that name. Raises TactileError for another sensor's, or another shape."""
+    """Read the array (T, 19) of that name. Raises TactileError for another sensor's, or another shape."""
     shape, _ = store.shapes[name]
     if len(shape) == 2 and shape[1] != ELECTRODES:
         check_electrodes(store.path, shape[1], name)

@@ -23,15 +23,15 @@ VERSIONS = [
 
 
 def score(keys: Collection[str]) -> float:
-    """1 where a topic carries the message, else 0."""
+    """Return 1 where a topic carries the message, else 0."""
     return float(MESSAGE in keys)
 
 
 def sensors(message: Any) -> list[Any]:
-    """The five BioTacs of a message."""
+    """Return the five BioTacs of a message."""
     return message.tactiles
 
 
 def row(sensor: Any) -> list[float]:
-    """pdc, tac, tdc, pac..., electrodes."""
+    """Return one row: pdc, tac, tdc, pac..., electrodes."""
     return [sensor.pdc, sensor.tac, sensor.tdc, sensor.pac0, sensor.pac1, *sensor.electrodes]

@@ -44,15 +44,15 @@ biotac_sensors/BioTacTime bt_time
 
 
 def score(keys: Collection[str]) -> float:
-    """1 where a topic carries the message, else 0."""
+    """Return 1 where a topic carries the message, else 0."""
     return float(MESSAGE in keys)
 
 
 def sensors(message: Any) -> list[Any]:
-    """The BioTacs of a message."""
+    """Return the BioTacs of a message."""
     return message.bt_data
 
 
 def row(sensor: Any) -> list[float]:
-    """pdc, tac, tdc, pac..., electrodes."""
+    """Return one row: pdc, tac, tdc, pac..., electrodes."""
     return [sensor.pdc_data, sensor.tac_data, sensor.tdc_data, *sensor.pac_data, *sensor.electrode_data]

@@ -1,4 +1,4 @@
-"""31 columns: time, position (3), force (3), pac0, pac1, pdc, tac, tdc, electrodes0..18.
+"""CSV of 31 columns: time, position (3), force (3), pac0, pac1, pdc, tac, tdc, electrodes0..18.
 
 The three components are taken as written ``position_x``, ``position.x``, ``position0``, ``positionx`` or
 ``position[0]`` (and so for force); the columns may carry a ROS prefix such as ``field.tactiles0.`` (assumed: no file
@@ -26,7 +26,7 @@ OTHER = re.compile(r"(?:^|.*[^a-z])(electrodes|pac|pdc|tac|tdc|time)\W*(\d*)\W*$
 
 
 def canonical(names: Sequence[str]) -> list[str]:
-    """The columns' names as this layout calls them; unknown ones stay."""
+    """Translate column names to this layout's; unknown ones stay."""
     found = []
     for name in names:
         vector, other = VECTOR.match(name), OTHER.match(name)
@@ -39,12 +39,12 @@ def canonical(names: Sequence[str]) -> list[str]:
 
 
 def score(keys: Collection[str]) -> float:
-    """Share of the time and the electrodes among the columns, however they are written."""
+    """Return the share of time and electrodes among the columns, in any spelling."""
     return share(canonical(list(keys)), ["time", *ELECTRODE_NAMES])
 
 
 def read(table: Table) -> Recording:
-    """(T, 19) counts with place and force (T, 3), in the file's own units.
+    """Read (T, 19) counts with place and force (T, 3), in the file's own units.
 
     Raises TactileError for a column that is missing, more electrodes, or too many lines that cannot be read.
     """

@@ -1,4 +1,4 @@
-"""ff_e1..24 or ff_biotac_1..24 (also mf, th) of a BioTac SP: recognised, and refused for now."""
+"""CSV of a BioTac SP, ff_e1..24 or ff_biotac_1..24 (also mf, th): recognised, and refused for now."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ COLUMN = re.compile(r"(ff|mf|rf|lf|th)_(e|biotac_)\d+$")
 
 
 def score(keys: Collection[str]) -> float:
-    """1 for a finger's electrodes, but for a few that may be missing, else 0."""
+    """Return 1 for a finger's electrodes, of which a few may be missing, else 0."""
     return float(sum(bool(COLUMN.match(key)) for key in keys) >= 20)
 
 
 def read(table: Table) -> Recording:
-    """Raises TactileError: a BioTac SP has 24 electrodes."""
+    """Raise TactileError: a BioTac SP has 24 electrodes."""
     check_electrodes(table.path, 24, "line 1")
     raise AssertionError("24 electrodes are refused")

@@ -1,4 +1,4 @@
-"""timestamp,tdc,tac,pdc,pac1..22,ele1..19, a separator at the end of each row (the layout of the slide set)."""
+"""CSV of the slide set: timestamp,tdc,tac,pdc,pac1..22,ele1..19, a separator at the end of each row."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(table: Table) -> Recording:
-    """(T, 19) counts with pdc, tac, tdc and 22 samples of pac a line.
+    """Read (T, 19) counts with pdc, tac, tdc and 22 samples of pac a line.
 
     Raises TactileError for a column that is missing, more electrodes, or too many lines that cannot be read.
     """

@@ -1,6 +1,7 @@
-"""electrode_vals/data (T, 19) and, where present, contact_loc/data, force_vec/data (T, 3), indenter_type/data (T, ...).
+"""HDF5 with electrode_vals/data (T, 19) and, if present, contact_loc/data, force_vec/data (T, 3), indenter_type/data
+(T, ...).
 
-Such files hold no time stamps; 100 Hz is assumed and said.
+Such files hold no time stamps; 100 Hz is assumed, with a warning.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ NAME = "HDF5 with electrode_vals/data, contact_loc/data, force_vec/data, indente
 
 
 def score(keys: Collection[str]) -> float:
-    """1 where the electrodes' array is there, else 0."""
+    """Return 1 where the electrodes' array is present, else 0."""
     return float(ELECTRODES_NAME in keys)
 
 
 def read(store: Store) -> Recording:
-    """(T, 19) electrodes with place and force (T, 3), in the file's own units, and the indenters' numbers.
+    """Read (T, 19) electrodes with place and force (T, 3), in the file's own units, and the indenters' numbers.
 
     Raises TactileError for arrays of other shapes.
     """
@@ -44,7 +45,7 @@ def read(store: Store) -> Recording:
 
 
 def _indenters(store: Store, frames: int) -> dict[str, list[float]]:
-    """The different indenter numbers of the file, where it names them."""
+    """Return the distinct indenter numbers of the file, where it has them."""
     name = "indenter_type/data"
     if name not in store.shapes:
         return {}

@@ -14,10 +14,10 @@ NAME = f"HDF5 simulated recording ({FORMAT})"
 
 
 def score(keys: Collection[str]) -> float:
-    """1 where the file names the format, else 0."""
+    """Return 1 where the file names the format, else 0."""
     return float(f"format={FORMAT}" in keys)
 
 
 def read(store: Store) -> Recording:
-    """Counts, and the truth beside them. Raises what ``read_simulated`` raises."""
+    """Read counts and the truth. Raises the errors of ``read_simulated``."""
     return read_simulated(store, NAME)

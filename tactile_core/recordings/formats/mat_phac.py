@@ -1,6 +1,6 @@
 """MATLAB 5 of the Penn Haptic Adjective Corpus 2: F0Electrodes, F1Electrodes (19, T) of two fingers, 100 Hz.
 
-Beside them F0pac (22, T), F0pdc, F0tac, F0tdc (1, T), likewise F1; the gripper's channels are passed over.
+Also F0pac (22, T), F0pdc, F0tac, F0tdc (1, T), likewise F1; the gripper's channels are ignored.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _ELECTRODES = re.compile(r"F([0-4])Electrodes")
 
 
 def score(keys: Collection[str]) -> float:
-    """1 where a finger's electrodes are there, else 0."""
+    """Return 1 where a finger's electrodes are present, else 0."""
     return float(bool(fingers(keys)))
 
 
 def fingers(keys: Collection[str]) -> tuple[int, ...]:
-    """Numbers of the fingers that a file holds, growing."""
+    """Return the numbers of the fingers that a file holds, ascending."""
     return tuple(sorted(int(found[1]) for key in keys if (found := _ELECTRODES.fullmatch(key))))
 
 

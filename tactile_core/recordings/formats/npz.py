@@ -1,4 +1,6 @@
-"""electrodes (T, 19) and, if present, time, pdc, tac, tdc (T,), pac (T, P), position, force (T, 3); no pickle."""
+"""NPZ with electrodes (T, 19) and, if present, time, pdc, tac, tdc (T,), pac (T, P), position, force (T, 3); no
+pickle.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +16,12 @@ NAME = "NPZ with electrodes (T, 19), optional time, pdc, tac, tdc, pac, position
 
 
 def score(keys: Collection[str]) -> float:
-    """1 where the electrodes' array is there, else 0."""
+    """Return 1 where the electrodes' array is present, else 0."""
     return float("electrodes" in keys)
 
 
 def read(store: Store) -> Recording:
-    """(T, 19) electrodes and what else there is. Raises TactileError for arrays of other shapes."""
+    """Read (T, 19) electrodes and the optional arrays. Raises TactileError for arrays of other shapes."""
     electrodes = electrodes_of(store, "electrodes")
     frames = len(electrodes)
     columns = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}

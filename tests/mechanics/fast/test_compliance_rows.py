@@ -54,4 +54,4 @@ def test_nodes_are_followed_as_the_indenter_slides_on():
         contact = problem.at_pose(there, contact)
         gap, _ = there.distance(ball, compliance.surface.rest + contact.displacement)
         assert contact.converged and contact.axial_force > 0
-        assert gap.min() > -1e-6  # m, what MECHANICS allows
+        assert gap.min() > -1e-6  # m, the target

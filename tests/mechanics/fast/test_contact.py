@@ -69,7 +69,7 @@ def test_no_penetration_no_tension_balance(indenter, place):
         assert contact.converged
         moved = compliance.surface.rest + contact.displacement.astype(float)
         distance, normal = pose.moved(contact.depth).distance(indenter, moved[compliance.touchable])
-        assert distance.min() > -1e-6  # m, the penetration MECHANICS allows
+        assert distance.min() > -1e-6  # m, the penetration that the target allows
         pressing = np.einsum("ki,ki->k", contact.nodal_force, normal[contact.nodes])
         assert (pressing > 0).all()
         sideways = contact.nodal_force - pressing[:, None] * normal[contact.nodes]
@@ -139,7 +139,7 @@ def test_the_inner_skin_rests_on_the_core():
     assert len(light.core_nodes) == 0 and len(deep.core_nodes) > 0 and deep.converged
     assert (deep.core_force > 0).all()
     gaps = deep.sensing_gaps
-    assert gaps[skin.feet : skin.feet + skin.facing].min() > -1e-6  # m, the penetration MECHANICS allows
+    assert gaps[skin.feet : skin.feet + skin.facing].min() > -1e-6  # m, the penetration that the target allows
     assert np.abs(gaps[deep.core_nodes]).max() < 0.3e-6  # closed to the solver's tolerance
     # with the core the same depth takes more force: it holds the skin against the ball
     free = ContactProblem(dataclasses.replace(skin, watch_gap=skin.watch_gap + 1), ball, pose, 1.2e-3).at_depth(1.2e-3)

@@ -27,7 +27,7 @@ def contact():
 
 
 def test_the_shipped_file_is_small_finite_and_whole():
-    assert shipped(correction.FILE).stat().st_size < 2e6  # MECHANICS, point 6
+    assert shipped(correction.FILE).stat().st_size < 2e6  # bytes: the target
     for sensor in correction.learned().values():
         for parts in (sensor.still, sensor.rubbing):
             for field in dataclasses.fields(parts):

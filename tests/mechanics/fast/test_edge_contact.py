@@ -78,7 +78,7 @@ def test_a_ring_deeper_than_its_wire_is_held_out_between_nodes():
     press = CorrectedPress(compliance, RING, pose, 2.4e-3)
     found = press.at_depth(DEEP).linear
     at = compliance.surface.rest + found.displacement
-    assert found.converged and pose.moved(DEEP).distance(RING, at)[0].min() > -1e-6  # m, what MECHANICS allows
+    assert found.converged and pose.moved(DEEP).distance(RING, at)[0].min() > -1e-6  # m, the target
     assert penetration_between("", compliance.surface.grid(at), RING, pose.moved(DEEP), DEEP, closed=False) < 100e-6
     np.testing.assert_allclose(found.nodal_force.sum(axis=0), found.force, atol=1e-12)
     # Of other steps to it: another order of the same sums, and 0.2 um of each gap.

@@ -121,7 +121,7 @@ def _rate(one: Recorded) -> float:
 
 
 def _check_rate(one: Recorded, first: float) -> None:
-    """Raises TactileError for a recording of another rate than the first one's, and for less than a frame a second."""
+    """Raise TactileError for a recording of another rate than the first one's, and for less than a frame a second."""
     rate = _rate(one)
     if round(first) < 1 or abs(rate / first - 1) > SAME_RATE:
         expected = f"{first:g} frames/s, as the first: the layout has one rate" if round(first) else "1 or more"
@@ -206,7 +206,7 @@ class _Stats:
         self._high = np.maximum(self._high, np.where(good, values, -np.inf).max(axis=0))
 
     def summarise(self) -> dict[str, list[float]]:
-        """As stats.json has them; 0 where no number was finite."""
+        """Return the statistics as in stats.json; 0 where no number was finite."""
         count = np.maximum(self._count, 1)
         mean = self._sum / count
         std = np.sqrt(np.maximum(self._squares / count - mean**2, 0))

@@ -13,7 +13,7 @@ BRIEF = "a folder of PNG pictures a recording"
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """One folder a recording."""
+    """Write one folder a recording."""
     needed(source, "image", "image")
     done = 0
     for one in source.recordings:
