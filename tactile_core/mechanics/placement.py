@@ -16,7 +16,13 @@ FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (docs/sources.md, 
 
 @dataclasses.dataclass(frozen=True)
 class Placement:
-    """A place and an angle: (x, z) m on the DIGIT's plane, and the lean of the indenter's axis, rad."""
+    """Place and angle of an indenter, the same for both sensors.
+
+    x, z : m on the DIGIT's plane, along the finger and across it; on the BioTac, the place that unrolls onto it
+    tilt : rad, angle between the indenter's axis and the surface normal; tilt_heading : rad, direction of that lean
+
+    >>> tactile.Placement(x=2e-3, z=0.0, tilt=0.1)
+    """
 
     x: float
     z: float

@@ -97,10 +97,20 @@ def solve(
 ) -> Solution:
     """Press ``indenter`` into ``sensor`` at ``place`` to a depth, m, or a force along the motion, N.
 
-    ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round the
-    contact (seconds; with friction ten or more; a minute or more for indenters that need a finer mesh), ``reference``
-    the same on cells half as large (minutes).
+    sensor : ``"biotac"`` or ``"digit"``; indenter : of ``tactile.indenters``, in m; place : a ``tactile.Placement``
+    depth, force : one of the two: m beyond first touch, or N
+    tier : ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round
+        the contact (seconds; with friction ten or more; a minute or more for indenters that need a finer mesh),
+        ``reference`` the same on cells half as large (minutes)
+    friction : Coulomb's coefficient, 0 or more
+
+    Returns a :class:`Solution`: ``displacement`` (n_nodes, 3) m, ``force`` (3,) N, ``depth`` m, ``pressure`` Pa, and
+    the errors expected of the tier.
     Raises TactileError for an impossible request, or for one beyond what the tier finds.
+
+    >>> ball = tactile.indenters.Sphere(radius=3e-3)
+    >>> contact = tactile.solve("digit", ball, tactile.Placement(x=-6e-3, z=0.0), force=2.0)
+    >>> contact.depth, contact.displacement.shape
     """
     return next(solve_path(sensor, indenter, place, [Step(depth, force)], tier, friction))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Protocol
 
 import numpy as np
@@ -10,7 +11,7 @@ from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from .background import resting_picture
 from .camera_noise import camera_noise
-from .height_map import of_unit, rest_height_map
+from .height_map import digit_mapper, of_unit, rest_height_map
 from .mitsuba.direct_light import Hits, direct_light
 from .mitsuba.gel_light import ASIDE, GelLight
 from .mitsuba.gel_mesh import GelMesh
@@ -35,27 +36,33 @@ class Light(Protocol):
 
 
 class Renderer:
-    """Pictures by one preset; the scene and what only the resting gel decides are made once.
+    """Camera pictures of one DIGIT by one preset; the scene and the picture at rest are made once.
 
-    calibration : None for the one that ships; preset : one of ``presets.NAMES``
-    variant : of Mitsuba, "llvm_ad_rgb" or "scalar_rgb"; None for the faster one that works here. Not asked by ``fast``
-    background : (H, W, 3) picture of the undeformed gel, 8-bit values; None for what the calibration makes
-    rest : (H, W) heights of the undeformed gel, m; None for the calibration's, whose dome heights then get too
-    seed : of the reference's random places and points; the others have none
+    calibration : the unit's camera and lights, or the file of `tactile calibrate`; None for the unit that ships
+    preset : ``fast`` (numpy alone, 8 ms a picture), ``standard``, ``quality`` or ``reference`` (Mitsuba)
+    variant : Mitsuba's, "llvm_ad_rgb" or "scalar_rgb"; None for the faster one that works here; unused by ``fast``
+    background : (H, W, 3) picture of the undeformed gel, levels 0 to 255; None for the calibration's
+    rest : (H, W) heights of the undeformed gel, m; None for the calibration's, whose dome is then applied to heights
+    seed : seed of ``reference``'s random samples; the other presets draw none
     Raises TactileError for an unknown preset, arrays of another shape, values that are not finite, and a gel that
     reaches an LED or the camera; ModuleNotFoundError where mitsuba is missing.
+
+    >>> renderer = tactile.Renderer(preset="fast")
+    >>> pictures = renderer.render(touch.displacement_digit)   # (T, 320, 240, 3) uint8
     """
 
     def __init__(
         self,
-        calibration: Calibration | None = None,
+        calibration: Calibration | str | os.PathLike[str] | None = None,
         preset: str = DEFAULT,
         variant: str | None = None,
         background: np.ndarray | None = None,
         rest: np.ndarray | None = None,
         seed: int = 0,
     ) -> None:
-        self.calibration = calibration = calibration or load_calibration()
+        if not isinstance(calibration, Calibration):
+            calibration = load_calibration(calibration)
+        self.calibration = calibration
         self.camera = calibration.camera
         self._domed = rest is None and calibration.dome_scale != 1
         own = rest_height_map(self.camera) if rest is None else rest
@@ -80,6 +87,20 @@ class Renderer:
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
         return self.picture(self.radiance(height_map))
+
+    def render(self, displacement: np.ndarray) -> np.ndarray:
+        """Pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
+
+        displacement : of the DIGIT surface's 2,867 nodes, as ``translate`` and ``solve`` return it
+        Raises TactileError for another shape or values that are not finite.
+        """
+        mapper = digit_mapper(self.camera)
+        if np.ndim(displacement) != 3:
+            return self(mapper(displacement))
+        pictures = np.empty((len(displacement), *self.camera.shape, 3), np.uint8)
+        for k, frame in enumerate(displacement):
+            pictures[k] = self(mapper(frame))
+        return pictures
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3) float32, levels of its band, that each LED gives to what pixels see."""

@@ -34,9 +34,16 @@ def layouts() -> tuple[ModuleType, ...]:
 
 
 def read(path: str | os.PathLike[str]) -> Recording:
-    """Read a recording of any known layout, which is detected from the content, not from the file's name.
+    """Read a BioTac recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
 
-    Raises TactileError for a file that is not there, not a recording, of another sensor, or mostly unreadable.
+    path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
+
+    Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19) counts, ``pdc``, ``pac``, ``tac``, ``tdc``
+    where the file has them, ``warnings`` for what is odd in it. Nothing is resampled, repaired or dropped.
+    Raises TactileError for a file that is missing, not a recording, of another sensor, or mostly unreadable.
+
+    >>> recording = tactile.read("touch.csv")
+    >>> len(recording), recording.rate, recording.electrodes.shape
     """
     path = os.fspath(path)
     with reading(path):

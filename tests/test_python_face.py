@@ -1,0 +1,69 @@
+"""Public names of the package: listed by dir and help, imported at first use; from a CSV to pictures in five lines."""
+
+from __future__ import annotations
+
+import pydoc
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tactile_core as tactile
+from tactile_core.sensors import digit_surface
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_dir_lists_the_public_names_alone():
+    assert [name for name in dir(tactile) if not name.startswith("__")] == sorted(tactile.__all__)
+
+
+def test_every_public_name_is_there_and_teaches():
+    for name in tactile.__all__:
+        assert getattr(tactile, name).__doc__, name
+    for name in ("read", "translate", "Renderer", "solve", "Placement"):
+        text = pydoc.render_doc(getattr(tactile, name))
+        assert ">>>" in text and " m" in text, f"help(tactile.{name}) needs an example and units"
+
+
+def test_an_unknown_name_is_refused_with_the_known_ones():
+    with pytest.raises(AttributeError, match=r"'convert'; its public names: .*translate"):
+        _ = tactile.convert
+
+
+def test_names_are_imported_at_first_use():
+    code = (
+        "import sys, tactile_core as t\n"
+        "assert 'numpy' not in sys.modules\n"
+        "t.TactileError; assert 'numpy' not in sys.modules\n"
+        "t.read; assert 'tactile_core.recordings.readers' in sys.modules and 'mitsuba' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=60)
+
+
+def test_types_ship_with_the_package():
+    assert (ROOT / "tactile_core" / "py.typed").exists()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert "py.typed" in project["tool"]["setuptools"]["package-data"]["tactile_core"]
+
+
+def test_five_lines_from_a_csv_to_pictures(slide_csv):
+    recording = tactile.read(slide_csv())
+    touch = tactile.translate(recording)
+    pictures = tactile.Renderer(preset="fast").render(touch.displacement_digit)
+    assert pictures.shape == (150, 320, 240, 3) and pictures.dtype == np.uint8
+    assert pictures[-1].astype(int).std() > 0
+
+
+def test_a_press_becomes_a_picture_of_a_print():
+    renderer = tactile.Renderer(preset="fast")
+    ball = tactile.indenters.Sphere(radius=3e-3)
+    contact = tactile.solve("digit", ball, tactile.Placement(x=-6e-3, z=0.0), force=2.0)
+    still = np.zeros((1, len(digit_surface().rest), 3))
+    background, picture = renderer.render(still)[0].astype(int), renderer.render(contact.displacement).astype(int)
+    change = np.abs(picture - background).max(axis=2)
+    middle, corner = change[110:210, 70:170], change[:40, :40]
+    assert middle.max() > 10 and corner.max() <= 2  # grey levels: a print under the ball, none in the corner
