@@ -20,6 +20,7 @@ def contact_patch(displacement: np.ndarray, surface: Lattice) -> np.ndarray:
     A surface takes the indenter's curvature in contact and the opposite one beside it: the patch is where the smoothed
     Laplacian of the depth is negative. (The pressure on a half-space is |k| times the depth over wave numbers k; k^2 in
     its place is the local form, and measured better: thin gels damp long waves.)
+    A frame dented less than ``FLOOR`` has none.
     """
     rows, columns = surface.shape
     inward = -np.einsum("tni,ni->tn", displacement, node_normals(surface.rest, surface.faces))
@@ -30,10 +31,11 @@ def contact_patch(displacement: np.ndarray, surface: Lattice) -> np.ndarray:
     square = (2 * np.pi * np.fft.fftfreq(padded.shape[1])[:, None]) ** 2 + across**2
     bend = np.fft.irfft2(np.fft.rfft2(padded) * square * np.exp(-square * SMOOTH**2), s=padded.shape[1:])
     bend = bend[:, _MARGIN:-_MARGIN, _MARGIN:-_MARGIN]
-    peaks = (np.maximum(field.max((1, 2), keepdims=True), _STILL) for field in (bend, depth))
-    bent, deep = (field > share * peak for field, share, peak in zip((bend, depth), (BEND, DEEP), peaks, strict=True))
-    return (bent & deep).reshape(displacement.shape[:2])
+    bent, deep = (field > share * field.max((1, 2), keepdims=True) for field, share in ((bend, BEND), (depth, DEEP)))
+    touched = depth.max((1, 2), keepdims=True) > FLOOR
+    return (bent & deep & touched).reshape(displacement.shape[:2])
 
 
+FLOOR = 5e-6  # m: a dent less deep is no contact. It moves a picture by one level at most, where the camera's own noise
+# is 2 to 3 levels (docs/sources.md, DIGIT camera): no sensor of this kind could tell it from rest.
 _MARGIN = 20  # cells of rest round the lattice, so that opposite rims do not meet in the Fourier sums
-_STILL = 1e-9  # m: less is no dent

@@ -1,0 +1,48 @@
+"""Contact patches of gels that are hardly dented, and of silence."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tactile_core import recordings, sensors
+from tactile_core.recordings.signals import FRAMEWISE
+from tactile_core.translation import contact_patch, translate
+from tactile_core.translation.contact_track import Tracked
+
+
+@pytest.fixture(scope="module")
+def gel():
+    return sensors.digit_surface()
+
+
+def dent(gel, depth):
+    away = np.linalg.norm(gel.rest[:, [0, 2]] - [-8e-3, 1e-3], axis=1)
+    moved = np.zeros((1, *gel.rest.shape))
+    moved[0, :, 1] = depth * np.exp(-0.5 * (away / 1.5e-3) ** 2)
+    return moved
+
+
+@pytest.mark.parametrize(("depth", "touched"), [(0.9, False), (1.2, True), (20, True)])
+def test_a_dent_is_a_contact_from_an_absolute_depth_on(gel, depth, touched):
+    patch = contact_patch.contact_patch(dent(gel, depth * contact_patch.FLOOR), gel)
+    assert patch.any() == touched
+
+
+def test_what_the_networks_make_of_noise_alone_shows_no_contact(request, gel):
+    """Three seconds of an untouched sensor: the shipped recording with nothing but noise in it, followed as always."""
+    recording = recordings.read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
+    signals = recordings.prepare(recording)
+    noise = np.random.default_rng(5).normal(scale=1.5, size=signals.change.shape)  # counts: docs/sources.md, read-out
+    silent = dataclasses.replace(signals, change=noise.astype(signals.change.dtype))
+    translator = translate.load_translator()
+
+    def part(frames):
+        return dataclasses.replace(silent, **{name: getattr(silent, name)[frames] for name in FRAMEWISE})
+
+    def posteriors(start, stop):
+        return recording.time[start:stop], translator.posterior(part(np.arange(start, stop)))
+
+    every = np.arange(len(recording))
+    moved = translator(silent, Tracked(posteriors, len(recording))(every)).displacement_digit
+    assert not contact_patch.contact_patch(moved, gel).any()
