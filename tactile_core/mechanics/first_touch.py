@@ -144,16 +144,17 @@ def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
 
     Toward a convex part Newton's steps never go through; where another part lets them, the distance leads back.
     """
-    own, travel, left = pose.to_own(points), 0.0, _FARTHEST  # in its frame points come up along z
+    own, travel, left = pose.to_own(points), 0.0, _FARTHEST
+    ahead = pose.own_direction  # in its frame points come the other way
     for _ in range(_ADVANCES):
         gap, normal = indenter.distance(own)
         step = smallest = float(gap.min())
         if abs(smallest) < _TOUCHES:
             break
         if smallest > 0:
-            step = float((gap / np.maximum(-normal[:, 2], _LEAST_RATE)).min())
+            step = float((gap / np.maximum(normal @ ahead, _LEAST_RATE)).min())
         step = min(step, left)
         left -= step
         travel += step
-        own[:, 2] += step
+        own -= step * ahead
     return pose.moved(travel)

@@ -29,8 +29,8 @@ def between(first: Pose, second: Pose, share: float) -> Pose:
     size = np.linalg.norm(twice)
     angle = np.arctan2(size, np.trace(turn) - 1)
     if size < 1e-15:
-        return Pose(apex, second.axes)
+        return Pose(apex, second.axes, second.push)
     x, y, z = twice / size
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     part = np.eye(3) + np.sin(share * angle) * cross + (1 - np.cos(share * angle)) * (cross @ cross)
-    return Pose(apex, part @ first.axes)
+    return Pose(apex, part @ first.axes, second.push)

@@ -10,6 +10,7 @@ import logging
 import os
 import pathlib
 import zipfile
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -60,15 +61,43 @@ class MeshIndenter(Indenter):
         content = mesh_file.read_bytes(path)
         settings = json.dumps([_FORMAT, pathlib.Path(path).suffix.lower(), scale, up, spacing]).encode()
         digest = hashlib.sha256(settings + content).hexdigest()
+        return cls._cached(digest, lambda: mesh_file.solid(content, path, scale, up), path, spacing)
+
+    @classmethod
+    def from_trimesh(cls, mesh: Any, spacing: float | None = None) -> MeshIndenter:
+        """Take a ``trimesh.Trimesh``, metres, in its own frame; its grid is built once and cached on disk by its hash.
+
+        spacing : m, of the grid, over which sharp edges are rounded; None for 0.1 mm, or more where the body is large
+        Raises TactileError as ``from_file`` does, and for more than 200,000 triangles.
+        """
+        try:
+            vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+        except (AttributeError, TypeError, ValueError):
+            found = f"a {type(mesh).__name__}"
+            raise TactileError(
+                "indenter", found, "an indenter of tactile_core, or a trimesh.Trimesh in metres"
+            ) from None
+        mesh_file.check_triangles("indenter", vertices, faces)
+        mesh_file.check_size("indenter", np.ptp(vertices, axis=0).max(), 1.0)
+        spacing = mesh_grid.finest(np.ptp(vertices, axis=0)) if spacing is None else spacing
+        _check("indenter", 1.0, "z", spacing)
+        digest = hashlib.sha256(json.dumps([_FORMAT, "trimesh", spacing, vertices.shape]).encode())
+        digest.update(np.ascontiguousarray(vertices).tobytes() + np.ascontiguousarray(faces).tobytes())
+        make = functools.partial(mesh_file.closed_mesh, vertices, faces, "indenter", 1.0)
+        return cls._cached(digest.hexdigest(), make, "indenter", spacing)
+
+    @classmethod
+    def _cached(cls, digest: str, make: Callable[[], Any], where: str | os.PathLike, spacing: float) -> MeshIndenter:
+        """The indenter of a mesh (mm) that ``make`` gives, from the cache where its grid has been built before."""
         file = _cache_file(digest)
         try:
             arrays = _load(file)
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):  # not built yet, or cut short
-            log.info("building the distance grid of %s in %s (up to a minute, once)", path, file)
-            mesh = mesh_file.solid(content, path, scale, up)
-            built = cls(mesh_grid.build(mesh, path, spacing), _hull(mesh), (0.0, 0.0))
+            log.info("building the distance grid of %s in %s (up to a minute, once)", where, file)
+            mesh = make()
+            built = cls(mesh_grid.build(mesh, where, spacing), _hull(mesh), (0.0, 0.0))
             error = mesh_grid.error_of(mesh, built.distance)
-            log.info("%s: distance within %.1f um rms, %.1f um at most", path, *(error * 1e6))
+            log.info("%s: distance within %.1f um rms, %.1f um at most", where, *(error * 1e6))
             arrays = (built.grid.coefficients, built.grid.origin, built.hull, error)
             _store(file, dict(zip(_ARRAYS, arrays, strict=True)))
             arrays = _load(file)

@@ -50,19 +50,28 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
     It crosses itself when an edge goes through a triangle that it does not belong to; coplanar overlaps are left to
     the count of crossings on the grid's columns.
     """
+    vertices, faces = _parsed(content, pathlib.Path(where))
+    mesh = closed_mesh(vertices @ _turn(up).T, faces, where, scale)
+    low = mesh.vertices[mesh.vertices[:, 2] < mesh.vertices[:, 2].min() + _LOWEST_MM]
+    middle = (low.min(axis=0) + low.max(axis=0)) / 2
+    mesh.apply_translation(-np.array([*middle[:2], low[:, 2].min()]))
+    return mesh
+
+
+def closed_mesh(vertices: np.ndarray, faces: np.ndarray, where: str | os.PathLike, scale: float) -> Any:
+    """The solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), where it stands; ``scale`` m a unit.
+
+    Raises TactileError as ``solid`` does.
+    """
     import trimesh
 
-    vertices, faces = _parsed(content, pathlib.Path(where))
-    _check_size(where, np.ptp(vertices, axis=0).max(), scale)
-    mesh = trimesh.Trimesh(vertices @ _turn(up).T * (scale * 1e3), faces, process=False)
+    check_size(where, np.ptp(vertices, axis=0).max(), scale)
+    mesh = trimesh.Trimesh(vertices * (scale * 1e3), faces, process=False)
     mesh.merge_vertices()
     corners = np.sort(mesh.faces, axis=1)
     mesh.update_faces((corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2]))
     mesh.remove_unreferenced_vertices()
     _check_solid(where, mesh)
-    low = mesh.vertices[mesh.vertices[:, 2] < mesh.vertices[:, 2].min() + _LOWEST_MM]
-    middle = (low.min(axis=0) + low.max(axis=0)) / 2
-    mesh.apply_translation(-np.array([*middle[:2], low[:, 2].min()]))
     return mesh
 
 
@@ -77,18 +86,24 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
         vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
     except Exception as error:  # a damaged file fails wherever its parser happens to be
         raise TactileError(path, f"cannot be read as a mesh ({error})", "a triangle mesh") from error
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
-        raise TactileError(path, f"vertices {vertices.shape}, faces {faces.shape}", "three coordinates, three corners")
-    if not len(faces):
-        raise TactileError(path, "no triangles", "a triangle mesh")
-    if len(faces) > MAX_FACES:
-        raise TactileError(path, f"{len(faces)} triangles", f"at most {MAX_FACES}", "Simplify it")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise TactileError(path, "triangles of missing vertices", "a triangle mesh")
+    check_triangles(path, vertices, faces)
     vertices = vertices[np.unique(faces)]
-    if not np.isfinite(vertices).all():
-        raise TactileError(path, "a coordinate is nan or infinite", "finite coordinates")
     return vertices, np.unique(faces, return_inverse=True)[1].reshape(-1, 3)
+
+
+def check_triangles(where: str | os.PathLike, vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Raise TactileError for vertices (n, 3) and faces (m, 3) that are no triangles of an indenter's number."""
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        found = f"vertices {vertices.shape}, faces {faces.shape}"
+        raise TactileError(where, found, "three coordinates, three corners")
+    if not len(faces):
+        raise TactileError(where, "no triangles", "a triangle mesh")
+    if len(faces) > MAX_FACES:
+        raise TactileError(where, f"{len(faces)} triangles", f"at most {MAX_FACES}", "Simplify it")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise TactileError(where, "triangles of missing vertices", "a triangle mesh")
+    if not np.isfinite(vertices[faces]).all():
+        raise TactileError(where, "a coordinate is nan or infinite", "finite coordinates")
 
 
 def _check_length(content: bytes, path: pathlib.Path) -> None:
@@ -98,7 +113,8 @@ def _check_length(content: bytes, path: pathlib.Path) -> None:
         raise TactileError(path, f"{len(content) / 1e6:.0f} MB", f"at most {MAX_FACES} triangles", "Simplify it")
 
 
-def _check_size(where: str | os.PathLike, extent: float, scale: float) -> None:
+def check_size(where: str | os.PathLike, extent: float, scale: float) -> None:
+    """Raise TactileError for a body of an extent, in units of ``scale`` m, that is no indenter's."""
     smallest, largest = EXTENT_MM
     if smallest <= extent * scale * 1e3 <= largest:
         return

@@ -15,9 +15,19 @@ from .spline_grid import SplineGrid
 
 MARGIN = 1e-3  # m, how far the grid reaches beyond the body
 MAX_NODES = 8_000_000  # 32 MB kept, about 300 MB while it is built
+_COARSER = 1.1  # step in the search of a spacing
 _SPARE = 6  # nodes more on every side while the spline is fitted: what it assumes at its ends fades by 0.27 a node
+_FINEST = 0.1e-3  # m: finer than the nodes of either sensor
 _CHECKED = 500  # points near the surface at which the error is measured
 _NEAR_MM = 0.3  # how near
+
+
+def finest(extent: np.ndarray) -> float:
+    """The spacing, m, of the finest grid that a body of extent (3,) m fits in, 0.1 mm at least."""
+    spacing = _FINEST
+    while np.prod(np.ceil((extent + 2 * MARGIN) / spacing) + 3 + 2 * _SPARE) > MAX_NODES:
+        spacing *= _COARSER
+    return float(np.round(spacing, 8))
 
 
 def build(mesh: Any, where: str | os.PathLike, spacing: float) -> SplineGrid:

@@ -10,16 +10,20 @@ import numpy as np
 from ...errors import TactileError
 from .indenter import Indenter
 
+_OWN_DOWN = np.array([0.0, 0.0, -1.0])
+
 
 @dataclasses.dataclass(frozen=True)
 class Pose:
     """Position and orientation of an indenter: own origin at ``apex`` (3,) m, own axes as columns of ``axes`` (3, 3).
 
+    push : unit vector (3,) of the sensor's frame along which the indenter moves; None for its own -z
     Raises TactileError for a number that is nan or infinite.
     """
 
     apex: np.ndarray
     axes: np.ndarray
+    push: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if not math.isfinite(np.vdot(self.apex, self.apex) + np.vdot(self.axes, self.axes)):  # quicker than each
@@ -27,16 +31,21 @@ class Pose:
 
     @property
     def direction(self) -> np.ndarray:
-        """Unit vector (3,) into the sensor: the indenter's own -z."""
-        return -self.axes[:, 2]
+        """Unit vector (3,) into the sensor, along which the indenter moves."""
+        return -self.axes[:, 2] if self.push is None else self.push
+
+    @property
+    def own_direction(self) -> np.ndarray:
+        """``direction`` in the indenter's own frame."""
+        return _OWN_DOWN if self.push is None else self.push @ self.axes
 
     def moved(self, depth: float) -> Pose:
         """The pose after moving ``depth`` m along ``direction``."""
-        return Pose(self.apex + depth * self.direction, self.axes)
+        return Pose(self.apex + depth * self.direction, self.axes, self.push)
 
     def slid(self, along: float, across: float) -> Pose:
         """The pose after sliding, m, along the indenter's own x and y."""
-        return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes)
+        return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes, self.push)
 
     def to_own(self, points: np.ndarray) -> np.ndarray:
         """Transform sensor points (n, 3) m to the indenter's frame, in which sticking points stay put as it moves."""

@@ -20,9 +20,9 @@ def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
     far : m, how deep points may lie in the indenter. Points that lie in front of it already stay.
     """
     own, travel, on_way = pose.to_own(points), np.full(len(points), far), np.arange(len(points))
+    ahead = pose.own_direction
     for _ in range(_TRACE_STEPS):
-        place = own.take(on_way, axis=0)
-        place[:, 2] -= travel[on_way]  # the motion is along its own -z
+        place = own.take(on_way, axis=0) + travel[on_way, None] * ahead
         gap, _ = indenter.distance(place)
         travel[on_way] -= np.maximum(gap, 0)
         on_way = on_way[(gap > _ARRIVED) & (travel[on_way] > 0)]

@@ -1,0 +1,285 @@
+"""A fingertip in a simulator's loop: the pose of an indenter in, the contact and the camera's picture out.
+
+gel = Gel("digit", indenter=Sphere(3e-3))
+for pose in poses:                      # 4 x 4, or (position, quaternion), in the sensor's frame
+    contact = gel.press(pose)
+    picture = gel.picture()
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+
+from .. import sensors
+from ..errors import TactileError
+from ..geometry.indenters import Indenter, MeshIndenter, Pose
+from ..geometry.indenters.rigid_pose import rigid_pose
+from ..mechanics.fast.active_set import UnsolvedError
+from ..mechanics.fast.compliance import Compliance, compliance_of
+from ..mechanics.fast.press import CorrectedPress, FastContact
+from ..mechanics.first_touch import first_touch
+from ..mechanics.node_areas import node_areas
+from ..mechanics.penetration import PenetrationError
+from ..mechanics.placement import FRICTION
+from ..mechanics.thickness import DEPTH_LIMIT, thickness_under
+from ..pictures.height_map import digit_mapper, folds_counted
+from ..pictures.presets import FAST
+from ..pictures.renderer import Renderer
+from ..sensors.calibration import Calibration
+from ..sensors.calibration_file import load_calibration
+
+PUSH = np.array([0.0, 1.0, 0.0])  # into the gel: along +y of the sensors' frame
+FLAGS = {
+    "unsolved": "no equilibrium was found; the values are those of the contact before",
+    "too deep": "the pose lies deeper than 60 % of the thickness; the values are those at that depth",
+    "force not reached": "no depth bears the force; the values are those at the greatest depth that was solved",
+    "began inside": "the first pose lies in the gel; the indenter was taken to come straight in along +y",
+    "jumped": "the step is too long to follow; friction was forgotten, and the indenter taken to come in anew along +y",
+}
+# Farther, or turned by more, in one step a contact is another one, assumed: at 100 Hz that is 0.3 m/s and 2 turns a s.
+_LONGEST_STEP, _LARGEST_TURN = 3e-3, 0.13  # m, rad
+_LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less cannot be told from rounding
+_SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the greatest depth, at which to stand where a force is not reached
+_BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (assumed: 20 mm/s at 100 Hz)
+
+
+@dataclasses.dataclass(frozen=True)
+class GelContact:
+    """A contact of a ``Gel``, SI units, in the sensor's frame; n surface nodes.
+
+    force : (3,) N, exerted by the indenter; displacement : (n, 3) m of the surface
+    traction : (n, 3) Pa; times the nodes' areas (n,) m2, ``Gel.areas``, and added up it is the force
+    patch : (n,) bool, the nodes that carry force; slipping : share of them whose friction is spent
+    depth : m, past first touch along +y; below zero the indenter stands in front of the sensor
+    pressure : Pa, rise of the BioTac's fluid pressure; 0 for the DIGIT
+    pose : (4, 4), where the indenter stands, deeper than the pose given where a force was asked for
+    flags : names out of ``FLAGS`` of what is wrong with it, none for a sound contact
+    """
+
+    force: np.ndarray
+    displacement: np.ndarray
+    traction: np.ndarray
+    patch: np.ndarray
+    slipping: float
+    depth: float
+    pressure: float
+    pose: np.ndarray
+    flags: tuple[str, ...] = ()
+
+
+class Gel:
+    """A DIGIT's gel or a BioTac's skin that one indenter presses; each contact goes on from the one before.
+
+    Keep one a thread: instances share nothing that changes. The same poses give the same numbers.
+
+    sensor : "digit" or "biotac"
+    indenter : one of ``geometry.indenters``, or a closed ``trimesh.Trimesh`` in metres
+    friction : Coulomb's coefficient; 0 for none
+    calibration : of the camera and its lights, None for the one that ships; preset : of the pictures
+    Raises TactileError for another sensor, and for meshes and values that no indenter can have.
+    """
+
+    def __init__(
+        self,
+        sensor: str = "digit",
+        indenter: Any = None,
+        *,
+        friction: float = FRICTION,
+        calibration: Calibration | None = None,
+        preset: str = FAST,
+    ) -> None:
+        if sensor not in ("digit", "biotac"):
+            raise TactileError("Gel, sensor", repr(sensor), "digit or biotac")
+        if not (np.isfinite(friction) and friction >= 0):
+            raise TactileError("Gel, friction", repr(friction), "a coefficient of zero or more")
+        self.sensor, self.friction, self.preset = sensor, float(friction), preset
+        self.indenter: Indenter = indenter if hasattr(indenter, "curvature") else MeshIndenter.from_trimesh(indenter)
+        self.surface = sensors.sensor_surface(sensor)
+        self._calibration = calibration
+        self.reset()
+
+    def reset(self) -> None:
+        """Take the indenter away: the next contact depends on nothing before."""
+        self._press: CorrectedPress | None = None
+        self._pose: Pose | None = None  # of the step before
+        self._contact = self._untouched(Pose(np.zeros(3), np.eye(3), PUSH))
+
+    def press(self, pose: Any, force: float | None = None) -> GelContact:
+        """Move the indenter to a pose, along a straight line from the last one, and return the contact there.
+
+        pose : (4, 4) matrix, or (position (3,) m, quaternion (4,) w, x, y, z), of the indenter's origin and axes
+        force : N along +y; with it the indenter moves on along +y, out or in, until it bears that force; 0 lifts it
+        Raises TactileError for what is no pose or force; the contact before then stays. Whatever else happens is
+        said in ``flags``.
+        """
+        if force is not None and not (np.isfinite(force) and force >= 0):
+            raise TactileError("Gel, force", f"{force!r} N", "zero or more, and finite")
+        here, flags = Pose(*rigid_pose(pose), PUSH), []
+        jumps = self._press is not None and self._touches and self._too_far(here)
+        if jumps:
+            self._press = None
+        before, self._pose = self._pose, here
+        if force is not None and force < _LEAST_FORCE:
+            self._press, self._contact = None, self._untouched(here)
+            return self._contact
+        try:
+            found = self._moved_to(here, force, flags, began=before is None)
+            if jumps and found is not None:
+                flags.insert(0, "jumped")
+        except UnsolvedError:
+            found = None
+            flags.append("unsolved")
+        self._contact = self._described(found, here, flags)
+        return self._contact
+
+    def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
+        """The contact at each of many poses, one after the other; forces : N, as in ``press``, one a pose."""
+        if forces is None:
+            for pose in poses:
+                yield self.press(pose)
+        else:
+            for pose, force in zip(poses, forces, strict=True):
+                yield self.press(pose, force)
+
+    @property
+    def contact(self) -> GelContact:
+        """The last contact; nothing touches before the first step."""
+        return self._contact
+
+    @property
+    def areas(self) -> np.ndarray:
+        """Area (n,) m2 that each resting node stands for."""
+        return node_areas(self.sensor)
+
+    def height_map(self) -> np.ndarray:
+        """Heights (H, W) float32, m, of the DIGIT's gel under the camera's pixels in the last contact.
+
+        Where a hard slide folds the gel over itself the height there is a guess. Raises TactileError for the BioTac.
+        """
+        if self.sensor != "digit":
+            raise TactileError("Gel, picture", "the BioTac has no camera", "a Gel of the DIGIT")
+        with folds_counted():
+            return digit_mapper(self._renderer.camera)(self._contact.displacement)
+
+    def picture(self) -> np.ndarray:
+        """Picture (H, W, 3) uint8 that the DIGIT's camera takes of the last contact.
+
+        Raises TactileError for the BioTac, which has no camera.
+        """
+        return self._renderer(self.height_map())
+
+    def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
+        """The pose (4, 4) in which the indenter, its own z out of the sensor, stands ``depth`` m past first touch.
+
+        x, z : m, place of its origin in the sensor's frame. Raises TactileError where it passes the sensor by.
+        """
+        axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
+        return _matrix(self._first_touch(Pose(np.array([x, 0.0, z]), axes, PUSH)).moved(depth))
+
+    def _first_touch(self, pose: Pose) -> Pose:
+        """Where an indenter that comes along +y first touches; raises TactileError where it passes the sensor by."""
+        in_front = self._foremost - pose.support(self.indenter, PUSH)[1]  # from there the search is short
+        return first_touch(self.surface, self.indenter, pose.moved(in_front))
+
+    @functools.cached_property
+    def _foremost(self) -> float:
+        """The y, m, of the surface's foremost node."""
+        return float(self.surface.rest[:, 1].min())
+
+    @functools.cached_property
+    def _renderer(self) -> Renderer:
+        return Renderer(self._calibration or load_calibration(), self.preset)
+
+    @functools.cached_property
+    def _compliance(self) -> Compliance:
+        return compliance_of(self.sensor)
+
+    @property
+    def _touches(self) -> bool:
+        return bool(self._contact.patch.any())
+
+    def _too_far(self, pose: Pose) -> bool:
+        moved = pose.apex - self._pose.apex
+        turn = np.arccos(np.clip((np.trace(pose.axes.T @ self._pose.axes) - 1) / 2, -1, 1))
+        return bool(np.linalg.norm(moved) > _LONGEST_STEP or turn > _LARGEST_TURN)
+
+    def _moved_to(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
+        """The contact at a pose or force; None where nothing touches. Raises UnsolvedError."""
+        try:
+            touch = self._first_touch(pose)
+        except TactileError:  # it passes the sensor by
+            if force is not None:
+                flags.append("force not reached")
+            self._press = None
+            return None
+        depth = float((pose.apex - touch.apex) @ PUSH)
+        limit = DEPTH_LIMIT * thickness_under(self.sensor, self.indenter, touch)
+        if force is None and depth <= 0:
+            self._press = None
+            return None
+        if began and force is None and depth > _BEGUN_INSIDE:
+            flags.append("began inside")
+        if self._press is None:
+            self._press = CorrectedPress(self._compliance, self.indenter, touch, limit, self.friction)
+        self._press.limit = limit
+        try:
+            if force is not None:
+                return self._at_force(self._press, touch, force, limit, flags)
+            if depth > limit:
+                flags.append("too deep")
+            return self._at_depth(self._press, touch, min(depth, limit))
+        except PenetrationError as error:
+            raise UnsolvedError(str(error)) from error
+
+    def _at_depth(self, press: CorrectedPress, touch: Pose, depth: float) -> FastContact:
+        found = press.at_depth(depth, touch)
+        if not found.linear.converged:
+            raise UnsolvedError(f"no contact at {depth * 1e3:g} mm")
+        return found
+
+    def _at_force(
+        self, press: CorrectedPress, touch: Pose, force: float, limit: float, flags: list[str]
+    ) -> FastContact:
+        """The contact at a force, or where it is not reached as deep as one is found."""
+        found = press.at_force(force, touch)
+        if found is not None:
+            return found
+        flags.append("force not reached")
+        for share in _SHALLOWER:
+            try:
+                return self._at_depth(press, touch, share * limit)
+            except UnsolvedError:
+                continue
+        raise UnsolvedError(f"no contact at {force:g} N")
+
+    def _described(self, found: FastContact | None, pose: Pose, flags: list[str]) -> GelContact:
+        if "unsolved" in flags:
+            return dataclasses.replace(self._contact, pose=_matrix(pose), flags=tuple(flags))
+        if found is None:
+            return dataclasses.replace(self._untouched(pose), flags=tuple(flags))
+        linear, nodes = found.linear, self._compliance.touchable[found.linear.nodes]
+        traction = np.zeros_like(self.surface.rest)
+        traction[nodes] = found.corrected.factor * linear.nodal_force / self.areas[nodes, None]
+        patch = np.zeros(len(traction), bool)
+        patch[nodes] = True
+        slipping = float(linear.slipping.mean()) if len(nodes) and self.friction else 0.0
+        return GelContact(
+            found.force, found.corrected.displacement, traction, patch, slipping, found.depth, found.pressure,
+            _matrix(linear.pose), tuple(flags),
+        )  # fmt: skip
+
+    def _untouched(self, pose: Pose) -> GelContact:
+        none = np.zeros_like(self.surface.rest)
+        patch = np.zeros(len(none), bool)
+        return GelContact(np.zeros(3), none, none.copy(), patch, 0.0, 0.0, 0.0, _matrix(pose))
+
+
+def _matrix(pose: Pose) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = pose.axes, pose.apex
+    return matrix

@@ -1,0 +1,38 @@
+"""Share of a sensor's surface that each of its nodes stands for: a nodal force over it is a traction."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from .solids.hex_mesh import gel_mesh, outer_faces, skin_mesh
+
+_GAUSS = np.sqrt(0.6) * np.array([-1.0, 0, 1]), np.array([5.0, 8, 5]) / 9
+
+
+@functools.cache
+def node_areas(sensor: str) -> np.ndarray:
+    """Area (n,) m2 of each resting surface node of ``"biotac"`` or ``"digit"``: the integral of its shape function.
+
+    Surfaces are of quadratic faces, on which an even pressure loads corners, edges and middles as 1 : 4 : 16; divided
+    by these areas it is even again.
+    """
+    mesh = skin_mesh() if sensor == "biotac" else gel_mesh()
+    faces, areas = outer_faces(mesh), np.zeros(len(mesh.nodes))
+    corners = mesh.nodes[faces].reshape(-1, 3, 3, 3)  # face, b along eta, a along xi, axis
+    for xi, by_xi in zip(*_GAUSS, strict=True):
+        for eta, by_eta in zip(*_GAUSS, strict=True):
+            (along, slope_along), (across, slope_across) = _quadratic(xi), _quadratic(eta)
+            first = np.einsum("fbai,b,a->fi", corners, across, slope_along)
+            second = np.einsum("fbai,b,a->fi", corners, slope_across, along)
+            area = by_xi * by_eta * np.linalg.norm(np.cross(first, second), axis=1)
+            np.add.at(areas, faces, area[:, None] * np.outer(across, along).ravel())
+    areas = areas[mesh.surface]
+    areas.flags.writeable = False
+    return areas
+
+
+def _quadratic(t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Values and slopes (3,) of the quadratic shape functions of nodes at -1, 0, 1."""
+    return np.array([t * (t - 1) / 2, 1 - t * t, t * (t + 1) / 2]), np.array([t - 0.5, -2 * t, t + 0.5])

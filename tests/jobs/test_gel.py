@@ -1,0 +1,229 @@
+"""A fingertip in a simulator's loop: forces, tractions, pictures, memory, and what it makes of bad input."""
+
+import threading
+
+import numpy as np
+import pytest
+import trimesh
+
+from tactile_core import sensors
+from tactile_core.errors import TactileError
+from tactile_core.geometry.indenters import Box, Sphere
+from tactile_core.jobs.gel import FLAGS, Gel, GelContact
+from tactile_core.mechanics.placement import Placement
+from tactile_core.mechanics.solve import solve
+from tactile_core.sensors import digit
+
+BALL = Sphere(3e-3)
+TOP = float(digit.gel_surface().rest[np.argmin(digit.gel_surface().rest[:, 1]), 0])  # m, where the dome is level
+
+
+def shifted(pose: np.ndarray, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> np.ndarray:
+    moved = pose.copy()
+    moved[:3, 3] += [x, y, z]
+    return moved
+
+
+def turned(pose: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """The pose of a body whose own axes are turned, about its origin."""
+    moved = pose.copy()
+    moved[:3, :3] = pose[:3, :3] @ turn
+    return moved
+
+
+def path(gel: Gel) -> list[np.ndarray]:
+    """Pressed 0.5 mm in, then slid 0.5 mm along the finger."""
+    start = gel.touching(-8e-3, 0.0)
+    return [shifted(start, y=0.1e-3 * k) for k in range(6)] + [
+        shifted(start, x=0.1e-3 * k, y=0.5e-3) for k in range(1, 6)
+    ]
+
+
+def same(one: GelContact, other: GelContact) -> bool:
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("force", "displacement", "patch"))
+
+
+def test_a_press_is_what_the_solver_finds():
+    gel = Gel("digit", BALL)
+    found = gel.press(gel.touching(TOP, 0.0, 0.4e-3))
+    expected = solve("digit", BALL, Placement(TOP, 0.0), depth=0.4e-3)
+    # The motion is along +y here and along the dome's normal there: the same to the lattice's slope at its top.
+    np.testing.assert_allclose(found.force[1], expected.force[1], rtol=2e-3)
+    assert np.abs(found.displacement - expected.displacement).max() < 1e-6
+    assert found.depth == pytest.approx(0.4e-3, abs=1e-8)
+    assert found.flags == ("began inside",)
+
+
+@pytest.mark.parametrize("sensor", ["digit", "biotac"])
+@pytest.mark.parametrize("indenter", [BALL, Box((5e-3, 4e-3, 3e-3), 0.5e-3)], ids=["ball", "box"])
+def test_tractions_add_up_to_the_force(sensor, indenter):
+    gel = Gel(sensor, indenter)
+    for contact in gel.follow(path(gel)[1:]):
+        total = (contact.traction * gel.areas[:, None]).sum(axis=0)
+        np.testing.assert_allclose(total, contact.force, atol=0.01 * np.linalg.norm(contact.force))
+        assert contact.patch.any() and (np.abs(contact.traction[~contact.patch]) == 0).all()
+        assert contact.flags == ()
+
+
+def test_areas_are_those_of_the_surface():
+    surface = sensors.digit_surface()
+    flat = trimesh.Trimesh(surface.rest, surface.faces, process=False).area
+    assert Gel("digit", BALL).areas.sum() == pytest.approx(flat, rel=3e-3)  # triangles cut off the rim
+
+
+def test_traction_under_a_ball_is_hertz_pressure():
+    """At less than a tenth of the thickness it is nearly Hertz's: p0 sqrt(1 - r^2 / a^2), F = 2/3 pi a^2 p0."""
+    gel = Gel("digit", BALL, friction=0.0)
+    contact = gel.press(gel.touching(TOP, 0.0, 0.3e-3))
+    rest = gel.surface.rest
+    share = contact.traction[:, 1] * gel.areas / contact.force[1]
+    from_middle = np.hypot(rest[:, 0] - TOP, rest[:, 2])
+    radius = np.sqrt(2.5 * share @ from_middle**2)
+    peak = 1.5 * contact.force[1] / (np.pi * radius**2)
+    inner = from_middle < 0.7 * radius
+    expected = peak * np.sqrt(1 - (from_middle[inner] / radius) ** 2)
+    assert inner.sum() > 6
+    # A node's share of the force jumps where the patch's rim cuts through its face; divided by the areas of triangles
+    # in place of the faces' it is 1.9 times off.
+    assert np.abs(contact.traction[inner, 1] - expected).max() < 0.2 * peak
+
+
+def test_a_force_is_reached_along_the_motion():
+    gel = Gel("digit", BALL)
+    pose = gel.touching(-8e-3, 1e-3)
+    for force in (0.5, 1.5, 0.2):
+        contact = gel.press(pose, force=force)
+        assert contact.force[1] == pytest.approx(force, rel=2e-3)  # a fiftieth of the fast tier's error, twice
+        assert contact.flags == ()
+    assert contact.pose[1, 3] > pose[1, 3]
+    assert not gel.press(pose, force=0).patch.any()
+
+
+def test_poses_are_matrices_or_positions_with_quaternions():
+    gel, other = Gel("digit", BALL), Gel("digit", BALL)
+    pose = gel.touching(-8e-3, 0.0, 0.2e-3)
+    quaternion = np.array([np.cos(np.pi / 4), np.sin(np.pi / 4), 0, 0])  # own z to -y
+    assert same(gel.press(pose), other.press((pose[:3, 3], quaternion))) or np.allclose(
+        gel.contact.displacement, other.contact.displacement, atol=1e-12
+    )
+
+
+def test_a_trimesh_of_any_attitude_presses_along_y():
+    """A ball is a ball however it is turned; its grid's error is far below that of a node's spacing."""
+    mesh = trimesh.creation.icosphere(4, 3e-3)  # m, its own origin in its middle
+    gel, exact = Gel("digit", mesh), Gel("digit", BALL)
+    middle = exact.touching(-8e-3, 0.0, 0.4e-3)
+    expected = exact.press(middle)
+    turn = trimesh.transformations.rotation_matrix(1.1, [1.0, 2.0, 3.0])[:3, :3]
+    for attitude in (np.eye(3), turn):
+        gel.reset()
+        found = gel.press(turned(shifted(middle, y=-3e-3), attitude))
+        np.testing.assert_allclose(found.force, expected.force, atol=0.02 * np.linalg.norm(expected.force))
+        assert np.abs(found.displacement - expected.displacement).max() < 8e-6  # icosphere and grid: 5 um
+
+
+def test_friction_remembers_the_path_and_reset_forgets_it():
+    gel = Gel("digit", BALL)
+    *_, slid = gel.follow(path(gel))
+    assert slid.force[0] > 0.05
+    gel.reset()
+    straight = gel.press(path(gel)[-1])
+    assert abs(straight.force[0]) < 0.2 * slid.force[0]
+    smooth = Gel("digit", BALL, friction=0.0)
+    *_, slid_without = smooth.follow(path(smooth))
+    assert abs(slid_without.force[0]) < 0.2 * slid.force[0]
+
+
+@pytest.mark.parametrize("sensor", ["digit", "biotac"])
+def test_the_same_poses_give_the_same_bytes_also_in_threads(sensor):
+    gel = Gel(sensor, BALL)
+    poses = path(gel)
+    first = list(gel.follow(poses))
+    found = [[], []]
+
+    def run(into):
+        into += list(Gel(sensor, BALL).follow(poses))
+
+    threads = [threading.Thread(target=run, args=(each,)) for each in found]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for run_ in found:
+        assert all(same(one, other) for one, other in zip(first, run_, strict=True))
+
+
+def test_a_picture_shows_the_contact():
+    gel = Gel("digit", BALL)
+    rest = gel.picture()
+    gel.press(gel.touching(-8e-3, 0.0, 0.5e-3))
+    pressed = gel.picture()
+    assert pressed.shape == rest.shape == (320, 240, 3)
+    assert np.abs(pressed.astype(int) - rest).max() > 40
+    assert gel.height_map().max() > 0.2e-3
+    with pytest.raises(TactileError, match="no camera"):
+        Gel("biotac", BALL).picture()
+
+
+@pytest.mark.parametrize(
+    ("pose", "words"),
+    [
+        (np.full((4, 4), np.nan), "finite"),
+        (np.diag([2.0, 2, 2, 1]), "scale"),
+        (np.diag([1.0, -1, 1, 1]), "mirror"),
+        (np.eye(4).T + np.eye(4)[:, ::-1] * 0.1, "last row"),
+        (np.eye(3), "4 x 4"),
+        ((np.zeros(3), np.zeros(4)), "unit quaternion"),
+        ((np.zeros(2), np.array([1.0, 0, 0, 0])), "shape"),
+        ((np.array([0, 0, 5.0]), np.array([1.0, 0, 0, 0])), "millimetres"),
+        ("home", "numbers"),
+    ],
+)
+def test_what_is_no_pose_is_refused_and_the_loop_goes_on(pose, words):
+    gel = Gel("digit", BALL)
+    before = gel.press(gel.touching(-8e-3, 0.0, 0.02e-3))
+    with pytest.raises(TactileError, match=words):
+        gel.press(pose)
+    assert gel.contact is before
+    assert gel.press(gel.touching(-8e-3, 0.0, 0.04e-3)).flags == ()
+
+
+@pytest.mark.parametrize("force", [np.nan, -1.0, np.inf])
+def test_what_is_no_force_is_refused(force):
+    gel = Gel("digit", BALL)
+    with pytest.raises(TactileError, match="force"):
+        gel.press(gel.touching(-8e-3, 0.0), force=force)
+
+
+def test_flags_tell_what_is_wrong_and_the_loop_goes_on():
+    gel = Gel("digit", BALL)
+    assert gel.press(gel.touching(-8e-3, 0.0, 0.3e-3)).flags == ("began inside",)
+    assert gel.press(gel.touching(-14e-3, 3e-3, 0.3e-3)).flags == ("jumped",)
+    deep = gel.press(shifted(gel.touching(-14e-3, 3e-3), y=2.95e-3))
+    assert deep.flags == ("too deep",) and deep.depth < 2.5e-3
+    strong = gel.press(gel.touching(-14e-3, 3e-3, 0.3e-3), force=1e4)
+    assert "force not reached" in strong.flags and strong.force[1] > 1
+    away = gel.press(shifted(gel.touching(-14e-3, 3e-3), y=-5e-3))
+    assert away.flags == () and not away.patch.any() and not away.displacement.any()
+    beside = gel.press(shifted(gel.touching(-14e-3, 3e-3), z=50e-3))
+    assert beside.flags == () and not beside.patch.any()
+    assert gel.press(shifted(gel.touching(-14e-3, 3e-3), z=50e-3), force=1.0).flags == ("force not reached",)
+    assert gel.press(gel.touching(-8e-3, 0.0, 0.02e-3)).flags == ()
+    assert {"began inside", "jumped", "too deep", "force not reached"} <= set(FLAGS)
+
+
+def test_meshes_and_sensors_that_cannot_be_are_refused():
+    cut = trimesh.creation.icosphere(2, 3e-3)
+    cut.update_faces(np.arange(len(cut.faces)) > 0)
+    huge = type(
+        "Mesh", (), {"vertices": np.random.default_rng(0).random((9, 3)), "faces": np.zeros((5_000_000, 3), int)}
+    )
+    for mesh, words in ((cut, "not closed"), (huge, "5000000 triangles"), ("ball", "trimesh"), (None, "trimesh")):
+        with pytest.raises(TactileError, match=words):
+            Gel("digit", mesh)
+    with pytest.raises(TactileError, match="scale"):
+        Gel("digit", trimesh.creation.icosphere(2, 3.0))  # in millimetres
+    with pytest.raises(TactileError, match="digit or biotac"):
+        Gel("gelsight", BALL)
+    with pytest.raises(TactileError, match="coefficient"):
+        Gel("digit", BALL, friction=-1.0)
