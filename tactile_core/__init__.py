@@ -14,6 +14,12 @@ From an indenter to a picture:
     contact = tactile.solve("digit", ball, tactile.Placement(x=-6e-3, z=0.0), force=2.0)
     picture = renderer.render(contact.displacement)                     # (320, 240, 3) uint8
 
+From a simulator's poses to contacts and pictures, step by step:
+
+    gel = tactile.Gel("digit", indenter=ball)
+    contact = gel.press(pose)                                           # 4 x 4, or (position, quaternion)
+    picture = gel.picture()
+
 SI units throughout; time is the first axis. Importing this package loads the standard library alone: each name below
 loads what it needs when it is first used. ``help(tactile.translate)`` and the like describe arguments and errors.
 """
@@ -26,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .errors import TactileError as TactileError
     from .geometry import indenters as indenters
+    from .jobs.gel import Gel as Gel
     from .mechanics.placement import Placement as Placement
     from .mechanics.solve import solve as solve
     from .pictures.renderer import Renderer as Renderer
@@ -35,6 +42,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {  # of each public name: its module, and its name there; none for the module itself
+    "Gel": (".jobs.gel", "Gel"),
     "Placement": (".mechanics.placement", "Placement"),
     "Renderer": (".pictures.renderer", "Renderer"),
     "TactileError": (".errors", "TactileError"),
@@ -43,7 +51,7 @@ _HOME = {  # of each public name: its module, and its name there; none for the m
     "solve": (".mechanics.solve", "solve"),
     "translate": (".translation.translate_recording", "translate"),
 }
-__all__ = ["Placement", "Renderer", "TactileError", "indenters", "read", "solve", "translate"]
+__all__ = ["Gel", "Placement", "Renderer", "TactileError", "indenters", "read", "solve", "translate"]
 
 
 def __getattr__(name: str) -> Any:

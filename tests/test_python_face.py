@@ -24,7 +24,7 @@ def test_dir_lists_the_public_names_alone():
 def test_every_public_name_is_there_and_teaches():
     for name in tactile.__all__:
         assert getattr(tactile, name).__doc__, name
-    for name in ("read", "translate", "Renderer", "solve", "Placement"):
+    for name in ("read", "translate", "Renderer", "solve", "Placement", "Gel"):
         text = pydoc.render_doc(getattr(tactile, name))
         assert ">>>" in text and " m" in text, f"help(tactile.{name}) needs an example and units"
 

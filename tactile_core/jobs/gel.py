@@ -77,6 +77,11 @@ class Gel:
 
     Keep one a thread: instances share nothing that changes. The same poses give the same numbers.
 
+    >>> gel = Gel("digit", indenter=Sphere(3e-3))        # m
+    >>> pose = gel.touching(x=-8e-3, z=0.0, depth=0.3e-3)
+    >>> contact = gel.press(pose)                        # contact.force N, .displacement m, .traction Pa
+    >>> picture = gel.picture()                          # (320, 240, 3) uint8
+
     sensor : "digit" or "biotac"
     indenter : one of ``geometry.indenters``, or a closed ``trimesh.Trimesh`` in metres
     friction : Coulomb's coefficient; 0 for none
