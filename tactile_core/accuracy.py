@@ -118,7 +118,9 @@ def row(
 
     ok : |value| <= target, or value >= target for ``at_least``; None where there is no target
     """
-    ok = None if target is None else bool(value >= target if at_least else abs(value) <= target)
+    ok = None
+    if target is not None:
+        ok = value is not None and bool(value >= target if at_least else abs(value) <= target)
     value, target, null = (None if number is None else float(f"{number:.4g}") for number in (value, target, null))
     return {"name": name, "value": value, "unit": unit, "target": target, "ok": ok, "null": null, "set": of}
 

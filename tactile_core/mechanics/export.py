@@ -11,8 +11,9 @@ import numpy as np
 from ..errors import TactileError
 from ..sensors import sensor_surface
 from . import mesh_files
+from .finite_strain.body import Sensor
 from .solids.hex_mesh import HexMesh, gel_mesh, skin_mesh
-from .solve import Sensor, Solution
+from .solve import Solution
 
 SUFFIXES = (".ply", ".stl", ".vtu")
 

@@ -51,7 +51,7 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     met = in_front(lattice.axes, indenter, pose, closed=lattice.closed) if indenter.least_side < _NARROW else None
     pose, nodes = _on_nodes(lattice, np.empty((0, 3)) if met is None else met[1], indenter, pose)
     before_tip = nodes < len(lattice.rest)
-    tip = np.empty((0, 2)) if before_tip.all() else met[0]
+    tip = np.empty((0, 2)) if met is None or before_tip.all() else met[0]
     nodes = nodes[nodes < rows * columns]
     places = np.concatenate([np.array(np.divmod(nodes, columns), float), tip.T], axis=1)
     for finer in _FINER if places.size else ():

@@ -48,7 +48,7 @@ class ShadowCaster:
         # Turned so that the picture lies around angle 0: no jump at +-pi inside it.
         angle = np.angle((right + 1j * down) * np.exp(-1j * middle))
         distance = np.hypot(right, down)
-        self._step_angle = GRID_STEP / float(np.hypot(*foot[:2]))
+        self._step_angle = GRID_STEP / float(np.hypot(foot[0], foot[1]))
         self._angle_0, self._distance_0 = angle.min(), distance.min()
         self._row = ((angle - self._angle_0) / self._step_angle).astype(np.float32)
         self._column = ((distance - self._distance_0) / GRID_STEP).astype(np.float32)

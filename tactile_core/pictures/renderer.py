@@ -168,8 +168,8 @@ class MitsubaLight:
         if self.preset.passes == 1:
             shift, points = ASIDE, [light_points(led, count) for led in leds]
         else:
-            *shift, turn, depth = (self._start + number * _EVEN) % 1
-            shift = (shift[0] - 0.5, shift[1] - 0.5)
+            right, down, turn, depth = (self._start + number * _EVEN) % 1
+            shift = (right - 0.5, down - 0.5)
             points = [sphere_points(led, count, turn, depth) for led in leds]
         place, seen = self._tracer.trace(np.concatenate(points), shift)
         hits = Hits.on_map(place, tilt, self.unit.camera)

@@ -66,7 +66,7 @@ def open_bag(path: str) -> Iterator[Bag]:
         if len(told) > MAX_METADATA or PACKED.search(told):
             advice = "Unpack it: ros2 bag convert"
             raise TactileError(path, "a bag packed file by file, or with huge metadata", "a plain bag", advice)
-    openers = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
+    openers: dict[str | None, Any] = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
     with damage_told(path, "bag"):
         reader = openers[what](Path(path))
         reader.open()
@@ -112,7 +112,8 @@ def read_bag(
     Reads the requested finger, or the first that is not all zeros; a warning names the others.
     """
     rows = np.empty((0, layout.WIDTH + 1))
-    finger, warnings, repeated = bag.finger, [], 0
+    warnings: list[str] = []
+    finger, repeated = bag.finger, 0
     for block in _blocks(bag, layout, frames):
         if finger is None:
             finger, warnings = _choose(bag, block)

@@ -34,7 +34,7 @@ def read_parts(path: str | os.PathLike[str]) -> Iterator[Part]:
     path = os.fspath(path)
     shift, time = 0.0, None
     for part in _parts(path):
-        if part.repeated:
+        if part.repeated and time is not None:
             shift = time[-part.repeated]
         time = part.recording.time + shift
         yield replace(part, recording=replace(part.recording, time=time))

@@ -74,5 +74,5 @@ def _moves(readings: np.ndarray) -> bool:
     return bool(np.median(np.ptp(readings, axis=0)) > STEADY)
 
 
-def _electrodes(mask: np.ndarray) -> str:
+def _electrodes(mask: np.ndarray | np.bool) -> str:
     return ", ".join(f"E{j + 1}" for j in np.flatnonzero(mask))

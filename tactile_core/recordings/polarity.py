@@ -59,13 +59,14 @@ def polarity_of(
     """
     touching = np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
     contacts = by_contacts(change[touching & ~quiet])
-    measured = pdc is not None and len(pdc) >= FEWEST and bool(np.isfinite(pdc).all()) and np.ptp(pdc) > 0
-    swing = float(np.subtract(*np.percentile(pdc, [95, 5]))) if measured else 0.0
-    if measured and swing < SWING and not rest_known:
+    if pdc is not None and not (len(pdc) >= FEWEST and bool(np.isfinite(pdc).all()) and np.ptp(pdc) > 0):
+        pdc = None
+    swing = 0.0 if pdc is None else float(np.subtract(*np.percentile(pdc, [95, 5])))
+    if pdc is not None and swing < SWING and not rest_known:
         # Nothing was pressed, or the grip was steady: then what looks like rest may be a contact.
         found = f"the fluid's pressure changes by {swing:.0f} counts, less than {SWING:.0f}"
         return Polarity(FALLS, f"assumed: {found}", False)
-    shown = [_by_pressure(electrodes, pdc, swing)] if swing >= SWING else []
+    shown = [_by_pressure(electrodes, pdc, swing)] if pdc is not None and swing >= SWING else []
     shown += [contacts] if contacts is not None and (rest_known or quiet.any()) else []
     sure = [found for found in shown if found.sure]
     if sure and len({found.name for found in sure}) == 1:

@@ -89,7 +89,8 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
     if split(path)[1] is not None:
         return [path]
     with reading(path):
-        container, known = container_of(path), ()
+        container = container_of(path)
+        known: tuple[int, ...] = ()
         if container == "mat":
             with open_matlab(path) as store:
                 known = layout_of(path, container, store.shapes).fingers(store.shapes)

@@ -121,7 +121,7 @@ def _stuck_runs(values: np.ndarray) -> np.ndarray:
     large = np.abs(steps) > LIMIT
     alone = large.sum(axis=1) <= ALONE
     for j in np.flatnonzero(large.any(axis=0)):
-        edges = np.flatnonzero(large[:, j] & alone)
+        edges = np.flatnonzero(large[:, j] & alone).tolist()
         for first, start in enumerate(edges):
             for end in edges[first + 1 :]:
                 if end - start > STUCK:

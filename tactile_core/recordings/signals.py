@@ -301,11 +301,12 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
     return Quiet(mask, ((frames.start, frames.stop),), "told by the user")
 
 
-def _frames(tare: slice | str, count: int) -> slice:
+def _frames(asked: slice | str, count: int) -> slice:
     """Convert the tare frames to a plain slice. Raises TactileError where they are not inside the recording."""
-    asked = tare
-    if isinstance(tare, str):
-        ends = tare.split(":")
+    if isinstance(asked, slice):
+        tare = asked
+    else:
+        ends = asked.split(":")
         try:
             tare = slice(*(int(end) if end.strip() else None for end in ends))
         except (ValueError, TypeError):

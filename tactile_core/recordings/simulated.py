@@ -63,8 +63,8 @@ def write_simulated(
         for name, value in given.items()
         if value is not None
     }
-    forces = {"force": truth.force, "contact_center": truth.contact_center}
-    forces = {f"truth/{name}": np.asarray(value, np.float32) for name, value in forces.items() if value is not None}
+    known = {"force": truth.force, "contact_center": truth.contact_center}
+    forces = {f"truth/{name}": np.asarray(value, np.float32) for name, value in known.items() if value is not None}
     for name, value in forces.items():
         _check_shape(path, name, value, (frames, 3 if name == "truth/force" else 2))
     moved = {name: getattr(truth, name) for name in ("displacement_biotac", "displacement_digit")}
@@ -119,7 +119,7 @@ def read_simulated(store: Store, layout: str) -> Recording:
     about = {key: store.attributes.get(key, "") for key in ("sensor", "scene", "seed", "made_by", "note")}
     about["polarity"] = str(store.attributes.get("polarity", RISES))
     time, truth = _times(store, frames), _truth(store, frames)
-    columns = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
+    columns: dict[str, Any] = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
     return assemble(
         store.path,
         layout,

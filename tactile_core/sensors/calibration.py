@@ -160,11 +160,11 @@ class Calibration:
         if not min(self.coating.albedo) > 0:
             raise TactileError("coating, albedo", "0", "more than 0, or no LED's light is seen")
         own = np.diag(gain.centre)
-        leds = tuple(
+        red, green, blue = (
             dataclasses.replace(led, radiance=float(level * np.square(led.position).sum() / (albedo * led.radius**2)))
             for led, level, albedo in zip(self.leds, own, self.coating.albedo, strict=True)
         )
-        return dataclasses.replace(self, leds=leds, response=gain.times(1 / own))
+        return dataclasses.replace(self, leds=(red, green, blue), response=gain.times(1 / own))
 
     def at_size(self, width: int, height: int) -> Calibration:
         """Return the same view in other pixels: px/mm grow with the picture.

@@ -109,14 +109,14 @@ class _Reader:
         return Calibration(
             unit=_text("unit", self._content["unit"]),
             camera=self._camera(),
-            leds=tuple(self._led(colour) for colour in COLOURS),
+            leds=(self._led("red"), self._led("green"), self._led("blue")),
             response=self._response(),
             ambient=tuple(_numbers(f"ambient, {led}", self._content["ambient"][led], AMBIENT_TERMS) for led in COLOURS),
             coating=self._coating(),
             gel_index=_number("gel, index", self._content["gel"]["index"]),
             dome_scale=_number("gel, dome_scale", self._content["gel"]["dome_scale"]),
             photograph=self._photograph(folder),
-            noise=_numbers("noise, levels", self._content["noise"]["levels"], 3),
+            noise=_three("noise, levels", self._content["noise"]["levels"]),
             fit=self._fit(),
         )
 
@@ -140,10 +140,10 @@ class _Reader:
         if not isinstance(table, dict):
             raise TactileError(where, repr(table), "a table")
         self._check_names(where, table, ("position_mm", "radius_mm", "radiance"))
-        position = _numbers(f"{where}, position_mm", table["position_mm"], 3)
+        x, y, z = _three(f"{where}, position_mm", table["position_mm"])
         radius = _number(f"{where}, radius_mm", table["radius_mm"])
         radiance = _number(f"{where}, radiance", table["radiance"])
-        return Led(colour, tuple(1e-3 * value for value in position), 1e-3 * radius, radiance)
+        return Led(colour, (1e-3 * x, 1e-3 * y, 1e-3 * z), 1e-3 * radius, radiance)
 
     def _response(self) -> Response:
         table = {name: _rows(f"response, {name}", self._content["response"][name]) for name in _TABLES["response"]}
@@ -156,7 +156,7 @@ class _Reader:
     def _coating(self) -> Coating:
         table = self._content["coating"]
         numbers = {name: _number(f"coating, {name}", table[name]) for name in ("roughness", "gloss", "metallic")}
-        albedo = _numbers("coating, albedo", table["albedo"], 3)
+        albedo = _three("coating, albedo", table["albedo"])
         return Coating(_text("coating, bsdf", table["bsdf"]), albedo, **numbers)
 
     def _photograph(self, folder: Path) -> str:
@@ -206,6 +206,11 @@ def _numbers(where: str, value: Any, count: int) -> tuple[float, ...]:
     if not isinstance(value, list) or len(value) != count:
         raise TactileError(where, repr(value), f"a list of {count} numbers")
     return tuple(_number(where, item) for item in value)
+
+
+def _three(where: str, value: Any) -> tuple[float, float, float]:
+    first, second, third = _numbers(where, value, 3)
+    return first, second, third
 
 
 def _rows(where: str, value: Any) -> tuple[tuple[float, ...], ...]:

@@ -106,7 +106,7 @@ class Camera:
         """Coordinate z (width,) m at height zero of each column of pixels: the columns of a height map."""
         return self.centre_z + self.right_z * self.right
 
-    def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Project gel points at x, z and height, m, to fractional (row, column); whole numbers are pixel centres."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
@@ -119,7 +119,9 @@ class Camera:
         row, column = self.to_pixel(x, z)
         return (row > -0.5) & (row < self.height - 0.5) & (column > -0.5) & (column < self.width - 0.5)
 
-    def to_gel(self, row: np.ndarray, column: np.ndarray, height: np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def to_gel(
+        self, row: np.ndarray, column: np.ndarray, height: np.ndarray | float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return (x, z) m of the points at a height, m, that fractional pixels see: the inverse of ``to_pixel``."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)

@@ -91,7 +91,9 @@ def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarr
         w = _closest_weights(point, a, b, c)
         at = np.einsum("fk,fkd->fd", w, np.stack([a, b, c], 1))
         best = int(np.argmin(((at - point) ** 2).sum(1)))
-        faces.append(best), weights.append(w[best]), places.append(at[best])
+        faces.append(best)
+        weights.append(w[best])
+        places.append(at[best])
     return np.array(faces), np.array(weights), np.array(places)
 
 

@@ -59,7 +59,7 @@ def read(path: str | os.PathLike, identity: dict) -> State:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         text = json.loads(arrays.pop("state").tobytes())
-        state = State(*(_of_kind(text[name], kind) for name, kind in TEXT.items()), arrays)
+        state = State(**{name: _of_kind(text[name], kind) for name, kind in TEXT.items()}, arrays=arrays)
     except Exception as error:  # of zip files, arrays, JSON and what it tells: a dozen types on damaged bytes
         raise TactileError(path, f"cannot be read ({error})", "a checkpoint", ADVICE) from error
     for name, expected in identity.items():

@@ -78,8 +78,8 @@ def adapt_hand(
     """
     units: dict[int | None, list[str]] = {}
     for path in paths:
-        for finger in each_finger(path):
-            units.setdefault(split(finger)[1], []).append(finger)
+        for one in each_finger(path):
+            units.setdefault(split(one)[1], []).append(one)
     if len(units) > 1 and None in units:
         found = "files of several fingers, and of one"
         raise TactileError(paths[0], found, "one kind", "Adapt to each by itself")

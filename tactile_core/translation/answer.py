@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from typing import Literal
 
@@ -12,7 +13,9 @@ from ..errors import TactileError
 
 MOST_SAMPLES = 100  # contacts a frame; 50 bytes each (assumed: more tell nothing new)
 FARTHEST = 25.0  # mm, the gel's length: beyond, no contact of the BioTac lies on it
-LIKELY, MEAN = "likely", "mean"
+Estimate = Literal["likely", "mean"]
+LIKELY: Estimate = "likely"
+MEAN: Estimate = "mean"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,7 +28,7 @@ class Answer:
     samples : number of contacts drawn for each frame from its posterior
     """
 
-    kind: Literal["likely", "mean"] = LIKELY
+    kind: Estimate = LIKELY
     frames_apart: bool = False
     mount_shift_mm: tuple[float, float] = (0.0, 0.0)
     samples: int = 0
@@ -59,10 +62,10 @@ def parse_shift(text: str) -> tuple[float, float]:
     """Parse ``"4,-1.5"`` to (4.0, -1.5) mm; raises TactileError for anything else, or a shift longer than the gel."""
     number = r"\s*([+-]?\d{1,3}(?:\.\d{0,6})?)\s*"
     found = re.fullmatch(f"{number},{number}", text)
-    shift = tuple(float(part) for part in found.groups()) if found else ()
-    if not found or max(map(abs, shift)) > FARTHEST:
+    x, z = (float(part) for part in found.groups()) if found else (math.inf, math.inf)
+    if max(abs(x), abs(z)) > FARTHEST:
         expected = f"X,Z in mm, each from -{FARTHEST:g} to {FARTHEST:g}, such as 4,-1.5"
         raise TactileError(
             "--mount-shift", repr(text), expected, "Give it that way; for a negative X --mount-shift=-4,0"
         )
-    return shift
+    return x, z

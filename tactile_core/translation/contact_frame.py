@@ -118,7 +118,7 @@ class ContactFrame:
             first, last = max(middle - self.half, 0), min(middle + self.half + 1, size)
             on_grid.append(slice(first, last))
             in_window.append(slice(first - middle + self.half, last - middle + self.half))
-        return tuple(on_grid), tuple(in_window)
+        return (on_grid[0], on_grid[1]), (in_window[0], in_window[1])
 
 
 def frame_of(sensor: str, half: int) -> ContactFrame:

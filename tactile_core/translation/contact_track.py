@@ -87,6 +87,9 @@ class Follower:
     def __init__(self) -> None:
         self._score: np.ndarray | None = None
         self._place = np.zeros(PLACE)
+        self._variance: np.ndarray
+        self._frame: _Frame
+        self._time: float
 
     def __call__(self, posterior: Posterior, time: float) -> np.ndarray:
         """Estimate the state (1, STATE) float32 of a contact from the posterior of one frame at `time` s."""

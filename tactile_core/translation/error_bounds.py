@@ -8,6 +8,7 @@ bounds were too wide over the electrodes and too narrow beyond them.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -58,5 +59,5 @@ def check(card: Mapping[str, object], where: str) -> None:
                 raise TactileError(entry, f"{value!r:.80}", f"{PLACES} factors above 0, one a place", ADVICE)
 
 
-def _is_factor(value: object) -> bool:
+def _is_factor(value: Any) -> bool:
     return type(value) in (int, float) and 0 < value < 1e6

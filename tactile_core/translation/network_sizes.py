@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from ..errors import TactileError
 from .layers import plain_shapes, residual_shapes
@@ -49,8 +50,8 @@ SIZE_NAMES = {net: _OWN.get(net, _MAP) for net in NETS}
 def card_entry(card: dict, net: str, path: Path) -> dict:
     """Return the card's entry for one network: its sha256 and sizes."""
     nets = card.get("nets")
-    entry = nets.get(net) if isinstance(nets, dict) else None
-    sizes = entry.get("sizes") if isinstance(entry, dict) else None
+    entry: Any = nets.get(net) if isinstance(nets, dict) else None
+    sizes: Any = entry.get("sizes") if isinstance(entry, dict) else None
     names = SIZE_NAMES[net]
     whole = isinstance(sizes, dict) and sorted(sizes) == sorted(names)
     whole = whole and all(type(size) is int and 0 <= size <= MAX_SIZE for size in sizes.values())

@@ -304,13 +304,13 @@ class Networks:
             raise TactileError(f"networks, {name}", f"array of shape {x.shape}", expected, "Give frames first")
         if len(x) == 1:
             return function(x)
-        out: np.ndarray | None = None
+        out = np.empty(0, np.float32)
         for start in range(0, max(len(x), 1), BLOCK):  # an empty recording still tells the shape of its result
             part = x[start : start + BLOCK]
             if len(part) < BLOCK:
                 part = np.concatenate([part, np.zeros((BLOCK - len(part), *shape), np.float32)])
             result = function(part)[: len(x) - start]
-            if out is None:
+            if start == 0:
                 out = np.empty((len(x), *result.shape[1:]), np.float32)
             out[start : start + BLOCK] = result
         return out
@@ -333,7 +333,7 @@ def load(folder: str | os.PathLike | None = None) -> Networks:
     raises: TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)
     """
     shipped = folder is None
-    folder = Path(WEIGHTS_FOLDER if shipped else folder)
+    folder = Path(folder or WEIGHTS_FOLDER)
     card, digest = read_card(folder)
     if shipped and digest != SHIPPED_CARD_SHA256:
         raise TactileError(folder / CARD_NAME, f"sha256 {digest}", SHIPPED_CARD_SHA256, ADVICE)

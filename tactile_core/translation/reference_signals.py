@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -86,7 +87,7 @@ def _k_means(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 def write(folder: str | os.PathLike, signals: ReferenceSignals) -> dict:
     """Write ``signals.safetensors`` into a weights folder; returns the card's entry "signals"."""
-    arrays = {
+    arrays: dict[str, np.ndarray] = {
         "typical": signals.typical.astype(np.float16),
         "bias.signed": signals.bias_signed.astype(np.float32),
         "bias.rectified": signals.bias_rectified.astype(np.float32),
@@ -102,7 +103,7 @@ def read(folder: str | os.PathLike) -> ReferenceSignals:
     Raises TactileError: a card without them, or a file that is missing, changed or of another shape.
     """
     card, _ = weights.read_card(folder)
-    entry = card.get("signals")
+    entry: Any = card.get("signals")
     whole = isinstance(entry, dict) and isinstance(entry.get("sha256"), str)
     if not whole or type(entry.get("count")) is not int or not 0 < entry["count"] <= MOST:
         where = f"{Path(folder) / weights.CARD_NAME}, signals"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
+from typing import Any
 
 import numpy as np
 
@@ -119,7 +120,7 @@ class Translator:
         change = np.asarray(signals.typical, np.float32)
         latent_signal = nets.encode_signal(change, rectified)
         alone = state is None
-        if alone:
+        if state is None:
             posterior = nets.posterior(latent_signal, rectified)
             state = posterior.average if self.answer.kind == MEAN else posterior.heaviest
         latent_biotac = nets.given(latent_signal, state, rectified)
@@ -164,7 +165,7 @@ class Translator:
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Mark (T,) bool the changes (T, 19) counts outside those of the training, by any distance's quantile."""
-        return (self._distances(change, rectified) > self._quantile(IN_RANGE, rectified)).any(axis=0)
+        return np.any(self._distances(change, rectified) > self._quantile(IN_RANGE, rectified), axis=0)
 
     def _confidence(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> np.ndarray:
         """Confidence (T,): 1 for signals like those of the training, 0 far from them.
@@ -208,22 +209,22 @@ class Translator:
 def _check_quantiles(card: dict, where: str) -> None:
     """Check the quantiles behind confidence and silence: growing finite numbers, one a level."""
     _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
-    distance = card.get("distance") if isinstance(card.get("distance"), dict) else {}
+    distance: Any = card.get("distance") if isinstance(card.get("distance"), dict) else {}
     for kind in KINDS:
-        table = distance.get(kind) if isinstance(distance.get(kind), dict) else {}
+        table: Any = distance.get(kind) if isinstance(distance.get(kind), dict) else {}
         _check_table({"levels": distance.get("levels"), **table}, networks.DISTANCES, f"{where}, distance.{kind}")
 
 
-def _check_table(table: object, names: tuple[str, ...], where: str) -> None:
-    levels = table.get("levels") if isinstance(table, dict) else None
+def _check_table(table: Any, names: tuple[str, ...], where: str) -> None:
+    levels: Any = table.get("levels") if isinstance(table, dict) else None
     for name in ("levels", *names):
-        values = table.get(name) if isinstance(table, dict) else None
+        values: Any = table.get(name) if isinstance(table, dict) else None
         if not (_grows(values) and len(values) == len(levels)):
             expected = "as many growing, finite numbers as levels"
             raise TactileError(f"{where}.{name}", f"{values!r:.80}", expected, ADVICE)
 
 
-def _grows(values: object) -> bool:
+def _grows(values: Any) -> bool:
     numbers = isinstance(values, list) and len(values) > 0 and all(type(v) in (int, float) for v in values)
     return numbers and all(0 <= v <= sys.float_info.max for v in values) and values == sorted(values)
 

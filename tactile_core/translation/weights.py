@@ -21,7 +21,7 @@ from ..recordings.polarity import FALLS
 
 CARD_NAME = "card.json"
 CARD_FORMAT = "tactile-weights-2"
-DTYPES = {"F32": np.dtype("<f4"), "F16": np.dtype("<f2")}
+DTYPES: dict[str, np.dtype] = {"F32": np.dtype("<f4"), "F16": np.dtype("<f2")}
 MAX_HEADER_BYTES = 1_000_000  # our headers are about 3 kB; the limit keeps a damaged length from asking for gigabytes
 MAX_FILE_BYTES = 500_000_000  # shipped files are a few MB
 ADVICE = "Take the file from a fresh copy of the weights, or train again with `tactile train`"

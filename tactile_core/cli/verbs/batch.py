@@ -122,8 +122,8 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
         jobs.write(folder, job)
         return job
     if job.id != there.id:
-        found, advice = "holds another job (other recordings, contents or options)", "Name another --out folder"
-        raise TactileError(folder, found, "the same command that began it", advice)
+        held, advice = "holds another job (other recordings, contents or options)", "Name another --out folder"
+        raise TactileError(folder, held, "the same command that began it", advice)
     return there
 
 
@@ -172,8 +172,8 @@ def _verify(folder: Path, job: Job, progress: bool) -> int:
     with bar("verify", "file", progress) as shown:
         bad = manifest.damaged(folder, shown)
     for file in bad:
-        found = "damaged, or another's" if file.exists() else "missing"
-        complain(f"{file}: {found}; the same command makes it anew")
+        state = "damaged, or another's" if file.exists() else "missing"
+        complain(f"{file}: {state}; the same command makes it anew")
     if bad:
         return 2
     found = manifest.status(folder, job)

@@ -134,7 +134,7 @@ def _is_bag(folder: Path) -> bool:
 
 def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[Input]:
     """Read every file once. Raises TactileError for one that cannot be read; progress : (files done, in all)."""
-    found = []
+    found: list[Input] = []
     for done, path in enumerate(paths, 1):
         digest, size = content_hash(path)
         for finger in _fingers(path):

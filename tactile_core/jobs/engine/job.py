@@ -52,8 +52,8 @@ def _hash(content: Any) -> str:
 
 def make(inputs: list[Input], recipe: Recipe, weights: str | None, calibration: str | None = None) -> Job:
     """A new job."""
-    paths = [None if path is None else os.path.abspath(path) for path in (weights, calibration)]
-    return Job(FORMAT, inputs, recipe, *paths, provenance.versions())
+    networks, unit = (None if path is None else os.path.abspath(path) for path in (weights, calibration))
+    return Job(FORMAT, inputs, recipe, networks, unit, provenance.versions())
 
 
 def write(folder: Path, job: Job) -> None:

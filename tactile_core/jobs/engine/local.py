@@ -61,7 +61,7 @@ class Local:
             thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *more: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None = None, *more: object) -> None:
         self._stopped = True
         for _ in self._threads:
             self._todo.put(None)

@@ -59,8 +59,8 @@ def _remove(folder: Path) -> None:
         shutil.rmtree(folder / name, ignore_errors=True)
     for file in (jobs.MANIFEST, jobs.FILE, lock.FILE, DONE):
         (folder / file).unlink(missing_ok=True)
-    for file in folder.glob(f"{lock.FILE}-*"):
-        file.unlink()
+    for reader in folder.glob(f"{lock.FILE}-*"):
+        reader.unlink()
     with suppress(OSError):
         folder.rmdir()
 

@@ -7,7 +7,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, Self
 
 from ...errors import TactileError
 from ...files import atomic, lock
@@ -28,9 +28,9 @@ class Place(Protocol):
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
         """Replies as they come, as long as `count` says that some are awaited."""
 
-    def __enter__(self) -> Place: ...
+    def __enter__(self) -> Self: ...
 
-    def __exit__(self, *error: object) -> None: ...
+    def __exit__(self, kind: type[BaseException] | None, *more: object) -> None: ...
 
 
 @dataclasses.dataclass

@@ -38,8 +38,10 @@ def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibratio
     camera = dataclasses.replace(
         calibration.camera, px_per_mm_x=scale_x, px_per_mm_y=scale_y, apparent_height=1e-3 * height
     )
-    leds = tuple(
-        dataclasses.replace(led, position=tuple(1e-3 * float(v) for v in row[:3]), radius=1e-3 * float(row[3]))
-        for led, row in zip(calibration.leds, numbers[FIRST_LED:].reshape(3, 4), strict=True)
+    red, green, blue = (
+        dataclasses.replace(led, position=(1e-3 * x, 1e-3 * y, 1e-3 * z), radius=1e-3 * radius)
+        for led, (x, y, z, radius) in zip(calibration.leds, numbers[FIRST_LED:].reshape(3, 4).tolist(), strict=True)
     )
-    return dataclasses.replace(calibration, camera=camera, leds=leds, dome_scale=dome).with_gain(calibration.gain)
+    return dataclasses.replace(calibration, camera=camera, leds=(red, green, blue), dome_scale=dome).with_gain(
+        calibration.gain
+    )

@@ -94,12 +94,12 @@ def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | 
         raise TactileError(folder, found, f"{FEWEST_FOR_MEDIAN} or more", advice)
     else:
         rest = estimated_background(np.stack(list(pictures.values())))
-    found = {name: _press(name, picture, rest) for name, picture in pictures.items()}
-    presses = tuple(press for press in found.values() if press is not None)
+    tried = {name: _press(name, picture, rest) for name, picture in pictures.items()}
+    presses = tuple(press for press in tried.values() if press is not None)
     if not presses:
         advice = "Give the background with --background, or press harder"
         raise TactileError(folder, f"no press in {len(pictures)} photographs", "photographs of a pressed ball", advice)
-    untouched = tuple(name for name, press in found.items() if press is None)
+    untouched = tuple(name for name, press in tried.items() if press is None)
     return Photographs(Path(folder), presses, rest, background is None, untouched, measured_noise(presses, rest))
 
 
@@ -146,7 +146,8 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
             rest = press.change - windowed(press.change.astype(float), window)
             found.append([channel[np.abs(channel) < NOISE_LIMIT].std() for channel in rest[quiet].T])
     levels = np.median(found, axis=0) if found else np.zeros(3)
-    return tuple(float(level) for level in levels)
+    red, green, blue = (float(level) for level in levels)
+    return red, green, blue
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:

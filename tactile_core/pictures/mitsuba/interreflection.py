@@ -71,7 +71,7 @@ def _on_gel(
     place = np.stack([*np.meshgrid(right, down), height], -1).astype(np.float32)
     flat = np.zeros_like(height)
     rim = Hits.from_slopes(place, flat, flat)
-    radiance = direct_light(rim, None, [(led.position,) for led in unit.leds], unit)
+    radiance = direct_light(rim, None, [np.array([led.position]) for led in unit.leds], unit)
     outside = np.maximum(np.abs(place[..., 0]) - camera.right[-1], np.abs(place[..., 1]) - camera.down[-1])
     radiance[outside > MARGIN] = 0
     inside = slice(margin, -margin), slice(margin, -margin)

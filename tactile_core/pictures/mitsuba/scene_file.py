@@ -111,7 +111,8 @@ def _add(parent: ElementTree.Element, name: str, value: Any) -> None:
         transform = ElementTree.SubElement(parent, "transform", name=name)
         ElementTree.SubElement(transform, "matrix", value=" ".join(f"{each:.9g}" for each in value.ravel()))
     elif isinstance(value, list):
-        ElementTree.SubElement(parent, "point", name=name, **{k: f"{v:.9g}" for k, v in zip("xyz", value, strict=True)})
+        place = {k: f"{v:.9g}" for k, v in zip("xyz", value, strict=True)}
+        ElementTree.SubElement(parent, "point", {"name": name, **place})
     elif isinstance(value, bool):
         _field(parent, "boolean", name, "true" if value else "false")
     else:

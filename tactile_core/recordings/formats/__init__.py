@@ -13,6 +13,7 @@ Those of bags have no ``read``, but the message they know: see ``bag_biotac_hand
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,7 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
 
     Raises TactileError for a missing column, and the errors of ``assemble``.
     """
+    columns: dict[str, Any] = {channel: table.columns(names) for channel, names in channels.items()}
     return assemble(
         table.path,
         layout,
@@ -45,7 +47,7 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
         pdc=table.column("pdc"),
         tac=table.column("tac"),
         tdc=table.column("tdc"),
-        **{channel: table.columns(names) for channel, names in channels.items()},
+        **columns,
     )
 
 

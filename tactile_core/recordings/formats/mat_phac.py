@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
+from typing import Any
 
 from ...errors import TactileError
 from ..array_store import Store
@@ -43,8 +44,8 @@ def read(store: Store, finger: int) -> Recording:
         )
     electrodes = store.array(name, (ELECTRODES, None)).T
     frames = len(electrodes)
-    columns = {each: store.optional(f"F{finger}{each}", (1, frames)) for each in ("pdc", "tac", "tdc")}
-    columns = {each: None if values is None else values[0] for each, values in columns.items()}
+    rows = {each: store.optional(f"F{finger}{each}", (1, frames)) for each in ("pdc", "tac", "tdc")}
+    columns: dict[str, Any] = {each: None if values is None else values[0] for each, values in rows.items()}
     if f"F{finger}pac" in store.shapes:
         columns["pac"] = store.array(f"F{finger}pac", (*store.shapes[f"F{finger}pac"][0][:1], frames)).T
     return assemble(store.path, NAME, electrodes=electrodes, stamps=None, **columns)

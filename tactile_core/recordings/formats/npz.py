@@ -5,6 +5,7 @@ pickle.
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Any
 
 from ..array_store import Store
 from ..assemble import assemble
@@ -24,7 +25,7 @@ def read(store: Store) -> Recording:
     """Read (T, 19) electrodes and the optional arrays. Raises TactileError for arrays of other shapes."""
     electrodes = electrodes_of(store, "electrodes")
     frames = len(electrodes)
-    columns = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
+    columns: dict[str, Any] = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
     columns |= {name: store.optional(name, (frames, 3)) for name in ("position", "force")}
     if "pac" in store.shapes:
         columns["pac"] = store.array("pac", (frames, *store.shapes["pac"][0][1:2]))
