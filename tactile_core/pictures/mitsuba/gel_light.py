@@ -13,7 +13,7 @@ from ..presets import Preset
 from .camera_rays import camera_rays
 from .direct_light import evened, lookup
 from .gel_mesh import MM, GelMesh, check_mesh
-from .gel_scene import gel_shape, lamps, walls
+from .gel_scene import change_numbers, gel_shape, kinds, lamps, walls
 from .led_integrator import DIRECTIONS, bounced, direct, register
 from .tracer import MOST_MISSED
 from .variant import LLVM, activate
@@ -52,24 +52,49 @@ class GelLight:
         self._values = mi.traverse(self._scene)
         self._look(mi)
 
+    def change_unit(self, unit: Calibration) -> None:
+        """Take the numbers of another unit with as many pixels: a hundredth of a second, where a new scene compiles.
+
+        Its LEDs, camera, coating and index may differ in numbers, not in kind (a material's name; a sphere so small
+        that it is a point). Not for a preset of paths, nor with more lamps. Raises TactileError where it must not.
+        """
+        mi = activate(LLVM)
+        mesh = GelMesh(unit.camera, self.preset.spacing)
+        same = kinds(unit) == kinds(self.unit) and unit.camera.shape == self.unit.camera.shape
+        if self.preset.paths or not same or mesh.faces.shape != self._mesh.faces.shape:
+            raise TactileError("scene", "another kind of unit", "other numbers alone", "Make a new scene")
+        self.unit, self._mesh = unit, mesh
+        change_numbers(mi, mi.traverse(self._lights), self._values, unit)
+        self._look_from(mi)
+
     def _look(self, mi: Any) -> None:
-        """Rays that do not change."""
+        """Rays of the unit's camera."""
         camera, step = self.unit.camera, self.preset.bounce_step
         if self.preset.paths:
             self._paths = mi.load_dict({"type": "path", "max_depth": DEPTH, "hide_emitters": True})
             return
         import drjit
 
-        self._rays = self._towards(mi, 1)
         self._slopes = mi.Texture2f(camera.shape, 2, use_accel=False, wrap_mode=drjit.WrapMode.Clamp)
         row, column = np.indices(camera.shape)
         # Four neighbours' points lie a quarter of their distance apart.
         self._phase = mi.Float(((column % 2 + 2 * (row % 2)) / 4).ravel().astype(np.float32))
-        self._coarse = self._towards(mi, step, DIRECTIONS) if step else None
+        self._look_from(mi)
         if step:
             row, column = np.indices((camera.height // step, camera.width // step))
             turned = (column % 2 + 2 * (row % 2) + 0.5) / 4
             self._turned = mi.Float(np.repeat(turned.ravel(), DIRECTIONS).astype(np.float32))
+
+    def _look_from(self, mi: Any) -> None:
+        """Cast rays from where the camera stands."""
+        import drjit
+
+        camera, step = self.unit.camera, self.preset.bounce_step
+        self._rays = self._towards(mi, 1)
+        self._coarse = self._towards(mi, step, DIRECTIONS) if step else None
+        # Opaque: as literals, another camera would be other kernels.
+        sides = camera.pixel_size[0] * camera.width, -camera.pixel_size[1] * camera.height
+        self._per_mm = [drjit.opaque(mi.Float, 1 / (MM * side)) for side in sides]
 
     def _towards(self, mi: Any, step: int, times: int = 1) -> Any:
         """Rays at every step-th pixel, each so many times."""
@@ -103,12 +128,8 @@ class GelLight:
         mi = activate(LLVM)
         import drjit as dr
 
-        camera = self.unit.camera
         hit = self._scene.ray_intersect(ray)
-        place = mi.Point2f(
-            hit.p.x / (MM * camera.pixel_size[0] * camera.width) + 0.5,
-            -hit.p.y / (MM * camera.pixel_size[1] * camera.height) + 0.5,
-        )
+        place = mi.Point2f(hit.p.x * self._per_mm[0] + 0.5, hit.p.y * self._per_mm[1] + 0.5)
         right, down = self._slopes.eval(place)
         hit.sh_frame.n = dr.normalize(mi.Normal3f(-right, down, 1))
         hit.initialize_sh_frame()

@@ -16,6 +16,7 @@ from ...sensors.coating import DIFFUSE, PRINCIPLED, Coating
 from .gel_mesh import MM, GelMesh, check_mesh
 
 PIGMENT_INDEX = 1.5  # of the clear coat of a glossy paint: acrylic and polyurethane binders
+LEAST_STEP = 1e-3  # between indices: reflects a ten millionth
 # Of an LED's distance: Mitsuba samples a smaller sphere's cone to no better than 0.1 % in single precision.
 POINTLIKE = 0.01
 WALL_GAP = 1.0  # mm round the LEDs, and above them
@@ -45,8 +46,13 @@ def material(coating: Coating, gel_index: float) -> dict[str, Any]:
         }  # fmt: skip
     return {
         "type": "roughplastic", "diffuse_reflectance": albedo, "alpha": coating.roughness, "int_ior": PIGMENT_INDEX,
-        "ext_ior": gel_index, "specular_reflectance": {"type": "rgb", "value": [coating.gloss] * 3},
+        "ext_ior": _outer_index(gel_index), "specular_reflectance": {"type": "rgb", "value": [coating.gloss] * 3},
     }  # fmt: skip
+
+
+def _outer_index(gel_index: float) -> float:
+    """Index round the clear coat; Mitsuba refuses equal ones, which would reflect nothing."""
+    return gel_index if abs(gel_index - PIGMENT_INDEX) > LEAST_STEP else PIGMENT_INDEX - LEAST_STEP
 
 
 def lamps(unit: Calibration) -> dict[str, Any]:
@@ -66,6 +72,38 @@ def _lamp(led: Led) -> dict[str, Any]:
         "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},
         "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}},
     }  # fmt: skip
+
+
+def kinds(unit: Calibration) -> list[str]:
+    """Plugins of the coating and of each LED."""
+    return [unit.coating.bsdf, *(lamp["type"] for lamp in lamps(unit).values())]
+
+
+def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
+    """Give loaded LEDs and gel another unit's numbers; lights, gel : what ``traverse`` finds in their scenes.
+
+    Same plugins as before: nothing is compiled again.
+    """
+    for name, lamp in lamps(unit).items():
+        if lamp["type"] == "point":
+            lights[f"{name}.position"] = lamp["position"]
+            lights[f"{name}.intensity.value"] = mi.Color3f(lamp["intensity"]["value"])
+        else:
+            place = mi.ScalarTransform4f().translate(lamp["center"]).scale(lamp["radius"])
+            lights[f"{name}.to_world"] = type(lights[f"{name}.to_world"])(place)
+            lights[f"{name}.emitter.radiance.value"] = mi.Color3f(lamp["emitter"]["radiance"]["value"])
+    lights.update()
+    coating = unit.coating
+    numbers = {"diffuse": {"reflectance": coating.albedo},
+               "roughplastic": {"diffuse_reflectance": coating.albedo, "specular_reflectance": [coating.gloss] * 3,
+                                "alpha": coating.roughness, "eta": PIGMENT_INDEX / _outer_index(unit.gel_index)},
+               "principled": {"base_color": coating.albedo, "roughness": coating.roughness,
+                              "metallic": coating.metallic, "specular": coating.gloss}}  # fmt: skip
+    for name, value in numbers[coating.bsdf].items():
+        for key in (f"gel.bsdf.{name}.value", f"gel.bsdf.{name}"):
+            if key in gel:
+                gel[key] = type(gel[key])(np.asarray(value, float).tolist())
+    gel.update()
 
 
 def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:

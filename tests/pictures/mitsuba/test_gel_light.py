@@ -44,6 +44,26 @@ def test_our_integrator_is_near_mitsubas_paths(small, coating):
     assert (errors[1] < 0.8 * errors[0]).all()  # a bounce brings it nearer
 
 
+@pytest.mark.parametrize("coating", COATINGS, ids=lambda coating: coating.bsdf)
+def test_other_numbers_in_one_scene_make_what_a_new_scene_makes(small, coating):
+    leds = tuple(
+        dataclasses.replace(led, position=tuple(np.add(led.position, 1e-3).tolist()), radius=0.7 * led.radius,
+                            radiance=2 * led.radiance) for led in small.leds
+    )  # fmt: skip
+    camera = dataclasses.replace(small.camera, px_per_mm_x=1.02 * small.camera.px_per_mm_x, apparent_height=30e-3)
+    paint = dataclasses.replace(coating, albedo=(0.3, 0.4, 0.2), roughness=0.5, gloss=0.9)
+    other = dataclasses.replace(small, leds=leds, camera=camera, coating=paint, gel_index=1.5)
+    light = GelLight(dataclasses.replace(small, coating=coating), QUALITY, rest_height_map(small.camera), 0)
+    height = PRESS.on(other.camera)
+    before = light.radiance(height)
+    light.change_unit(other)
+    new = GelLight(other, QUALITY, rest_height_map(other.camera), 0).radiance(height)
+    np.testing.assert_array_equal(light.radiance(height), new)
+    assert np.abs(new - before).mean() > 1  # levels: the numbers matter
+    with pytest.raises(TactileError, match="other numbers alone"):
+        light.change_unit(other.at_size(30, 40))
+
+
 def test_an_led_that_is_off_or_doubled_or_moved_acts(small):
     def with_red(**change) -> np.ndarray:
         red = dataclasses.replace(small.leds[0], **change)
