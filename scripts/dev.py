@@ -34,7 +34,12 @@ BLENDER_SECONDS = 1800  # some Blenders hang at exit (4.5 where an operator stay
 STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
 # Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
-SIZES_MB = {"": "50", "dev": "430", "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)"}
+SIZES_MB = {
+    "": "50",
+    "plain": "430",
+    "dev": "530",
+    "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)",
+}
 NETWORK_SIGNS = (
     "NewConnectionError",
     "NameResolutionError",
@@ -65,7 +70,7 @@ def main(arguments: list[str] | None = None) -> int:
     # No abbreviations: `-t` and the like belong to pytest.
     test = commands.add_parser("test", help="run ruff and pytest; other arguments go to pytest", allow_abbrev=False)
     test.add_argument("--train", action="store_true", help="also install torch and run the training tests")
-    test.add_argument("--numpy", metavar="VERSION", help="install this numpy instead of the pinned one")
+    test.add_argument("--numpy", metavar="VERSION", help="install this numpy, and nothing that is compiled")
     blender = commands.add_parser("test-blender", help="test the extension inside Blender", allow_abbrev=False)
     blender.add_argument("--bpy", metavar="VERSION", default="4.5.15", help="of the wheel (default: %(default)s)")
     blender.add_argument("--binary", type=Path, metavar="PATH", help="a real Blender in place of the wheel")
@@ -116,7 +121,7 @@ def run_demo(folder: Path) -> int:
 
 def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
     """Ruff, then pytest, whatever ruff says; the status of the first that fails."""
-    extras = ("dev", "train") if options.train else ("dev",)
+    extras = ("plain" if options.numpy else "dev", *(("train",) if options.train else ()))
     python = install(options.venv, extras, options.numpy)
     failed = []
     for command in (["ruff", "check", "."], ["pytest", *pytest_arguments]):

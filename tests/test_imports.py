@@ -20,7 +20,7 @@ MODULES = sorted(
 )
 LAZY = (
     "h5py", "scipy", "matplotlib", "PIL", "mitsuba", "OpenEXR", "trimesh", "skfem", "cholespy", "rosbags",
-    "distributed",
+    "distributed", "numba", "mujoco", "gymnasium",
 )  # fmt: skip
 HEAVY = (*LAZY, "torch", "bpy", "drjit", "tqdm")
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...files.compiled import available
 from .compliance import Compliance
 from .compliance_rows import ComplianceRows
+from .frictionless_loops import normal_compliance
 from .interpolated_points import SpringRows
 from .mirror_symmetry import axes_of
 
@@ -56,6 +58,8 @@ class ComplianceBlock:
     def normal(self, normals: np.ndarray) -> np.ndarray:
         """Compliance (k + c, k + c) m/N of the gaps: along ``normals`` (k, 3), and of the core's gaps."""
         k, size = self.k, 3 * self.k
+        if available():
+            return normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, _RIDGE)
         matrix = np.empty((k + self.c, k + self.c))
         matrix[:k, :k] = self.along(normals, normals)
         if self.c:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...files.compiled import available
 from .compliance import Compliance
 from .mirror_symmetry import axes_of
+from .surface_loops import gather_rows
 from .surface_response import runs
 
 
@@ -46,6 +48,12 @@ class ComplianceRows:
         if len(new):
             new = np.unique(new)  # a node may stand twice
             self._known[new] = True
+            if available():
+                gather_rows(
+                    self.compliance.move, self._entries, new, self._row, self._mirrored, self._columns,
+                    self._mirrored_columns,
+                )  # fmt: skip
+                return self._entries.take(axes_of(at), axis=0)
             mirrored = self._mirrored[new]
             direct, turned = new[~mirrored], new[mirrored]
             self._entries[axes_of(direct)] = self._gathered(self._row[direct], self._columns)

@@ -11,12 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...files.compiled import available
 from ...geometry.indenters import Indenter, Pose
 from ..penetration import check_follows
 from ..pose_path import between, same_place
 from . import surface_response
 from .active_set import UnsolvedError
 from .candidates import Candidates
+from .compiled_friction import CompiledFriction
 from .compliance import Compliance
 from .compliance_block import ComplianceBlock
 from .compliance_rows import ComplianceRows
@@ -198,7 +200,9 @@ class ContactProblem:
         else:
             begin.force, begin.slipping = _borne(before, candidates.nodes)
             spots = self._spots(before, moved, pose, candidates.nodes)
-            solver = Friction(block, rest, core_gap, self.indenter, pose, spots, self.friction)
+            solver = (CompiledFriction if available() else Friction)(
+                block, rest, core_gap, self.indenter, pose, spots, self.friction
+            )
         try:
             return solver.solve(begin, axial_force)
         except UnsolvedError:

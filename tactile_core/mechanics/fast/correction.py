@@ -15,11 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import sensors
+from ...files.compiled import available
 from ...files.shipped import shipped
 from ...sensors import biotac, unrolling
 from ...sensors import digit as digit_shape
 from .compliance import Compliance
 from .contact_state import Contact
+from .surface_loops import add_field
 
 REACH = 12.0  # patch radii, how far the learned fields go; they fade over the last of their cells
 LINES = 33  # of their grid, even in asinh(distance / radius): fine at the patch, coarse far from it
@@ -270,5 +272,14 @@ def correct(compliance: Compliance, contact: Contact, parts: Correction | None =
         return Corrected(contact.displacement, 1.0)
     at = frame(compliance, contact)
     seen = features(compliance, contact, at)
-    moved = contact.displacement + contact.depth * spread_field(compliance.name, at, parts.field(seen))
-    return Corrected(moved, parts.factor(seen))
+    return Corrected(_with_field(compliance.name, contact, at, parts.field(seen)), parts.factor(seen))
+
+
+def _with_field(sensor: str, contact: Contact, at: Frame, field: np.ndarray) -> np.ndarray:
+    """Displacement (n, 3) m of a contact with a field on the grid (g, 3), per metre of depth."""
+    if not available():
+        return contact.displacement + contact.depth * spread_field(sensor, at, field)
+    return add_field(
+        contact.displacement, plane(sensor), _frames_by_axis(sensor), at.centre, at.radius, REACH, LINES, field,
+        contact.depth,
+    )  # fmt: skip

@@ -20,13 +20,13 @@ from .stick_slip import LEAST_FORCE, Slipping, Step
 
 SLIP_TOLERANCE = 0.05e-6  # m, motion of a sticking node that counts as none: a quarter of the gaps' tolerance
 MAX_ITERATIONS = 24  # most contacts take 3 to 7; smaller steps help those that do not settle
-_LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
-_GAP_NOISE = 1e-9  # m: below what single precision of the compliance resolves
-_BEYOND = 1e-9  # relative, by which a sticking force may pass its limit before the node slips
+LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
+GAP_NOISE = 1e-9  # m: below what single precision of the compliance resolves
+BEYOND = 1e-9  # relative, by which a sticking force may pass its limit before the node slips
 # ... and may for nodes that have stuck again so often: at edges a node may slip backward as soon as it slips.
-_BEYOND_WAVERING, _WAVERS = 0.01, 2
-_NEARLY_CLOSED = 5e-6  # m, assumed: with larger gaps Newton's step in turning normals leads astray at edges
-_FLAT = np.empty(0, int), np.empty((0, 3, 3))  # no node feels the curvature
+BEYOND_WAVERING, WAVERS = 0.01, 2
+NEARLY_CLOSED = 5e-6  # m, assumed: with larger gaps Newton's step in turning normals leads astray at edges
+FLAT = np.empty(0, int), np.empty((0, 3, 3))  # no node feels the curvature
 _MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # as without friction: nodes, and curvature x force x compliance
 
 
@@ -91,7 +91,7 @@ class Friction:
             points = self.rest + displacement
             (gap, turned), off = there.distance(self.indenter, points), self._off(points, there)
             slip = _across(off, normal)
-            beyond = np.where(stuck_again < _WAVERS, _BEYOND, _BEYOND_WAVERING)
+            beyond = np.where(stuck_again < WAVERS, BEYOND, BEYOND_WAVERING)
             active, slips, changed = self._sort(guess, seen, slip, gap, self.core_gap + core_moved, beyond)
             stuck_again += guess.slips & ~slips & active[:k]
             state = Try(
@@ -105,7 +105,7 @@ class Friction:
             left |= guess.active[:k] & ~active[:k]
             guess.active, guess.slips = active, slips
             self._come_back(guess, back, slip, turned)
-            calm = not changed and bool(np.abs(gap[active[:k]]).max(initial=0.0) < _NEARLY_CLOSED)
+            calm = not changed and bool(np.abs(gap[active[:k]]).max(initial=0.0) < NEARLY_CLOSED)
             trust = pace.after(gap, active[:k])
             if pace.stalled:
                 break
@@ -138,7 +138,7 @@ class Friction:
         moves = moved - place
         onto = dot(normal, moves)
         slip = _across(off, normal) + moves - onto[:, None] * normal
-        bend = self._bend(guess, place, there) if curved else _FLAT
+        bend = self._bend(guess, place, there) if curved else FLAT
         return _Seen(normal, lean, slip, gap + onto, self.core_gap + core_moved, moves, *bend)
 
     def _off(self, points: np.ndarray, there: Pose) -> np.ndarray:
@@ -147,11 +147,15 @@ class Friction:
 
     def _bend(self, guess: _Guess, place: np.ndarray, there: Pose) -> tuple[np.ndarray, np.ndarray]:
         """Find the slipping nodes (c,) most affected by the indenter's curvature, and that curvature (c, 3, 3) 1/m."""
-        at = np.flatnonzero(guess.slips)
+        return self._bend_at(np.flatnonzero(guess.slips), guess.force, place, there)
+
+    def _bend_at(
+        self, at: np.ndarray, force: np.ndarray, place: np.ndarray, there: Pose
+    ) -> tuple[np.ndarray, np.ndarray]:
         if not len(at):
-            return _FLAT
+            return FLAT
         found = there.curvature(self.indenter, self.rest[at] + place[at])
-        feels = lengths(guess.force[at]) * self.block.matrix.diagonal()[3 * at] * lengths(found.reshape(-1, 9))
+        feels = lengths(force[at]) * self.block.matrix.diagonal()[3 * at] * lengths(found.reshape(-1, 9))
         felt = np.argsort(-feels, kind="stable")[:_MOST_CURVED]
         felt = np.sort(felt[feels[felt] > _FEELS_CURVATURE])
         return felt, found[felt]
@@ -171,7 +175,7 @@ class Friction:
         step = 0.0
         if axial_force is not None:
             step = solved.step_for(axial_force - float(guess.force.sum(axis=0) @ direction))
-            step = min(max(step, -_LARGEST_STEP), _LARGEST_STEP)
+            step = min(max(step, -LARGEST_STEP), LARGEST_STEP)
         change, core_change, of_slipping = solved.change(step)
         force, core = guess.force.copy(), guess.core.copy()
         force[at[solved.sticks]] += change
@@ -186,7 +190,7 @@ class Friction:
         k = len(gap)
         pressing = dot(guess.force, seen.normal)
         opening = np.concatenate([gap, core_gap])
-        active = np.where(guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -_GAP_NOISE)
+        active = np.where(guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -GAP_NOISE)
         held = active[:k] & guess.active[:k]
         over = lengths(guess.force - pressing[:, None] * seen.normal) > (
             self.friction * pressing * (1 + beyond) + LEAST_FORCE

@@ -12,10 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...files.compiled import available
 from ...geometry.indenters import Indenter, Pose
 from ...geometry.indenters.indenter import lengths
 from .active_set import Pressing, complement
 from .compliance_block import ComplianceBlock
+from .frictionless_loops import tangent_response
 from .node_vectors import weighted
 
 GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that the target allows
@@ -84,7 +86,10 @@ class Pace:
 
     def after(self, gap: np.ndarray, active: np.ndarray) -> float:
         """The share of the next step to take, for gaps (k,) m that should be closed where ``active`` (k,)."""
-        wrong = max(-gap.min(), np.abs(gap[active]).max(initial=0.0))
+        return self.after_wrong(max(-gap.min(), np.abs(gap[active]).max(initial=0.0)))
+
+    def after_wrong(self, wrong: float) -> float:
+        """The same from the largest of these gaps, or the deepest place in the indenter, m."""
         self._calls += 1
         if wrong > max(_PROGRESS * self._last, GAP_TOLERANCE) and self._calls > _FREE_ITERATIONS:
             self._trust = max(_SHRINK * self._trust, _LEAST_TRUST)
@@ -228,14 +233,9 @@ class Frictionless:
             return None
         nodes, root = touching[felt[chosen // 3]], np.sqrt(weight[chosen])
         tangent = axes[chosen // 3, :, chosen % 3] * root[:, None]
-        three = 3 * nodes + np.arange(3)[:, None]
-        moved = weighted(self.block.matrix.take(three, axis=0), tangent.T[:, :, None])
-        on_surface = moved[:, : 3 * self.block.k].reshape(len(nodes), self.block.k, 3)
-        onto_gaps = np.einsum("qbi,bi->qb", on_surface, normal).take(touching, axis=1)
-        if self.block.c:
-            onto_gaps = np.concatenate([onto_gaps, moved[:, active[len(touching) :] + 2 * self.block.k]], axis=1)
+        among, onto_gaps = self._tangent_response(nodes, tangent, normal, active)
         relief, _ = lapack.dpotrs(solved.factor, onto_gaps.T, lower=1)
-        among = np.einsum("qri,ri->qr", on_surface[:, nodes], tangent) - onto_gaps @ relief
+        among = among - onto_gaps @ relief
         mode, shape = np.linalg.eigh((among + among.T) / 2)
         driven = shape.T @ np.einsum("qi,qi->q", tangent, travel[nodes])
         amount = shape @ (driven / _stiffness(mode))
@@ -246,6 +246,22 @@ class Frictionless:
         force = change[: self.block.k, None] * normal
         np.add.at(force, nodes, amount[:, None] * tangent)
         return force, change[self.block.k :]
+
+    def _tangent_response(
+        self, nodes: np.ndarray, tangent: np.ndarray, normal: np.ndarray, active: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Motion along weighted tangents (q, 3) at nodes (q,) under forces along them (q, q); of active gaps (q, a)."""
+        k, touching = self.block.k, active[active < self.block.k]
+        if available():
+            core = active[len(touching) :] - k
+            return tangent_response(self.block.matrix, k, nodes, tangent, normal, touching, core)
+        three = 3 * nodes + np.arange(3)[:, None]
+        moved = weighted(self.block.matrix.take(three, axis=0), tangent.T[:, :, None])
+        on_surface = moved[:, : 3 * k].reshape(len(nodes), k, 3)
+        onto_gaps = np.einsum("qbi,bi->qb", on_surface, normal).take(touching, axis=1)
+        if self.block.c:
+            onto_gaps = np.concatenate([onto_gaps, moved[:, active[len(touching) :] + 2 * k]], axis=1)
+        return np.einsum("qri,ri->qr", on_surface[:, nodes], tangent), onto_gaps
 
     def _settled(self, state: Try, gap, normal, step, axial_force) -> bool:  # noqa: ANN001
         active = state.active[: len(gap)]

@@ -17,9 +17,9 @@ from .active_set import UnsolvedError
 from .mirror_symmetry import axes_of
 from .node_vectors import cross, dot, weighted
 
-_RIDGE = 1e-6  # relative, of the compliance: keeps single precision definite
-_LARGEST_TURN = 1.0  # rad, of a slipping node's friction in one step
-_LARGEST_TILT = 0.3  # rad, of a normal in one step
+RIDGE = 1e-6  # relative, of the compliance: keeps single precision definite
+LARGEST_TURN = 1.0  # rad, of a slipping node's friction in one step
+LARGEST_TILT = 0.3  # rad, of a normal in one step
 LEAST_FORCE = 1e-9  # N: below what single precision of the compliance resolves
 
 
@@ -60,12 +60,12 @@ class Slipping:
 
     def forces(self, pressing: np.ndarray, turn: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Forces (s, 3) N after a turn (s,) of friction and motion (c, 3) m of the curved nodes."""
-        turn = np.minimum(np.maximum(turn, -_LARGEST_TURN), _LARGEST_TURN)[:, None]
+        turn = np.minimum(np.maximum(turn, -LARGEST_TURN), LARGEST_TURN)[:, None]
         normal, lean = self.normal, np.cos(turn) * self.lean + np.sin(turn) * self.across
         if len(self.curved):
             tilt = (self.bend @ motion[:, :, None])[:, :, 0]
             normal = normal.copy()
-            normal[self.curved] += tilt * np.minimum(1, _LARGEST_TILT / np.maximum(lengths(tilt), 1e-12))[:, None]
+            normal[self.curved] += tilt * np.minimum(1, LARGEST_TILT / np.maximum(lengths(tilt), 1e-12))[:, None]
             normal /= lengths(normal)[:, None]
             lean -= dot(lean, normal)[:, None] * normal
             lean /= lengths(lean)[:, None]
@@ -94,7 +94,7 @@ class Step:
         self._stuck, self._whole, s = 3 * len(stuck), 3 * len(stuck) + len(core), len(slips)
         index = np.concatenate([axes_of(stuck), core, slips, slips + 1, slips + 2])
         matrix = compliance.take(index, 0).take(index, 1)
-        matrix.reshape(-1)[:: len(index) + 1] *= 1 + _RIDGE
+        matrix.reshape(-1)[:: len(index) + 1] *= 1 + RIDGE
         right = np.zeros((len(index), 2))
         right[: self._stuck, 0] = -away[self.sticks].ravel()
         right[: self._stuck, 1].reshape(-1, 3)[:] = direction
@@ -104,7 +104,7 @@ class Step:
         self._carry = right[:, 1]
         if s:
             matrix, right, self._carry = self._reduced(matrix, right)
-        self._answer = _solved(matrix, right, symmetric=not s)
+        self._answer = solved(matrix, right, symmetric=not s)
 
     def step_for(self, missing: float) -> float:
         """Distance, m, that the indenter moves for ``missing`` N more along its motion. Raises UnsolvedError."""
@@ -162,8 +162,8 @@ class Step:
         among[: on_slips.shape[1], -3 * len(at) :].reshape(-1, len(at), 3)[:] = felt
 
 
-def _solved(matrix: np.ndarray, right: np.ndarray, *, symmetric: bool) -> np.ndarray:
-    """Solve the system (j, j) for ``right`` (j, 2); overwrites the matrix."""
+def solved(matrix: np.ndarray, right: np.ndarray, *, symmetric: bool) -> np.ndarray:
+    """Solve the system (j, j) for ``right`` (j, 2); overwrites the matrix. Raises UnsolvedError."""
     from scipy.linalg import lapack
 
     if not len(matrix):

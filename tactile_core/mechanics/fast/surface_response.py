@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...files.compiled import available
 from .compliance import Compliance
+from .surface_loops import surface_motion
 
 _MIRROR = np.array([1.0, 1.0, -1.0])
 
@@ -25,6 +27,8 @@ def displacement(
     (c,) N at sensing points."""
     rows, mirror, image = compliance.answers
     row, mirrored = rows[nodes], mirror[nodes]
+    if available():
+        return surface_motion(compliance.move, row, mirrored, image, force, compliance.inner_move, inner, inner_force)
     moved = _under(compliance, row[~mirrored], force[~mirrored])
     if mirrored.any():
         order = np.argsort(row[mirrored], kind="stable")

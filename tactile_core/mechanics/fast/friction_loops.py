@@ -1,0 +1,320 @@
+"""Compiled loops of the friction solver: what ``friction`` and ``stick_slip`` do in numpy, where the formulas stand.
+
+Arrays: force, place, normal, ... (k, 3) float64, bool masks, ``matrix`` (3 k + c, 3 k + c) float32 of the block.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...files.compiled import Loop
+
+
+@Loop
+def respond(matrix, force, core):  # noqa: ANN001, ANN201
+    """Displacement (k, 3) m of the nodes and motion (c,) m of the core's points under forces (k, 3), (c,) N."""
+    k, c = force.shape[0], core.shape[0]
+    size = 3 * k + c
+    moved = np.zeros(size)
+    for row in range(size):
+        load = force[row // 3, row % 3] if row < 3 * k else core[row - 3 * k]
+        if load != 0.0:
+            line = matrix[row]
+            for column in range(size):
+                moved[column] += load * line[column]
+    return moved[: 3 * k].copy().reshape(k, 3), moved[3 * k :].copy()
+
+
+@Loop
+def reduce_to_law(force, core, active, slips, normal, friction, lean):  # noqa: ANN001, ANN201
+    """Reduce guessed forces to Coulomb's law, in place; ``lean`` (k, 3) is set to the direction of friction."""
+    k = force.shape[0]
+    for a in range(k):
+        for i in range(3):
+            lean[a, i] = 0.0
+            if not active[a]:
+                force[a, i] = 0.0
+        if not slips[a]:
+            continue
+        pressing = force[a, 0] * normal[a, 0] + force[a, 1] * normal[a, 1] + force[a, 2] * normal[a, 2]
+        square = 0.0
+        for i in range(3):
+            lean[a, i] = force[a, i] - pressing * normal[a, i]
+            square += lean[a, i] ** 2
+        long = np.sqrt(square)
+        if long == 0.0:
+            slips[a] = False
+            continue
+        pressing = max(pressing, 0.0)
+        for i in range(3):
+            lean[a, i] /= long
+            force[a, i] = pressing * (normal[a, i] + friction * lean[a, i])
+    for p in range(core.shape[0]):
+        core[p] = max(core[p], 0.0) if active[k + p] else 0.0
+
+
+@Loop
+def linearise(moved, place, off, gap, normal, moves, slip, gap_then):  # noqa: ANN001, ANN201
+    """Motion from the place (k, 3), slip from the spots (k, 3) and gaps (k,) m that the moved nodes have then."""
+    for a in range(place.shape[0]):
+        onto, along = 0.0, 0.0
+        for i in range(3):
+            moves[a, i] = moved[a, i] - place[a, i]
+            onto += normal[a, i] * moves[a, i]
+            along += off[a, i] * normal[a, i]
+        for i in range(3):
+            slip[a, i] = (off[a, i] - along * normal[a, i]) + moves[a, i] - onto * normal[a, i]
+        gap_then[a] = gap[a] + onto
+
+
+@Loop
+def assemble(  # noqa: ANN201
+    matrix, k, stuck, core_at, slipping, normal, lean, force, slip, gap, core_gap, moves, curved, bend, direction,  # noqa: ANN001
+    friction, ridge, least,  # noqa: ANN001
+):  # fmt: skip
+    """The system of a Newton step and its two right sides; see ``stick_slip.Step``.
+
+    stuck, slipping : nodes (t,), (s,) that stick and slip; core_at : (d,) points that press
+    curved : (q,), which of the slipping nodes' normals turn; bend : (q, 3, 3) 1/m
+    """
+    t, d, s, q = len(stuck), len(core_at), len(slipping), len(curved)
+    n = 3 * t + d
+    total, rows = n + 2 * s + 3 * q, n + 3 * s
+    index = np.empty(rows, np.int64)
+    for a in range(t):
+        for i in range(3):
+            index[3 * a + i] = 3 * stuck[a] + i
+    for p in range(d):
+        index[3 * t + p] = 3 * k + core_at[p]
+    for a in range(s):
+        for i in range(3):
+            index[n + 3 * a + i] = 3 * slipping[a] + i
+    across, pressing = np.empty((s, 3)), np.empty(s)
+    turning = np.empty((q, 3, 3))
+    for a in range(s):
+        node = slipping[a]
+        u, v = normal[node], lean[node]
+        across[a, 0] = u[1] * v[2] - u[2] * v[1]
+        across[a, 1] = u[2] * v[0] - u[0] * v[2]
+        across[a, 2] = u[0] * v[1] - u[1] * v[0]
+        pressing[a] = force[node, 0] * u[0] + force[node, 1] * u[1] + force[node, 2] * u[2]
+    for p in range(q):
+        node = slipping[curved[p]]
+        for j in range(3):
+            onto = 0.0
+            for i in range(3):
+                onto += lean[node, i] * bend[p, i, j]
+            for i in range(3):
+                turning[p, i, j] = pressing[curved[p]] * (bend[p, i, j] - friction * normal[node, i] * onto)
+    columns = np.empty((rows, total), np.float32)  # all base rows, the columns of the unknowns
+    for r in range(rows):
+        line, out = matrix[index[r]], columns[r]
+        for b in range(n):
+            out[b] = line[index[b]]
+        if r < n:
+            out[r] *= 1 + ridge
+        for a in range(s):
+            node = slipping[a]
+            x, y, z = line[3 * node], line[3 * node + 1], line[3 * node + 2]
+            own = r - n - 3 * a
+            if own == 0:
+                x *= 1 + ridge
+            elif own == 1:
+                y *= 1 + ridge
+            elif own == 2:
+                z *= 1 + ridge
+            out[n + a] = (
+                x * (normal[node, 0] + friction * lean[node, 0])
+                + y * (normal[node, 1] + friction * lean[node, 1])
+                + z * (normal[node, 2] + friction * lean[node, 2])
+            )
+            out[n + s + a] = x * across[a, 0] + y * across[a, 1] + z * across[a, 2]
+        for p in range(q):
+            node = slipping[curved[p]]
+            x, y, z = line[3 * node], line[3 * node + 1], line[3 * node + 2]
+            own = r - n - 3 * curved[p]
+            if own == 0:
+                x *= 1 + ridge
+            elif own == 1:
+                y *= 1 + ridge
+            elif own == 2:
+                z *= 1 + ridge
+            for j in range(3):
+                out[n + 2 * s + 3 * p + j] = x * turning[p, 0, j] + y * turning[p, 1, j] + z * turning[p, 2, j]
+    system, right, carry = np.empty((total, total), np.float32), np.zeros((total, 2)), np.zeros(total)
+    system[:n] = columns[:n]
+    for a in range(t):
+        node = stuck[a]
+        for i in range(3):
+            right[3 * a + i, 0] = -(slip[node, i] + gap[node] * normal[node, i])
+            right[3 * a + i, 1] = carry[3 * a + i] = direction[i]
+    for p in range(d):
+        right[3 * t + p, 0] = -core_gap[core_at[p]]
+    for a in range(s):
+        node = slipping[a]
+        against = 0.0
+        for b in range(total):
+            system[n + a, b], system[n + s + a, b] = 0.0, 0.0
+        for i in range(3):
+            line = columns[n + 3 * a + i]
+            u, w = np.float32(normal[node, i]), np.float32(across[a, i])
+            for b in range(total):
+                system[n + a, b] += u * line[b]
+                system[n + s + a, b] += w * line[b]
+            away = slip[node, i] + gap[node] * normal[node, i]
+            right[n + a, 0] -= normal[node, i] * away
+            right[n + s + a, 0] -= across[a, i] * away
+            right[n + a, 1] += normal[node, i] * direction[i]
+            right[n + s + a, 1] += across[a, i] * direction[i]
+            carry[n + a] += direction[i] * (normal[node, i] + friction * lean[node, i])
+            carry[n + s + a] += direction[i] * across[a, i]
+            against -= slip[node, i] * lean[node, i]
+        system[n + s + a, n + s + a] += max(against, 0.0) / (friction * max(pressing[a], least))
+    for p in range(q):
+        for i in range(3):
+            line, at = columns[n + 3 * curved[p] + i], n + 2 * s + 3 * p + i
+            for b in range(total):
+                system[at, b] = -line[b]
+            system[at, at] += 1
+            right[at, 0] = moves[slipping[curved[p]], i]
+            right[at, 1] = -direction[i]
+            for j in range(3):
+                carry[at] += direction[j] * turning[p, j, i]
+    return system, right, carry, across, pressing
+
+
+@Loop
+def advance(  # noqa: ANN201
+    force, core, answer, step, stuck, core_at, slipping, normal, lean, across, pressing, curved, bend, friction, least,  # noqa: ANN001
+    largest_turn, largest_tilt,  # noqa: ANN001
+):  # fmt: skip
+    """New forces (k, 3), (c,) N after a Newton step; answer : (j, 2), its solution, at rest and a metre of ``step``."""
+    t, d, s = len(stuck), len(core_at), len(slipping)
+    n = 3 * t + d
+    new, new_core = force.copy(), core.copy()
+    for a in range(t):
+        for i in range(3):
+            new[stuck[a], i] += answer[3 * a + i, 0] + step * answer[3 * a + i, 1]
+    for p in range(d):
+        new_core[core_at[p]] += answer[3 * t + p, 0] + step * answer[3 * t + p, 1]
+    place = 0
+    for a in range(s):
+        node = slipping[a]
+        limit = friction * max(pressing[a], least)
+        turn = (answer[n + s + a, 0] + step * answer[n + s + a, 1]) / limit
+        turn = min(max(turn, -largest_turn), largest_turn)
+        u, v = normal[node].copy(), np.empty(3)
+        for i in range(3):
+            v[i] = np.cos(turn) * lean[node, i] + np.sin(turn) * across[a, i]
+        if len(curved):
+            if place < len(curved) and curved[place] == a:
+                tilt, at = np.zeros(3), n + 2 * s + 3 * place
+                for i in range(3):
+                    for j in range(3):
+                        tilt[i] += bend[place, i, j] * (answer[at + j, 0] + step * answer[at + j, 1])
+                size = np.sqrt(tilt[0] ** 2 + tilt[1] ** 2 + tilt[2] ** 2)
+                share = min(1.0, largest_tilt / max(size, 1e-12))
+                for i in range(3):
+                    u[i] += tilt[i] * share
+                place += 1
+            size = np.sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2)
+            onto = 0.0
+            for i in range(3):
+                u[i] /= size
+                onto += v[i] * u[i]
+            size = 0.0
+            for i in range(3):
+                v[i] -= onto * u[i]
+                size += v[i] ** 2
+            size = np.sqrt(size)
+            for i in range(3):
+                v[i] /= size
+        total = pressing[a] + answer[n + a, 0] + step * answer[n + a, 1]
+        for i in range(3):
+            new[node, i] = total * (u[i] + friction * v[i])
+    return new, new_core
+
+
+@Loop
+def sort(  # noqa: ANN201
+    force, core, active, slips, normal, lean, off, gap, core_gap, turned, stuck_again, left, friction, least, noise,  # noqa: ANN001
+    gap_tolerance, slip_tolerance, sideways_tolerance, beyond, beyond_wavering, wavers, may_be_empty,  # noqa: ANN001
+):  # fmt: skip
+    """Which points touch and slip after a step; whether that changed and whether nodes are where they belong.
+
+    Returns active (k + c,), slips (k,), changed, settled, the largest gap, m, of what touches, and that or the deepest
+    place in the indenter. ``force`` of nodes that touch again, ``stuck_again`` and ``left`` (k,) are updated in place.
+    may_be_empty : whether no contact at all is an answer
+    """
+    k, c = force.shape[0], core.shape[0]
+    new_active, new_slips = np.empty(k + c, np.bool_), np.zeros(k, np.bool_)
+    changed, any_active, deepest, widest, wide_slip, tilted = False, False, np.inf, 0.0, 0.0, 0.0
+    whole = np.zeros(3)
+    for a in range(k):
+        pressing, onto = 0.0, 0.0
+        for i in range(3):
+            pressing += force[a, i] * normal[a, i]
+            onto += off[a, i] * normal[a, i]
+            whole[i] += force[a, i]
+        slip_lean, sideways, length, slip_square = 0.0, 0.0, 0.0, 0.0
+        for i in range(3):
+            slip = off[a, i] - onto * normal[a, i]
+            slip_lean += slip * lean[a, i]
+            slip_square += slip**2
+            sideways += (force[a, i] - pressing * normal[a, i]) ** 2
+            length += force[a, i] ** 2
+        for i in range(3):
+            tilted += (turned[a, i] - normal[a, i]) ** 2 * length
+        sideways = np.sqrt(sideways)
+        touches = pressing >= -least if active[a] else gap[a] < -noise
+        new_active[a] = touches
+        changed |= (active[a] and not touches) or (not active[a] and gap[a] < -gap_tolerance)
+        if touches and active[a]:
+            over = beyond if stuck_again[a] < wavers else beyond_wavering
+            if slips[a]:
+                new_slips[a] = slip_lean <= slip_tolerance
+            else:
+                new_slips[a] = sideways > friction * pressing * (1 + over) + least
+            changed |= new_slips[a] != slips[a]
+        if slips[a] and not new_slips[a] and touches:
+            stuck_again[a] += 1
+        deepest = min(deepest, gap[a])
+        if active[a]:
+            any_active = True
+            widest = max(widest, abs(gap[a]))
+            free = slip_square
+            if slips[a] and sideways > 0:  # what a node slips along its friction is free
+                share = 0.0
+                for i in range(3):
+                    share += (off[a, i] - onto * normal[a, i]) * (force[a, i] - pressing * normal[a, i])
+                free -= (share / max(sideways, 1e-30)) ** 2
+            wide_slip = max(wide_slip, free)
+    for p in range(c):
+        touches = core[p] >= -least if active[k + p] else core_gap[p] < -noise
+        new_active[k + p] = touches
+        changed |= (active[k + p] and not touches) or (not active[k + p] and core_gap[p] < -gap_tolerance)
+    settled = not changed and (any_active or may_be_empty) and deepest >= -gap_tolerance and widest <= gap_tolerance
+    settled = settled and np.sqrt(max(wide_slip, 0.0)) <= slip_tolerance
+    size = np.sqrt(whole[0] ** 2 + whole[1] ** 2 + whole[2] ** 2)
+    settled = settled and np.sqrt(tilted) <= sideways_tolerance * size
+    if settled:
+        return new_active, new_slips, changed, settled, 0.0, 0.0
+    wrong = 0.0
+    for a in range(k):
+        back = left[a] and new_active[a] and not active[a]
+        left[a] = left[a] or (active[a] and not new_active[a])
+        if new_active[a]:
+            wrong = max(wrong, abs(gap[a]))
+        if not back:
+            continue
+        onto, far = 0.0, 0.0
+        for i in range(3):
+            onto += off[a, i] * normal[a, i]
+        for i in range(3):
+            far += (off[a, i] - onto * normal[a, i]) ** 2
+        far = np.sqrt(far)
+        if far > 0:
+            new_slips[a] = True
+            for i in range(3):
+                force[a, i] = least * (turned[a, i] - friction * (off[a, i] - onto * normal[a, i]) / far)
+    return new_active, new_slips, changed, settled, wrong, max(-deepest, wrong)
