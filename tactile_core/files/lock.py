@@ -30,6 +30,21 @@ def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def awaited(file: Path) -> Iterator[None]:
+    """Wait for the lock on ``file``, which stays afterwards, and hold it: what several want is then made once.
+
+    Where the file system keeps no locks it is held at once, by each that asks.
+    """
+    descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        with contextlib.suppress(OSError):
+            _wait(descriptor)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+@contextlib.contextmanager
 def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
     """Hold a lock on ``file``, which stays afterwards: a lock on a file that others remove protects nothing."""
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
@@ -55,3 +70,19 @@ def _take(descriptor: int, shared: bool) -> None:
         import fcntl
 
         fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+
+
+def _wait(descriptor: int) -> None:
+    if os.name == "nt":
+        import errno
+        import msvcrt
+
+        while True:
+            try:
+                return msvcrt.locking(descriptor, msvcrt.LK_LOCK, 1)  # gives up after ten tries, a second apart
+            except OSError as error:
+                if error.errno not in (errno.EDEADLK, errno.EACCES):
+                    raise
+    import fcntl
+
+    return fcntl.flock(descriptor, fcntl.LOCK_EX)

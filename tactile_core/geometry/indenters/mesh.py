@@ -9,14 +9,13 @@ import json
 import logging
 import os
 import pathlib
-import zipfile
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ...errors import TactileError
-from ...files import atomic
+from ...files import array_cache
 from ...files.cache import cache_folder
 from . import mesh_file, mesh_grid
 from .indenter import Indenter
@@ -24,6 +23,7 @@ from .spline_grid import SplineGrid
 
 log = logging.getLogger(__name__)
 _FORMAT = 1  # raise when the meaning of the cached arrays changes
+_ROOM = "40 MB"
 _ARRAYS = ("coefficients", "origin", "hull", "error")
 _SPACING = (0.01e-3, 1e-3)  # m
 _FLATTEST = 0.5  # flatter than at any edge: deep inside, where opposite faces are equally near
@@ -89,18 +89,21 @@ class MeshIndenter(Indenter):
     @classmethod
     def _cached(cls, digest: str, make: Callable[[], Any], where: str | os.PathLike, spacing: float) -> MeshIndenter:
         """The indenter of a mesh (mm) that ``make`` gives, from the cache where its grid has been built before."""
-        file = _cache_file(digest)
+        folder = cache_folder() / f"indenter-{digest[:16]}"
         try:
-            arrays = _load(file)
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):  # not built yet, or cut short
-            log.info("building the distance grid of %s in %s (up to a minute, once)", where, file)
+            arrays = _load(folder)
+        except array_cache.DamagedError as damage:
+            if (folder / array_cache.HASHES).exists():
+                log.warning("%s: damaged (%s); it is built again", folder, damage)
+            log.info("building the distance grid of %s in %s (up to a minute, once)", where, folder)
             mesh = make()
             built = cls(mesh_grid.build(mesh, where, spacing), _hull(mesh), (0.0, 0.0))
             error = mesh_grid.error_of(mesh, built.distance)
             log.info("%s: distance within %.1f um rms, %.1f um at most", where, *(error * 1e6))
             arrays = (built.grid.coefficients, built.grid.origin, built.hull, error)
-            _store(file, dict(zip(_ARRAYS, arrays, strict=True)))
-            arrays = _load(file)
+            array_cache.claim(folder, _ROOM)
+            array_cache.store(folder, dict(zip(_ARRAYS, arrays, strict=True)), _ROOM)
+            arrays = _load(folder)
         coefficients, origin, hull, error = arrays
         return cls(SplineGrid(origin, spacing, coefficients), hull, tuple(error.tolist()))
 
@@ -150,25 +153,9 @@ def _hull(mesh: Any) -> np.ndarray:
     return mesh.vertices[scipy.spatial.ConvexHull(mesh.vertices).vertices] * 1e-3
 
 
-def _cache_file(digest: str) -> pathlib.Path:
-    return cache_folder() / f"indenter-{digest[:16]}.npz"
-
-
 @functools.lru_cache(maxsize=4)  # a scene asks for its indenters at every press
-def _load(file: pathlib.Path) -> tuple[np.ndarray, ...]:
-    with np.load(file, allow_pickle=False) as stored:
-        arrays = tuple(stored[name] for name in _ARRAYS)
+def _load(folder: pathlib.Path) -> tuple[np.ndarray, ...]:
+    arrays = tuple(array.copy() for array in array_cache.load(folder, _ARRAYS).values())
     for array in arrays:
         array.flags.writeable = False
     return arrays
-
-
-def _store(file: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write arrays whole or not at all; two processes that build at once write the same bytes."""
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with atomic.new_file(file) as partial, open(partial, "wb") as stream:
-            np.savez(stream, **arrays)
-    except OSError as error:
-        found = f"cannot be written ({error.strerror})"
-        raise TactileError(file, found, "room for 40 MB", "Make room, or name a folder in TACTILE_CACHE") from error

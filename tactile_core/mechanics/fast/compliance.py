@@ -18,7 +18,7 @@ import numpy as np
 
 from ... import sensors
 from ...errors import TactileError
-from ...files import atomic
+from ...files import array_cache, lock
 from ...files.cache import cache_folder
 from ...geometry.lattice import Lattice
 from ...sensors import Material, digit
@@ -31,6 +31,7 @@ from .sensing_points import ON_PLANE, electrode_feet, facing_nodes, images, sens
 
 log = logging.getLogger(__name__)
 _FORMAT = 6  # raise when the meaning of the cached arrays changes
+_ROOM = "350 MB"
 
 # Skin nodes that can be touched: those that unroll onto the gel or up to this far beside it, m.
 _BESIDE_GEL = 2.0e-3
@@ -166,45 +167,30 @@ def _folder(solid: _Solid) -> pathlib.Path:
 
 
 def _cached(solid: _Solid) -> Compliance:
-    name, lattice, touchable, mesh, material = solid
+    """Read the matrices, checked against the hashes of when they were built; build them where they are not there."""
+    name, lattice, touchable, mesh, _ = solid
     folder = _folder(solid)
     try:
-        loaded = _load(folder)
-    except (OSError, ValueError):  # not built yet, or cut short
-        log.info("building the compliance of the %s in %s (about a minute, once)", name, folder)
-        _claim(folder)
-        _store(folder, build(mesh, material, touchable, lattice)._asdict())
-        loaded = _load(folder)
+        loaded = array_cache.load(folder, Arrays._fields)
+    except array_cache.DamagedError:  # not built yet, perhaps by a process that is at it now
+        array_cache.claim(folder, _ROOM)
+        with lock.awaited(folder.with_name(f".{folder.name}.lock")):
+            loaded = _built(solid, folder)
     counts = (len(electrode_feet().gap), len(facing_nodes(mesh))) if len(mesh.inner) else (0, 0)
-    return Compliance(name, lattice, touchable, *loaded, *counts)
+    return Compliance(name, lattice, touchable, **loaded, feet=counts[0], facing=counts[1])
 
 
-def _load(folder: pathlib.Path) -> Arrays:
-    read = (np.load(folder / f"{array}.npy", mmap_mode="r", allow_pickle=False) for array in Arrays._fields)
-    # A plain view: numpy's memory map class costs a microsecond at every slice.
-    return Arrays(*(array.view(np.ndarray) for array in read))
-
-
-def _claim(folder: pathlib.Path) -> None:
-    """Find out before the long build whether its result can be kept."""
+def _built(solid: _Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
+    """Return what another process built while this one waited, or build it."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "probe").touch()
-        (folder / "probe").unlink()
-    except OSError as error:
-        found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, "a folder for 350 MB", "Name one in TACTILE_CACHE") from error
-
-
-def _store(folder: pathlib.Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write arrays whole or not at all; two processes that build at once write the same bytes."""
-    try:
-        for name, values in arrays.items():
-            with atomic.new_file(folder / f"{name}.npy") as partial, open(partial, "wb") as file:
-                np.save(file, values)
-    except OSError as error:
-        found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, "room for 350 MB", "Make room, or name a folder in TACTILE_CACHE") from error
+        return array_cache.load(folder, Arrays._fields)
+    except array_cache.DamagedError as damage:
+        if (folder / array_cache.HASHES).exists():
+            log.warning("%s: damaged (%s); it is built again", folder, damage)
+    log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)
+    arrays = build(solid.mesh, solid.material, solid.touchable, solid.lattice)
+    array_cache.store(folder, arrays._asdict(), _ROOM)
+    return array_cache.load(folder, Arrays._fields)
 
 
 def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lattice) -> Arrays:

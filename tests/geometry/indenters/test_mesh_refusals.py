@@ -155,7 +155,7 @@ def test_full_disk_says_so(ball_file, monkeypatch):
     def full(*_args, **_kwargs):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(np, "savez", full)
+    monkeypatch.setattr(np, "save", full)
     with pytest.raises(TactileError, match=r"No space left.*TACTILE_CACHE"):
         MeshIndenter.from_file(ball_file, spacing=0.31e-3)
 
