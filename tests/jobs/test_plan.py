@@ -72,7 +72,7 @@ def test_outputs_add_up(monkeypatch, tmp_path):
     assert 100 < number < 160 and contacts.seconds == pytest.approx(0.01 * number)
     assert contacts.disk == pytest.approx(0.002 * number)
     alone, both = found.seconds, plan_for(keep="displacement_digit,displacement_biotac").seconds
-    assert both - alone == pytest.approx(0.03 * number + plan.BUILD_S["digit"])
+    assert both - alone == pytest.approx(0.03 * number + plan.BUILD_S["biotac"])
     assert plan_for(keep="displacement_biotac").memory == plan.BUILD_MB + 150 and found.memory == plan.BUILD_MB + 100
     assert plan_for(keep="displacement_digit,displacement_biotac").memory == plan.BUILD_MB + 150  # one after the other
 
