@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from ..errors import TactileError
+
 
 def tell(text: str) -> None:
     """A result, on stdout."""
@@ -20,6 +22,32 @@ def say(text: str) -> None:
 def complain(text: str) -> None:
     """An error, on stderr."""
     say("error: " + text)
+
+
+LONG = 60.0  # s from which on a job is asked about
+
+
+def duration(seconds: float) -> str:
+    """Write a time in the unit in which it is read best: 40 s, 12 min, 3.5 h."""
+    if seconds < 2 * LONG:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
+
+def agree(cost: str, seconds: float, agreed: bool) -> None:
+    """Print what a job will cost; ask whether to begin where it takes long and a person is at the terminal.
+
+    agreed : in advance, by --yes. Raises TactileError where nobody agrees.
+    """
+    say(cost)
+    if agreed or seconds <= LONG:
+        return
+    if sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty():
+        sys.stderr.write("tactile: begin? [y/N] ")
+        sys.stderr.flush()
+        if sys.stdin.readline().strip().lower() in ("y", "yes"):
+            return
+    raise TactileError("the cost", cost, "a word that it may begin", "Add --yes, or allow a larger --error")
 
 
 @contextmanager

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -88,7 +90,7 @@ def simulate(scene, tmp_path, monkeypatch, capsys):
 
 
 def test_simulate_tells_what_it_picked_and_why(simulate, table):
-    status, err, asked = simulate("--error", "20um", "--keep", "displacement_digit")
+    status, err, asked = simulate("--error", "20um", "--keep", "displacement_digit", "--yes")
     assert status == 0 and asked["tiers"] == {"digit": "full"}
     assert "DIGIT: full tier" in err and "BioTac" not in err and "of the thickness" in err
 
@@ -100,3 +102,29 @@ def test_simulate_tells_what_it_picked_and_why(simulate, table):
 def test_simulate_refuses_bounds_it_cannot_meet(simulate, table, bound, words):
     status, err, asked = simulate("--error", bound)
     assert status == 2 and words in err and asked == {}
+
+
+@pytest.mark.parametrize(("bound", "tier"), [("20um", "full"), ("0.4um", "reference")])
+def test_a_long_simulation_tells_its_cost_first_and_waits_for_a_word(simulate, table, bound, tier):
+    status, err, asked = simulate("--error", bound, "--keep", "displacement_digit")
+    assert status == 2 and asked == {} and "--yes" in err
+    cost = next(line for line in err.splitlines() if "MB of memory" in line)
+    assert "about" in cost and ("min" in cost or " h " in cost)
+    assert simulate("--error", bound, "--keep", "displacement_digit", "--yes")[2]["tiers"] == {"digit": tier}
+
+
+@pytest.mark.parametrize(("word", "begins"), [("y", True), ("yes", True), ("", False), ("n", False)])
+def test_at_a_terminal_it_asks(simulate, table, monkeypatch, word, begins):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    monkeypatch.setattr(sys, "stdin", Terminal(word + "\n"))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    status, err, asked = simulate("--error", "20um", "--keep", "displacement_digit")
+    assert "begin?" in err and bool(asked) == begins and status == (0 if begins else 2)
+
+
+def test_a_short_simulation_begins_at_once(simulate, table):
+    status, err, asked = simulate("--error", "500um", "--keep", "displacement_digit")
+    assert status == 0 and "MB of memory" not in err and asked["tiers"] == {"digit": "fast"}

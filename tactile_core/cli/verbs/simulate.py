@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from ...errors import TactileError
-from ..terminal import bar, say, tell
+from ..terminal import agree, bar, duration, say, tell
 from . import engine
 from .common import NOTHING, check_seed, electrodes_argument, error_argument, progress_argument, seed_argument
 
@@ -15,7 +16,8 @@ Simulate the recording that a scene describes, marked so and with its true meshe
 needs is not solved: electrodes and displacement_biotac need the BioTac, displacement_digit the DIGIT.
 
 --error 50um picks for each sensor the cheapest tier of contact whose measured error (rms of the surface; 95 of 100
-contacts stay below), to the depth that the scene reaches, is at most that, and says which; fast without it.
+contacts stay below), to the depth that the scene reaches, is at most that, and says which; fast without it. What the
+full or the reference tier will cost is told first; over a minute is asked about, or needs --yes.
 
 With --isaac-like the scene's motion presses a BioTac skin of your own, as Isaac Gym computed it: linear tetrahedra,
 E 1.552 MPa, nu 0.316, no fluid, hence no electrodes, and no friction. Ten frames a second of displacement, force and
@@ -45,6 +47,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     )
     electrodes_argument(verb)
     error_argument(verb, "um of the surface, such as 50um")
+    verb.add_argument(
+        "--yes", action="store_true", help="begin at once, however long the tier that --error picks will take"
+    )
     verb.add_argument(
         "--isaac-like",
         metavar="FILE.tet",
@@ -96,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
             from ...simulation.recording import ALL, simulate_recording
 
             keep = results.parse_words(options.keep, ALL)
-            tiers = {} if bound is None else _tiers(options.scene, keep, bound)
+            tiers = {} if bound is None else _tiers(options, keep, bound)
             simulate_recording(
                 options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers, electrodes=options.electrodes
             )
@@ -110,14 +115,19 @@ def _bound(text: str) -> float:
     return accuracy.parse_budget(text).only("um", "Pictures are drawn by `tactile render`")
 
 
-def _tiers(scene: str, keep: tuple[str, ...], bound: float) -> dict[str, str]:
-    """The cheapest within the bound, um, and why."""
+def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> dict[str, str]:
+    """The cheapest within the bound, um, and why. Raises TactileError for a long simulation that nobody agreed to."""
+    from ... import accuracy
+    from ...jobs.plan import of_scene
     from ...simulation.recording import sensors_of
     from ...simulation.tier_choice import choose_for_scene
 
-    found = choose_for_scene(scene, sensors_of(keep), bound)
+    found = choose_for_scene(options.scene, sensors_of(keep), bound)
     for sensor, choice in found.items():
         say(choice.describe(sensor))
+    if any(choice.tier != "fast" for choice in found.values()):
+        cost = of_scene(Path(options.scene), keep, accuracy.Budget(um=bound), None)
+        agree(f"about {duration(cost.seconds)} and {cost.memory:.0f} MB of memory", cost.seconds, options.yes)
     return {sensor: choice.tier for sensor, choice in found.items()}
 
 
