@@ -4,6 +4,8 @@
     python3 scripts/dev.py test                     check the style, then run the tests
     python3 scripts/dev.py test --train             the same with torch, so that the training tests run too
     python3 scripts/dev.py test tests/cli/test_cli.py -x    what is not known here goes to pytest
+    python3 scripts/dev.py check                    check style and types (ruff, mypy)
+    python3 scripts/dev.py docs                     build the pages and the API reference as a site in out/site/
     python3 scripts/dev.py test-blender             the extension's tests in the bpy wheel (--bpy 5.0.1 for another)
     python3 scripts/dev.py test-blender --binary /usr/bin/blender    and in a real Blender, from the zip that users get
 
@@ -31,6 +33,11 @@ TEST_PACKAGES = ("pytest", "pytest-timeout")
 # What the extension's tests need beside bpy; 4.2 to 5.0 were built for the first numpy's binary interface.
 BLENDER_PACKAGES = (*TEST_PACKAGES, "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree")
 BLENDER_SECONDS = 1800  # some Blenders hang at exit (4.5 where an operator stays registered): no run may last longer
+# What a command of the same name as its extra runs, by `python -m`.
+TOOLS = {
+    "check": (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"]),
+    "docs": (["sphinx", "--fail-on-warning", "--keep-going", "-q", "docs", "out/site"],),
+}
 STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
 # Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
@@ -38,6 +45,8 @@ SIZES_MB = {
     "": "50",
     "plain": "430",
     "dev": "530",
+    "check": "40",
+    "docs": "30",
     "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)",
 }
 NETWORK_SIGNS = (
@@ -71,19 +80,23 @@ def main(arguments: list[str] | None = None) -> int:
     test = commands.add_parser("test", help="run ruff and pytest; other arguments go to pytest", allow_abbrev=False)
     test.add_argument("--train", action="store_true", help="also install torch and run the training tests")
     test.add_argument("--numpy", metavar="VERSION", help="install this numpy, and nothing that is compiled")
+    check = commands.add_parser("check", help="check style and types", allow_abbrev=False)
+    docs = commands.add_parser("docs", help="build the site of the documentation", allow_abbrev=False)
     blender = commands.add_parser("test-blender", help="test the extension inside Blender", allow_abbrev=False)
     blender.add_argument("--bpy", metavar="VERSION", default="4.5.15", help="of the wheel (default: %(default)s)")
     blender.add_argument("--binary", type=Path, metavar="PATH", help="a real Blender in place of the wheel")
     blender.add_argument("--venv", type=Path, help="where to install (default: .venv-bpy-VERSION)")
-    for command in (demo, test):
+    for command in (demo, test, check, docs):
         command.add_argument("--venv", type=Path, default=ROOT / ".venv", help="where to install (default: .venv)")
     options, rest = parser.parse_known_args(arguments)
-    if rest and options.command == "demo":
+    if rest and options.command in ("demo", *TOOLS):
         parser.error("unknown arguments: " + " ".join(rest))
     try:
         check_python(sys.version_info[:2])
         if options.command == "test-blender":
             return run_in_binary(options.binary, rest) if options.binary else run_in_bpy(options, rest)
+        if options.command in TOOLS:
+            return run_tools(options.venv, options.command)
         return run_demo(options.venv) if options.command == "demo" else run_tests(options, rest)
     except SetupError as error:
         print(f"dev.py: error: {error}", file=sys.stderr)
@@ -125,6 +138,17 @@ def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
     python = install(options.venv, extras, options.numpy)
     failed = []
     for command in (["ruff", "check", "."], ["pytest", *pytest_arguments]):
+        say(" ".join(command))
+        status = subprocess.call([str(python), "-m", *command], cwd=str(ROOT), env=environment())
+        failed += [status] if status else []
+    return failed[0] if failed else 0
+
+
+def run_tools(folder: Path, extra: str) -> int:
+    """Run every tool of an extra, whatever the others report; returns the status of the first that fails."""
+    python = install(folder, (extra,))
+    failed = []
+    for command in TOOLS[extra]:
         say(" ".join(command))
         status = subprocess.call([str(python), "-m", *command], cwd=str(ROOT), env=environment())
         failed += [status] if status else []

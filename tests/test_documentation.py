@@ -178,12 +178,41 @@ def test_what_is_not_run_here_is_shown_and_run_there():
 
 
 @pytest.mark.parametrize("text", shown(PAGES, "python"))
-def test_python_of_a_page_runs(text, tmp_path):
+def test_python_of_a_page_runs(text, user):
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "-c", text], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=SECONDS
+        [sys.executable, "-c", text], cwd=user, env=environment, capture_output=True, text=True, timeout=SECONDS
     )
     assert done.returncode == 0 and done.stdout, done.stderr
+
+
+EXAMPLES = sorted((ROOT / "docs").glob("*_and_*.py"))
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
+def test_an_example_script_draws_its_figure(script, tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, script], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=SECONDS
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / f"{script.stem}.png").stat().st_size > 20_000  # bytes; an empty figure takes 4,000
+    assert re.search(r"\d", done.stdout), "it prints what it measured"
+
+
+def test_there_are_two_example_scripts():
+    assert [script.stem for script in EXAMPLES] == ["convert_and_look", "press_and_render"]
+
+
+@pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="sphinx is absent: dev.py docs")
+def test_the_site_builds_without_a_warning(tmp_path):
+    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "-q", "docs", str(tmp_path / "site")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=SECONDS)
+    assert done.returncode == 0, done.stdout + done.stderr
+    reference = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
+    assert all(
+        name in reference for name in ("readers.read", "translate_recording.translate", "Renderer", "solve.solve")
+    )
 
 
 @pytest.mark.parametrize("text", [each for each in shown(PAGES, "toml") if "tactile-scene-1" in each.values[0]])

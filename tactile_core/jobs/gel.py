@@ -124,7 +124,8 @@ class Gel:
         """
         if force is not None and not (np.isfinite(force) and force >= 0):
             raise TactileError("Gel, force", f"{force!r} N", "zero or more, and finite")
-        here, flags = Pose(*rigid_pose(pose), PUSH), []
+        here = Pose(*rigid_pose(pose), PUSH)
+        flags: list[str] = []
         jumps = self._press is not None and self._touches and self._too_far(here)
         if jumps:
             self._press = None
@@ -209,6 +210,8 @@ class Gel:
         return bool(self._contact.patch.any())
 
     def _too_far(self, pose: Pose) -> bool:
+        if self._pose is None:
+            return False
         moved = pose.apex - self._pose.apex
         turn = np.arccos(np.clip((np.trace(pose.axes.T @ self._pose.axes) - 1) / 2, -1, 1))
         return bool(np.linalg.norm(moved) > _LONGEST_STEP or turn > _LARGEST_TURN)

@@ -46,7 +46,7 @@ def translate(
 
     >>> recording = tactile.read("touch.csv")
     >>> touch = tactile.translate(recording)
-    >>> touch.force[:, 2].max()  # N, largest force along z
+    >>> touch.force[:, 1].max()  # N, largest force into the skin
     """
     chosen = np.arange(len(recording))[frames]
     if not len(chosen) or chosen[0] > chosen[-1]:

@@ -165,6 +165,20 @@ def test_every_dependency_is_pinned():
     assert all(re.fullmatch(r"[\w.-]+==[\w.+]+", line) for line in lines if line and not line.startswith("#"))
 
 
+def test_the_commit_hook_checks_with_the_pinned_ruff():
+    pinned = re.search(r"(?m)^ruff==(.+)$", (ROOT / "constraints.txt").read_text(encoding="utf-8")).group(1)
+    assert f"rev: v{pinned} " in (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", ["check", "docs"])
+def test_tools_run_after_one_another_and_the_first_failure_counts(command, dev, pip, venv, monkeypatch):
+    ran = []
+    monkeypatch.setattr(dev.subprocess, "call", lambda command, **more: ran.append(command[2]) or len(ran) + 4)
+    assert dev.run_tools(venv, command) == 5
+    assert ran == [tool[0] for tool in dev.TOOLS[command]]
+    assert pip == [((command,), None)]
+
+
 def test_the_root_file_of_the_blender_extension_does_not_disturb_pytest(tmp_path):
     (tmp_path / "pyproject.toml").write_bytes((ROOT / "pyproject.toml").read_bytes())
     (tmp_path / "__init__.py").write_text("from .addon import register, unregister\n")
