@@ -51,16 +51,16 @@ def test_a_promise_counts_what_stayed_below(script):
     assert [line.split(" | ")[-1] for line in promise.lines()] == ["75.0% |", "100.0% |", "50.0% |"]
 
 
-def test_readme_gets_the_table(script, tmp_path):
+def test_the_page_of_accuracy_gets_the_table(script, tmp_path):
     from benchmarks.table.method import Method
-    from benchmarks.table.readme import HEADER, write_readme
+    from benchmarks.table.summary import HEADER, write_summary
 
-    file = tmp_path / "README.md"
+    file = tmp_path / "accuracy.md"
     file.write_text(f"before\n\n{HEADER}\n| old | a | 1 | 2 | 3 | 4 |\n\nafter\n")
     drawn = [Method("pictures", name, ms, 100.0, 2.0, "levels", 9.0, "set")
              for name, ms in (("fast", 1.26), ("standard_llvm_ad_rgb", 30.4), ("quality_scalar_rgb", 123.0),
                               ("reference_llvm_ad_rgb", 9876.0))]  # fmt: skip
-    write_readme(file, [Method("chain", "fast", 2.0, 50.0, 1.0, "levels", 3.0, "set"), *drawn])
+    write_summary(file, [Method("chain", "fast", 2.0, 50.0, 1.0, "levels", 3.0, "set"), *drawn])
     assert file.read_text() == (
         f"before\n\n{HEADER}\n"
         "| picture of a known gel | fast / standard / quality / reference | 1.3 / 30 / 120 / 9,900 | 100"
@@ -69,7 +69,7 @@ def test_readme_gets_the_table(script, tmp_path):
     )
     (tmp_path / "other.md").write_text("no table\n")
     with pytest.raises(TactileError, match=r"other\.md"):
-        write_readme(tmp_path / "other.md", drawn)
+        write_summary(tmp_path / "other.md", drawn)
 
 
 def test_the_report_that_ships_can_be_read_and_draws(script):

@@ -1,6 +1,6 @@
 """Speed against error of every stage, in one run on one machine: a table, a plot, rows.
 
-    python scripts/benchmark.py                      everything; docs/benchmark.json, .md and its plots, README's table
+    python scripts/benchmark.py                      everything; docs/benchmark.*, the table of docs/accuracy.md
     python scripts/benchmark.py --quick --json FILE  under three minutes; writes FILE alone
     python scripts/benchmark.py --only chain --json FILE    some stages, or methods such as "translation numpy_1"
     python scripts/benchmark.py PRESSES              pictures beside photographs too: a folder of a 6 mm ball's presses
@@ -64,12 +64,12 @@ def main(arguments: list[str] | None = None) -> int:
     if options.json:
         atomic.write_json(options.json, rows)
     if not options.quick and not options.only:
-        from benchmarks.table.readme import write_readme
         from benchmarks.table.report import write_report
+        from benchmarks.table.summary import write_summary
 
         write_report(ROOT / "docs", methods, rows, missing, text)
         atomic.write_bytes(ROOT / "docs" / "promised.png", picture)
-        write_readme(ROOT / "README.md", methods)
+        write_summary(ROOT / "docs" / "accuracy.md", methods)
     for each in failed(rows):
         print(f"MISSED: {each['name']} = {each['value']}, right is 0.9 to 0.98", file=sys.stderr)
     return int(bool(failed(rows)))

@@ -94,7 +94,8 @@ def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
             lights[f"{name}.emitter.radiance.value"] = mi.Color3f(lamp["emitter"]["radiance"]["value"])
     lights.update()
     coating = unit.coating
-    numbers = {"diffuse": {"reflectance": coating.albedo},
+    numbers: dict[str, dict[str, Any]] = {
+               "diffuse": {"reflectance": coating.albedo},
                "roughplastic": {"diffuse_reflectance": coating.albedo, "specular_reflectance": [coating.gloss] * 3,
                                 "alpha": coating.roughness, "eta": PIGMENT_INDEX / _outer_index(unit.gel_index)},
                "principled": {"base_color": coating.albedo, "roughness": coating.roughness,

@@ -1,4 +1,4 @@
-"""README's table of speed against error, written from what a whole run measured."""
+"""Table of speed against error in docs/accuracy.md, written from the results of a whole run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LINES = (
 PLACE = re.compile(re.escape(HEADER) + r"\n(?:\|.*\n)+")
 
 
-def write_readme(path: Path, methods: Sequence[Method]) -> None:
+def write_summary(path: Path, methods: Sequence[Method]) -> None:
     """Put the table of these methods in the place of the one in the file.
 
     Raises TactileError where the file has no such table.
