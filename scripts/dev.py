@@ -242,7 +242,7 @@ def install(folder: Path, extras: tuple[str, ...], numpy: str | None = None) -> 
 
 
 def make_venv(folder: Path) -> Path:
-    """Make the environment, or make it anew when it is half made, moved, or of another Python; returns its Python."""
+    """Make the environment, or replace it when it is half made, moved, or of another Python; returns its Python."""
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if folder.is_file() or (folder.is_dir() and folder != ROOT / ".venv" and is_foreign(folder)):
         raise SetupError(f"{folder} holds something else. Name a new or an empty folder")
@@ -250,7 +250,7 @@ def make_venv(folder: Path) -> Path:
         why = why_unusable(python, read_stamp(folder))
         if why is None:
             return python
-        say(f"making {relative(folder)} anew: {why}")
+        say(f"making {relative(folder)} again: {why}")
     else:
         say(f"making {relative(folder)} with Python {python_version()}")
     try:

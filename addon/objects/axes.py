@@ -2,7 +2,7 @@
 
 The sensors' frame (``tactile_core.sensors``): x along the finger, y normal to the pad with the contact side at -y, z
 lateral. In Blender the pad looks up: X = x, Y = z, Z = -y, a rotation. Lengths follow the scene: one Blender unit is
-``unit_settings.scale_length`` metres. The importers set it to 0.001 unless told otherwise, so that a fingertip is 28
+``unit_settings.scale_length`` metres. The importers set it to 0.001 unless asked otherwise, so that a fingertip is 28
 units long and the viewport's clipping and grid suit it; the sidebar then shows millimetres.
 """
 

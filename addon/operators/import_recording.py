@@ -61,7 +61,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
             axes.use_millimetres(scene)
         frames = self.first_frame + found.chosen.astype(float)
         skin = self._objects(scene, path, found, frames)
-        told = motion.animate(
+        summary = motion.animate(
             skin, sensors.biotac_surface().rest, found.translation.displacement_biotac, frames, self.motion
         )
         if self.set_timeline:
@@ -71,7 +71,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
             self.report({"WARNING"}, warning)
         if len(frames) > LONG and self.motion != "MESH_CACHE":
             self.report({"WARNING"}, f"{len(frames)} frames: a mesh cache makes a smaller, faster file")
-        self.report({"INFO"}, f"{len(frames)} frames at {found.recording.rate:.4g} Hz. {told}")
+        self.report({"INFO"}, f"{len(frames)} frames at {found.recording.rate:.4g} Hz. {summary}")
 
     def _objects(
         self, scene: bpy.types.Scene, path: str, found: recording_data.Translated, frames: np.ndarray

@@ -50,9 +50,9 @@ class TACTILE_OT_simulate(TactileOperator):
         if thing is None:
             raise TactileError(self._thing, "no longer in the scene", "the indenter that was simulated")
         result = simulation_result.read(self._folder.path)
-        told = simulation_result.bake(context, thing, result)
+        summary = simulation_result.bake(context, thing, result)
         self._keep(context)
-        self.report({"INFO"}, told)
+        self.report({"INFO"}, summary)
 
     def _keep(self, context: bpy.types.Context) -> None:
         """The simulated recording beside the saved .blend, so that it can be translated like a real one."""

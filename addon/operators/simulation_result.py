@@ -49,7 +49,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
     seconds = result.seconds - result.seconds[0]
     # The mechanics run at the sensor's 100 Hz: each frame shows the nearest of its samples.
     sample = np.abs((frames - scene.frame_start)[:, None] / rate - seconds[None, :]).argmin(axis=1)
-    told = [*result.picked]
+    sentences = [*result.picked]
     force = result.force[sample][:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
     for role, surface, moved in (
         ("BIOTAC", sensors.biotac_surface(), result.moved.get("biotac")),
@@ -58,7 +58,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
         sensor = properties.of_role(scene, role)
         if sensor is None or moved is None:  # it was added, or removed, while the other process worked
             continue
-        told.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
+        sentences.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
         custom_properties.write(sensor, {"force": force}, frames)
         if role == "DIGIT":
             patch_nodes.add_patch(sensor, contact_patch.contact_patch(moved[sample], surface), frames[0], 1.0)
@@ -66,7 +66,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
     if thing.tactile.press_by == "HEIGHT":
         curves.write_curve(thing, "tactile.force", frames, np.linalg.norm(force, axis=1))
     _stand(context, thing, result, sample, frames)
-    return "; ".join(told)
+    return "; ".join(sentences)
 
 
 def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarray) -> None:  # noqa: ANN001

@@ -42,7 +42,7 @@ class TACTILE_OT_translate(TactileOperator):
             bpy.data.objects.remove(old)
         gel = digit_objects.add_gel(group, about.per_metre, skin)
         surface, moved = sensors.digit_surface(), found.translation.displacement_digit
-        told = motion.animate(gel, surface.rest, moved, frames, about.motion)
+        summary = motion.animate(gel, surface.rest, moved, frames, about.motion)
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0
         patch_nodes.add_patch(gel, contact_patch.contact_patch(moved, surface), frames[0], step)
         values = custom_properties.columns(found)
@@ -52,7 +52,7 @@ class TACTILE_OT_translate(TactileOperator):
         low = timeline.mark_low_confidence(context.scene, found.translation.confidence, frames)
         view.show(context, [skin, gel])
         pictures.update(gel, context.evaluated_depsgraph_get())
-        self.report({"INFO"}, f"{told}; {low} parts of low confidence")
+        self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
 
 register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_translate,))

@@ -21,7 +21,7 @@ _PATIENCE = 5.0  # s that a cancelled job has to end by itself
 
 
 class Job:
-    """A worker and its folder. ``done`` of ``total`` is what it has told; ``finished`` : whether it ended well."""
+    """A worker and its folder. ``done`` of ``total`` is its reported progress; ``finished`` : whether it ended well."""
 
     def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:
         """Start it. folder : where its input lies and its output goes; listening : whether it waits for ``tell``."""

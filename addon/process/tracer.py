@@ -28,7 +28,7 @@ class Tracer:
         self._job = Job("render", self._folder.path, listening=True, preset=preset)
 
     def draw(self, heights: np.ndarray, stopped: Callable[[], bool]) -> np.ndarray:
-        """Picture (H, W, 3) uint8 of heights (H, W) m. Raises TactileError, or Stopped when told to stop."""
+        """Picture (H, W, 3) uint8 of heights (H, W) m. Raises TactileError, or Stopped when asked to stop."""
         self._count += 1
         np.save(self._folder.path / "heights.npy", heights)
         self._job.tell({"picture": self._count})

@@ -63,7 +63,7 @@ def simulate(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def _forces_from_heights(folder: Path, progress: Progress) -> None:
-    """Write the scene's forces anew: those that the DIGIT answers at each depth."""
+    """Replace the scene's forces by those that the DIGIT answers at each depth."""
     import msgspec
 
     from tactile_core.mechanics.placement import Placement, pose_at

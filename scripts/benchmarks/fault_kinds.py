@@ -152,8 +152,8 @@ def bit_flips(bench: Bench) -> Lost:
         data = bytearray(file.read_bytes())
         data[bench.random.randrange(len(data))] ^= 1 << bench.random.randrange(8)
         file.write_bytes(data)
-    told = call([*TACTILE, "--out", str(out), "--verify"], expected=2).stderr
-    unseen = sum(file.name not in told for file in files)
+    output = call([*TACTILE, "--out", str(out), "--verify"], expected=2).stderr
+    unseen = sum(file.name not in output for file in files)
     call(bench.command(out))
     return bench.lost(out) + unseen, len(files)
 
@@ -178,8 +178,8 @@ def clock_backwards(bench: Bench) -> Lost:
     for index, file in enumerate(sorted(out.glob("*/*.h5"))):
         os.utime(file, (4e9, 4e9) if index % 2 else (0, 0))
     next(out.glob("shards/*.h5")).unlink()
-    told = call(bench.command(out)).stdout
-    return bench.lost(out) + ("1 shards made" not in told), 1
+    output = call(bench.command(out)).stdout
+    return bench.lost(out) + ("1 shards made" not in output), 1
 
 
 def dask_worker_dies(bench: Bench) -> Lost | None:
@@ -269,10 +269,10 @@ def _killed_half_way(out: Path, command: list[str], shards: int) -> Lost:
     call(command, most=LONG)
     call([*TACTILE, "--out", str(out), "--verify"], most=LONG)
     files = list(out.glob("shards/*"))
-    told = json.loads((out / "manifest.json").read_text())
-    listed = sum(len(one["shards"]) for one in told["recordings"])
+    manifest = json.loads((out / "manifest.json").read_text())
+    listed = sum(len(one["shards"]) for one in manifest["recordings"])
     left = [file for file in out.rglob(".*") if "lock" not in file.name]
-    return abs(shards - len(files)) + abs(shards - listed) + len(told["aside"]) + len(left), blows
+    return abs(shards - len(files)) + abs(shards - listed) + len(manifest["aside"]) + len(left), blows
 
 
 FAULTS: dict[str, Callable[[Bench], Lost | None]] = {

@@ -113,8 +113,8 @@ def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomCon
         except TactileError as error:
             print(f"{path.stem}, {contact.name}: {error}", file=sys.stderr)
             return {}
-        told = f"{path.stem}, {contact.name}, {share:.2f} of the thickness: {seconds:.3g} s"
-        print(told, file=sys.stderr, flush=True)
+        sentence = f"{path.stem}, {contact.name}, {share:.2f} of the thickness: {seconds:.3g} s"
+        print(sentence, file=sys.stderr, flush=True)
         force = np.linalg.norm(found.force)
         with atomic.new_file(path) as partial, open(partial, "wb") as file:
             np.savez(file, displacement=found.displacement, force=force, share=share, seconds=seconds, number=number)
@@ -135,10 +135,10 @@ def validated(sensor: Sensor) -> Iterator[Miss]:
     rows = dict(
         re.findall(rf"^\| {sensor}_full_(\S+) \| ([^|]+ \|[^|]*\|[^|]*\|[^|]*)\|", REPORT.read_text(), re.MULTILINE)
     )
-    for name, told in rows.items():
+    for name, line in rows.items():
         depth = re.fullmatch(r"([\d.]+)mm(\S*)_shape_rms", name)
         if depth:
-            value, _, _, null = (cell.strip() for cell in told.split("|"))
+            value, _, _, null = (cell.strip() for cell in line.split("|"))
             force = float(rows[f"{depth[1]}mm{depth[2]}_force_error"].split("|")[0]) / 100
             share = 1e-3 * float(depth[1]) / tiers.thickness_of(sensor)
             yield Miss(-100, share, 1e-6 * float(value), abs(force), 1e-6 * float(null))

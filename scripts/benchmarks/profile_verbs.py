@@ -52,8 +52,8 @@ if sys.platform == "linux":  # where ru_maxrss begins with what the parent had
     peak = int(re.search(r"VmHWM:\\s+(\\d+)", pathlib.Path("/proc/self/status").read_text())[1]) / 1024
 else:
     peak = used.ru_maxrss / (1024 * 1024 if sys.platform == "darwin" else 1024)
-told = {"status": status, "cpu": used.ru_utime + used.ru_stime, "peak": peak, "modules": sorted(sys.modules)}
-open(sys.argv[1], "w").write(json.dumps(told))
+record = {"status": status, "cpu": used.ru_utime + used.ru_stime, "peak": peak, "modules": sorted(sys.modules)}
+open(sys.argv[1], "w").write(json.dumps(record))
 """
 HOTTEST = """
 import cProfile, json, pstats, sys
@@ -168,18 +168,18 @@ points = [
 
 def run(case: Case, folder: Path) -> Cost:
     """Run one case in a fresh process."""
-    told = folder / "told.json"
-    told.unlink(missing_ok=True)
+    file = folder / "record.json"
+    file.unlink(missing_ok=True)
     words = [word.replace("{}", str(folder)) for word in case.words.split()]
     began = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-c", CHILD, str(told), *words], capture_output=True, text=True,
+        [sys.executable, "-X", "importtime", "-c", CHILD, str(file), *words], capture_output=True, text=True,
         env={**os.environ, **ONE_CORE, "PYTHONPATH": str(ROOT)}, cwd=ROOT, timeout=300,
     )  # fmt: skip
     wall = time.perf_counter() - began
-    if not told.exists():
+    if not file.exists():
         raise AssertionError(f"{case.name}: {done.stderr[-1000:]}")
-    result = json.loads(told.read_text())
+    result = json.loads(file.read_text())
     imports = sum(int(own) for own in re.findall(r"^import time: +(\d+) \|", done.stderr, re.MULTILINE)) / 1e6
     loaded = {name.partition(".")[0] for name in result["modules"]} & set(HEAVY)
     return Cost(result["status"], result["cpu"], wall, imports, result["peak"], loaded)
@@ -252,11 +252,11 @@ def long_conversion(folder: Path) -> list[Row]:
     timings = json.loads((folder / "whole" / "long" / "timings.json").read_text(encoding="utf-8"))
     for stage, each in timings["ms_a_frame"].items():
         yield row(f"convert_700_{stage}", each, "ms", of="a frame, on the wall")
-    told = folder / "hot.json"
+    file = folder / "hot.json"
     words = ["convert", str(folder / "long.h5"), "--out", str(folder / "again")]
     environment = {**os.environ, **ONE_CORE, "PYTHONPATH": str(ROOT)}
-    subprocess.run([sys.executable, "-c", HOTTEST, told, *words], env=environment, check=True, capture_output=True)
-    for place, (name, at, number, seconds) in enumerate(json.loads(told.read_text())[:HOT], 1):
+    subprocess.run([sys.executable, "-c", HOTTEST, file, *words], env=environment, check=True, capture_output=True)
+    for place, (name, at, number, seconds) in enumerate(json.loads(file.read_text())[:HOT], 1):
         where = f" {Path(at).name}:{number}" if number else ""
         yield row(f"hot_{place}", seconds, "s", of=f"{name.strip('<>{}')}{where}")
 

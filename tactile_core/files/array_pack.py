@@ -43,7 +43,7 @@ def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, n
     except TactileError:
         raise
     except Exception as error:  # the library raises a dozen types on damaged bytes
-        raise TactileError(file, f"damaged ({error})", "a shard", "Run the job again: it is made anew") from error
+        raise TactileError(file, f"damaged ({error})", "a shard", "Run the job again, which makes it again") from error
     return found
 
 

@@ -58,7 +58,7 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Ite
 
     An error or Ctrl-C inside the block removes it and leaves what was at `path` untouched. What a killed process left
     behind is cleared by the next one (or by `sweep`): a lock on `.<name>.tactile-lock`, which the system drops when its
-    holder dies, tells a dead writer from a living one. Raises TactileError when the folder exists and `overwrite` is
+    holder dies, shows whether a writer is dead. Raises TactileError when the folder exists and `overwrite` is
     not true (None: the user has no such option), and when another process is writing it.
     """
     path = Path(os.path.abspath(path))

@@ -146,10 +146,10 @@ def _unpacked(packed: bytes, limit: int) -> int:
             count += len(unpacker.decompress(packed, STEP))
             packed = unpacker.unconsumed_tail
     except zlib.error:
-        pass  # damaged: HDF5 tells when it is read
+        pass  # damaged: HDF5 reports it when it is read
     return count
 
 
 def _refused(path: str | os.PathLike, name: str | bytes, found: str, expected: str) -> TactileError:
     name = name.decode(errors="replace") if isinstance(name, bytes) else name
-    return TactileError(f"{os.fspath(path)}, {name}", found, expected, "Write the file anew with h5py or h5repack")
+    return TactileError(f"{os.fspath(path)}, {name}", found, expected, "Write the file again with h5py or h5repack")

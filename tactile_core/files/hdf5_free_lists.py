@@ -28,7 +28,7 @@ def check_free_lists(path: str | os.PathLike, start: int, width: int, length: in
             count = _free_places(data, place, start, width, length)
             left -= count
             if left <= 0 or (count >= MOST_OF_HEAP and _named(data, place - start, width)):
-                found, advice = "a list of free places without end", "Write the file anew with h5py or h5repack"
+                found, advice = "a list of free places without end", "Write the file again with h5py or h5repack"
                 raise TactileError(f"{os.fspath(path)}, byte {place}", found, "a whole HDF5 file", advice)
             place = data.find(SIGNATURE, place + 1)
 

@@ -14,8 +14,8 @@ def sha256(path: str | os.PathLike) -> str:
 
     if os.path.isdir(path):
         files = sorted(file for file in Path(path).iterdir() if file.is_file())
-        told = "".join(f"{sha256(file)} {file.name}\n" for file in files)
-        return hashlib.sha256(told.encode(errors="surrogateescape")).hexdigest()
+        listing = "".join(f"{sha256(file)} {file.name}\n" for file in files)
+        return hashlib.sha256(listing.encode(errors="surrogateescape")).hexdigest()
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -33,7 +33,7 @@ SHEET_ARRAYS = (
     "displacement_biotac", "displacement_digit", "force", "confidence", "expected_error_digit", "contact_center"
 )  # fmt: skip
 LEFT = ("expected_error_digit", "error_bound_digit")
-# Flags that the translation sets, so that no warning of the recording tells of them.
+# Flags that the translation sets, which no warning of the recording mentions.
 REMARKABLE = {
     "out_of_range": "signals unlike those the networks were trained on",
     "beyond_digit": "the contact has no counterpart on the DIGIT's gel",

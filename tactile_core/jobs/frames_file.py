@@ -26,7 +26,7 @@ ALWAYS = {
     "time": ("s", "from the recording's first frame; attribute start_time: unix time of that frame, 0 if unknown"),
     "electrodes": ("count", "(T, 19) E1..E19 as read, bad samples repaired; attribute rest: reading without contact"),
     "force": ("N", "(T, 3) exerted by the object on the sensor, sensor frame; 0 without contact (not where rectified)"),
-    "pressure": ("Pa", "by which the fluid's has risen, told from the electrodes alone; 0 where the force is"),
+    "pressure": ("Pa", "rise of the fluid's, estimated from the electrodes alone; 0 where the force is"),
     "contact_center": ("m", "(T, 2) = (x, z) on the DIGIT after unrolling; NaN without contact"),
     "confidence": ("1", "0 (a guess) to 1"),
     "expected_error_biotac": ("m", "expected largest node error: half of such frames have less"),
@@ -72,7 +72,7 @@ def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
 def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:
     """Datasets of a file that keeps these words, with unit and meaning; a shard has the pictures, too."""
     kept = [PICTURES if shard and word == "image" else KEPT[word] for word in keep]
-    return {name: told for about in (ALWAYS, *kept) for name, told in about.items()}
+    return {name: meaning for about in (ALWAYS, *kept) for name, meaning in about.items()}
 
 
 class FramesFile:
@@ -102,7 +102,7 @@ class FramesFile:
 
     def __exit__(self, kind: type[BaseException] | None, *more: object) -> None:
         try:
-            with self._checked() if kind is None else suppress(Exception):  # the error on its way out tells more
+            with self._checked() if kind is None else suppress(Exception):  # the error on its way out says more
                 self._file.close()
         finally:
             self._disk.close()

@@ -39,11 +39,11 @@ FLAGS = {
     "too deep": "the pose lies deeper than 60 % of the thickness; the values are those at that depth",
     "force not reached": "no depth bears the force; the values are those at the greatest depth that was solved",
     "began inside": "the first pose lies in the gel; the indenter was taken to come straight in along +y",
-    "jumped": "the step is too long to follow; friction was forgotten, and the indenter taken to come in anew along +y",
+    "jumped": "the step is too long to follow; friction was forgotten, and the indenter taken to come in along +y",
 }
 # Farther, or turned by more, in one step a contact is another one, assumed: at 100 Hz that is 0.3 m/s and 2 turns a s.
 _LONGEST_STEP, _LARGEST_TURN = 3e-3, 0.13  # m, rad
-_LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less cannot be told from rounding
+_LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less is lost in rounding
 _SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the greatest depth, at which to stand where a force is not reached
 _BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (assumed: 20 mm/s at 100 Hz)
 

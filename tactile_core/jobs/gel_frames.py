@@ -114,7 +114,7 @@ def _check_displacement(store: Store, name: str) -> None:
     shape, count = store.shapes[name][0], len(sensors.digit_surface().rest)
     if shape[1:] != (count, 3):
         raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {count}, 3)",
-                           "It was made with another version of the surface: make it anew")  # fmt: skip
+                           "It was made with another version of the surface: make it again")  # fmt: skip
 
 
 def _of_npz(path: Path) -> Frames:
@@ -185,5 +185,5 @@ def _array(store: Store, name: str, sensor: str) -> np.ndarray:
     shape, count = store.shapes[name][0], len(sensors.sensor_surface(sensor).rest)
     if shape[1:] != (count, 3):
         raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {count}, 3)",
-                           "It was made with another version of the surface: make it anew")  # fmt: skip
+                           "It was made with another version of the surface: make it again")  # fmt: skip
     return store.array(name, (None, count, 3), np.float32)

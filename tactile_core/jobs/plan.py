@@ -37,13 +37,13 @@ TIER_MB = {"fast": 0.0, "full": 150.0, "reference": 3100.0}  # of memory more th
 class Part:
     """Output that is built, with its cost.
 
-    verb : which builds it; told : how much of it; seconds; memory, disk : MB it adds
+    verb : command that builds it; extent : how much of it, in words; seconds; memory, disk : MB it adds
     building : MB taken meanwhile, and given back
     """
 
     what: str
     verb: str
-    told: str
+    extent: str
     seconds: float = 0.0
     memory: float = 0.0
     disk: float = 0.0
@@ -85,7 +85,7 @@ class Plan:
         found = [self.of, f"{'verb':9}{'what':22}{'s':>9}{'MB':>7}{'disk MB':>9}  of"]
         for part in self.parts:
             numbers = f"{part.seconds:9.2f}{part.memory or part.building:7.0f}{part.disk:9.1f}"
-            found.append(f"{part.verb:9}{part.what:22}{numbers}  {part.told}")
+            found.append(f"{part.verb:9}{part.what:22}{numbers}  {part.extent}")
         found.append(f"in all about {self.seconds:.3g} s, {self.memory:.0f} MB of memory, {self.disk:.3g} MB on disk")
         return [*found, f"not built: {', '.join(self.left_out) or 'nothing'}"]
 
@@ -124,8 +124,8 @@ def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | No
     needed |= {"displacement_digit"} if "image" in keep else set()
     used = recording.sensors_of(needed)
     choices = tier_choice.choose_for_scene(path, used, budget.um)
-    start, told = _part("simulate_nothing"), f"{frames} frames, {contacts} in contact; indenter {spec.indenter}"
-    parts = [Part("start", "simulate", told, start["start"], start["mb"])]
+    start, extent = _part("simulate_nothing"), f"{frames} frames, {contacts} in contact; indenter {spec.indenter}"
+    parts = [Part("start", "simulate", extent, start["start"], start["mb"])]
     for sensor in used:
         kept = f"displacement_{sensor}" in needed
         parts += [*_matrices(sensor), _contacts(sensor, choices[sensor], contacts, kept)]
@@ -162,11 +162,11 @@ def _part(name: str) -> dict[str, float]:
     return costs()["parts"][name]
 
 
-def _each(what: str, verb: str, told: str, frames: int, name: str, beside: str) -> Part:
+def _each(what: str, verb: str, extent: str, frames: int, name: str, beside: str) -> Part:
     """Cost of one output a frame beyond what is done beside it anyway."""
     own, other = _part(name), _part(beside)
     seconds, disk = (max(own[key] - other[key], 0) * frames / 1e3 for key in ("ms", "kb"))
-    return Part(what, verb, told, seconds, max(own["mb"] - other["mb"], 0), disk)
+    return Part(what, verb, extent, seconds, max(own["mb"] - other["mb"], 0), disk)
 
 
 def _matrices(sensor: str) -> list[Part]:
@@ -177,9 +177,9 @@ def _matrices(sensor: str) -> list[Part]:
     nodes = f"{found.surface} surface nodes, {found.touchable} of them touchable; solid of {found.volume} nodes"
     if found.bytes:
         return [Part(f"{NAMES[sensor]} matrices", "simulate", f"{found.bytes / 1e6:.0f} MB, cached; {nodes}")]
-    told = f"to be built once in {found.folder}; {nodes}"
+    extent = f"to be built once in {found.folder}; {nodes}"
     what = f"{NAMES[sensor]} matrices"
-    return [Part(what, "simulate", told, BUILD_S[sensor], disk=MATRICES_MB[sensor], building=BUILD_MB)]
+    return [Part(what, "simulate", extent, BUILD_S[sensor], disk=MATRICES_MB[sensor], building=BUILD_MB)]
 
 
 def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
@@ -191,18 +191,18 @@ def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
         full = costs()["full_ms"][sensor]
         ms += full * tiers[choice.tier][sensor]["ms"] / tiers["full"][sensor]["ms"]
     once = max(part["start"] - start["start"], 0)
-    told = f"{contacts} contacts; {choice.describe(sensor)}"
+    extent = f"{contacts} contacts; {choice.describe(sensor)}"
     disk = part["kb"] * contacts / 1e3 if kept else 0.0
     seconds, memory = once + ms * contacts / 1e3, max(part["mb"] - start["mb"], 0) + TIER_MB[choice.tier]
-    return Part(f"{NAMES[sensor]} contacts", "simulate", told, seconds, memory, disk)
+    return Part(f"{NAMES[sensor]} contacts", "simulate", extent, seconds, memory, disk)
 
 
 def _translation(frames: int, keep: str, verb: str) -> list[Part]:
     part = _part(f"convert_{keep}")
     nets = ", ".join(("SVB", "S2MPN", "MVB", "M2MPN", "MVD", "force", "pressure", "error"))
-    told = f"{frames} frames; {nets}; surfaces {' and '.join(network_sizes.SURFACES)}; contact sheet"
+    extent = f"{frames} frames; {nets}; surfaces {' and '.join(network_sizes.SURFACES)}; contact sheet"
     seconds = part["start"] + part["ms"] * frames / 1e3
-    return [Part("networks", verb, told, seconds, part["mb"], part["kb"] * frames / 1e3)]
+    return [Part("networks", verb, extent, seconds, part["mb"], part["kb"] * frames / 1e3)]
 
 
 def _rendered(frames: int, budget: Budget, preset: str | None) -> list[Part]:

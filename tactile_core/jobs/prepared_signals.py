@@ -2,7 +2,7 @@
 
 Datasets, T first: ``time`` float64 s; ``change`` float64 and ``electrodes`` float32 (T, 19) counts; ``quiet`` bool;
 ``flags`` uint16; ``pdc`` float64 counts. ``part`` (P,) first frame of each part of the recording, ``rest`` (P, 19)
-counts. ``about``: JSON of what is told of the recording. Chunks carry checksums, so a shard reads no damaged ones.
+counts. ``about``: JSON of what is reported of the recording. Chunks carry checksums, so a shard reads no damaged ones.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
     evidence, doubts = "", np.uint16(0)
     for part in read_parts(path):
         recording = part.recording
-        if rest is not None and options.tare not in (None, "none"):  # told frames lie in the first part
+        if rest is not None and options.tare not in (None, "none"):  # frames that the user named lie in the first part
             options = dataclasses.replace(options, tare=slice(0, len(recording)))
         signals = prepare(recording, options)
         if rest is None:
@@ -118,7 +118,7 @@ def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
             doubts = np.uint16(0) if evidence else signals.flags[0] & DOUBTS
             options = dataclasses.replace(options, kind=signals.kind, counts_per_unit=factor, polarity=polarity)
         elif options.tare is not None or (not signals.quiet.any() and signals.kind != "raw"):
-            signals = _carried(recording, signals, rest, rest_pdc, told=options.tare is not None)
+            signals = _carried(recording, signals, rest, rest_pdc, given=options.tare is not None)
         signals = _decided_once(signals, doubts, evidence, first=rest is None)
         rest, rest_pdc = signals.rest + signals.drift * recording.duration, _rest_pdc(recording, signals)
         # What is calm in the next part is rest where it lies near this one's: a long grip is calm, too.
@@ -156,11 +156,11 @@ def _rest_pdc(recording: Recording, signals: Signals) -> float:
     return float(recording.pdc[0] - signals.pdc[0]) if recording.pdc is not None else np.nan
 
 
-def _carried(recording: Recording, signals: Signals, rest: np.ndarray, rest_pdc: float, told: bool) -> Signals:
+def _carried(recording: Recording, signals: Signals, rest: np.ndarray, rest_pdc: float, given: bool) -> Signals:
     """A part without rest of its own, from the rest (19,) and PDC at the end of the part before."""
     drift = np.zeros_like(signals.drift)
     warnings = tuple(text for text in signals.warnings if not text.startswith(("no quiet part", "rest is the unit's")))
-    if not told:
+    if not given:
         warnings += (CARRIED,)
     sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
     change = signals.change + sign * (signals.rest - rest)
@@ -255,7 +255,7 @@ class Prepared:
         except TactileError:
             raise
         except Exception as error:  # the library raises a dozen types on damaged bytes
-            found, advice = f"damaged ({error})", "Run the job again: it is made anew"
+            found, advice = f"damaged ({error})", "Run the job again, which makes it again"
             raise TactileError(self._path, found, "a prepared recording", advice) from error
 
 

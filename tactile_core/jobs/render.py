@@ -81,7 +81,7 @@ def render(
 ) -> Path:
     """Render an input into the folder `out`, which appears whole or not at all; returns it.
 
-    progress : given a word, a context that yields a callback (done, in all); say : told what was picked, and why
+    progress : given a word, a context that yields a callback (done, in all); say : receives what was picked, and why
     Raises TactileError for a bad input, calibration or option, and a disk that cannot be written.
     """
     clock = Stopwatch()

@@ -101,9 +101,9 @@ def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
             raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
         frames = read_frames(one.path)
         rows = select(parse_frames(job.recipe.frames), len(frames.numbers))
-        told = {NUMBERS: frames.numbers[rows], VALUES: np.stack(list(frames.iterate_rows(rows)))}
+        arrays = {NUMBERS: frames.numbers[rows], VALUES: np.stack(list(frames.iterate_rows(rows)))}
         kind = np.frombuffer(frames.kind.encode(), np.uint8)
-        array_pack.write(file, told | {KIND: kind, HEIGHTS: np.bool_(frames.heights is not None)})
+        array_pack.write(file, arrays | {KIND: kind, HEIGHTS: np.bool_(frames.heights is not None)})
     return count(folder, job, index), made
 
 

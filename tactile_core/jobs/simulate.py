@@ -77,15 +77,15 @@ def plan(
 
 
 def _put_together(folder: Path, job: Job, out: Path) -> None:
-    told = []
+    rows = []
     try:
         with atomic.new_folder(out) as partial:
             for index, one in enumerate(job.inputs):
                 array_pack.unpack(jobs.shard_file(folder, one.name, 0), partial)
-                told.append({
+                rows.append({
                     "file": f"{one.name}.h5", "seed": job.recipe.seed + index, "values": job.recipe.values[index]
                 })  # fmt: skip
-            content = {"format": FORMAT, "scene_sha256": job.inputs[0].sha256, "recordings": told}
+            content = {"format": FORMAT, "scene_sha256": job.inputs[0].sha256, "recordings": rows}
             atomic.write_json(partial / GRID, content)
     except OSError as error:
         found = f"cannot be written ({error.strerror or error})"
@@ -107,11 +107,11 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
         return False
     scene, text = load(one, tuple(job.recipe.files))
     values = job.recipe.values[index]
-    told = with_values(msgspec.toml.decode(text, type=Scene), values, one.path)  # its files named as the scene does
+    varied = with_values(msgspec.toml.decode(text, type=Scene), values, one.path)  # its files named as the scene does
     scene = with_values(scene, values, one.path)
     with tempfile.TemporaryDirectory() as name:
         out, seed = Path(name) / f"{one.name}.h5", job.recipe.seed + index
-        electrodes, loaded = job.recipe.electrodes, (scene, to_toml(told))
+        electrodes, loaded = job.recipe.electrodes, (scene, to_toml(varied))
         simulate_recording(one.path, out, seed, keep=job.recipe.keep, loaded=loaded, electrodes=electrodes)
         array_pack.write_files(file, Path(name))
     return True

@@ -38,7 +38,7 @@ def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
     file = jobs.prepared_file(folder, job.inputs[index].name)
     try:
         about = prepared_signals.Prepared(file).about()
-    except TactileError:  # none yet, or a damaged one, which the next run makes anew
+    except TactileError:  # none yet, or a damaged one, which the next run makes again
         return None
     return Seen(frame_shard.count(about["frames"], job), about["frames"], tuple(about["warnings"]))
 

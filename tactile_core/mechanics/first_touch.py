@@ -16,7 +16,7 @@ _CLOSE = 60e-6  # m: nodes this little farther than the first one may hide the t
 _MOST_PLACES = 12
 _FINER = (4, 16, 64, 256)  # of a lattice spacing: 1.4 um at last, which hides less than 1 nm of a ball of 1 mm
 _AROUND = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij")).reshape(2, -1)
-_MANY = 2**20  # more than a grid has columns: one number tells a place (exactly, for they are sums of halves)
+_MANY = 2**20  # more than a grid has columns: one number identifies a place (exactly, for they are sums of halves)
 _HIDDEN = 6e-6  # m, more than a quarter of a spacing hides: (0.045 mm)^2 / 2 over the smallest edge radius, 0.2 mm
 _CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no indenter reaches the sensor
 _FARTHEST = 30e-3  # m, past all of a sensor from wherever the motion starts

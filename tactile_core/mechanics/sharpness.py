@@ -12,7 +12,7 @@ LEARNED_RADIUS = 0.4e-3
 # m, of the sharpest edges that are held out between a surface's nodes as well: round a wedge of 0.1 mm the gel found no
 # shape between its own, and took two minutes to say so; edges of 0.4 mm are held.
 BENDS = 0.2e-3
-_LEAST_RADIUS = 10e-6  # m, below which no edge tells itself from one of this radius
+_LEAST_RADIUS = 10e-6  # m, below which an edge acts like one of this radius
 _NEAR = 0.5e-3  # m, from the indenter: farther off it may be as sharp as it likes
 
 

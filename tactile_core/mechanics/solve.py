@@ -27,7 +27,7 @@ from .thickness import DEPTH_LIMIT, thickness_under
 Tier = Literal["fast", "full", "reference"]
 TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
 
-_LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less cannot be told from rounding and the lattice's own roughness
+_LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less is lost in rounding and the lattice's own roughness
 _REACHED = 1 / 3  # of the depth that a mesh is made for: contacts less deep are too small for it (assumed)
 _ROOM = 1.5  # times the depth at the largest force, for which a mesh is made: places on a path differ (assumed)
 _MOST_MESHES = 3

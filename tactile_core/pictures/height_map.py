@@ -3,7 +3,7 @@
 A height is the position of the coating toward the camera, in metres. It grows with y of the shared frame: an
 indentation raises it. Zero is the plane ``camera.HEIGHT_ZERO_Y``, which touches the resting gel's lowest point, so
 the dome is part of the map: about 0 in the middle, up to 1.7 mm where the resting gel falls away. The map follows
-sideways movement too: it tells of the gel point that has come to lie there. It is a map of the gel, seen along its
+sideways movement too: its value is that of the gel point that has moved there. It is a map of the gel, seen along its
 normal: pixels stand for the places on the plane of height zero where the camera sees them; perspective comes later.
 """
 

@@ -119,15 +119,15 @@ def assemble(
 
 def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
     """Write sentences that name row and field of the first few problems, and the number of the others."""
-    told = [
+    sentences = [
         f"{row_word} {p.row}, {p.field}: {p.found}; "
         + ("interpolated from the frames around it" if p.essential else "left empty")
         for p in problems[:SHOWN]
     ]
     if len(problems) > SHOWN:
         rest = problems[SHOWN:]
-        told.append(f"{len(rest)} more bad cells, in {row_word}s {rest[0].row} to {max(p.row for p in rest)}")
-    return told
+        sentences.append(f"{len(rest)} more bad cells, in {row_word}s {rest[0].row} to {max(p.row for p in rest)}")
+    return sentences
 
 
 def _check_size(path: str, electrodes: np.ndarray) -> None:
@@ -146,10 +146,10 @@ def _unreadable(
     electrodes: np.ndarray, bad: np.ndarray, names: Sequence[str], rows: np.ndarray, known: Sequence[Problem]
 ) -> list[Problem]:
     """Find electrode cells that are no possible reading and that no reader has reported; bad : (T, 19) bool."""
-    told = {(p.frame, "" if p.field == "row" else p.field) for p in known}
+    known_places = {(p.frame, "" if p.field == "row" else p.field) for p in known}
     found = []
     for frame, j in np.argwhere(bad)[:MAX_PROBLEMS]:
-        if (frame, names[j]) not in told and (frame, "") not in told:
+        if (frame, names[j]) not in known_places and (frame, "") not in known_places:
             found.append(Problem(int(frame), int(rows[frame]), names[j], f"{electrodes[frame, j]:g} is no reading"))
     return found
 
@@ -204,16 +204,16 @@ def _time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[n
     forward = steps[steps > 0]
     usual = float(np.median(forward)) if len(forward) else 1.0 / NOMINAL_RATE
     backward, gap = steps <= 0, steps > GAP_STEPS * usual
-    told = []
+    sentences = []
     for what, where in (("do not go forward", backward), ("leave a gap", gap)):
         frames = np.flatnonzero(where) + 1
         if len(frames):
             first = frames[0]
             worst = frames[np.argmax(np.abs(steps[frames - 1]))]
-            told.append(
+            sentences.append(
                 f"time stamps {what} at {len(frames)} place{'s' * (len(frames) > 1)}, first before {row_word}"
                 f" {rows[first]} ({1e3 * steps[first - 1]:.1f} ms), largest before {row_word} {rows[worst]}"
                 f" ({1e3 * steps[worst - 1]:.1f} ms);"
                 " frames stay in file order"
             )
-    return np.flatnonzero(backward | gap) + 1, told
+    return np.flatnonzero(backward | gap) + 1, sentences

@@ -21,7 +21,7 @@ from .assemble import MAX_FRAMES, assemble, check_electrodes
 from .fingers import named, split
 from .recording import ELECTRODES, Recording
 
-LOOKED_AT = 100  # frames by which the fingers of a hand are told
+LOOKED_AT = 100  # frames from which the fingers of a hand are recognised
 STARTS = {b"#ROSBAG V": "ros1", b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite"}
 MARK = "metadata.yaml"  # of a folder that is a ROS 2 bag
 MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk; recorders make them of 1 to 16 MB (assumed enough)
@@ -62,8 +62,8 @@ def open_bag(path: str) -> Iterator[Bag]:
     what = kind(Path(path))
     if what == "folder":
         with open(Path(path) / MARK, "rb") as file:
-            told = file.read(MAX_METADATA + 1)
-        if len(told) > MAX_METADATA or PACKED.search(told):
+            metadata = file.read(MAX_METADATA + 1)
+        if len(metadata) > MAX_METADATA or PACKED.search(metadata):
             advice = "Unpack it: ros2 bag convert"
             raise TactileError(path, "a bag packed file by file, or with huge metadata", "a plain bag", advice)
     openers: dict[str | None, Any] = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
@@ -219,8 +219,9 @@ def _choose(bag: Bag, block: np.ndarray) -> tuple[int, list[str]]:
     if len(live) == 1:
         return int(live[0]), []
     others = ", ".join(str(number) for number in live[1:])
-    told = f"finger {live[0]} is read; others with signals: {others} (ask for one as {Path(bag.path).name}#{live[-1]})"
-    return int(live[0]), [told]
+    advice = f"ask for one as {Path(bag.path).name}#{live[-1]}"
+    warning = f"finger {live[0]} is read; others with signals: {others} ({advice})"
+    return int(live[0]), [warning]
 
 
 def _recording(bag: Bag, layout: ModuleType, rows: np.ndarray, warnings: list[str]) -> Recording:

@@ -97,11 +97,11 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
     The report records it. A rectified change has lost offset and sign: it is only divided by the gain.
     """
     offset = np.zeros(ELECTRODES) if signals.kind == "rectified" else np.array(sensor.offset_counts)
-    told = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
+    applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
     change = (signals.typical - offset) / np.array(sensor.gain)
     if signals.kind == "raw":
         change = divider.of_unit(change, signals.rest)
-    return dataclasses.replace(signals, change=change, report={**signals.report, "sensor": told})
+    return dataclasses.replace(signals, change=change, report={**signals.report, "sensor": applied})
 
 
 def read(path: str | os.PathLike) -> SensorFile:

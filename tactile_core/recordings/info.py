@@ -77,12 +77,12 @@ def _time(recording: Recording) -> str:
     steps = 1e3 * np.diff(recording.time)
     jumps = int(np.sum(recording.flags & Flag.TIME_JUMP > 0))
     where = recording.rows[np.flatnonzero(recording.flags & Flag.TIME_JUMP)[:5]].tolist()
-    told = (
+    ending = (
         f"; {jumps} jumps, before {recording.row_word} {', '.join(map(str, where))}{' …' * (jumps > 5)}"
         if jumps
         else "; no gaps"
     )
-    return f"steps {steps.min():.1f} to {steps.max():.1f} ms{told}"
+    return f"steps {steps.min():.1f} to {steps.max():.1f} ms{ending}"
 
 
 def _parts(recording: Recording, signals: Signals) -> str:

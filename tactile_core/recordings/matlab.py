@@ -44,7 +44,7 @@ def open_matlab(path: str) -> Iterator[Store]:
     names = [name for name, _, _ in listed]
     if len(names) > MOST_VARIABLES or len(set(names)) < len(names):
         found = f"{len(names)} variables, {len(names) - len(set(names))} of them twice"
-        raise TactileError(path, found, f"at most {MOST_VARIABLES}, each once", "Save them anew")
+        raise TactileError(path, found, f"at most {MOST_VARIABLES}, each once", "Save them again")
     for name, _, kind in listed:
         if kind in REFUSED:
             advice = "Save the plain arrays alone"

@@ -19,7 +19,7 @@ POLARITIES = (FALLS, RISES)
 PATTERNS = "contact_patterns.npy"  # (P, 19) counts, changes of simulated contacts as raw readings have them
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a change says nothing
 # Counts of PDC, 0.55 kPa, that pressure must swing by. Under a steady grip the electrodes' drift is larger than what
-# pressure tells: of 36 real fingers (PHAC-2, trials 01 to 03) those that swing less are wrong in 4 of 19 cases,
+# pressure shows it: of 36 real fingers (PHAC-2, trials 01 to 03) those that swing less are wrong in 4 of 19 cases,
 # those that swing more in none of 17.
 SWING = 15.0
 FEWEST = 20  # frames; of fewer no slope is taken (assumed)
@@ -27,7 +27,7 @@ MOST = 500  # frames looked at, evenly spread
 # By how much the likeness of the one sign must exceed the other's; or how much less of the change it must leave over,
 # as a share of what the other leaves: simulated contacts, with noise of 1.5 counts and gains 10 % apart, leave .41 of
 # it in the median, and 1 of 100 more than .7. A light touch that makes the skin bulge is like a firm one upside down,
-# by a likeness of .9; that the right sign has .98 tells them apart.
+# by a likeness of .9; the right sign has .98, which separates them.
 MARGIN, LEFT = 0.15, 0.7
 LIKE = 0.6  # likeness that is one: 95 of 100 random changes reach .62, changes with real pressure .66 to .87
 SCALE = 15.0  # counts, of the arcsinh that the networks see changes through
@@ -95,8 +95,8 @@ def by_contacts(touches: np.ndarray) -> Polarity | None:
 def _decided(changes: np.ndarray, what: str) -> Polarity:
     falls, rises = likeness(changes), likeness(-changes)
     name = FALLS if falls >= rises else RISES
-    told = f"{what} is like simulated contacts by {falls:.2f} if counts fall, by {rises:.2f} if they rise"
-    return Polarity(name, told, max(falls, rises) >= LIKE and _apart(min(falls, rises), max(falls, rises)))
+    evidence = f"{what} is like simulated contacts by {falls:.2f} if counts fall, by {rises:.2f} if they rise"
+    return Polarity(name, evidence, max(falls, rises) >= LIKE and _apart(min(falls, rises), max(falls, rises)))
 
 
 def _apart(less: float, more: float) -> bool:

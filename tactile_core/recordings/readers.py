@@ -70,14 +70,14 @@ def _read_finger(layout: ModuleType, store: Store, finger: int | None) -> Record
     known = layout.fingers(store.shapes)
     chosen = known[0] if finger is None else finger
     if chosen not in known:
-        told = ", ".join(map(str, known))
-        raise TactileError(store.path, f"finger {chosen}", f"one that it holds: {told}", "Name it as path#finger")
+        listed = ", ".join(map(str, known))
+        raise TactileError(store.path, f"finger {chosen}", f"one that it holds: {listed}", "Name it as path#finger")
     found = layout.read(store, chosen)
     if finger is not None or len(known) == 1:
         return named(found, finger)
     others = ", ".join(map(str, known[1:]))
-    told = f"finger {chosen} is read; others: {others} (ask for one as {os.path.basename(store.path)}#{known[-1]})"
-    return replace(found, warnings=(told, *found.warnings))
+    warning = f"finger {chosen} is read; others: {others} (ask for one as {os.path.basename(store.path)}#{known[-1]})"
+    return replace(found, warnings=(warning, *found.warnings))
 
 
 def each_finger(path: str | os.PathLike[str]) -> list[str]:

@@ -42,7 +42,7 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
     to the level of the second around it. It lasts at most 5 samples, or at most 50
     where no more than 3 electrodes jump with it (a bit stuck in one channel; seen in mat5_50 of the slide set). A
     press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of 20-50 ms
-    is not flat; a contact that comes and goes within one single sample (10 ms) cannot be told from a glitch. At the
+    is not flat; a contact that comes and goes within one single sample (10 ms) looks like a glitch. At the
     start and end of a recording only one jump can be seen; there it must exceed 100 counts, within 3 samples.
     """
     found = np.zeros(values.shape, bool)

@@ -75,8 +75,8 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
         mask[start : start + n] = True
     parts = _runs(mask)
     by = "calm electrodes and the lowest PDC" if windows.pdc is not None else "calm electrodes (no PDC to confirm it)"
-    told = f"{len(parts)} quiet part{'s' * (len(parts) != 1)} ({by})" if parts else "no calm part at the rest level"
-    return Quiet(mask, parts, told)
+    evidence = f"{len(parts)} quiet part{'s' * (len(parts) != 1)} ({by})" if parts else "no calm part at the rest level"
+    return Quiet(mask, parts, evidence)
 
 
 def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:

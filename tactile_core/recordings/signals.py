@@ -168,7 +168,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
 def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -> tuple[str, str]:
     if options.kind is None:
         return detect(readings)
-    return options.kind, f"told by the user (the samples look {detect(readings)[0]})"
+    return options.kind, f"given by the user (the samples look {detect(readings)[0]})"
 
 
 def _unit_rest(
@@ -177,15 +177,15 @@ def _unit_rest(
     """Return the unit's rest if it is known and no calm level lies near it: a steady grip is calm, too."""
     if options.rest is None or kind != "raw" or options.tare is not None:
         return None
-    told = "no quiet part"
+    reason = "no quiet part"
     if quiet.parts:
         still = level(readings[quiet.mask])
         pdc = np.nan if recording.pdc is None else float(np.median(recording.pdc[quiet.mask]))
         if options.rest.agrees(still, pdc):
             return None
         off = np.abs(still - np.array(options.rest.counts))
-        told = f"what is calm lies up to {off.max():.0f} counts from it (E{off.argmax() + 1})"
-    warnings.append(f"rest is the unit's own: {told}")
+        reason = f"what is calm lies up to {off.max():.0f} counts from it (E{off.argmax() + 1})"
+    warnings.append(f"rest is the unit's own: {reason}")
     return options.rest
 
 
@@ -212,10 +212,10 @@ def _polarity(
     if kind == "rectified":
         return Polarity(FALLS, "the sign is lost", True)
     shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known)
-    for told, who in ((options.polarity, "as told"), (recording.about.get("polarity", ""), "as the file says")):
-        if told in POLARITIES:
-            doubt = shown.sure and shown.name != told
-            return Polarity(told, f"{who}; {shown.evidence}" if shown.sure else who, not doubt)
+    for stated, who in ((options.polarity, "as given"), (recording.about.get("polarity", ""), "as the file says")):
+        if stated in POLARITIES:
+            doubt = shown.sure and shown.name != stated
+            return Polarity(stated, f"{who}; {shown.evidence}" if shown.sure else who, not doubt)
     return shown
 
 
@@ -294,11 +294,11 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
                 "frames A:B",
                 "Name frames without contact, or leave the option out",
             )
-        return Quiet(np.zeros(len(readings), bool), (), "the file's own zero, as told by the user")
+        return Quiet(np.zeros(len(readings), bool), (), "the file's own zero, as asked for")
     frames = _frames(options.tare, len(readings))
     mask = np.zeros(len(readings), bool)
     mask[frames] = True
-    return Quiet(mask, ((frames.start, frames.stop),), "told by the user")
+    return Quiet(mask, ((frames.start, frames.stop),), "given by the user")
 
 
 def _frames(asked: slice | str, count: int) -> slice:
@@ -334,7 +334,7 @@ def _rest(
             readings, quiet, options.drift and kind != "rectified"
         )  # drift of a rectified signal has no sign
     if options.tare == "none":
-        warnings.append("no tare, as told: the file's own zero is taken for rest")
+        warnings.append("no tare, as asked for: the file's own zero is taken for rest")
         return np.zeros(readings.shape)
     if kind == "raw":
         guess = calmest(readings, recording.pdc, recording.rate)
@@ -366,7 +366,7 @@ def _report(
         "kind": kind,
         "kind_evidence": evidence,
         "counts_per_unit": unit,
-        "tare": "none" if options.tare == "none" else "told" if options.tare is not None else "automatic",
+        "tare": "none" if options.tare == "none" else "given" if options.tare is not None else "automatic",
         "tare_window_frames": window_frames(recording.rate),
         "quiet_parts": [list(part) for part in quiet.parts],
         "quiet_evidence": quiet.evidence,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 LONGEST = 101  # frames, a second: beyond, touch itself is smoothed away (assumed)
-# Frames where the user tells none. Rectified signals need it: folded noise does not average out in the networks.
+# Frames where the user gives none. Rectified signals need it: folded noise does not average out in the networks.
 RECTIFIED, SIGNED = 3, 1
 
 

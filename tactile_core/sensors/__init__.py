@@ -53,7 +53,7 @@ _ELECTRODES_SYNTOUCH_MM = np.array([
     [-6.2, 3.513, -3.67], [-8.0, 4.956, -1.116], [-10.5, 3.513, -3.67], [-13.4, 4.956, -1.116],
     [-2.8, 0.0, -5.08], [-9.8, 0.0, -5.08], [-13.6, 0.0, -5.08],
 ])  # fmt: skip
-# The sign of z cannot be told from the symmetric mesh (docs/sources.md, Frame): +y of SynTouch's frame to +z, assumed.
+# The symmetric mesh does not show the sign of z (docs/sources.md, Frame): +y of SynTouch's frame to +z, assumed.
 _LATERAL_SIGN = 1.0
 
 

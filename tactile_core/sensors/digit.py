@@ -52,7 +52,7 @@ def _dome_coefficients() -> np.ndarray:
 def dome_height(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Height of the resting gel above its flat back, m, at (x, z) in m: even in z, smooth.
 
-    Least squares of the profile table of the public mesh (see ``data/README.md``) by Chebyshev polynomials
+    Least squares of the profile table of the public mesh (docs/sources.md, DIGIT gel) by Chebyshev polynomials
     along and even powers across; the table is a faceted surface sampled on a grid, hence the smoothing.
     """
     x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))

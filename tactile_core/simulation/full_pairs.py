@@ -130,8 +130,8 @@ def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray
             rows.append({**named, "slide": slide.astype(np.float32), **_row(biotac, digit)})
     except TactileError as error:
         lost = str(error)
-    told = {"wanted": np.int32(len(steps)), "lost": np.str_(lost), "seconds": np.float64(time.process_time() - began)}
-    return rows, told
+    record = {"wanted": np.int32(len(steps)), "lost": np.str_(lost), "seconds": np.float64(time.process_time() - began)}
+    return rows, record
 
 
 def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float) -> Iterator[Pair]:

@@ -196,8 +196,8 @@ def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> N
     except (ValueError, RecursionError) as error:
         raise TactileError(place, str(error), "a JSON list of names", ADVICE) from error
     if indenter.size and not 0 <= indenter.min() <= indenter.max() < len(found):
-        told = f"{len(found)} names for numbers {indenter.min()} to {indenter.max()}"
-        raise TactileError(place, told, "a name for each number of the dataset indenter, from 0", ADVICE)
+        listed = f"{len(found)} names for numbers {indenter.min()} to {indenter.max()}"
+        raise TactileError(place, listed, "a name for each number of the dataset indenter, from 0", ADVICE)
 
 
 def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attributes: dict[str, str]) -> str:

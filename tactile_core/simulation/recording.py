@@ -66,16 +66,16 @@ def simulate_recording(
         frames.append(_solve(scene_path, indenter, at, newtons, t, sensors_used, tiers or {}))
         if progress:
             progress(len(frames), len(time))
-    told, counts = "", {}
+    fluid, counts = "", {}
     if "electrodes" in keep:
         pressure, still = _pressure(frames), np.full(len(time), _STILL_COUNT, np.int16)
         counts = {"electrodes": readings(_signals(frames, electrodes), time, wiring, seed), "pdc": pdc_counts(pressure)}
         counts |= {"tac": still, "tdc": still}
-        told = " " + _describe_fluid(pressure, electrodes)
+        fluid = " " + _describe_fluid(pressure, electrodes)
     write_simulated(
         out, time=time, **counts, truth=_truth(frames, keep), scene=text, seed=seed,
         made_by=f"tactile {__version__}, mechanics.recording{_tiers_told(tiers)}",
-        note=f"Simulated, not measured: {scene.description}{told}",
+        note=f"Simulated, not measured: {scene.description}{fluid}",
     )  # fmt: skip
 
 
@@ -150,8 +150,8 @@ def pdc_counts(pressure: np.ndarray) -> np.ndarray:
 def _describe_fluid(pressure: np.ndarray, electrodes: str) -> str:
     """The fluid's pressure and the electrodes' law in words for the file."""
     low, high = pressure.min() / 1e3, pressure.max() / 1e3
-    told = f"Fluid pressure {low:.2f} to {high:.2f} kPa; PDC counts {sensors.PRESSURE_PER_COUNT:g} Pa each."
-    return f"{told} Electrodes by the {electrodes} law."
+    fluid = f"Fluid pressure {low:.2f} to {high:.2f} kPa; PDC counts {sensors.PRESSURE_PER_COUNT:g} Pa each."
+    return f"{fluid} Electrodes by the {electrodes} law."
 
 
 def _wiring(spec: RecordingSpec) -> Wiring:

@@ -60,7 +60,7 @@ def read(path: str | os.PathLike, identity: dict) -> State:
             arrays = {name: file[name] for name in file.files}
         text = json.loads(arrays.pop("state").tobytes())
         state = State(**{name: _of_kind(text[name], kind) for name, kind in TEXT.items()}, arrays=arrays)
-    except Exception as error:  # of zip files, arrays, JSON and what it tells: a dozen types on damaged bytes
+    except Exception as error:  # of zip files, arrays, JSON and its content: a dozen types on damaged bytes
         raise TactileError(path, f"cannot be read ({error})", "a checkpoint", ADVICE) from error
     for name, expected in identity.items():
         if state.identity.get(name) != expected:

@@ -137,8 +137,8 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
     state = nets.contact(latent, data.rectified)
     true, middle = on_skin(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
     miss, null = (accuracy.lengths(on_skin(frame, each) - true) for each in (state[:, :PLACE], middle))
-    told = nets.force_in(state, nets.given(latent, state, data.rectified))
-    load, usual = accuracy.lengths(told), np.median(data.force[train])
+    estimated = nets.force_in(state, nets.given(latent, state, data.rectified))
+    load, usual = accuracy.lengths(estimated), np.median(data.force[train])
     share, nothing = (100 * np.abs(each - data.force[test]) / data.force[test] for each in (load, usual))
     of = f"kept presses, {when}"
     return [

@@ -44,7 +44,7 @@ class LabelledRecording:
 def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> LabelledRecording:
     """Read a recording with contact places and forces (Narang et al.: contact_loc, force_vec) for this frame.
 
-    Places are taken to be SynTouch's frame of the electrodes (docs/sources.md), in m or mm as their size tells; of
+    Places are taken to be SynTouch's frame of the electrodes (docs/sources.md), in m or mm as their size shows; of
     forces only the magnitude counts, whatever their frame.
     Raises TactileError: no labels, places that are not on the skin, too few contacts.
     """

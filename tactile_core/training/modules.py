@@ -63,7 +63,7 @@ class Residual(nn.Module):
 class ContactPosterior(nn.Module):
     """S2MPN or R2MPN: what a signal's latent leaves open about the contact, and the BioTac's latent once it is known.
 
-    A mixture of Gaussians over the contact's state (a mixture density network, Bishop 1994) and a network that tells
+    A mixture of Gaussians over the contact's state (a mixture density network, Bishop 1994) and a network that gives
     the code of the dent's shape from the signal and a state. A shape thus is never averaged over places and depths.
     """
 
@@ -130,7 +130,7 @@ class Vae(nn.Module):
 class MeshVae(Vae):
     """MVB or MVD: a latent is the place of the dent and a code of its shape in the frame that moves with it.
 
-    The place is read off the mesh, not learned; the decoder and the networks that start from a latent are told, beside
+    The place is read off the mesh, not learned; the decoder and the networks that start from a latent take it, beside
     it, what the whole cell of the place leaves (`placed`), without which a shape on a lattice is not known.
     surface : what ties places to cells, coefficients to fields
     """

@@ -120,8 +120,8 @@ def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Surprise at the contact, in nats, code of a frozen autoencoder given the contact, and the signal itself.
 
-    By likelihood alone a contact is never told fainter than it may be. SVB learns along: what it keeps of a signal is
-    then what tells contacts apart.
+    By likelihood alone a contact is never estimated fainter than it may be. SVB learns along: it keeps of a signal
+    then what separates contacts.
     """
     with torch.no_grad():
         target = model.MVB.mean(batch.biotac)
@@ -150,7 +150,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
     """Compute the loss of the whole chain: a frozen chain is 23-26 % worse than signal -> DIGIT directly.
 
     docs/sources.md, Networks, has the figure.
-    Shapes are held against the truth where the contact truly is, places by themselves: a dent that is told beside its
+    Shapes are held against the truth where the contact truly is, places by themselves: a dent beside its
     place would be paid for with being faint. The autoencoders' own losses stay in at half, so that latents keep their
     meaning and meshes can be encoded. What the signal says of the contact is learned before and stays as it is.
     """
@@ -167,7 +167,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Force from the BioTac's latent, be it encoded from a mesh or told from a signal and its contact's state."""
+    """Force from the BioTac's latent, encoded from a mesh, or estimated from a signal and its contact's state."""
     with torch.no_grad():
         latent = torch.cat([model.MVB.mean(batch.biotac), model.given(batch.signal, batch.state)[0]])
     true = batch.force.repeat(2, 1)
@@ -180,7 +180,7 @@ def pressure_loss(
 ) -> Tensor:
     """The fluid's pressure from the signal as read, on the head's own scale, nearly a logarithm.
 
-    Relative errors in its place drew what is uncertain low: told pressures of slides were a sixth lower still.
+    Relative errors in its place biased uncertain pressures low: the estimates for slides were a sixth lower still.
     """
     error = model.pressure(compress(batch.signal)) - torch.asinh(batch.pressure / PRESSURE_SCALE)
     return error.square().mean()

@@ -165,8 +165,8 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
     if not touched.all():
         warnings.append(f"{_names(~touched)}: hardly touched in these recordings; gain kept at 1")
     for electrode in np.flatnonzero(wild):
-        told = f"outside {LEAST:g} to {MOST:g}; kept at 1 (a dead channel?)"
-        warnings.append(f"E{electrode + 1}: gain {gain[electrode]:.2f} is {told}")
+        outcome = f"outside {LEAST:g} to {MOST:g}; kept at 1 (a dead channel?)"
+        warnings.append(f"E{electrode + 1}: gain {gain[electrode]:.2f} is {outcome}")
     if found.alike < FEW_CONTACTS:
         warnings.append(
             f"only {found.alike} different contacts: gains are uncertain; touch more places, softly and hard"

@@ -133,7 +133,7 @@ def _step(seconds: np.ndarray | float) -> np.ndarray:
 def _steps(time: np.ndarray) -> np.ndarray:
     """Variance (T, STATE) of the change since the frame before; free at the first frame and after gaps."""
     seconds = np.diff(time, prepend=-np.inf)
-    close = (seconds >= 0) & (seconds < GAP)  # a clock that runs backwards tells nothing
+    close = (seconds >= 0) & (seconds < GAP)  # a clock that runs backwards carries no information
     return np.where(close[:, None], _step(np.where(close, seconds, 0)), ANYWHERE**2)
 
 

@@ -193,10 +193,10 @@ class Networks:
 
     def force_in(self, state: np.ndarray, latent_biotac: np.ndarray) -> np.ndarray:
         """Force (T, 3) N, of the states' size, from states (T, STATE) and their latent_biotac (T, L)."""
-        told = self.force(latent_biotac)
-        length = np.sqrt(np.square(told).sum(-1))
+        estimate = self.force(latent_biotac)
+        length = np.sqrt(np.square(estimate).sum(-1))
         size = np.float32(FORCE_SCALE) * np.sinh(np.clip(state[:, PLACE], 0, COMPRESSED_LIMIT))
-        return told * (size / np.where(length > 0, length, 1))[:, None]
+        return estimate * (size / np.where(length > 0, length, 1))[:, None]
 
     def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one."""
@@ -305,7 +305,7 @@ class Networks:
         if len(x) == 1:
             return function(x)
         out = np.empty(0, np.float32)
-        for start in range(0, max(len(x), 1), BLOCK):  # an empty recording still tells the shape of its result
+        for start in range(0, max(len(x), 1), BLOCK):  # an empty recording still gives a result its shape
             part = x[start : start + BLOCK]
             if len(part) < BLOCK:
                 part = np.concatenate([part, np.zeros((BLOCK - len(part), *shape), np.float32)])
@@ -321,10 +321,10 @@ def _signal(change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarra
     change = np.asarray(change, np.float32)
     if change.shape[1:] != (ELECTRODES,):
         return change, (ELECTRODES,)
-    told = np.broadcast_to(np.asarray(rectified, np.float32), len(change))[:, None]
+    mark = np.broadcast_to(np.asarray(rectified, np.float32), len(change))[:, None]
     # A rectified change is read as one that falls, as most do; less its level at rest it may lie below zero.
-    change = np.where(told > 0, -np.abs(change), change)
-    return np.concatenate([change, told], -1), (ELECTRODES + 1,)
+    change = np.where(mark > 0, -np.abs(change), change)
+    return np.concatenate([change, mark], -1), (ELECTRODES + 1,)
 
 
 def load(folder: str | os.PathLike | None = None) -> Networks:

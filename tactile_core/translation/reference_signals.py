@@ -21,7 +21,7 @@ from .networks import compress, expand
 FILE = "signals.safetensors"
 COUNT = 512  # typical signals; fewer are worse (gains of 30 % found to 16-20 % with 256, to 10-12 % with 512 and more)
 FEWEST = 16  # of them: from fewer contacts nothing can be matched (assumed)
-TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a signal tells nothing of gains
+TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a signal says nothing about gains
 TURNS = 15  # of k-means; more change nothing that matters
 MOST = 10_000  # signals that k-means looks at
 NOISE = 1.5  # counts (docs/sources.md, BioTac read-out)

@@ -15,7 +15,7 @@ from ..recordings.signal_kind import detect
 
 FEWEST = 3  # recordings: of fewer nothing says how far a grip is from rest (assumed)
 LEAST_PRESSED = 0.25  # share of the recordings, those of the lowest pressure, whose mean is taken for rest
-SPREAD_OVER = 0.5  # share of the recordings whose range tells how far rest may be off
+SPREAD_OVER = 0.5  # share of the recordings whose range estimates the error of rest
 
 
 @dataclass(frozen=True)

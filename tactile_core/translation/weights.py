@@ -212,7 +212,8 @@ def read_card(folder: str | os.PathLike) -> tuple[dict, str]:
         found = card.get("format") if isinstance(card, dict) else type(card).__name__
         raise TactileError(path, f"format {found!r}", f"format {CARD_FORMAT!r}", ADVICE)
     if card.get("polarity") != FALLS:
-        told = repr(card["polarity"]) if "polarity" in card else "missing: trained on counts that rise where films thin"
+        old = "missing: trained on counts that rise where films thin"
+        stated = repr(card["polarity"]) if "polarity" in card else old
         expected = f"{FALLS!r}, as raw counts do"
-        raise TactileError(f"{path}, polarity", told, expected, "Train them anew with this version")
+        raise TactileError(f"{path}, polarity", stated, expected, "Train them again with this version")
     return card, sha256(data)

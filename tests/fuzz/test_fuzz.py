@@ -1,4 +1,4 @@
-"""Whatever the bytes, a loader ends well or in a TactileError. ``hostile.py`` runs the same for as long as told."""
+"""Whatever the bytes, a loader ends well or in a TactileError. ``hostile.py`` runs the same for a given time."""
 
 from __future__ import annotations
 

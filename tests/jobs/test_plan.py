@@ -68,7 +68,7 @@ def test_outputs_add_up(monkeypatch, tmp_path):
     monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))  # so that nothing is cached, on every machine
     found = plan_for(keep="displacement_digit")
     contacts = next(part for part in found.parts if part.what == "DIGIT contacts")
-    number = int(contacts.told.split()[0])
+    number = int(contacts.extent.split()[0])
     assert 100 < number < 160 and contacts.seconds == pytest.approx(0.01 * number)
     assert contacts.disk == pytest.approx(0.002 * number)
     alone, both = found.seconds, plan_for(keep="displacement_digit,displacement_biotac").seconds
@@ -87,7 +87,7 @@ def test_matrices_that_are_not_cached_are_to_be_built(monkeypatch, tmp_path):
     monkeypatch.setattr(compliance, "build", lambda *given: pytest.fail("matrices were built"))
     found = plan_for(keep="displacement_digit")
     matrices = next(part for part in found.parts if part.what == "DIGIT matrices")
-    assert matrices.seconds == plan.BUILD_S["digit"] and matrices.disk == 151 and str(tmp_path) in matrices.told
+    assert matrices.seconds == plan.BUILD_S["digit"] and matrices.disk == 151 and str(tmp_path) in matrices.extent
     assert list(tmp_path.iterdir()) == []
 
 
@@ -98,7 +98,7 @@ def test_matrices_that_are_cached_are_told_with_their_size(monkeypatch, tmp_path
     for name in compliance.Arrays._fields:
         (folder / f"{name}.npy").write_bytes(bytes(1_000_000))
     matrices = next(part for part in plan_for(keep="image").parts if part.what == "DIGIT matrices")
-    assert matrices.seconds == 0 and "7 MB, cached" in matrices.told and "2867 surface nodes" in matrices.told
+    assert matrices.seconds == 0 and "7 MB, cached" in matrices.extent and "2867 surface nodes" in matrices.extent
 
 
 def test_pictures_cost_what_their_preset_was_measured_to(monkeypatch):
@@ -108,7 +108,7 @@ def test_pictures_cost_what_their_preset_was_measured_to(monkeypatch):
     monkeypatch.setattr(plan, "_variant", lambda preset: "scalar_rgb")
     assert plan._preset_ms("standard") == presets.measured()["presets"]["standard"]["ms"]["scalar_rgb"]
     exact = presets.measured()["presets"]["fast"]["error"]
-    assert any("preset fast" in part.told for part in plan_for(keep="image", budget=Budget(levels=exact)).parts)
+    assert any("preset fast" in part.extent for part in plan_for(keep="image", budget=Budget(levels=exact)).parts)
 
 
 def test_a_recording_is_planned_as_it_is_converted(slide_csv):
@@ -116,7 +116,7 @@ def test_a_recording_is_planned_as_it_is_converted(slide_csv):
     assert built(latent) == ["networks"] and "contact mechanics" in latent.left_out
     assert built(everything) == ["networks", "height maps", "pictures"]
     assert built(plan_for(slide_csv())) == ["networks", "pictures"]  # as `convert` keeps them
-    assert latent.seconds == pytest.approx(1.0 + 0.01 * 150) and "150 frames" in latent.parts[0].told
+    assert latent.seconds == pytest.approx(1.0 + 0.01 * 150) and "150 frames" in latent.parts[0].extent
 
 
 @pytest.mark.parametrize(

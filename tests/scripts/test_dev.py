@@ -95,7 +95,7 @@ def test_an_interrupted_installation_is_made_anew(dev, venv, monkeypatch, capsys
     (venv / "debris").write_text("x")
     monkeypatch.setattr(dev, "pip_install", lambda *arguments: None)
     dev.install(venv, ())
-    assert "anew: its installation was interrupted" in capsys.readouterr().out
+    assert "again: its installation was interrupted" in capsys.readouterr().out
     assert not (venv / "debris").exists()
 
 
@@ -103,7 +103,7 @@ def test_a_half_made_environment_is_made_anew(dev, pip, venv, capsys):
     venv.mkdir()
     (venv / "pyvenv.cfg").write_text("home = nowhere\n")
     assert dev.install(venv, ()).exists()
-    assert "anew: it is half made" in capsys.readouterr().out
+    assert "again: it is half made" in capsys.readouterr().out
 
 
 def test_an_environment_of_another_python_installs_again(dev, pip, venv, monkeypatch):

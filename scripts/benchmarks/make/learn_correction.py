@@ -32,7 +32,7 @@ SHARES = 0.4, 0.7, 1.0  # of a press's depth, at which it is sampled
 # m of a load step with friction: on a 7 mm ball 0.06 mm steps differ from it by 4 um rms and 1.6 % of force.
 _RUBBING_STEP = 0.5e-3
 _FOLDS = 5
-_BINS = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 2.0  # depth over thickness, of what is trusted and told
+_BINS = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 2.0  # depth over thickness, of which errors are trusted and reported
 _SIGNIFICANT = 10e-6  # m, nodes that move less do not count: they belong to no contact
 
 

@@ -1,9 +1,9 @@
-"""Make tactile_core/data/contact_patterns.npy: the electrodes' answer to simulated contacts, which tells polarities.
+"""Make tactile_core/data/contact_patterns.npy: the electrodes' response to simulated contacts, which shows polarities.
 
     python scripts/benchmarks/make/make_contact_patterns.py [WEIGHTS]     of the weights that ship, or of others
 
 The reference signals of the weights, in counts against rest, with the sign of a raw reading (``sensors.COUNT_SIGN``).
-Run it again when the weights were trained anew.
+Run it again when the weights were trained again.
 """
 
 from __future__ import annotations

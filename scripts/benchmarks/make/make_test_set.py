@@ -44,12 +44,12 @@ def solve_one(job: Job) -> str:
         return f"{path.name}: was there"
     scene, _ = load_scene(SCENE)
     press = full_pairs.draw_press(scene, *job[1:])
-    rows, told = full_pairs.full_rows(scene, press)
+    rows, record = full_pairs.full_rows(scene, press)
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
-    why = np.frombuffer(str(told["lost"]).encode(), np.uint8)
-    array_pack.write(path, {**columns, **told, "lost": why, "count": np.int32(len(rows))})
-    what = f"{scene.indenters[press.which].name} {press.depth * 1e3:.2f} mm, {len(rows)} of {told['wanted']} contacts"
-    return f"{path.name}: {what}, {told['seconds']:.1f} s {told['lost']}"
+    why = np.frombuffer(str(record["lost"]).encode(), np.uint8)
+    array_pack.write(path, {**columns, **record, "lost": why, "count": np.int32(len(rows))})
+    what = f"{scene.indenters[press.which].name} {press.depth * 1e3:.2f} mm, {len(rows)} of {record['wanted']} contacts"
+    return f"{path.name}: {what}, {record['seconds']:.1f} s {record['lost']}"
 
 
 def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
@@ -57,19 +57,19 @@ def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
     files = sorted(folder.glob(f"press_{seed}_*.h5"))
     counts, wanted, lost = [], 0, {}
     for path in files:
-        told = array_pack.read(path, names=("count", "wanted", "lost"))
-        counts.append(int(told["count"]))
-        wanted += int(told["wanted"])
-        if len(told["lost"]):
-            lost[path.stem] = told["lost"].tobytes().decode()
+        record = array_pack.read(path, names=("count", "wanted", "lost"))
+        counts.append(int(record["count"]))
+        wanted += int(record["wanted"])
+        if len(record["lost"]):
+            lost[path.stem] = record["lost"].tobytes().decode()
     scene, text = load_scene(SCENE)
     with atomic.new_file(out) as partial, tempfile.TemporaryDirectory() as scratch:
         fine = pathlib.Path(scratch) / "fine.h5"
         pairs_file.merge(files, sum(counts), fine, text, seed, [spec.name for spec in scene.indenters])
         _coarsen(fine, partial)
-    told = {**card(out), "tier": "full", "contacts_wanted": wanted, "presses_solved": len(files), "lost": lost}
-    atomic.write_json(card_path(out), told)
-    return told
+    record = {**card(out), "tier": "full", "contacts_wanted": wanted, "presses_solved": len(files), "lost": lost}
+    atomic.write_json(card_path(out), record)
+    return record
 
 
 def _coarsen(fine: pathlib.Path, out: pathlib.Path) -> None:
@@ -109,11 +109,10 @@ def main() -> int:
     with concurrent.futures.ProcessPoolExecutor(arguments.workers) as pool:
         for done, line in enumerate(pool.map(solve_one, jobs), 1):
             print(f"{done}/{len(jobs)} {line}", flush=True)
-    told = merge(arguments.work, arguments.seed, arguments.out)
-    print(
-        f"{arguments.out}: {told['contacts']} of {told['contacts_wanted']} contacts, {told['presses_solved']} presses"
-    )
-    for name, why in told["lost"].items():
+    record = merge(arguments.work, arguments.seed, arguments.out)
+    contacts = f"{record['contacts']} of {record['contacts_wanted']} contacts"
+    print(f"{arguments.out}: {contacts}, {record['presses_solved']} presses")
+    for name, why in record["lost"].items():
         print(f"{name}: {why}")
     return 0
 

@@ -122,7 +122,7 @@ def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) 
 def _inner_skin() -> Callable[[Contact], np.ndarray]:
     """A function that gives the displacement (n_inner, 3) m of the inner skin in a contact of the fast tier.
 
-    The compliance watches its nodes along one direction each; here the solid is solved anew under the contact's forces.
+    The compliance watches its nodes along one direction each; here the solid is solved under the contact's forces.
     """
     mesh, compliance = skin_mesh(), biotac_compliance()
     free = np.repeat(~mesh.clamped, 3)

@@ -1,6 +1,6 @@
 """The Isaac-like mode on the public meshes of both sensors against our own model of them.
 
-Two differences are told apart: Isaac Gym's settings against our own material with the fluid (what a user of such data
+Two differences are separated: Isaac Gym's settings against our own material with the fluid (what a user of such data
 meets), and linear tetrahedra against our mixed hexahedra with one material and no fluid (locking, and nodes 1 mm apart:
 on the DIGIT's mesh the ball first touches a node 72 um below where it touches the gel).
 """

@@ -27,7 +27,7 @@ at 0.6 (nu = .5). The solver follows the exact solution, so the formula is asked
 The contact's edge falls between nodes: a force at a small depth scatters with the spacing (0.2 % at 0.1 mm), the shape
 does not.
 What each tier is off by on many contacts, by depth, is in `tactile_core/data/mechanics_tiers.json`, made by
-`scripts/benchmarks/measure_tiers.py`; [benchmark](benchmark.md) tells how well its bounds hold.
+`scripts/benchmarks/measure_tiers.py`; [benchmark](benchmark.md) shows how well its bounds hold.
 
 A contact is refused where the surface has let the indenter through between its nodes: where some carry force on its
 back, as round a ring's wire pressed deeper than its radius, and in the finite-strain tiers also where the surface lies

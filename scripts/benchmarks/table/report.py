@@ -49,9 +49,9 @@ def write_report(
     """``benchmark.json``, ``benchmark.md`` and ``benchmark.png``; more : Markdown that follows the tables."""
     machine = provenance.machine()
     atomic.write_json(folder / "benchmark.json", {"machine": machine, "missing": missing, "rows": list(rows)})
-    told = ", ".join(f"{name} ({why})" for name, why in missing.items()) or "nothing"
+    listed = ", ".join(f"{name} ({why})" for name, why in missing.items()) or "nothing"
     load = f", {os.getloadavg()[0]:.0f} programs competing for them at the end" if hasattr(os, "getloadavg") else ""
-    text = INTRODUCTION.format(machine=f"{machine['processor']}, {machine['cores']} cores{load}", missing=told)
+    text = INTRODUCTION.format(machine=f"{machine['processor']}, {machine['cores']} cores{load}", missing=listed)
     for stage, title in TITLES.items():
         lines = [as_line(method) for method in methods if method.stage == stage]
         if lines:
@@ -75,8 +75,8 @@ def short(value: float | None) -> str:
 
 def same_pairs() -> str:
     """The table of both trainings."""
-    told = json.loads(SAME_PAIRS.read_text())
-    ours, across = ({each["name"]: each for each in told[name]} for name in ("ours", "across"))
+    record = json.loads(SAME_PAIRS.read_text())
+    ours, across = ({each["name"]: each for each in record[name]} for name in ("ours", "across"))
     lines = [
         f"| {name.removesuffix('_rms_um')} | {short(found['value'])} um | {short(ours[name]['value'])} um"
         f" | {short(found['null'])} um |"
@@ -84,7 +84,7 @@ def same_pairs() -> str:
     ]  # fmt: skip
     spent = [f"{short(each['training_s']['value'])} s ({each['training_s']['set']})" for each in (across, ours)]
     lines.append(f"| training | {spent[0]} | {spent[1]} | |")
-    return SAME.format(count=told["pairs"], how=told["how"], date=told["date"]) + "\n".join(lines) + "\n"
+    return SAME.format(count=record["pairs"], how=record["how"], date=record["date"]) + "\n".join(lines) + "\n"
 
 
 def plot(methods: Sequence[Method]) -> bytes:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from .method import Method
 
 STAGES = ("mechanics", "translation", "pictures", "chain", "photographs")
-WITH_FILE = ("pictures", "chain", "photographs")  # which are told a file or a folder
+WITH_FILE = ("pictures", "chain", "photographs")  # which take a file or a folder
 
 
 def measured(stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()) -> Iterator[Method]:

@@ -36,8 +36,8 @@ def train_both(pairs: Path) -> None:
         card = train(pairs, folder, progress=lambda share, text: print(f"{share:.0%} {text}", file=sys.stderr))
         seconds = time.process_time() - began
         ours = our_rows(Path(folder) / "weights")
-    told = f"{card['pairs']['contacts']['train']} contacts, CPU"
-    write(pairs, [*ours, row("training_s", seconds, "s", of=told)], measure(pairs, TEST_SET))
+    described = f"{card['pairs']['contacts']['train']} contacts, CPU"
+    write(pairs, [*ours, row("training_s", seconds, "s", of=described)], measure(pairs, TEST_SET))
 
 
 def our_rows(weights: Path) -> list[Row]:
@@ -53,11 +53,11 @@ def write(pairs: Path, ours: list[Row], across: list[Row]) -> None:
     """Write the measurements with how, when and where they were made."""
     count = len(read_pairs(pairs).press)
     how = f"scripts/benchmark.py --across {pairs.name}: both trained on the same pairs, split by press"
-    told = {
+    record = {
         "how": how,
         "pairs": count,
         "contacts": len(read_pairs(TEST_SET).press),
         "date": datetime.date.today().isoformat(),
         "machine": provenance.machine(),
     }
-    atomic.write_json(SAME_PAIRS, told | {"ours": ours, "across": across})
+    atomic.write_json(SAME_PAIRS, record | {"ours": ours, "across": across})

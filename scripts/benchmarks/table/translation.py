@@ -44,9 +44,9 @@ def measure(name: str, quick: bool) -> Method:
     some = np.resize(change, (int(batch), change.shape[1]))
     ms, mb = best_ms(lambda: work(some), int(batch), most=200), peak_mb()
     if kind in QUOTED:
-        told = json.loads(SAME_PAIRS.read_text())
-        found = {each["name"]: each for each in told[QUOTED[kind]]}
-        of = f"{told['contacts']} test contacts, trained on {told['pairs']:,} pairs (across_rows.json)"
+        record = json.loads(SAME_PAIRS.read_text())
+        found = {each["name"]: each for each in record[QUOTED[kind]]}
+        of = f"{record['contacts']} test contacts, trained on {record['pairs']:,} pairs (across_rows.json)"
     else:
         found = {each["name"]: each for each in _errors(work, pairs, change)}
         of = f"{len(pairs.press)} test contacts, signal to DIGIT"

@@ -1,4 +1,4 @@
-"""The fluid's pressure told from the electrodes against the one that PDC measures: the absolute label on real fingers.
+"""Fluid pressure estimated from the electrodes, against the one that PDC measures: the absolute label on real fingers.
 
 Slides hold both from one zero. Sample 7 of each material may be looked at, the others are reported; of grips only the
 order within a file counts, as their pressure has no zero (docs/sources.md, Real data sets).
@@ -32,17 +32,18 @@ def slide_rows(folder: Path, network: Translator, most: int | None, sensor: Elec
     choose = [path for path in slide_set.find(folder) if path not in slide_set.reporting(folder)]
     if not choose:
         return
-    told, seen = (np.concatenate([_frames(path, network, sensor) for path in paths]) for paths in (report, choose))
-    of = f"{len(told)} frames above {CONTACT:g} Pa, {len(report)} recordings"
+    estimated, seen = (np.concatenate([_frames(path, network, sensor) for path in paths]) for paths in (report, choose))
+    of = f"{len(estimated)} frames above {CONTACT:g} Pa, {len(report)} recordings"
     constant = np.median(seen[:, 0])
-    value, null = _error(told[:, 1], told[:, 0]), _error(np.full(len(told), constant), told[:, 0])
+    value, null = _error(estimated[:, 1], estimated[:, 0]), _error(np.full(len(estimated), constant), estimated[:, 0])
     yield row("pressure_error", value, "%", AS_IT_COMES, null=null, of=f"{of}; null: a constant, {constant:.0f} Pa")
     scale = [np.median(seen[:, 0] / seen[:, k]) for k in (1, 2)]
-    value, null = (_error(scale[k - 1] * told[:, k], told[:, 0]) for k in (1, 2))
-    told_of = f"{of}; scale {scale[0]:.3f} from sample {slide_set.CHOOSING}; null: sum of electrodes, scaled likewise"
-    yield row("pressure_error_scaled", value, "%", SCALED, null=null, of=told_of)
+    value, null = (_error(scale[k - 1] * estimated[:, k], estimated[:, 0]) for k in (1, 2))
+    whole_set = f"{of}; scale {scale[0]:.3f} from sample {slide_set.CHOOSING}; null: sum of electrodes, scaled likewise"
+    yield row("pressure_error_scaled", value, "%", SCALED, null=null, of=whole_set)
     largest = network.card["pairs"]["largest_pressure_Pa"]
-    yield row("pressure_above_training", float((told[:, 0] > largest).mean()), "1", ABOVE, of=f"{of}; {largest:.0f} Pa")
+    above = float((estimated[:, 0] > largest).mean())
+    yield row("pressure_above_training", above, "1", ABOVE, of=f"{of}; {largest:.0f} Pa")
 
 
 def grip_row(prepared: Iterable[Signals], network: Translator) -> Row:
@@ -66,5 +67,5 @@ def _frames(path: Path, network: Translator, sensor: ElectrodeGains | None) -> n
     return columns[measured > CONTACT]
 
 
-def _error(told: np.ndarray, measured: np.ndarray) -> float:
-    return float(100 * np.median(np.abs(told / measured - 1)))
+def _error(estimated: np.ndarray, measured: np.ndarray) -> float:
+    return float(100 * np.median(np.abs(estimated / measured - 1)))

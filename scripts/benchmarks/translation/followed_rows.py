@@ -31,7 +31,7 @@ def rows(network: Translator, file: Path = SHIPPED) -> list[Row]:
     followed = _judged(recording, [network.followed(unit, recording.time) for unit in units])
     alone = _judged(recording, [network(unit) for unit in units])
     of = f"{len(followed['place'])} frames of {UNITS} units; null: each frame alone"
-    told = [
+    figures = [
         ("followed_place", "place", 50, "mm", PLACE), ("followed_place_90", "place", 90, "mm", None),
         ("followed_step", "step", 50, "mm", None), ("followed_force", "force", 50, "%", FORCE),
         ("followed_force_90", "force", 90, "%", None), ("followed_peak", "peak", 50, "%", PEAK),
@@ -39,7 +39,7 @@ def rows(network: Translator, file: Path = SHIPPED) -> list[Row]:
     ]  # fmt: skip
     return [
         row(name, _over(followed[kind], level), unit, target, null=_over(alone[kind], level), of=of)
-        for name, kind, level, unit, target in told
+        for name, kind, level, unit, target in figures
     ]
 
 
@@ -56,7 +56,7 @@ def _read_by(signals: Signals, random: np.random.Generator) -> Signals:
 
 
 def _judged(recording: Recording, found: list[Translation]) -> dict[str, np.ndarray]:
-    """place mm, force %, peak %, step mm of frames in contact; wrong : of all frames, whether touch is told wrongly."""
+    """Errors of place mm, force %, peak %, step mm of frames in contact; wrong : (T,) bool, touch misjudged."""
     truth, rest = recording.truth, sensors.digit_surface().rest
     force = accuracy.lengths(truth.force)
     on = force > TOUCHED
@@ -64,14 +64,14 @@ def _judged(recording: Recording, found: list[Translation]) -> dict[str, np.ndar
         accuracy.dent_center(truth.displacement_digit, rest),
         accuracy.lengths(truth.displacement_digit).max(1),
     )
-    told: dict[str, list[np.ndarray]] = {name: [] for name in ("place", "force", "peak", "step", "wrong")}
+    errors: dict[str, list[np.ndarray]] = {name: [] for name in ("place", "force", "peak", "step", "wrong")}
     for each in found:
         away = 1e3 * accuracy.lengths(each.contact_center - center)
         touched = np.isfinite(away)
         steps = 1e3 * accuracy.lengths(np.diff(each.contact_center, axis=0))
-        told["place"].append(np.where(touched, away, np.inf)[on])  # a contact that is lost is not near
-        told["force"].append(100 * np.abs(accuracy.lengths(each.force)[on] / force[on] - 1))
-        told["peak"].append(100 * np.abs(accuracy.lengths(each.displacement_digit).max(1)[on] / peak[on] - 1))
-        told["step"].append(steps[(on[1:] & on[:-1]) & np.isfinite(steps)])
-        told["wrong"].append(np.where(force > 0, on & ~touched, touched))
-    return {name: np.concatenate(values) for name, values in told.items()}
+        errors["place"].append(np.where(touched, away, np.inf)[on])  # a contact that is lost is not near
+        errors["force"].append(100 * np.abs(accuracy.lengths(each.force)[on] / force[on] - 1))
+        errors["peak"].append(100 * np.abs(accuracy.lengths(each.displacement_digit).max(1)[on] / peak[on] - 1))
+        errors["step"].append(steps[(on[1:] & on[:-1]) & np.isfinite(steps)])
+        errors["wrong"].append(np.where(force > 0, on & ~touched, touched))
+    return {name: np.concatenate(values) for name, values in errors.items()}

@@ -75,21 +75,21 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
     prepared = [prepare_unit(recordings.read(one), None, sensor.gains_for(one, finger, SOFT)) for one, finger in held]
     every = [prepare_unit(recordings.read(one), None, sensor.gains_for(one, finger, SOFT)) for path in files
              if _trial(path) in REPORTING for finger, one in enumerate(each_finger(path))]  # fmt: skip
-    told = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
-    told += prints.rows("grip", prepared, network)
-    return [*told, fluid_pressure.grip_row(every, network), *_rest_rows(files)]
+    found = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
+    found += prints.rows("grip", prepared, network)
+    return [*found, fluid_pressure.grip_row(every, network), *_rest_rows(files)]
 
 
 def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> list[Row]:
     shuffle = np.random.default_rng(0).permutation(len(electrodes()))
-    told, null = [], []
+    results, null = [], []
     for path in hard:
         for finger, one in enumerate(each_finger(path)):
             unit = sensor.gains_for(one, finger, SOFT)
-            told.append(_judged(recordings.read(one), unit, network))
+            results.append(_judged(recordings.read(one), unit, network))
             null.append(_judged(recordings.read(one), unit, network, shuffle))
-    of = f"{len(told)} grips of hard flat objects, trials 04 and 05; null: electrodes shuffled"
-    figures = [np.array([one[k] for one in told]) for k in range(3)]
+    of = f"{len(results)} grips of hard flat objects, trials 04 and 05; null: electrodes shuffled"
+    figures = [np.array([one[k] for one in results]) for k in range(3)]
     shuffled = [np.array([one[k] for one in null]) for k in range(3)]
     return [
         row("grip_place_in_box", figures[0].mean(), "1", 0.95, null=shuffled[0].mean(), of=of, at_least=True),
@@ -150,7 +150,7 @@ def _rest_rows(files: list[Path]) -> list[Row]:
 def _rest_row(name: str, off: np.ndarray, spread: np.ndarray) -> Row:
     worst = int(np.abs(off).argmax())
     by_channel = " ".join(f"{value:.0f}" for value in off)
-    of = f"largest at E{worst + 1}, whose spread is told as {spread[worst]:.0f}; E1 to E19: {by_channel}"
+    of = f"largest at E{worst + 1}, whose spread is reported as {spread[worst]:.0f}; E1 to E19: {by_channel}"
     return row(name, float(np.sqrt(np.mean(off**2))), "counts rms", of=of)
 
 

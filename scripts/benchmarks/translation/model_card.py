@@ -32,7 +32,7 @@ LIMITS = """\
 ## Limits
 
 - All truth here is simulated. Real recordings are judged apart (`--recordings`): there only the fluid's pressure is
-  known, and how strong, silent and smooth the translation is can be told, not how right a deformation is.
+  known, and how strong, silent and smooth the translation is can be measured, not how right a deformation is.
 - The size of the electrodes and the BioTac's filling are assumed (see `docs/mechanics.md` and
   `tactile_core/sensors/`). A real unit's gains differ from the simulated ones by half: `tactile adapt` fits them.
 - Rectified recordings are read by networks that know they are; expect larger errors, as their bounds say.

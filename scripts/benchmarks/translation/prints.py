@@ -40,15 +40,15 @@ def rows(name: str, prepared: Iterable[Signals], network: Translator) -> list[Ro
     of = f"{inside.sum()} of {contact.sum()} frames above {CONTACT:g} Pa have their contact in the picture"
     null = f"; null: {lost.sum()} frames below {LOST:g} Pa"
 
-    told = [row(f"{name}_contact_in_picture", _over(np.mean, seen[contact]), "1", of=f"{contact.sum()} frames")]
+    found = [row(f"{name}_contact_in_picture", _over(np.mean, seen[contact]), "1", of=f"{contact.sum()} frames")]
     if inside.any():
         for figure, values, unit, over in (
             ("visible", level > VISIBLE, "1", np.mean),
             ("level", level, "levels rms", np.median),
         ):
             nothing = _over(over, values[lost])
-            told.append(row(f"{name}_print_{figure}", _over(over, values[inside]), unit, null=nothing, of=of + null))
-    return told
+            found.append(row(f"{name}_print_{figure}", _over(over, values[inside]), unit, null=nothing, of=of + null))
+    return found
 
 
 def _over(figure: Callable[[np.ndarray], float], values: np.ndarray) -> float | None:

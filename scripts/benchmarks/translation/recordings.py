@@ -32,7 +32,7 @@ from .slide_metrics import CONTACT, Figures, figures, largest_step
 Translate = Callable[[Signals], Translation]
 CHUNK = 128  # frames in memory at a time: 10 MB of displacements
 STRENGTHS = ("force", "volume")
-AIMED = "force"  # the strength that the targets are for; the other one is told beside it
+AIMED = "force"  # the strength that the targets are for; the other one is reported beside it
 # Targets (docs/sources.md, Targets) for held-out recordings of the same sensor and task.
 RANK_MEDIAN, RANK_QUARTILE, SILENCE, ROUGHNESS, SPREAD_MM = 0.92, 0.87, 0.05, 0.14, 0.9
 NO_LARGER = 1.0  # a repaired sample may step as far as the recording does elsewhere

@@ -71,10 +71,10 @@ def _cosines(
     """Rows of changes (n, 19) of units at rest counts (n, 19); the targets are the sheet's, the others stand beside."""
     shuffle = np.random.default_rng(0).permutation(real.shape[1])
     for word, law in laws.items():
-        told = [nearest(change, law(at_rest)) for change, at_rest in zip(real, rest, strict=True)]
+        results = [nearest(change, law(at_rest)) for change, at_rest in zip(real, rest, strict=True)]
         null = [nearest(change[shuffle], law(at_rest)) for change, at_rest in zip(real, rest, strict=True)]
         for k, held in enumerate(("free", "size_held")):
-            value, nothing = (float(np.median([one[k] for one in each])) for each in (told, null))
+            value, nothing = (float(np.median([one[k] for one in each])) for each in (results, null))
             target = targets[k] if word == "sheet" else None
             yield row(f"{name}_cosine_{word}_{held}", value, "1", target, null=nothing, of=of, at_least=True)
 

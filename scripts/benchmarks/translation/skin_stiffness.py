@@ -43,8 +43,8 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
     signal, pressure = _simulated(60 if quick else 600)
     for name, (changes, rests, measured) in {"grips": _grips(folders[0]), "slides": _slides(folders[1])}.items():
         ratio = [
-            told / _pressure(np.abs(change) if name == "slides" else change, rest, signal, pressure, name == "slides")
-            for change, rest, told in zip(changes, rests, measured, strict=True)
+            real / _pressure(np.abs(change) if name == "slides" else change, rest, signal, pressure, name == "slides")
+            for change, rest, real in zip(changes, rests, measured, strict=True)
         ]
         low, middle, high = np.nanpercentile(ratio, [25, 50, 75])
         of = f"{len(ratio)} {name}, quartiles {low:.2f} and {high:.2f}; E {sensors.BIOTAC_SKIN.youngs / 1e6:g} MPa"

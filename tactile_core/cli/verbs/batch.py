@@ -109,9 +109,9 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     if not options.inputs:
         if there is None:
             raise TactileError(folder, "no job here", "INPUTS, or the folder of a job", "Name recordings to convert")
-        told = [name for name, usual in RECIPE if getattr(options, name) != usual]
-        if told:
-            raise TactileError("--" + told[0].replace("_", "-"), "given without INPUTS", "the job as it was begun")
+        given = [name for name, usual in RECIPE if getattr(options, name) != usual]
+        if given:
+            raise TactileError("--" + given[0].replace("_", "-"), "given without INPUTS", "the job as it was begun")
         return there
     paths = inputs.find(options.inputs, folder)
     with bar("reading", "file", options.progress) as shown:
@@ -173,7 +173,7 @@ def _verify(folder: Path, job: Job, progress: bool) -> int:
         bad = manifest.damaged(folder, shown)
     for file in bad:
         state = "damaged, or another's" if file.exists() else "missing"
-        complain(f"{file}: {state}; the same command makes it anew")
+        complain(f"{file}: {state}; the same command makes it again")
     if bad:
         return 2
     found = manifest.status(folder, job)

@@ -31,7 +31,7 @@ A file of several fingers gives one result a finger, <name>_finger0, <name>_fing
 
 --error bounds what the toolkit adds to its networks' answer: levels, of a picture, picks the cheapest preset of
 `tactile render` that was measured to meet it (fast without it); um, of heights and displacements, is what is added
-anyway, or refused. What the networks themselves leave is told beside it, and is no part of it."""
+anyway, or refused. The error of the networks themselves is printed beside it, and is no part of it."""
 # 4 B a number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
 # noisy real one), packed height maps at 200 kB.
 SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
@@ -103,8 +103,8 @@ def run(options: argparse.Namespace) -> int:
         for warning in done.warnings:
             say(f"warning: {folder.name}: {warning}")
         if budget is not None:
-            for told in filter(None, (done.added, done.left)):
-                say(f"{folder.name}: {told}")
+            for sentence in filter(None, (done.added, done.left)):
+                say(f"{folder.name}: {sentence}")
         tell(str(done.folder))
     if failed and len(folders) > 1:
         complain(f"{failed} of {len(folders)} recordings were not converted")

@@ -17,13 +17,13 @@ needs is not solved: electrodes and displacement_biotac need the BioTac, displac
 
 --error 50um picks for each sensor the cheapest tier of contact whose measured error (rms of the surface; 95 of 100
 contacts stay below), to the depth that the scene reaches, is at most that, and says which; fast without it. What the
-full or the reference tier will cost is told first; over a minute is asked about, or needs --yes.
+full or the reference tier will cost is printed first; over a minute is asked about, or needs --yes.
 
 With --isaac-like the scene's motion presses a BioTac skin of your own, as Isaac Gym computed it: linear tetrahedra,
 E 1.552 MPa, nu 0.316, no fluid, hence no electrodes, and no friction. Ten frames a second of displacement, force and
 depth come out, for comparison with data that was made that way. Such meshes lock: the force is too high.
 
-With --grid many recordings are simulated into a folder, with grid.json, which tells the values of each. They wait in
+With --grid many recordings are simulated into a folder, with grid.json, which lists the values of each. They wait in
 OUT.parts until all are there, and the same command goes on after any interruption."""
 EPILOG = """\
 examples:

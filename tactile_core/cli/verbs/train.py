@@ -37,7 +37,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--without-below-x", type=float, metavar="MM", help="keep apart what touches the pad below x")
     what = "auto (default): a GPU when torch sees one; cpu; cuda. The same bytes again on the same device alone"
     verb.add_argument("--device", choices=DEVICES, default="auto", help=what)
-    verb.add_argument("--overwrite", action="store_true", help="train anew over older weights in DIR")
+    verb.add_argument("--overwrite", action="store_true", help="train again over older weights in DIR")
     progress_argument(verb)
 
 

@@ -23,7 +23,7 @@ TEXT = """\
 Follow a CSV recording while another program writes it, and show the newest frame's DIGIT picture: in a window, or in
 a PNG file that is replaced with each picture. With --play or --rosbag-play a finished recording is played at its own
 pace, or --speed times as fast. Rest is taken from the first quiet part: begin without contact. The time from frame to
-picture, and how much of it was computing, is told each second and at the end."""
+picture, and how much of it was computing, is printed each second and at the end."""
 EPILOG = """\
 examples:
   tactile watch touch.csv
@@ -72,14 +72,14 @@ def run(options: argparse.Namespace) -> int:
     source = _played(path, 1.0 if options.speed is None else options.speed) if playing else _followed(options)
     view = live.View(load_tools(options.weights), options.rate, options.polarity)
     draw = _window(path) if options.out is None else _file(options.out)
-    told, failed = time.perf_counter(), False
+    reported, failed = time.perf_counter(), False
     try:
         for rows, came in source:
             shown = None if rows is None else view.show(rows, came)
             if shown is not None and not draw(shown.picture):
                 break
-            if time.perf_counter() - told >= TOLD:
-                told = time.perf_counter()
+            if time.perf_counter() - reported >= TOLD:
+                reported = time.perf_counter()
                 say(view.describe_latency() + (f"; force {shown.force:.2f} N" if shown else ""))
     except TactileError:
         failed = not view.frames

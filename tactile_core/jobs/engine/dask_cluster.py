@@ -25,7 +25,7 @@ from .local import KILLS
 from .tasks import Reply, Task
 
 SCHEMES = ("tcp://", "tls://", "ucx://")
-PATIENCE, AGAIN = 10.0, 60.0  # s without a reply, after which it is told that there is no worker, and told again
+PATIENCE, AGAIN = 10.0, 60.0  # s without a reply, after which the lack of workers is reported, and reported again
 CONFIGURED = "distributed.comm.timeouts.connect"  # Dask's own setting of how long to wait for others, 30 s by itself
 
 
@@ -40,7 +40,7 @@ class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class Cluster:
     """A Dask scheduler's workers. address : of the scheduler, or of a file as `QueueFile`.
 
-    say : told when all tasks wait because no worker has come yet, as in a full queue
+    say : called when all tasks wait because no worker has come yet, as in a full queue
     """
 
     def __init__(self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None) -> None:

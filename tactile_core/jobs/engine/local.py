@@ -129,7 +129,7 @@ class _Worker:
         self._served += 1
         if not line.endswith("\n"):
             self._process.kill()
-            with suppress(OSError):  # what it never read would else be tried again, and told, when it is forgotten
+            with suppress(OSError):  # what it never read would else be tried again, and reported, when it is forgotten
                 self._process.stdin.close()
             status = self._process.wait()
             self.cause = f"signal {-status}" if status < 0 else f"exit status {status}"

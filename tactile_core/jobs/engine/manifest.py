@@ -71,13 +71,13 @@ def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
 
     Where the job was done once, by its manifest: shards that are gone, and whole ones of another place or job, too.
     """
-    told = _read_checksums(folder)
+    listed = _read_checksums(folder)
     there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]
-    files = sorted({*there, *told})
+    files = sorted({*there, *listed})
     bad = []
     for index, file in enumerate(files):
         digest = checksummed.verified_checksum(file)
-        if digest is None or told.get(file, digest) != digest:
+        if digest is None or listed.get(file, digest) != digest:
             bad.append(file)
         progress(index + 1, len(files))
     return bad
@@ -119,10 +119,10 @@ def write(folder: Path, job: Job) -> None:
 def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
     one = job.inputs[index]
     seen = kinds.module_for(job).inspect_input(folder, job, index) or kinds.Seen(0)
-    told: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
+    listed: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
     for number in range(seen.shards):
         path = jobs.shard_file(folder, one.name, number)
         digest = checksummed.stated_checksum(path)
         if digest is not None:
-            told["shards"].append({"file": path.name, "sha256": digest})
-    return told | {"warnings": list(seen.warnings)}
+            listed["shards"].append({"file": path.name, "sha256": digest})
+    return listed | {"warnings": list(seen.warnings)}

@@ -33,7 +33,7 @@ def begun(out: Path, job: Job) -> Iterator[Path]:
             jobs.write(folder, job)
         elif jobs.read(folder).id != job.id:
             found = "holds parts of another scene, seed, count, option or version"
-            raise TactileError(folder, found, "none or the same", "Remove the folder to start anew")
+            raise TactileError(folder, found, "none or the same", "Remove the folder to start again")
         yield folder
     if (folder / DONE).exists():
         _remove(folder)

@@ -60,8 +60,8 @@ def _run(folder: Path, task: Task) -> Reply:
         return Reply(error=str(error))
     except (OSError, MemoryError) as error:
         where = getattr(error, "filename", None) or folder
-        told = getattr(error, "strerror", None) or str(error) or "no memory left"
-        sentence = f"{where}: cannot be written ({told}). Make room and give the same command again"
+        reason = getattr(error, "strerror", None) or str(error) or "no memory left"
+        sentence = f"{where}: cannot be written ({reason}). Make room and give the same command again"
         return Reply(error=sentence, stop=isinstance(error, OSError))
 
 

@@ -23,7 +23,7 @@ from ..prepared_signals import Prepared
 if TYPE_CHECKING:
     from ..engine.job import Job
 
-ADVICE = "Make it anew: remove the file, then tactile batch --out DIR"
+ADVICE = "Make it again: remove the file, then tactile batch --out DIR"
 BLOCK = 32  # frames in memory at a time: 7 MB of pictures, 10 MB of heights
 
 
@@ -118,6 +118,6 @@ def _check_alike(paths: list[Path]) -> None:
     first: dict[str, str] = {}
     for path in paths:
         for name, found in _kinds(path).items():
-            told = f"{found[1].name} of shape {found[0]}"
-            if first.setdefault(name, told) != told:
-                raise TactileError(f"{path}, {name}", f"frames are {told}", f"{first[name]}, as in {paths[0]}", ADVICE)
+            kind = f"{found[1].name} of shape {found[0]}"
+            if first.setdefault(name, kind) != kind:
+                raise TactileError(f"{path}, {name}", f"frames are {kind}", f"{first[name]}, as in {paths[0]}", ADVICE)

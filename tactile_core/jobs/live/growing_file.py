@@ -35,7 +35,7 @@ class Growing:
         """The rows that came since the last call; None where none did, or too many are bad: all are passed over.
 
         Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row that
-        tells of another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN.
+        names another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN.
         """
         data = self._new_bytes()
         whole, end, self._rest = (self._rest + data).rpartition(b"\n")
@@ -63,8 +63,8 @@ class Growing:
             found = self._path.stat()
             size = found.st_size
             if size < self._place or _identity(found) != self._file:
-                told = "became shorter" if size < self._place else "was replaced by another file"
-                raise TactileError(self._path, told, "a file that grows", "Watch the new file")
+                change = "became shorter" if size < self._place else "was replaced by another file"
+                raise TactileError(self._path, change, "a file that grows", "Watch the new file")
             if size == self._place:
                 return b""
             with open(self._path, "rb") as file:

@@ -24,7 +24,7 @@ class LiveSignals:
     def __init__(self, rate: float = NOMINAL_RATE, polarity: str = AUTO) -> None:
         self._rate = rate
         self._seen, self._pdc, self._looked_at = np.empty((0, 19)), np.empty(0), 0
-        self.polarity = _stated_polarity(polarity, "as told")
+        self.polarity = _stated_polarity(polarity, "as given")
         self.rest: np.ndarray | None = None
         self.kind, self.found = "raw", ""
 

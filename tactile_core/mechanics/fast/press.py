@@ -26,7 +26,7 @@ _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
 _GROWTH = 1.6  # largest change of force in one step of a search, which a warm start follows safely
 _LEAST_DEPTH = 1e-6  # m, of a contact that has slid: friction may hold it where the resting surface is not reached
 _SEARCH_STEPS = 24
-_POWER_FROM, _POWERS = 1e-2, (0.7, 1.5)  # least growth that tells the power; what it may be (assumed)
+_POWER_FROM, _POWERS = 1e-2, (0.7, 1.5)  # least growth that determines the power; its range (assumed)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,7 +13,10 @@ from ...errors import TactileError
 
 MAX_CELLS = 100_000  # the public BioTac mesh holds 15,410; a solve of 100,000 takes minutes and gigabytes
 MAX_BYTES = 16 * 2**20  # assumed: three times what MAX_CELLS cells take; its lines take 200 MB at most
-SIZES = 1e-3, 0.2  # m, smallest and largest extent of a fingertip's mesh (assumed): told apart from one in millimetres
+SIZES = (
+    1e-3,
+    0.2,
+)  # m, smallest and largest extent of a fingertip's mesh (assumed): one in millimetres is larger
 THINNEST = 1e-6  # volume of a cell over its longest edge's cube; below that it is flat (a regular one: 0.118)
 # What exporters write before the lists (Isaac Gym's own does); a file that was cut short holds less.
 _PROMISE = re.compile(r"#\s*(\d+)\s+(vertices|tetrahedra)\s*$")
@@ -68,7 +71,7 @@ def checked(nodes: np.ndarray, cells: np.ndarray, where: str | os.PathLike = "te
     flat = np.abs(volume) < THINNEST * longest**3
     if flat.any():
         found = f"{int(flat.sum())} tetrahedra without volume, the first is number {int(np.argmax(flat))}"
-        raise TactileError(where, found, "solid tetrahedra", "Make the mesh anew")
+        raise TactileError(where, found, "solid tetrahedra", "Make the mesh again")
     cells = np.where((volume < 0)[:, None], cells[:, [0, 2, 1, 3]], cells)
     return TetMesh(nodes, cells, int((volume < 0).sum()))
 

@@ -74,7 +74,7 @@ class PatternFactor:
             import scipy.sparse
 
             return factor((upper + scipy.sparse.triu(upper, 1).T).tocsc())
-        # Compared by value: SciPy wraps the index arrays anew for every matrix.
+        # Compared by value: SciPy wraps the index arrays again for every matrix.
         pattern, nothing = (upper.indptr, upper.indices), np.zeros((upper.shape[0], 1))
         if self._analysed is None or not all(map(np.array_equal, self._analysed, pattern)):
             self._analysed = None
@@ -113,7 +113,7 @@ def _pardiso():  # noqa: ANN202
     try:
         import pypardiso
 
-        # Told where MKL lies, pypardiso does not search the whole environment for it: a second each time.
+        # Given the place of MKL, pypardiso does not search the whole environment for it: a second each time.
         for path in sorted(pathlib.Path(sys.prefix, "lib").glob("libmkl_rt.so*")):
             os.environ.setdefault("PYPARDISO_MKL_RT", str(path))
         solver = pypardiso.PyPardisoSolver(mtype=_SYMMETRIC_POSITIVE_DEFINITE)

@@ -22,14 +22,14 @@ WAYS = {
     (False, True): "mirrored left to right",
     (True, False): "mirrored top to bottom",
 }
-LOOKED_AT = 4  # presses, the plainest, by which the way they lie is told
+LOOKED_AT = 4  # presses, the plainest, from which their orientation is found
 CLEARLY = 0.8  # of what is unexplained as they are given, that another way may leave (assumed)
 
 
 def check_orientation(photographs: Photographs, ball_diameter: float, start: Calibration) -> None:
     """Raise TactileError for photographs that another way of laying them explains clearly better; ball_diameter : m.
 
-    The other four of the eight ways change the pictures' shape, and are told by that.
+    The other four of the eight ways change the pictures' shape, by which they are recognised.
     """
     plain = sorted(photographs.presses, key=lambda press: -float(np.square(press.change).sum()))[:LOOKED_AT]
     unit = fitted_size(start, photographs)

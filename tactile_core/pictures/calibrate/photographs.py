@@ -89,7 +89,7 @@ def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | 
             found = f"{rest.shape[1]} x {rest.shape[0]} pixels"
             raise TactileError(background, found, f"{sizes[first][1]} x {sizes[first][0]}, as the photographs")
     elif len(pictures) < FEWEST_FOR_MEDIAN:
-        found = f"{len(pictures)} photographs, from which no untouched gel can be told"
+        found = f"{len(pictures)} photographs, too few to estimate the untouched gel from"
         advice = "Give a photograph of the untouched gel: --background FILE"
         raise TactileError(folder, found, f"{FEWEST_FOR_MEDIAN} or more", advice)
     else:

@@ -18,7 +18,7 @@ OLDEST_LLVM = 18  # 15 and 16 abort the process on their first kernel on some ma
 PROBE_SECONDS = 60.0
 
 # Run in a process of its own, because a bad LLVM ends it: rays against a sphere, compiled; then LLVM's own version,
-# where the system tells which file was loaded (LLVM has that function since 16).
+# where the system can say which file was loaded (LLVM has that function since 16).
 _PROBE = """
 import mitsuba
 mitsuba.set_variant("llvm_ad_rgb")
@@ -50,7 +50,7 @@ def choose_variant(wanted: str | None = None) -> Choice:
 
     Raises TactileError for an unknown one or one that does not work; ModuleNotFoundError without mitsuba.
     """
-    import mitsuba  # noqa: F401 (so that its absence is told before anything is probed)
+    import mitsuba  # noqa: F401 (so that its absence is reported before anything is probed)
 
     if wanted not in (None, LLVM, SCALAR):
         raise TactileError("variant", repr(wanted), f"{LLVM} or {SCALAR}")
@@ -88,11 +88,11 @@ def llvm_trouble(library: str) -> str:
     return _too_old(done.stdout)
 
 
-def _too_old(told: str) -> str:
+def _too_old(message: str) -> str:
     """Describe an LLVM that is too old, from the probe's lines, as "LLVM 19 /usr/lib/libLLVM.so"; a major
     version of 0 is older than 16.
     """
-    for line in told.splitlines():
+    for line in message.splitlines():
         word, _, rest = line.partition(" ")
         major, _, file = rest.partition(" ")
         if word == "LLVM" and major.isdigit() and int(major) < OLDEST_LLVM:

@@ -24,7 +24,7 @@ def test_a_job_from_start_to_end(command, recordings, tmp_path):
     assert command("--out", out, "--verify").returncode == 0
     next((out / "shards").iterdir()).write_bytes(b"")
     bad = command("--out", out, "--verify")
-    assert bad.returncode == 2 and "the same command makes it anew" in bad.stderr
+    assert bad.returncode == 2 and "the same command makes it again" in bad.stderr
 
 
 def test_other_options_or_contents_in_the_same_folder_are_refused(command, recordings, tmp_path):

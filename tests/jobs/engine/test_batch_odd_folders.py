@@ -75,7 +75,7 @@ def test_verify_says_what_is_missing_and_what_is_not_complete(command, recording
     command("--out", out)
     sorted((out / "shards").iterdir())[1].unlink()
     told = command("--out", out, "--verify")
-    assert told.returncode == 2 and "00000_a-000001.h5: missing; the same command makes it anew" in told.stderr
+    assert told.returncode == 2 and "00000_a-000001.h5: missing; the same command makes it again" in told.stderr
 
 
 def test_a_damaged_prepared_recording_is_no_end_of_the_job(new_job, do, recordings):

@@ -170,19 +170,19 @@ def _schema(features: dict[str, Any]) -> pa.Schema:
     """Arrow's types of the columns, with the features as Hugging Face's datasets library reads them."""
     import pyarrow as pa
 
-    fields, told = [], {}
+    fields, described = [], {}
     for name, feature in features.items():
         kind, length = feature["dtype"], feature["shape"][0]
         if kind == "image":
             fields.append(pa.field(name, pa.struct([("bytes", pa.binary()), ("path", pa.string())])))
-            told[name] = {"_type": "Image"}
+            described[name] = {"_type": "Image"}
         elif length == 1:
             fields.append(pa.field(name, pa.type_for_alias(kind)))
-            told[name] = {"dtype": kind, "_type": "Value"}
+            described[name] = {"dtype": kind, "_type": "Value"}
         else:
             fields.append(pa.field(name, pa.list_(pa.type_for_alias(kind), length)))
-            told[name] = {"feature": {"dtype": kind, "_type": "Value"}, "length": length, "_type": "Sequence"}
-    return pa.schema(fields, metadata={"huggingface": json.dumps({"info": {"features": told}})})
+            described[name] = {"feature": {"dtype": kind, "_type": "Value"}, "length": length, "_type": "Sequence"}
+    return pa.schema(fields, metadata={"huggingface": json.dumps({"info": {"features": described}})})
 
 
 class _Stats:
