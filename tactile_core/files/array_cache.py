@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import TactileError
-from . import atomic
+from . import atomic, outside
 
 HASHES = "sha256.json"  # written last: without it an entry is not whole
 _MOST = 2**16  # bytes of that file; a few names and hashes
@@ -26,10 +26,9 @@ def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
     Hashing costs 0.6 ms of CPU time a megabyte (measured, SHA-256 with a processor's own instructions).
     """
     try:
-        with open(folder / HASHES, "rb") as file:
-            stated = json.loads(file.read(_MOST))
+        stated = json.loads(outside.read(folder / HASHES, _MOST))
         return {name: _checked(folder / f"{name}.npy", stated[name]) for name in names}
-    except (OSError, ValueError, TypeError, KeyError) as error:
+    except (OSError, ValueError, TypeError, KeyError, TactileError) as error:
         raise DamagedError(str(error)) from error
 
 
@@ -68,7 +67,7 @@ def _stored(file: Path, values: np.ndarray) -> str:
 
 def _checked(file: Path, stated: str) -> np.ndarray:
     """Map an array whose file has the stated hash."""
-    with open(file, "rb") as opened:
+    with outside.open_file(file) as opened:
         found = hashlib.file_digest(opened, "sha256").hexdigest()
     if found != stated:
         raise DamagedError(f"{file.name} has changed since it was built")

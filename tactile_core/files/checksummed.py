@@ -8,6 +8,9 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+from ..errors import TactileError
+from . import outside
+
 ROOM = 512  # bytes, the smallest user block of HDF5
 MAGIC = b"tactile-sealed-1 sha256 "
 _DIGITS = 64
@@ -28,16 +31,16 @@ def verified_checksum(path: Path) -> str | None:
     try:
         digest = stated_checksum(path)
         return digest if digest is not None and _digest(path) == digest else None
-    except OSError:
+    except (OSError, TactileError):
         return None
 
 
 def stated_checksum(path: Path) -> str | None:
     """Return the hash stored in a file, without checking that its content still matches; None where there is none."""
     try:
-        with open(path, "rb") as file:
+        with outside.open_file(path) as file:
             room = file.read(ROOM)
-    except OSError:
+    except (OSError, TactileError):
         return None
     digest = room[len(MAGIC) : len(MAGIC) + _DIGITS].decode("ascii", "replace")
     return digest if room == _line(digest) else None
@@ -48,6 +51,6 @@ def _line(digest: str) -> bytes:
 
 
 def _digest(path: Path) -> str:
-    with open(path, "rb") as file:
+    with outside.open_file(path) as file:
         file.seek(ROOM)
         return hashlib.file_digest(file, "sha256").hexdigest()

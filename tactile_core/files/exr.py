@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..errors import TactileError
-from . import atomic
+from . import atomic, outside
 
 MOST_BYTES = 2**28  # of all channels, unpacked; a render of four times the camera's pixels has 15 MB (assumed enough)
 HEIGHT_CHANNELS = ("height", "Y", "Z", "R")  # where a height map of others is looked for, in this order
@@ -29,12 +29,15 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     import OpenEXR
 
     try:
+        outside.check(path, "an EXR file")
         _check_size(path)
         with OpenEXR.File(os.fspath(path), separate_channels=True) as file:
             if not file.parts:  # where the library warned that it cannot read them
                 raise ValueError("its pixels are damaged")
             planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
             about = {name: value for name, value in file.header().items() if isinstance(value, str)}
+    except TactileError:
+        raise
     except Exception as error:  # the library raises RuntimeError and others
         raise TactileError(path, f"cannot be read as OpenEXR ({error})", "an EXR file") from error
     return planes, about

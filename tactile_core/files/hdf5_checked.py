@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from ..errors import TactileError
+from . import outside
 from .hdf5_free_lists import check_free_lists
 
 if TYPE_CHECKING:
@@ -52,13 +53,13 @@ def check_before_opening(path: str | os.PathLike) -> None:
     The first begins with a driver's information, for which the library takes up to 4 GB whatever the file holds; only
     files in several parts have it. The second has an endless free list, see ``hdf5_free_lists``.
     """
-    found = os.stat(path)
+    found = outside.check(path, "an HDF5 file")
     _check_bytes(os.fspath(path), found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
 
 
 @functools.lru_cache(maxsize=256)  # a prepared recording is opened for each shard
 def _check_bytes(path: str, *_identity: int) -> None:
-    with open(path, "rb") as file:
+    with outside.open_file(path) as file:
         size, start = os.fstat(file.fileno()).st_size, 0
         while start < size:
             file.seek(start)

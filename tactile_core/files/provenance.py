@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from .. import __version__
+from . import outside
 
 
 def sha256(path: str | os.PathLike) -> str:
@@ -16,7 +17,7 @@ def sha256(path: str | os.PathLike) -> str:
         files = sorted(file for file in Path(path).iterdir() if file.is_file())
         listing = "".join(f"{sha256(file)} {file.name}\n" for file in files)
         return hashlib.sha256(listing.encode(errors="surrogateescape")).hexdigest()
-    with open(path, "rb") as file:
+    with outside.open_file(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 
 from ..errors import TactileError
+from . import outside
 
 MOST = 16 * 2**20  # bytes: a list of 100,000 paths, a scene of 100,000 points (assumed enough)
 
@@ -18,13 +18,7 @@ def read_small(path: str | os.PathLike, most: int = MOST) -> str:
 
     Raises OSError and UnicodeDecodeError, TactileError for a longer file, a pipe or a device.
     """
-    if not stat.S_ISREG(os.stat(path).st_mode):
-        raise TactileError(path, "no regular file", "a text file")
-    with open(path, "rb") as file:
-        content = file.read(most + 1)
-    if len(content) > most:
-        raise TactileError(path, f"more than {most // 2**20} MB", "a short text file")
-    return content.decode("utf-8-sig")
+    return outside.read(path, most, "a text file").decode("utf-8-sig")
 
 
 def read_toml_text(path: str | os.PathLike) -> str:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from ..errors import TactileError
 from ..files import atomic
+from ..files.text_file import read_small
 from ..recordings.fingers import name_of
 
 FORMAT = "tactile-result-1"
@@ -96,8 +97,8 @@ def check_writable(out: Path) -> None:
 def is_result(folder: Path, maker: str = "") -> bool:
     """Return true if a folder holds a result of this package, made by `maker`, so that --overwrite may replace it."""
     try:
-        note = json.loads((folder / NOTE).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        note = json.loads(read_small(folder / NOTE))
+    except (OSError, ValueError, RecursionError, TactileError):
         return False
     return isinstance(note, dict) and note.get("format") == FORMAT and note.get("made_by", "") == maker
 

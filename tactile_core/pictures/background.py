@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..errors import TactileError
+from ..files import outside
 from ..sensors.calibration import AMBIENT_DEGREE, AMBIENT_UNIT, Calibration
 from ..sensors.camera import Camera
 
@@ -65,13 +66,15 @@ def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np
     """Picture (H, W, 3) uint8 of an image file; raises TactileError for what is no picture or of another size."""
     from PIL import Image
 
+    expected = f"an image file ({', '.join(FORMATS)})"
     try:
-        with Image.open(path, formats=FORMATS) as image:
+        with outside.open_file(path, expected) as file, Image.open(file, formats=FORMATS) as image:
             if image.width * image.height > MOST_PIXELS:
                 raise ValueError(f"{image.width} x {image.height} pixels, over {MOST_PIXELS // 10**6} million")
             picture = np.asarray(image.convert("RGB"))
+    except TactileError:
+        raise
     except Exception as error:  # the library raises a dozen types on damaged bytes
-        expected = f"an image file ({', '.join(FORMATS)})"
         raise TactileError(path, f"cannot be read as a picture ({error})", expected) from error
     if camera is not None and picture.shape[:2] != camera.shape:
         found = f"{picture.shape[1]} x {picture.shape[0]} pixels"

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
+from ..files import outside
 from ..files.hdf5_checked import declared, open_checked
 from .assemble import MAX_FRAMES
 
@@ -145,7 +146,7 @@ def open_npz(path: str) -> Iterator[Store]:
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
     with ExitStack() as stack:
         with damage_told(path, "NPZ"):
-            archive = stack.enter_context(zipfile.ZipFile(path))
+            archive = stack.enter_context(zipfile.ZipFile(stack.enter_context(outside.open_file(path, "an NPZ file"))))
             for member in archive.infolist():
                 if member.filename.endswith(".npy"):
                     _check_packing(path, member)

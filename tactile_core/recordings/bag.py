@@ -5,6 +5,7 @@ A bag's own message definitions are compared, never compiled: the decoding libra
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
+from ..files import outside
 from .array_store import damage_told
 from .assemble import MAX_FRAMES, assemble, check_electrodes
 from .fingers import named, split
@@ -44,7 +46,7 @@ def kind(path: Path) -> str | None:
     """Return the kind of bag at a path: ros1, mcap, sqlite or folder; None for anything else."""
     if path.is_dir():
         return "folder" if (path / MARK).is_file() else None
-    with open(path, "rb") as file:
+    with outside.open_file(path, "a recording") as file:
         start = file.read(16)
     return next((name for mark, name in STARTS.items() if start.startswith(mark)), None)
 
@@ -61,11 +63,14 @@ def open_bag(path: str) -> Iterator[Bag]:
     path, finger = split(path)
     what = kind(Path(path))
     if what == "folder":
-        with open(Path(path) / MARK, "rb") as file:
+        with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:
             metadata = file.read(MAX_METADATA + 1)
         if len(metadata) > MAX_METADATA or PACKED.search(metadata):
             advice = "Unpack it: ros2 bag convert"
             raise TactileError(path, "a bag packed file by file, or with huge metadata", "a plain bag", advice)
+        for name in sorted(os.listdir(path)):
+            if not os.path.isdir(os.path.join(path, name)):
+                outside.check(outside.inside(path, name, "a bag's own file"), "a bag's own file")
     openers: dict[str | None, Any] = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
     with damage_told(path, "bag"):
         reader = openers[what](Path(path))

@@ -12,6 +12,7 @@ from typing import IO
 import numpy as np
 
 from ..errors import TactileError
+from ..files import outside
 from .array_store import Store, damage_told
 
 START, START_OF_HDF5 = b"MATLAB 5", b"MATLAB 7"
@@ -28,7 +29,7 @@ HEADER, PACKED, STEP = 128, 15, 2**20  # bytes; type of a packed element (MAT-fi
 @contextmanager
 def open_matlab(path: str) -> Iterator[Store]:
     """Open for reading. Raises TactileError for MATLAB 7.3, for objects, for damage, and where scipy is missing."""
-    with open(path, "rb") as file:
+    with outside.open_file(path, "a MATLAB file") as file:
         if file.read(len(START_OF_HDF5)) == START_OF_HDF5:
             advice = "Save it in MATLAB with save(..., '-v7'), or as CSV"
             raise TactileError(path, "a MATLAB 7.3 file", "MATLAB 5 to 7", advice)
@@ -65,7 +66,7 @@ def open_matlab(path: str) -> Iterator[Store]:
 
 def _check_unpacked(path: str) -> None:
     """Raise TactileError for a compressed variable of more than MOST_UNPACKED bytes, which scipy would load."""
-    with damage_told(path, "MATLAB file"), open(path, "rb") as file:
+    with damage_told(path, "MATLAB file"), outside.open_file(path) as file:
         order = {b"IM": "<", b"MI": ">"}[file.read(HEADER)[-2:]]
         while len(tag := file.read(8)) == 8:
             kind, length = struct.unpack(f"{order}II", tag)

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 from ..errors import TactileError
+from ..files import outside
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
 from .bag import fingers_of, kind, open_bag, read_bag
@@ -132,7 +133,7 @@ def container_of(path: str) -> str:
         raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT or bag)")
     if kind(Path(path)) is not None:
         return "bag"
-    with open(path, "rb") as file:
+    with outside.open_file(path, "a recording") as file:
         start = file.read(8)
     if start.startswith((START, START_OF_HDF5)):
         return "mat"

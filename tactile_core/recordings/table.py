@@ -10,6 +10,7 @@ from typing import BinaryIO
 import numpy as np
 
 from ..errors import TactileError
+from ..files import outside
 from .assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from .truncated_cell import doubt_last_cell, shown
 
@@ -86,7 +87,7 @@ def read_header(path: str) -> tuple[str, ...]:
 
 def read_header_of_start(path: str) -> tuple[str, ...]:
     """Read the header like `read_header`, from a file of any length."""
-    with open(path, "rb") as file:
+    with outside.open_file(path, "a recording") as file:
         return _header(path, _text(path, _whole_lines(path, file, file.read(MAX_LINE))))[0]
 
 
@@ -102,7 +103,7 @@ def read_tables(path: str, part_bytes: int, context: int) -> Iterator[tuple[Tabl
 
     Yields each part and how many of its rows were in the one before. Raises TactileError like `read_table`.
     """
-    with open(path, "rb") as file:
+    with outside.open_file(path, "a recording") as file:
         data = _whole_lines(path, file, file.read(part_bytes))
         lines = _text(path, data)
         header, first, separator = _header(path, lines)
@@ -173,7 +174,7 @@ def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
 
 
 def _lines(path: str) -> list[str]:
-    with open(path, "rb") as file:
+    with outside.open_file(path, "a recording") as file:
         data = file.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise TactileError(

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import TactileError
-from ..files import atomic
+from ..files import atomic, outside
 from ..files.shipped import shipped
 from ..files.text_file import read_toml_text
 from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
@@ -163,7 +163,7 @@ class _Reader:
         name = _text("background, photograph", self._content["background"]["photograph"])
         if name and Path(name).name != name:
             raise TactileError("background, photograph", repr(name), "the name of a file beside the calibration")
-        return str(folder / name) if name else ""
+        return str(outside.inside(folder, name, "a photograph beside the calibration")) if name else ""
 
     def _fit(self) -> Fit:
         table = self._content["fit"]

@@ -13,6 +13,7 @@ import torch
 from torch import nn
 
 from ..errors import TactileError
+from ..files import outside
 from ..translation.weights import write_bytes
 
 TEXT = {"identity": dict, "stage": int, "epoch": int, "log": list}  # of the JSON text: a State but for its arrays
@@ -56,7 +57,7 @@ def read(path: str | os.PathLike, identity: dict) -> State:
     if not os.path.exists(path):
         return State(identity)
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with outside.open_file(path, "a checkpoint") as raw, np.load(raw, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         text = json.loads(arrays.pop("state").tobytes())
         state = State(**{name: _of_kind(text[name], kind) for name, kind in TEXT.items()}, arrays=arrays)

@@ -19,6 +19,7 @@ from torch import Tensor
 
 from .. import accuracy
 from ..accuracy import Row, row
+from ..files import outside
 from ..translation import networks, reference_signals
 from ..translation.contact_frame import on_skin
 from ..translation.network_sizes import NETS, PLACE
@@ -77,7 +78,7 @@ def fine_tune(
 
 
 def _file_sha256(path: str | os.PathLike) -> str:
-    with open(path, "rb") as file:
+    with outside.open_file(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

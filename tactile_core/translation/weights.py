@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import TactileError
-from ..files import atomic
+from ..files import atomic, outside
 from ..recordings.polarity import FALLS
 
 CARD_NAME = "card.json"
@@ -151,9 +151,8 @@ def read_bytes(path: str | os.PathLike) -> bytes:
     raises: TactileError if it is not there, cannot be read or is far too large
     """
     try:
-        if os.path.getsize(path) > MAX_FILE_BYTES:
-            raise TactileError(path, f"{os.path.getsize(path)} bytes", f"at most {MAX_FILE_BYTES}", ADVICE)
-        return Path(path).read_bytes()
+        path = outside.inside(Path(path).parent, Path(path).name, "a weights file")
+        return outside.read(path, MAX_FILE_BYTES, "a weights file")
     except OSError as error:
         raise TactileError(path, f"cannot be read ({error.strerror})", "a weights file", ADVICE) from error
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import TactileError
+from ...files import outside
 from .mesh_self_intersection import first_crossing
 
 SUFFIXES = (".stl", ".ply", ".obj", ".off")
@@ -31,7 +32,7 @@ def read_bytes(path: str | os.PathLike) -> bytes:
     if path.suffix.lower() not in SUFFIXES:
         raise TactileError(path, f"a {path.suffix or 'nameless'} file", f"a triangle mesh: {', '.join(SUFFIXES)}")
     try:
-        with open(path, "rb") as file:
+        with outside.open_file(path, "a triangle mesh") as file:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise TactileError(path, f"cannot be read ({error.strerror})", "a triangle mesh") from error

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import TactileError
+from ...files import outside
 from ...recordings.assemble import MAX_BAD_SHARE, BadRows
 from ...recordings.readers import layout_of
 from ...recordings.recording import Recording
@@ -67,7 +68,7 @@ class Growing:
                 raise TactileError(self._path, change, "a file that grows", "Watch the new file")
             if size == self._place:
                 return b""
-            with open(self._path, "rb") as file:
+            with outside.open_file(self._path, "a CSV file that grows") as file:
                 file.seek(self._place)
                 data = file.read(MOST)
         except OSError as error:

@@ -8,13 +8,15 @@ equilibrium is found exactly instead of stepped in time, and there is no frictio
 from __future__ import annotations
 
 import dataclasses
+import io
 import os
+import pathlib
 from typing import Any
 
 import numpy as np
 
 from ...errors import TactileError
-from ...geometry.indenters import Indenter, Pose
+from ...geometry.indenters import Indenter, Pose, mesh_file
 from ...sensors import Material, biotac, digit
 from ..finite_strain.contact_state import ContactState
 from ..finite_strain.newton import FiniteStrainContact
@@ -74,9 +76,13 @@ def near_body(mesh: TetMesh, path: str | os.PathLike) -> np.ndarray:
     """
     import trimesh
 
+    kind = pathlib.Path(path).suffix[1:].lower()
     try:
-        body = trimesh.load(path, force="mesh", process=True)
+        content, options = mesh_file.read_bytes(path), {"skip_materials": True} if kind == "obj" else {}
+        body = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=True, **options)
         closed = len(body.faces) > 3 and body.is_watertight
+    except TactileError:
+        raise
     except Exception as error:  # trimesh raises what its many readers raise
         raise TactileError(path, f"cannot be read ({error})", "a triangle mesh, such as core.obj") from error
     if not closed:

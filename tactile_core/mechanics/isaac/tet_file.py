@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import TactileError
+from ...files import outside
 
 MAX_CELLS = 100_000  # the public BioTac mesh holds 15,410; a solve of 100,000 takes minutes and gigabytes
 MAX_BYTES = 16 * 2**20  # assumed: three times what MAX_CELLS cells take; its lines take 200 MB at most
@@ -78,10 +79,7 @@ def checked(nodes: np.ndarray, cells: np.ndarray, where: str | os.PathLike = "te
 
 def _lines(path: Path) -> list[str]:
     try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise TactileError(path, f"{size >> 20} MB", f"at most {MAX_BYTES >> 20} MB", "Coarsen the mesh")
-        return path.read_text(encoding="utf-8").splitlines()
+        return outside.read(path, MAX_BYTES, "a .tet file").decode().splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise TactileError(path, f"cannot be read ({error})", "a .tet file in Isaac Gym's text layout") from error
 

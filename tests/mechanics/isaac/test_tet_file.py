@@ -97,7 +97,7 @@ def test_a_file_that_is_not_there_or_too_large_is_refused(tmp_path, write, monke
     with pytest.raises(TactileError, match="more than 1 vertices"):
         read_tet(write(text()))
     monkeypatch.setattr(tet_file, "MAX_BYTES", 10)
-    with pytest.raises(TactileError, match="MB"):
+    with pytest.raises(TactileError, match="more than 10 bytes"):
         read_tet(write(text()))
 
 

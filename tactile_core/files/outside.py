@@ -1,0 +1,76 @@
+"""Open files that come from outside: regular files alone, up to a size, so that no pipe, socket or device hangs a verb.
+
+Whatever opens a user's or a stranger's file goes through here; a library that opens by name is asked after `check`.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+from ..errors import TactileError
+
+KINDS = {
+    stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
+}  # fmt: skip
+
+
+def check(path: str | os.PathLike, expected: str = "a regular file") -> os.stat_result:
+    """Raise TactileError for a pipe, socket or device, OSError where nothing or a folder is; links count as their ends.
+
+    expected : what should be there, in words
+    """
+    return _regular(path, os.stat(path), expected)
+
+
+def open_file(path: str | os.PathLike, expected: str = "a regular file") -> BinaryIO:
+    """Open a regular file to read its bytes. Raises what `check` raises; waits for nothing."""
+    check(path, expected)  # before opening: some devices act when they are opened
+    file = open(path, "rb", opener=_open)  # noqa: SIM115 - the caller closes it
+    try:
+        _regular(path, os.fstat(file.fileno()), expected)  # it may have been exchanged since
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -> bytes:
+    """Read a file of at most ``most`` bytes. Raises what `open_file` raises, and TactileError for a longer file."""
+    with open_file(path, expected) as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise TactileError(path, f"more than {_size(most)}", f"{expected} of at most {_size(most)}")
+    return content
+
+
+def inside(folder: str | os.PathLike, name: str, expected: str = "a regular file") -> Path:
+    """Path of a file in a folder that others made, which need not exist. Raises TactileError for a link out of it."""
+    path = Path(folder) / name
+    try:
+        within = path.resolve().is_relative_to(Path(folder).resolve())
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle; RuntimeError before Python 3.13
+        raise TactileError(path, f"cannot be followed ({error})", expected) from error
+    if not within:
+        raise TactileError(path, "a link out of its folder", expected, "Put the file itself there")
+    return path
+
+
+def _open(path: str | os.PathLike, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _regular(path: str | os.PathLike, found: os.stat_result, expected: str) -> os.stat_result:
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
+    if not stat.S_ISREG(found.st_mode):
+        kind = KINDS.get(stat.S_IFMT(found.st_mode), "something else")
+        raise TactileError(path, f"{kind}, no regular file", expected, "Copy what it gives into a file")
+    return found
+
+
+def _size(count: int) -> str:
+    return f"{count // 2**20} MB" if count >= 2**20 else f"{count} bytes"
