@@ -70,7 +70,7 @@ def fetch(platform: str, python: str, folder: Path) -> list[Path]:
 
 
 def requirements() -> list[str]:
-    """``name==version`` of every wheel."""
+    """List ``name==version`` of every wheel."""
     text = (ROOT / "constraints.txt").read_text(encoding="utf-8")
     pins = dict(re.findall(r"(?m)^([A-Za-z0-9_.-]+)==(\S+)$", text))
     return [f"{name}=={pins[name]}" for name in WHEELS]

@@ -19,7 +19,9 @@ DIGITS_S, DIGITS_MM, DIGITS_N = 6, 5, 7  # decimals kept of float32 keyframes
 
 @dataclasses.dataclass(frozen=True)
 class Authored:
-    """scene : of ``tactile_core.simulation.scene``; meshes : file name -> content; apexes : (P, 3) m, where the
+    """Scene made from Blender's objects.
+
+    scene : of ``tactile_core.simulation.scene``; meshes : file name -> content; apexes : (P, 3) m, where the
     indenter stood at each point, or None where the scene's forces say how hard it presses.
     """
 

@@ -19,7 +19,9 @@ STANDING = "{} simulated"
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """seconds (T,), force (T, 3) N; apex (T, 3) m, turn (T, 3, 3): where the indenter stood, on the DIGIT if any.
+    """Result of a simulation.
+
+    seconds (T,), force (T, 3) N; apex (T, 3) m, turn (T, 3, 3): where the indenter stood, on the DIGIT if any.
 
     moved : displacement (T, n, 3) m of each sensor that was solved, by ``"biotac"`` and ``"digit"``
     picked : which tiers, in words, where a bound was given

@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measured(quick: bool) -> dict:
-    """bins: of depth over thickness, error of heights m; float32_m: of the translation."""
+    """Tabulate the error by bins: of depth over thickness, error of heights m; float32_m: of the translation."""
     specs = {one.name: one for one in load_scene(ROOT / "scenes" / "training")[0].indenters}
     bins = []
     for share, names in list(INDENTERS.items())[: 2 if quick else None]:

@@ -243,7 +243,7 @@ def write_long(path: Path) -> None:
 
 
 def long_conversion(folder: Path) -> list[Row]:
-    """`convert` of a long recording with all that it writes by default, where its time goes, its hottest functions."""
+    """Profile `convert` of a long recording with its default outputs: where its time goes, its hottest functions."""
     write_long(folder / "long.h5")
     cost = run(Case("long", "convert {}/long.h5 --out {}/whole"), folder)
     of = f"{LONG} frames, {cost.wall:.1f} s on the wall, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"

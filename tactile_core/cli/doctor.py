@@ -26,7 +26,10 @@ except importlib.metadata.PackageNotFoundError: print(getattr(module, "__version
 
 @dataclasses.dataclass(frozen=True)
 class Library:
-    """module : to import; package : its name in the index; extra : of ours that brings it, "" for always"""
+    """Optional library of the toolkit.
+
+    module : to import; package : its name in the index; extra : of ours that brings it, "" for always
+    """
 
     module: str
     package: str

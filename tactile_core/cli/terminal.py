@@ -37,7 +37,7 @@ def duration(seconds: float) -> str:
 def agree(cost: str, seconds: float, agreed: bool) -> None:
     """Print what a job will cost; ask whether to begin where it takes long and a person is at the terminal.
 
-    agreed : in advance, by --yes. Raises TactileError where nobody agrees.
+    agreed : in advance, by --yes. Raises TactileError without an agreement.
     """
     say(cost)
     if agreed or seconds <= LONG:

@@ -156,7 +156,7 @@ def _added(options: Options, made: FramePass) -> str:
 
 
 def _silent(done: int, total: int) -> None:
-    """Progress that nobody watches."""
+    """Discard progress."""
 
 
 def note(recording: Recording, made: FramePass, options: Options, tools: Tools) -> dict:

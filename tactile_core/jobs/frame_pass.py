@@ -107,7 +107,7 @@ class FramePass:
         tools: Tools,
         clock: Stopwatch,
     ) -> None:
-        """frames : (T,) indices into the recording, in order; keep : words of results.KEEPABLE."""
+        """Take frames : (T,) indices into the recording, in order; keep : words of results.KEEPABLE."""
         self.recording, self.signals, self.frames, self.keep = recording, signals, frames, keep
         self.tools, self.clock = tools, clock
         self._tracked = tools.tracked(self._read, len(recording))
@@ -180,7 +180,7 @@ class FramePass:
         return dataclasses.replace(self.signals, **part)
 
     def _draw(self, folder: Path, frames: np.ndarray, displacement: np.ndarray) -> dict[str, np.ndarray]:
-        """Heights, as far as they are kept; pictures go to their files. Frames that nobody looks at are passed over."""
+        """Heights, as far as they are kept; pictures go to their files. Frames neither kept nor shown are skipped."""
         whole = "height" in self.keep or "image" in self.keep
         seen = np.flatnonzero([whole or int(frame) in self.shown for frame in frames])
         if not len(seen):

@@ -10,7 +10,7 @@ from ..errors import TactileError
 
 
 def parse_frames(text: str) -> slice:
-    """``"A:B:STEP"`` as in Python, with STEP above 0; raises TactileError for anything else."""
+    """Parse ``"A:B:STEP"`` as in Python, with STEP above 0; raises TactileError for anything else."""
     if not re.fullmatch(r"(-?\d{1,9})?:(-?\d{1,9})?(:\d{0,9})?", text):
         raise TactileError("--frames", repr(text), "A:B or A:B:STEP, such as 100:200 or ::10", "Give it that way")
     first, last, step = ([int(part) if part else None for part in text.split(":")] + [None])[:3]

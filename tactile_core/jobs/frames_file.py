@@ -76,7 +76,7 @@ def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]
 
 
 class FramesFile:
-    """``frames.h5`` while it is written, some frames at a time. Nothing that was not kept is in it.
+    """Writer of ``frames.h5``, some frames at a time; it holds the kept arrays alone.
 
     All methods raise OSError, naming the file, where the disk cannot be written.
     """
@@ -84,7 +84,9 @@ class FramesFile:
     def __init__(
         self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0
     ) -> None:
-        """path : new file; count : T; attributes : of the file itself, beside format and version.
+        """Create the file.
+
+        path : new file; count : T; attributes : of the file itself, beside format and version.
 
         room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's seal; pictures are then in the file,
             and a large array has one chunk a frame

@@ -188,7 +188,7 @@ class Gel:
         return _matrix(self._first_touch(Pose(np.array([x, 0.0, z]), axes, PUSH)).moved(depth))
 
     def _first_touch(self, pose: Pose) -> Pose:
-        """Where an indenter that comes along +y first touches; raises TactileError where it passes the sensor by."""
+        """Find the first touch of an indenter that comes along +y; raises TactileError where it misses the sensor."""
         in_front = self._foremost - pose.support(self.indenter, PUSH)[1]  # from there the search is short
         return first_touch(self.surface, self.indenter, pose.moved(in_front))
 

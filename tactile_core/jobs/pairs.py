@@ -123,7 +123,7 @@ def blocks(folder: Path, job: Job) -> list[Path]:
 
 
 def wanted(counts: dict[int, int], count: int, where: str) -> int:
-    """Blocks for `count` contacts, by the contacts of those that are there: exact where they suffice.
+    """Estimate the blocks that `count` contacts take, from the blocks already made: exact where these suffice.
 
     Raises TactileError for a scene whose presses touch nothing.
     """

@@ -52,7 +52,7 @@ class Part:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """parts in the order they are built; left_out : what no output asked for needs."""
+    """Plan of a job: parts in the order they are built; left_out : parts that no requested output needs."""
 
     of: str
     parts: tuple[Part, ...]
@@ -111,7 +111,7 @@ def plan(path: str | os.PathLike, keep: str | None, budget: Budget, preset: str 
 
 
 def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:
-    """`tactile simulate`, then `tactile convert` for a translation and `tactile render` for pictures."""
+    """Plan `tactile simulate`, then `tactile convert` for a translation and `tactile render` for pictures."""
     from ..simulation import recording, tier_choice
     from ..simulation.scene import load_scene
 
@@ -141,7 +141,7 @@ def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | No
 
 
 def of_recording(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:
-    """`tactile convert --keep`."""
+    """Plan `tactile convert --keep`."""
     from .. import recordings
     from ..recordings.readers import each_finger
 

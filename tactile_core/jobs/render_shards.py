@@ -1,4 +1,4 @@
-"""`tactile render` by many processes: the same folder as by one, but for timings.json, which only one can tell."""
+"""`tactile render` by many processes: the folder of one process, but for timings.json, which only that one measures."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _put_together(folder: Path, job: Job, out: Path, options: Options) -> None:
 
 
 def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
-    """Read the input, simulating a scene; keep what is to be rendered of it."""
+    """Read the input, simulating a scene; keep the values to be rendered."""
     from .frame_range import parse_frames, select
     from .gel_frames import read_frames
 

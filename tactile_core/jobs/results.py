@@ -30,7 +30,7 @@ DEFAULT_KEEP = ("latent", "displacement", "image")
 
 
 def parse_keep(text: str) -> tuple[str, ...]:
-    """``"latent,image"`` -> ("latent", "image") in the order of KEEPABLE; ``""`` keeps only what is always written.
+    """Parse ``"latent,image"`` to ("latent", "image") in the order of KEEPABLE; ``""`` keeps the minimum.
 
     Raises TactileError for an unknown word.
     """
@@ -104,7 +104,7 @@ def is_result(folder: Path, maker: str = "") -> bool:
 
 
 def parse_words(text: str | None, known: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
-    """``"image,electrodes"`` as known words, in their order; None: all.
+    """Parse ``"image,electrodes"`` to known words, in their order; None: all.
 
     Raises TactileError for other words, or fewer than ``least``.
     """

@@ -86,7 +86,7 @@ def cheapest(error: float, variant: str) -> str:
 
 
 def fitting(error: float, variant: str | None = None) -> str:
-    """`cheapest` by the variant asked for or the one that works here; where Mitsuba is missing, as without LLVM."""
+    """Return the `cheapest` preset for a variant, or the one that works here; without Mitsuba as without LLVM."""
     if measured()["presets"][FAST]["error"] <= error:
         return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
     try:

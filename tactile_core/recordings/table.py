@@ -72,7 +72,7 @@ class Header:
 
 
 def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | None:
-    """Parse whole lines of a growing file, `before` lines of which came earlier; None if no data row is among them."""
+    """Parse whole lines of a growing file, after `before` earlier lines; None if they hold no data row."""
     lines = _text(path, data)
     skipped = max(0, header.lines - before)
     if not any(line.strip(" \t") for line in lines[skipped:]):

@@ -20,7 +20,10 @@ TIERS = ("fast", "full", "reference")
 
 
 class TierChoice(NamedTuple):
-    """tier : its name; error : um rms, which 95 of 100 contacts stay below; ms : a contact; share : depth reached."""
+    """Tier picked for a bound.
+
+    tier : its name; error : um rms, which 95 of 100 contacts stay below; ms : a contact; share : depth reached.
+    """
 
     tier: str
     error: float

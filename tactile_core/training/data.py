@@ -92,7 +92,7 @@ class Contacts:
         return Batch(rows, signed, *(each.to(self.device) for each in read))
 
     def _which(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rows (B,) of the pairs, 0 for silent ones, and which (B,) are seen in a mirror."""
+        """Rows (B,) of the pairs, 0 for silent ones, and which (B,) are mirrored."""
         contacts = len(self.pairs.press)
         return np.maximum(rows, 0) % contacts, rows >= contacts
 

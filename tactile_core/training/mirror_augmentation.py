@@ -1,4 +1,4 @@
-"""Contacts seen in a mirror: both sensors are even in z, so that every contact shows how another one would be."""
+"""Mirrored contacts: both sensors are even in z, so every contact's mirror image is a contact too."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class Options:
         rectified_offset, counts, of the tare before the fold, rectified_missing, share of channels that read nothing.
         Each was chosen among a few values as it let strength follow fluid pressure better on the sample recordings
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
-    mirrored : share of training samples that are seen in a mirror, both sensors being even in z
+    mirrored : share of training samples that are mirrored, both sensors being even in z
     without : names of indenters that are kept from the training; without_below_x : m, as much of the pad beyond x
     left_out : stages that are not run; their networks stay as they were drawn
     weight_decay : of AdamW; rectified_decay : of R2MPN (rectified signals are over-fitted else)

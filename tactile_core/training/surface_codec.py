@@ -24,7 +24,7 @@ SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, bu
 class SurfaceCodec:
     """Displacements of one sensor, the frame that moves over them and their linear bases, in the host's memory.
 
-    data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i seen in a mirror
+    data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i mirrored
     wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
     place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) nodes that move, at least FEWEST

@@ -78,7 +78,7 @@ def train(
 
 
 def quiet(share: float, text: str) -> None:
-    """Progress that nobody watches goes to the log."""
+    """Log progress where no callback is given."""
     log.info("%3.0f %% %s", 100 * share, text)
 
 

@@ -101,7 +101,7 @@ def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
 
 
 def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
-    """Return a unit of which only rest is known."""
+    """Return a unit with a known rest alone."""
     if rest is None:
         return None
     counts, spread = ([round(value, 4) for value in each.tolist()] for each in (rest.counts, rest.spread))

@@ -25,7 +25,9 @@ PRIOR = (
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """log_gain : (19,) natural logarithm; offset : (19,) counts; contacts : (19,) number that determined the gain.
+    """Fitted gains and offsets.
+
+    log_gain : (19,) natural logarithm; offset : (19,) counts; contacts : (19,) number that determined the gain.
 
     alike : number of different typical signals matched; settled : true if the last iteration changed nothing
     """

@@ -22,7 +22,9 @@ _ENTRIES = [0, 1, 3, 4, 8]  # of F (3, 3) as 9 numbers: those that axial symmetr
 
 @dataclasses.dataclass(frozen=True)
 class QuadMesh:
-    """nodes : (n, 3) m, x >= 0 and z = 0; cells : (n_cells, 9), node a + 3 b at (xi, eta) = (a, b) - 1
+    """Axisymmetric mesh.
+
+    nodes : (n, 3) m, x >= 0 and z = 0; cells : (n_cells, 9), node a + 3 b at (xi, eta) = (a, b) - 1
 
     clamped : (n,) bool; surface : (k,) nodes of the free side, outward
     """

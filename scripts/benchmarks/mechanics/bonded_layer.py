@@ -40,7 +40,7 @@ def quarter_disc(
 
 
 def _growing(start: float, end: float, count: int, first: float) -> np.ndarray:
-    """``count`` points after ``start`` up to ``end`` whose steps grow evenly, the first of ``first * start``."""
+    """Return ``count`` points after ``start`` up to ``end`` whose steps grow evenly, the first of ``first * start``."""
     step = first * start
     growth = (end - start - count * step) / (count * (count - 1) / 2) if count > 1 else 0.0
     return start + np.cumsum(step + growth * np.arange(count))

@@ -68,7 +68,7 @@ def electrode_rows(contacts: int = 240, *, each: bool = True) -> Iterator[Row]:
 
 
 def _law_rows(change: np.ndarray, gaps: np.ndarray, of: str, *, each: bool) -> Iterator[Row]:
-    """change : (n, 19) of the sheet's resistance or reading; gaps : (n, 19) m, of the law."""
+    """Compare change : (n, 19) of the sheet's resistance or reading; gaps : (n, 19) m, of the law."""
     law = signal_of_gaps(gaps)
     counts = change * (law**2).sum() / (law * change).sum()  # the single constant that fits best becomes the law's own
     own = (law * counts).sum(0) / (law**2).sum(0)  # of each electrode, as a share of the law's

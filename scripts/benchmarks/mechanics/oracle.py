@@ -1,4 +1,4 @@
-"""scikit-fem as oracle: energy, forces, coupling and tangent assembled by another library, the law by complex steps."""
+"""Use scikit-fem as oracle: energy, forces, coupling and tangent assembled by it, the law by complex steps."""
 
 from __future__ import annotations
 

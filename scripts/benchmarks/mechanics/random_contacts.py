@@ -30,7 +30,7 @@ RIM = 1e-3  # m, places this close to the gel's outline are left out
 
 @dataclasses.dataclass(frozen=True)
 class RandomContact:
-    """``depth`` is a share of the thickness at first touch, so that one draw serves both sensors."""
+    """Random contact; ``depth`` is a share of the thickness at first touch, so that one draw serves both sensors."""
 
     name: str
     indenter: Indenter
@@ -39,7 +39,7 @@ class RandomContact:
 
 
 def random_contacts(count: int, seed: int = 0) -> Iterator[RandomContact]:
-    """``count`` contacts, each from its own numbers: places even over the gel, tilts over directions, depths even."""
+    """Draw ``count`` contacts, each from its own numbers: places even over the gel, tilts and depths even."""
     names = list(INDENTERS)
     for number in range(count):
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))

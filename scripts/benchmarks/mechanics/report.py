@@ -1,4 +1,4 @@
-"""docs/mechanics.md: the rows as tables, and three plots beside it."""
+"""Write docs/mechanics.md: the rows as tables, and three plots beside it."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ contacts, solved by the full tier.
 def write_report(
     folder: Path, methods: Sequence[Method], rows: Sequence[Row], missing: dict[str, str], more: str
 ) -> None:
-    """``benchmark.json``, ``benchmark.md`` and ``benchmark.png``; more : Markdown that follows the tables."""
+    """Write ``benchmark.json``, ``benchmark.md`` and ``benchmark.png``; more : Markdown that follows the tables."""
     machine = provenance.machine()
     atomic.write_json(folder / "benchmark.json", {"machine": machine, "missing": missing, "rows": list(rows)})
     listed = ", ".join(f"{name} ({why})" for name, why in missing.items()) or "nothing"

@@ -105,7 +105,7 @@ def displaced_volume(displacement: np.ndarray) -> np.ndarray:
 
 
 def write(folder: Path, name: str, translated: Translated) -> None:
-    """``<name>.npz`` as the judging tool beside the recordings reads it; it appears whole or not at all."""
+    """Write ``<name>.npz`` as the judging tool beside the recordings reads it; it appears whole or not at all."""
     arrays = {key: getattr(translated, key) for key in ("force", "volume", "centre")}
     with atomic.new_file(folder / f"{name}.npz") as partial, open(partial, "wb") as file:
         np.savez(file, t=translated.time, feat=translated.latent, **arrays)

@@ -66,7 +66,7 @@ def reporting(folder: str | os.PathLike) -> list[Path]:
 
 
 def name_of(path: Path) -> str:
-    """``mat3_7`` of ``mat3_7_bio.csv``."""
+    """Return ``mat3_7`` of ``mat3_7_bio.csv``."""
     return path.name.removesuffix(BIO)
 
 

@@ -19,7 +19,7 @@ MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
 
 
 def progress_argument(verb: argparse.ArgumentParser) -> None:
-    """``--progress``."""
+    """Add ``--progress``."""
     verb.add_argument("--progress", action="store_true", help="show progress even where stderr is no terminal")
 
 
@@ -45,7 +45,7 @@ def prepare_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def polarity_argument(verb: argparse.ArgumentParser) -> None:
-    """``--polarity``."""
+    """Add ``--polarity``."""
     verb.add_argument(
         "--polarity",
         choices=("auto", "falls", "rises"),
@@ -56,7 +56,7 @@ def polarity_argument(verb: argparse.ArgumentParser) -> None:
 
 
 def electrodes_argument(verb: argparse.ArgumentParser) -> None:
-    """``--electrodes``."""
+    """Add ``--electrodes``."""
     verb.add_argument(
         "--electrodes",
         choices=("sheet", "gap"),
@@ -111,7 +111,7 @@ def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
 
 
 def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
-    """``--seed``; ``same`` : what the same seed makes again."""
+    """Add ``--seed``; ``same`` : the output that a seed determines, in words."""
     verb.add_argument("--seed", type=int, default=0, metavar="S", help=f"same seed, same {same} (default: 0)")
 
 

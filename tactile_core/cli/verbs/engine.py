@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def place_arguments(verb: argparse.ArgumentParser) -> None:
-    """``--workers``, ``--cluster``, ``--restart``, ``--plan``."""
+    """Add ``--workers``, ``--cluster``, ``--restart``, ``--plan``."""
     where = verb.add_mutually_exclusive_group()
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; changes no byte")
     where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
@@ -43,7 +43,7 @@ def check_counts(options: argparse.Namespace, *names: str) -> None:
 
 
 def part(text: str | None) -> tuple[int, int] | None:
-    """``"3/8"`` -> (3, 8). Raises TactileError."""
+    """Parse ``"3/8"`` to (3, 8). Raises TactileError for anything else."""
     if text is None:
         return None
     found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)

@@ -116,7 +116,10 @@ def _bound(text: str) -> float:
 
 
 def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> dict[str, str]:
-    """The cheapest within the bound, um, and why. Raises TactileError for a long simulation that nobody agreed to."""
+    """Choose the cheapest tiers within the bound, um, and give the reason.
+
+    Raises TactileError for a long simulation without consent.
+    """
     from ... import accuracy
     from ...jobs.plan import of_scene
     from ...simulation.recording import sensors_of

@@ -36,7 +36,7 @@ class Pose:
 
     @property
     def own_direction(self) -> np.ndarray:
-        """``direction`` in the indenter's own frame."""
+        """Direction of motion in the indenter's own frame."""
         return _OWN_DOWN if self.push is None else self.push @ self.axes
 
     def moved(self, depth: float) -> Pose:

@@ -146,7 +146,7 @@ def _start(wanted: QueueFile) -> Any:
 
 
 def wait() -> float:
-    """s to wait for a loop or a scheduler; DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s asks for more."""
+    """Seconds to wait for a loop or a scheduler; DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s asks for more."""
     import dask
     import distributed  # noqa: F401 - brings its settings
     from dask.utils import parse_timedelta

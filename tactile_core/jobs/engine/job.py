@@ -67,7 +67,7 @@ def write(folder: Path, job: Job) -> None:
 
 
 def check_empty(folder: Path, advice: str) -> None:
-    """Raise TactileError for a folder, without a job, that holds something of others; hidden files do not count."""
+    """Raise TactileError for a folder, without a job, that holds files of another program; hidden files are ignored."""
     others = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     if others:
         raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", advice)

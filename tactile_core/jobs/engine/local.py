@@ -27,7 +27,7 @@ Start = Callable[[], "subprocess.Popen[str]"]
 
 
 class Local:
-    """`workers` processes for the job in `folder`, each with one thread.
+    """Pool of `workers` processes for the job in `folder`, each with one thread.
 
     restart : tasks that one does before it is replaced; command : starts one, the folder's name is added
     """

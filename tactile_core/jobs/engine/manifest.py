@@ -22,7 +22,9 @@ FORMAT = "tactile-batch-1"
 
 @dataclasses.dataclass
 class Status:
-    """recordings, prepared : numbers of them; shards : of the prepared recordings, of which `there` exist
+    """Progress of a job.
+
+    recordings, prepared : numbers of them; shards : of the prepared recordings, of which `there` exist
 
     frames : of the prepared recordings; aside : task -> why it could not be done
     """
@@ -107,7 +109,7 @@ class _Manifest(msgspec.Struct):
 
 
 def write(folder: Path, job: Job) -> None:
-    """``manifest.json``: recordings in order, their shards and hashes; the same job gives the same bytes."""
+    """Write ``manifest.json``: recordings in order, their shards and hashes; the same job gives the same bytes."""
     content = {
         "format": FORMAT,
         "job": job.id,

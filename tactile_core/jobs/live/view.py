@@ -23,7 +23,10 @@ REMEMBERED = 1000  # latencies that figures are taken over
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """frame : its index; picture : (H, W, 3) uint8; force : N; latency : s from rows to picture; work : s of them"""
+    """Picture on display.
+
+    frame : its index; picture : (H, W, 3) uint8; force : N; latency : s from rows to picture; work : s of them
+    """
 
     frame: int
     picture: np.ndarray
@@ -36,7 +39,7 @@ class View:
     """Rows in, pictures out: always the newest, older ones that came meanwhile are passed over."""
 
     def __init__(self, tools: Tools, rate: float, polarity: str = AUTO) -> None:
-        """rate : Hz of the recording; polarity : as of ``PrepareOptions``."""
+        """Take the recording's rate, Hz, and its polarity, as of ``PrepareOptions``."""
         self._tools, self._signals, self._rate = tools, LiveSignals(rate, polarity), rate
         self._follow = Follower()
         self.frames, self.passed = 0, 0

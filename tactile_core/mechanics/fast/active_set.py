@@ -22,7 +22,10 @@ class UnsolvedError(ArithmeticError):
 
 @dataclasses.dataclass(frozen=True)
 class Pressing:
-    """pressing : (k,) N; active : (k,) bool; step : m, of the depth; factor : Cholesky factor of the active block."""
+    """State of an active-set solve.
+
+    pressing : (k,) N; active : (k,) bool; step : m, of the depth; factor : Cholesky factor of the active block.
+    """
 
     pressing: np.ndarray
     active: np.ndarray

@@ -70,7 +70,7 @@ class ComplianceBlock:
         return matrix
 
     def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """``normal`` at ``normals`` (k, 3) from what it was when those of the nodes ``at`` (j,) were others."""
+        """Update ``normal`` to ``normals`` (k, 3), where those of the nodes ``at`` (j,) have turned."""
         k, size = self.k, 3 * self.k
         rows = self.matrix.take(axes_of(at), axis=0)
         strips = _contract(rows[:, :size], normals[at].astype(np.float32), normals.astype(np.float32)).astype(float)

@@ -232,7 +232,7 @@ def spread_field(sensor: str, at: Frame, field: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _frames_by_axis(sensor: str) -> np.ndarray:
-    """``node_frames`` as (3, 3, n)."""
+    """Return ``node_frames`` as (3, 3, n)."""
     return np.ascontiguousarray(np.moveaxis(node_frames(sensor), 0, 2))
 
 

@@ -47,7 +47,7 @@ class _Sprung(Frictionless):
 
 
 class EdgeContactProblem(ContactProblem):
-    """``ContactProblem`` without friction whose candidates are nodes, and from number m on points between them."""
+    """Contact problem without friction whose candidates are nodes, and from number m on points between them."""
 
     def __init__(self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float) -> None:
         self._points = interpolated_points(compliance.surface, compliance.touchable)

@@ -85,8 +85,11 @@ def add_field(displacement, plane, frames, centre, radius, reach, lines, field, 
 
 @Loop
 def patch_shape(places, frames, force, direction):  # noqa: ANN001, ANN201
-    """Of a contact's nodes (k,): total load N, centre (2,) m, mean square distance m2 from it, spread (3,) m2 (xx, zz,
-    xz), mean force (3,) N and direction (3,) in the nodes' frames, sum of squared shares, largest share."""
+    """Moments of the loads on a contact's nodes (k,).
+
+    Returns the total load N, centre (2,) m, mean square distance m2 from it, spread (3,) m2 (xx, zz, xz), mean
+    force (3,) N and direction (3,) in the nodes' frames, sum of squared shares, largest share.
+    """
     k, total = len(force), 0.0
     load = np.empty(k)
     for a in range(k):

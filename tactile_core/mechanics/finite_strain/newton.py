@@ -208,7 +208,7 @@ class FiniteStrainContact:
     def _stiffened(self, touch: ContactState) -> ContactState:
         """A contact solved on with stiff springs between nodes; as it is where that fails, or where none are needed.
 
-        What stays hidden is seen afterwards (``penetration``).
+        Penetration that this leaves is found afterwards (``penetration``).
         """
         if not touch.guarded or not self._lets_through(touch):
             return touch

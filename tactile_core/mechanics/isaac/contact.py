@@ -130,7 +130,7 @@ class Press:
     def __init__(
         self, mesh: TetMesh, attached: np.ndarray, indenter: Indenter, pose: Pose, material: Material = SKIN
     ) -> None:
-        """attached : (n,) bool, nodes that do not move; pose : anywhere clear of the mesh, or at first touch."""
+        """Take attached : (n,) bool, nodes that do not move; pose : clear of the mesh, or at first touch."""
         self.solid = CorotatedTets(mesh, attached, material)
         skin = np.setdiff1d(mesh.surface, np.flatnonzero(attached))
         self.indenter = indenter

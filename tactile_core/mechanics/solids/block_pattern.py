@@ -14,7 +14,7 @@ class BlockPattern:
     """
 
     def __init__(self, cells: np.ndarray, clamped: np.ndarray) -> None:
-        """cells : (n_cells, k) nodes, every node belongs to one; clamped : (n,) bool, nodes that never move."""
+        """Take cells : (n_cells, k) nodes, every node belongs to one; clamped : (n,) bool, nodes that never move."""
         self.n_nodes = n_nodes = len(clamped)
         self.free = np.flatnonzero(np.repeat(~clamped, 3))  # degrees of freedom that ``upper`` has rows for
         pairs = cells[:, :, None].astype(np.int64) * n_nodes + cells[:, None, :]

@@ -23,7 +23,10 @@ _BATCH = 32  # cells whose stiffness is made at once: what they need stays in th
 
 @dataclasses.dataclass
 class State:
-    """displacement : (n, 3) m; pressure : (n_cells, 4) Pa, coefficients of 1, xi, eta, zeta (tension positive)."""
+    """State of a solid.
+
+    displacement : (n, 3) m; pressure : (n_cells, 4) Pa, coefficients of 1, xi, eta, zeta (tension positive).
+    """
 
     displacement: np.ndarray
     pressure: np.ndarray

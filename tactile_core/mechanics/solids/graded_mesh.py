@@ -22,7 +22,7 @@ _KEPT = 6  # patterns kept, each with the analysis and the last factor of its ma
 
 @dataclasses.dataclass(frozen=True)
 class Footprint:
-    """Area where a lattice is to be fine, in row and column numbers of the lattice.
+    """Area where a lattice is refined, in row and column numbers of the lattice.
 
     low, high : (row, column) of the fine part's corners
     spacing : of the nodes there, in lattice lines; growth : of a cell with its distance from the fine part

@@ -25,7 +25,10 @@ class Law(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class NeoHookean:
-    """shear : mu, Pa; bulk : kappa, Pa. Simo, Taylor, Pister, Comput. Methods Appl. Mech. Eng. 51, 1985."""
+    """Nearly incompressible neo-Hookean law.
+
+    shear : mu, Pa; bulk : kappa, Pa. Simo, Taylor, Pister, Comput. Methods Appl. Mech. Eng. 51, 1985.
+    """
 
     shear: float
     bulk: float

@@ -29,7 +29,7 @@ class SplitBulkModulus:
 
     @classmethod
     def from_law(cls, law: NeoHookean) -> SplitBulkModulus:
-        """``SHARE`` shear moduli at the points."""
+        """Split off ``SHARE`` shear moduli at the points."""
         return cls(law, SHARE * law.shear)
 
     @property

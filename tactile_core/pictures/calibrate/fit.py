@@ -30,7 +30,10 @@ MM_LIMITS = (1.0, 16.0)  # mm, ball diameters that fit on the gel
 
 @dataclasses.dataclass(frozen=True)
 class Calibrated:
-    """calibration : of the unit; tried : the presses it was fitted on, with it; warnings : sentences"""
+    """Result of a calibration.
+
+    calibration : of the unit; tried : the presses it was fitted on, with it; warnings : sentences
+    """
 
     calibration: Calibration
     tried: list[Evaluation]

@@ -52,7 +52,9 @@ class Press:
 
 @dataclasses.dataclass(frozen=True)
 class Photographs:
-    """background : (H, W, 3) float32, grey levels; estimated : whether it was made from the set
+    """Photographs of one unit, prepared.
+
+    background : (H, W, 3) float32, grey levels; estimated : whether it was made from the set
     untouched : names of photographs that show no press; noise : (3,) grey levels, standard deviation of a pixel
     """
 

@@ -24,7 +24,7 @@ class GelMesh:
     """
 
     def __init__(self, camera: Camera, spacing: float = SPACING, *, square: bool = False) -> None:
-        """spacing : m between vertices, rounded to whole pixels; square : scale up so that pixels are square."""
+        """Take spacing : m between vertices, rounded to whole pixels; square : scale up so that pixels are square."""
         self.camera = camera
         right, down = camera.pixel_size
         self.up_scale = right / down if square else 1.0

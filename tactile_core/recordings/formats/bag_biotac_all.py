@@ -1,4 +1,4 @@
-"""sr_robot_msgs/BiotacAll of Shadow Robot's driver: five BioTacs a message."""
+"""Message sr_robot_msgs/BiotacAll of Shadow Robot's driver: five BioTacs a message."""
 
 from __future__ import annotations
 

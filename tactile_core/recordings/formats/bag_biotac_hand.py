@@ -1,4 +1,4 @@
-"""biotac_sensors/BioTacHand of the SynTouch driver for ROS: any number of BioTacs a message, 22 PAC samples each."""
+"""Message biotac_sensors/BioTacHand of SynTouch's driver for ROS: any number of BioTacs, 22 PAC samples each."""
 
 from __future__ import annotations
 

@@ -196,7 +196,7 @@ class _Stats:
         self._high: Any = -np.inf
 
     def add(self, values: np.ndarray) -> None:
-        """values : (n,) or (n, k)."""
+        """Add values (n,) or (n, k)."""
         values = values.reshape(len(values), -1)
         good = np.isfinite(values)
         self._count = self._count + good.sum(axis=0)
