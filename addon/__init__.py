@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .operators import (
+    calibration_objects,
     import_recording,
     preview,
     render_engine,
@@ -24,6 +25,7 @@ PARTS = (
     preview,
     render_engine,
     render_setup,
+    calibration_objects,
     add_menu,
     simulate,
     scene_files,

@@ -31,7 +31,6 @@ def add_patch(gel: bpy.types.Object, patch: np.ndarray, first: float, step: floa
     modifier.node_group = _group(image, rows, columns, first, step)
     if old is not None and old.users == 0:
         bpy.data.node_groups.remove(old)
-    _colour(gel)
 
 
 def _group(image: bpy.types.Image, rows: int, columns: int, first: float, step: float) -> bpy.types.NodeTree:
@@ -68,24 +67,3 @@ def _group(image: bpy.types.Image, rows: int, columns: int, first: float, step: 
     for k, node in enumerate(nodes):
         node.location = (180 * (k % 6), -200 * (k // 6))
     return group
-
-
-def _colour(gel: bpy.types.Object) -> None:
-    """A material that shows the attribute over the object's colour."""
-    name = "Tactile contact patch"
-    material = bpy.data.materials.get(name)
-    if material is None:
-        material = gel.data.materials[0].copy()
-        material.name = name
-        nodes, links = material.node_tree.nodes, material.node_tree.links
-        shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
-        own = shader.inputs["Base Color"].links[0].from_socket
-        patch, mix = nodes.new("ShaderNodeAttribute"), nodes.new("ShaderNodeMix")
-        patch.attribute_name = ATTRIBUTE
-        mix.data_type = "RGBA"
-        colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
-        links.new(patch.outputs["Fac"], mix.inputs[0])
-        links.new(own, colours[0])
-        colours[1].default_value = (0.95, 0.35, 0.05, 1.0)
-        links.new(next(s for s in mix.outputs if s.type == "RGBA"), shader.inputs["Base Color"])
-    gel.data.materials[0] = material

@@ -1,15 +1,19 @@
-"""The fast picture of a gel as the scene has it now."""
+"""The picture of a gel as the scene has it now: its dent, and its LEDs, coating and camera as they stand."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import bpy
 import numpy as np
 
 from ...tactile_core.pictures import height_map, shading
 from ...tactile_core.sensors.calibration import Calibration
-from ..objects import digit_objects, images
-from ..ui import render_settings
+from ..objects import digit_objects, digit_unit, images
+from ..process import tracer
+from ..ui import render_settings, reports
 
+FAST = "fast"
 _shaders: dict[str, shading.Shader] = {}  # one at most: the frames of an animation share it
 
 
@@ -22,20 +26,28 @@ def shader_of(unit: Calibration) -> shading.Shader:
     return _shaders[key]
 
 
-def fast_picture(scene: bpy.types.Scene, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Picture (H, W, 3) uint8 and heights (H, W) m of a displacement (n, 3) m, by the scene's unit in its own size."""
-    unit = render_settings.calibration_of(scene)
-    heights = height_map.height_map(displacement, unit.camera)
-    return shader_of(unit)(heights), heights
+def draw(
+    gel: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    preset: str,
+    size: tuple[int, int] | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Picture (H, W, 3) uint8 and heights (H, W) m of a gel, (width, height) pixels large, by a preset.
+
+    The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba. Raises TactileError, and
+    ``tracer.Stopped`` where stopped() is true.
+    """
+    shown = digit_unit.shown_unit(gel, depsgraph, render_settings.calibration_of(depsgraph.scene, size))
+    heights = height_map.height_map(digit_objects.displacement_of(gel, depsgraph), shown.unit.camera)
+    if preset == FAST:
+        return shader_of(shown.unit)(heights), heights
+    reports.require("mitsuba")
+    return tracer.tracer_for(preset).draw(shown.unit, shown.around, heights, stopped), heights
 
 
 def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Image:
-    """Draw picture and height map of the current frame into their datablocks; returns the picture's."""
-    picture, heights = fast_picture(depsgraph.scene, digit_objects.displacement_of(gel, depsgraph))
+    """Draw fast picture and height map of the current frame into their datablocks; returns the picture's."""
+    picture, heights = draw(gel, depsgraph, FAST)
     images.show_heights(heights)
     return images.show_picture(picture)
-
-
-def update_picture(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """The picture alone: 2 ms less, which count while scrubbing."""
-    images.show_picture(fast_picture(depsgraph.scene, digit_objects.displacement_of(gel, depsgraph))[0])

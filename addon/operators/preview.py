@@ -1,13 +1,19 @@
-"""The live picture: while its toggle is on, every frame change draws the DIGIT's fast picture."""
+"""The live picture: while its toggle is on, each change of frame, LED, coating, camera or gel draws it again."""
+
+from collections.abc import Callable
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
-from ..ui import properties
+from ..objects import images
+from ..process import tracer
+from ..ui import properties, render_settings
 from ..ui.reports import TactileOperator
 from . import pictures
 
+_SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material, bpy.types.ShaderNodeTree)
+_drawing = False  # a picture's own update must not draw another
 _failed = ""  # why the last frame could not be drawn; shown in the panel
 
 
@@ -23,25 +29,49 @@ def failure() -> str:
 
 @persistent
 def _draw(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    global _failed
+    """Called at each change of the frame."""
+    global _failed, _drawing
     gel = properties.of_role(scene, "DIGIT")
-    if gel is None or depsgraph is None:
+    if gel is None or depsgraph is None or _drawing:
         return
+    _drawing = True
     try:
-        pictures.update_picture(gel, depsgraph)
+        images.show_picture(pictures.draw(gel, depsgraph, render_settings.preset_of(scene))[0])
         _failed = ""
-    except TactileError as error:  # a handler has no report: the panel shows it
+    except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
         _failed = str(error)
+    finally:
+        _drawing = False
+
+
+@persistent
+def _draw_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Called at each change of the scene: one of what the picture shows draws it again."""
+    if any(isinstance(update.id, _SEEN) for update in depsgraph.updates):
+        _draw(scene, depsgraph)
+
+
+@persistent
+def _end(*_: object) -> None:
+    """Called before another file is opened: the picture and its worker end with this one."""
+    switch_off()
 
 
 def switch_off() -> None:
-    """Remove the handler."""
-    if is_on():
-        bpy.app.handlers.frame_change_post.remove(_draw)
+    """Remove the handlers, and end the worker."""
+    for handlers, function in _handlers():
+        if function in handlers:
+            handlers.remove(function)
+    tracer.close_all()
+
+
+def _handlers() -> list[tuple[list, Callable]]:
+    known = bpy.app.handlers
+    return [(known.frame_change_post, _draw), (known.depsgraph_update_post, _draw_changes), (known.load_pre, _end)]
 
 
 class TACTILE_OT_live_picture(TactileOperator):
-    """Draw the DIGIT's picture at every frame change, in the Image Editor; press again to stop"""
+    """Draw the DIGIT's picture by the preset at every change, in the Image Editor; press again to stop"""
 
     bl_idname = "tactile.live_picture"
     bl_label = "Live Picture"
@@ -62,7 +92,8 @@ class TACTILE_OT_live_picture(TactileOperator):
             return
         gel = properties.of_role(context.scene, "DIGIT", context.object)
         image = pictures.update(gel, context.evaluated_depsgraph_get())
-        bpy.app.handlers.frame_change_post.append(_draw)
+        for handlers, function in _handlers():
+            handlers.append(function)
         for area in context.screen.areas if context.screen else ():
             if area.type == "IMAGE_EDITOR":
                 area.spaces.active.image = image

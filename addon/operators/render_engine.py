@@ -6,8 +6,6 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.pictures.height_map import height_map
-from ..objects import digit_objects
 from ..process import tracer
 from ..ui import properties, render_settings, reports
 from . import pictures
@@ -50,15 +48,9 @@ class TactileRenderEngine(bpy.types.RenderEngine):
             raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
         share = scene.render.resolution_percentage / 100
         width, height = (int(size * share) for size in (scene.render.resolution_x, scene.render.resolution_y))
-        unit = render_settings.calibration_of(scene, (width, height))
         preset = render_settings.preset_of(scene)
         self.update_stats("", f"Frame {scene.frame_current}: {preset}")
-        heights = height_map(digit_objects.displacement_of(gel, depsgraph), unit.camera)
-        self.update_progress(0.1)
-        if preset == "fast":
-            return pictures.shader_of(unit)(heights)
-        reports.require("mitsuba")
-        return tracer.tracer_for(unit, preset).draw(heights, self.test_break)
+        return pictures.draw(gel, depsgraph, preset, (width, height), self.test_break)[0]
 
 
 def _describe_error(error: Exception) -> str:

@@ -1,17 +1,13 @@
 """Set Up Render: everything that makes a rendered file hold the DIGIT's own 8-bit values; and the engine's panel."""
 
-import math
-
 import bpy
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.sensors.camera import HEIGHT_ZERO_Y, Camera
-from ..objects import axes
+from ...tactile_core.sensors.camera import COLOURS
+from ..objects import digit_body, digit_materials, digit_unit
 from ..ui import properties, render_settings, reports
 from ..ui.reports import TactileOperator
 from .render_engine import ID
-
-CAMERA = "DIGIT camera"
 
 
 class TACTILE_OT_set_up_render(TactileOperator):
@@ -26,9 +22,9 @@ class TACTILE_OT_set_up_render(TactileOperator):
         gel = properties.of_role(scene, "DIGIT", context.object)
         if gel is None:
             raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
-        settings = scene.tactile_render
-        path = bpy.path.abspath(settings.calibration) if settings.calibration else None
-        camera = render_settings.calibration_file.load_calibration(path).camera
+        unit = render_settings.calibration_of(scene)
+        digit_body.add_body(gel, unit)
+        camera = unit.camera
         render = scene.render
         render.engine = ID
         render.resolution_x, render.resolution_y, render.resolution_percentage = camera.width, camera.height, 100
@@ -38,26 +34,7 @@ class TACTILE_OT_set_up_render(TactileOperator):
         scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
         render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGB"
-        scene.camera = _camera_object(gel, camera)
-
-
-def _camera_object(gel: bpy.types.Object, camera: Camera) -> bpy.types.Object:
-    """A camera where the DIGIT's own seems to be: Blender renders no scene without one, and users see it."""
-    found = next((thing for thing in gel.children if thing.type == "CAMERA"), None)
-    if found is None:
-        found = bpy.data.objects.new(CAMERA, bpy.data.cameras.new(CAMERA))
-        gel.users_collection[0].objects.link(found)
-        found.parent = gel
-    per_metre, high = gel.tactile.per_metre, camera.apparent_height
-    place = [[camera.centre_x, HEIGHT_ZERO_Y + high, camera.centre_z]]
-    found.location = axes.to_blender(place, per_metre)[0]
-    # It looks up into the gel, its own -Z along the scene's Z; the fingertip, -X, is up in the picture.
-    found.rotation_euler = (math.pi, 0.0, -math.pi / 2 * camera.down_x)
-    lens = found.data
-    size = camera.height * camera.pixel_size[1]
-    lens.sensor_fit, lens.lens_unit, lens.angle = "VERTICAL", "FOV", 2 * math.atan(size / 2 / high)
-    lens.clip_start, lens.display_size = 1e-4 * per_metre, 2e-3 * per_metre
-    return found
+        scene.camera = digit_body.camera_of(gel)
 
 
 class TACTILE_PT_render(bpy.types.Panel):
@@ -87,8 +64,29 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     if settings.preset != "fast" and reports.missing("mitsuba"):
         layout.label(text="mitsuba is missing: see Preferences", icon="ERROR")
     layout.prop(settings, "calibration")
-    layout.prop(settings, "lights")
-    layout.prop(settings, "albedo")
+    gel = properties.of_role(context.scene, "DIGIT", context.object)
+    if gel is not None:
+        draw_parts(layout, context, gel)
+
+
+def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context, gel: bpy.types.Object) -> None:
+    """LEDs and coating of a gel as they stand, and what puts them back or keeps them."""
+    leds = digit_body.leds_of(gel)
+    for colour in COLOURS if leds else ():
+        row = layout.row(align=True)
+        if colour in leds:
+            row.prop(leds[colour].data, "energy", text=f"{colour.title()} LED")
+            row.prop(leds[colour].data, "color", text="")
+        else:
+            row.label(text=f"{colour.title()} LED deleted: off", icon="INFO")
+    coating = digit_body.coating_of(gel) if leds else None
+    for name, socket in digit_materials.sockets_of(coating).items() if coating else ():
+        layout.prop(socket, "default_value", text=name)
+    for name in digit_unit.left_out(context.scene)[:2]:
+        layout.label(text=f"{name} is left out: point lamps reach the picture", icon="INFO")
+    row = layout.row(align=True)
+    row.operator("tactile.reset_to_calibration", text="Reset", icon="LOOP_BACK")
+    row.operator("tactile.save_as_calibration", text="Save As", icon="FILE_TICK")
 
 
 CLASSES = (TACTILE_OT_set_up_render, TACTILE_PT_render)

@@ -5,8 +5,8 @@ import bpy
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import contact_patch
-from ..objects import custom_properties, digit_objects, motion, patch_nodes
-from ..ui import properties, timeline, view
+from ..objects import custom_properties, digit_body, digit_objects, motion, patch_nodes
+from ..ui import properties, render_settings, timeline, view
 from ..ui.progress import shown
 from ..ui.reports import TactileOperator
 from . import pictures, recording_data
@@ -38,9 +38,10 @@ class TACTILE_OT_translate(TactileOperator):
             found = recording_data.load(path, about.tare, about.frames, progress, about.polarity)
         frames = about.first_frame + found.chosen.astype(float)
         group = skin.users_collection[0]
-        for old in [thing for thing in group.objects if thing.tactile.role == "DIGIT"]:
-            bpy.data.objects.remove(old)
-        gel = digit_objects.add_gel(group, about.per_metre, skin)
+        # A gel that is there keeps its LEDs, coating and camera as the user has set them.
+        there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")
+        gel = next(there, None) or digit_objects.add_gel(group, about.per_metre, skin)
+        digit_body.add_body(gel, render_settings.calibration_of(context.scene))
         surface, moved = sensors.digit_surface(), found.translation.displacement_digit
         summary = motion.animate(gel, surface.rest, moved, frames, about.motion)
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import json
+import shutil
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.pictures.mitsuba.surroundings import Surroundings
 from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.calibration import Calibration
 from .jobs import Job, JobFolder
@@ -20,24 +25,49 @@ class Stopped(Exception):
 
 
 class Tracer:
-    """A worker that draws height maps by one preset of one calibration, until it is closed."""
+    """A worker that draws height maps by one preset, until it is closed; the unit may change between pictures."""
 
-    def __init__(self, unit: Calibration, preset: str) -> None:
-        self._folder, self._count = JobFolder(), 0
-        calibration_file.write_calibration(self._folder.path / "unit.toml", unit)
+    def __init__(self, preset: str) -> None:
+        self._folder, self._count, self._unit = JobFolder(), 0, ""
         self._job = Job("render", self._folder.path, listening=True, preset=preset)
 
-    def draw(self, heights: np.ndarray, stopped: Callable[[], bool]) -> np.ndarray:
+    def draw(
+        self, unit: Calibration, around: Surroundings, heights: np.ndarray, stopped: Callable[[], bool]
+    ) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m. Raises TactileError, or Stopped when asked to stop."""
         self._count += 1
+        self._tell_unit(unit, around)
         np.save(self._folder.path / "heights.npy", heights)
-        self._job.tell({"picture": self._count})
-        while self._job.done < self._count:
-            if self._job.poll(_LOOK):
-                raise TactileError("Tactile render", "the worker ended early", "a picture", "Render again")
-            if stopped():
-                raise Stopped
+        self._job.tell({"picture": self._count, "unit": self._unit})
+        try:
+            while self._job.done < self._count:
+                if self._job.poll(_LOOK):
+                    raise TactileError("Tactile render", "the worker ended early", "a picture", "Render again")
+                if stopped():
+                    raise Stopped
+        except TactileError:
+            for preset in [name for name, kept in _kept.items() if kept is self]:
+                del _kept[preset]  # it has ended: the next picture starts another
+            self.close()
+            raise
         return np.load(self._folder.path / "picture.npy", allow_pickle=False)
+
+    def _tell_unit(self, unit: Calibration, around: Surroundings) -> None:
+        """Write unit and surroundings, where they are other ones."""
+        bodies = [(body.vertices.tobytes(), body.faces.tobytes()) for body in around.occluders]
+        key = hashlib.sha256(repr((unit, around.lamps, bodies)).encode()).hexdigest()
+        if key == self._unit:
+            return
+        self._unit = key
+        calibration_file.write_calibration(self._folder.path / "unit.toml", unit)
+        # Beside the file, as the calibration names it.
+        if unit.photograph:
+            shutil.copyfile(unit.photograph, self._folder.path / Path(unit.photograph).name)
+        lamps = [dataclasses.asdict(lamp) for lamp in around.lamps]
+        (self._folder.path / "lamps.json").write_text(json.dumps(lamps), encoding="utf-8")
+        arrays = {f"vertices_{k}": body.vertices for k, body in enumerate(around.occluders)}
+        arrays |= {f"faces_{k}": body.faces for k, body in enumerate(around.occluders)}
+        np.savez(self._folder.path / "bodies.npz", **arrays)
 
     def close(self) -> None:
         """End the worker."""
@@ -48,13 +78,12 @@ class Tracer:
 _kept: dict[str, Tracer] = {}  # one at most: starting Mitsuba takes seconds, the frames of an animation share it
 
 
-def tracer_for(unit: Calibration, preset: str) -> Tracer:
-    """A running worker for this unit and preset."""
-    key = hashlib.sha256(f"{preset} {unit!r}".encode()).hexdigest()
-    if key not in _kept:
+def tracer_for(preset: str) -> Tracer:
+    """A running worker for this preset."""
+    if preset not in _kept:
         close_all()
-        _kept[key] = Tracer(unit, preset)
-    return _kept[key]
+        _kept[preset] = Tracer(preset)
+    return _kept[preset]
 
 
 def close_all() -> None:

@@ -129,19 +129,32 @@ def _result(folder: Path, picked: list[str]) -> None:
 
 
 def render(folder: Path, job: dict, progress: Progress) -> None:
-    """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8, by
-    FOLDER/unit.toml.
+    """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8, by the unit and
+    surroundings in the folder, which are read where the line names others than the one before.
     """
-    from tactile_core.pictures.renderer import Renderer
-    from tactile_core.sensors.calibration_file import load_calibration
-
-    renderer = Renderer(load_calibration(folder / "unit.toml"), job["preset"])
+    renderer, known = None, None
     for line in sys.stdin:
-        number = json.loads(line)["picture"]
+        asked = json.loads(line)
+        if renderer is None or asked["unit"] != known:
+            renderer, known = _renderer(folder, job["preset"]), asked["unit"]
         picture = renderer(np.load(folder / "heights.npy", allow_pickle=False))
         np.save(folder / "partial.npy", picture)
         (folder / "partial.npy").replace(folder / "picture.npy")
-        progress(number, number)
+        progress(asked["picture"], asked["picture"])
+
+
+def _renderer(folder: Path, preset: str) -> Any:
+    from tactile_core.pictures.mitsuba.surroundings import Lamp, Occluder, Surroundings
+    from tactile_core.pictures.renderer import Renderer
+    from tactile_core.sensors.calibration_file import load_calibration
+
+    lamps = [Lamp(**each) for each in json.loads((folder / "lamps.json").read_text(encoding="utf-8"))]
+    with np.load(folder / "bodies.npz", allow_pickle=False) as stored:
+        bodies = [Occluder(stored[f"vertices_{k}"], stored[f"faces_{k}"]) for k in range(len(stored.files) // 2)]
+    around = Surroundings(tuple(lamps), tuple(bodies))
+    if preset == "fast":
+        around = Surroundings()
+    return Renderer(load_calibration(folder / "unit.toml"), preset, surroundings=around)
 
 
 def read(folder: Path, job: dict, progress: Progress) -> None:

@@ -3,9 +3,9 @@
 import bpy
 
 from ...tactile_core.errors import TactileError
-from ..objects import axes, biotac_objects, digit_objects, indenter_objects
+from ..objects import axes, biotac_objects, digit_body, digit_objects, indenter_objects
 from ..operators.scene_bridge import sensor_of
-from . import properties, view
+from . import properties, render_settings, view
 from .reports import TactileOperator, require
 
 SENSORS = (
@@ -52,6 +52,7 @@ class TACTILE_OT_add_sensor(TactileOperator):
                 thing.location.y -= digit_objects.BESIDE * per_metre
         else:
             thing = digit_objects.add_gel(group, per_metre, properties.of_role(scene, "BIOTAC"))
+            digit_body.add_body(thing, render_settings.calibration_of(scene))
         view.show(context, [thing])
 
 

@@ -16,6 +16,9 @@ ROLES = (
     ("CORE", "BioTac core", "The rigid core under the skin"),
     ("ELECTRODE", "Electrode", "A marker of one electrode"),
     ("INDENTER", "Indenter", "A body that presses"),
+    ("LED", "LED", "A lamp of the DIGIT"),
+    ("BODY", "DIGIT body", "A part of the DIGIT that is there to be seen"),
+    ("TWIN", "Simulated indenter", "Where the simulation had the indenter"),
 )
 PRESS_BY = (
     ("HEIGHT", "Height", "It presses as deep as it is moved into the DIGIT's gel"),
@@ -49,6 +52,7 @@ class TactileObject(bpy.types.PropertyGroup):
     polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_TOLD, items=POLARITIES)
     frames: bpy.props.StringProperty(name="Frames", description="Part of the recording, A:B:STEP", default=":")
     motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
+    colour: bpy.props.StringProperty(name="Colour", description="Which LED of the calibration this is")
     spec: bpy.props.StringProperty(
         name="Shape", description="An indenter's kind and sizes, as in a scene file; empty: the object's own mesh"
     )

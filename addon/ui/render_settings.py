@@ -1,13 +1,14 @@
-"""Settings of a scene's DIGIT pictures: preset, unit, lights, coating."""
+"""Settings of a scene's DIGIT pictures: preset, unit, largest error."""
 
-import dataclasses
 import importlib.util
 
 import bpy
 
 from ...tactile_core import accuracy
+from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.calibration import Calibration
+from ..objects import digit_body
 
 _FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
 _MITSUBA = (
@@ -27,19 +28,11 @@ class TactileRender(bpy.types.PropertyGroup):
     preset: bpy.props.EnumProperty(name="Preset", description="How exactly the picture is made", items=PRESETS)
     calibration: bpy.props.StringProperty(
         name="Calibration", description="File of one DIGIT unit (tactile calibrate); empty: the one that ships",
-        subtype="FILE_PATH", options=_RELATIVE,
+        subtype="FILE_PATH", options=_RELATIVE, update=lambda settings, context: _take_calibration(settings, context),
     )  # fmt: skip
     error: bpy.props.StringProperty(
         name="Error", description="Largest error that the toolkit itself may add: 50um of a simulated surface,"
         " 0.6levels of a picture, or both with a comma. Picks tier and preset; empty: the fast tier, the preset above",
-    )  # fmt: skip
-    lights: bpy.props.FloatVectorProperty(
-        name="Lights", description="Strength of the red, green and blue LED, times that of the calibration", size=3,
-        default=(1.0, 1.0, 1.0), min=0.0, soft_max=2.0,
-    )  # fmt: skip
-    albedo: bpy.props.FloatProperty(
-        name="Coating", description="Share of light that the coating scatters back; negative: the calibration's",
-        default=-1.0, min=-1.0, max=1.0,
     )  # fmt: skip
 
 
@@ -62,22 +55,22 @@ def preset_of(scene: bpy.types.Scene) -> str:
 
 
 def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) -> Calibration:
-    """The unit that a scene renders with, its picture (width, height) pixels large. Raises TactileError."""
-    settings = scene.tactile_render
-    path = bpy.path.abspath(settings.calibration) if settings.calibration else None
-    unit = calibration_file.load_calibration(path)
-    unit = unit if size is None else unit.at_size(*size)
-    leds = tuple(
-        dataclasses.replace(led, radiance=led.radiance * share)
-        for led, share in zip(unit.leds, settings.lights, strict=True)
-    )
-    coating = unit.coating
-    if settings.albedo >= 0:
-        coating = dataclasses.replace(coating, albedo=(settings.albedo,) * 3)
-    changed = (leds, coating) != (unit.leds, unit.coating)
-    # A photograph shows the unit's own lights and coating: with others the picture at rest is the model's.
-    photograph = "" if changed else unit.photograph
-    return dataclasses.replace(unit, leds=leds, coating=coating, photograph=photograph)
+    """The unit whose file a scene names, its picture (width, height) pixels large. Raises TactileError."""
+    path = scene.tactile_render.calibration
+    unit = calibration_file.load_calibration(bpy.path.abspath(path) if path else None)
+    return unit if size is None else unit.at_size(*size)
+
+
+def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> None:
+    """Put LEDs, coating and camera to those of the file that was chosen; one that is none is reported by a render."""
+    scene = settings.id_data
+    try:
+        unit = calibration_of(scene)
+    except TactileError:
+        return
+    for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
+        if digit_body.leds_of(gel):
+            digit_body.reset(gel, unit)
 
 
 def register() -> None:

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ..errors import TactileError
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from .background import resting_picture
@@ -17,6 +18,7 @@ from .mitsuba.gel_light import ASIDE, GelLight
 from .mitsuba.gel_mesh import GelMesh
 from .mitsuba.interreflection import interreflection
 from .mitsuba.light_samples import light_points, sphere_points
+from .mitsuba.surroundings import NOTHING, Surroundings
 from .mitsuba.tracer import make_tracer
 from .mitsuba.variant import LLVM, choose_variant
 from .mitsuba.window import through_window
@@ -59,6 +61,7 @@ class Renderer:
         background: np.ndarray | None = None,
         rest: np.ndarray | None = None,
         seed: int = 0,
+        surroundings: Surroundings = NOTHING,
     ) -> None:
         if not isinstance(calibration, Calibration):
             calibration = load_calibration(calibration)
@@ -77,9 +80,12 @@ class Renderer:
             self.variant = choose_variant(variant).name
             chosen = preset_named(preset)
             if self.variant == LLVM:
-                self._light = GelLight(calibration, chosen, resting, seed)
+                self._light = GelLight(calibration, chosen, resting, seed, surroundings)
             else:
                 self._light = MitsubaLight(calibration, chosen, self.variant, resting, seed)
+        if surroundings and self.variant != LLVM:
+            found = f"{len(surroundings.lamps)} more lamps and {len(surroundings.occluders)} bodies in the light's way"
+            raise TactileError(f"preset {preset}", found, "a unit's own LEDs", "Choose standard, with LLVM (doctor)")
         self.rest_radiance = self._light.radiance(resting)
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")

@@ -82,7 +82,7 @@ def test_lights_change_their_own_colour(ready, tmp_path):
     ready.frame_set(80)
     levels = []
     for factor in (1.0, 0.2):
-        ready.tactile_render.lights = (factor, 1, 1)
+        bpy.data.lights["LED red"].energy *= factor
         ready.render.filepath = str(tmp_path / f"{factor}.png")
         bpy.ops.render.render(write_still=True)
         levels.append(_pixels(tmp_path / f"{factor}.png"))
@@ -161,44 +161,49 @@ def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, part, tmp_path):
 
 
 @pytest.fixture
-def traced(part, tmp_path):
-    """A worker as Mitsuba's presets use it, with the one that needs no Mitsuba; heights (H, W) m of a rest gel."""
+def traced(part):
+    """A worker as Mitsuba's presets use it, with the one that needs no Mitsuba; and what draws a gel's heights."""
     unit = part("tactile_core.sensors.calibration_file").load_calibration()
-    tracer = part("addon.process.tracer").Tracer(unit, "fast")
-    yield tracer, part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
+    nothing = part("tactile_core.pictures.mitsuba.surroundings").NOTHING
+    tracer = part("addon.process.tracer").Tracer("fast")
+
+    def draw(heights, stopped=lambda: False, unit=unit):
+        return tracer.draw(unit, nothing, heights, stopped)
+
+    yield tracer, draw, part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
     tracer.close()
 
 
 def test_a_worker_draws_what_the_library_draws(traced, part):
-    tracer, heights = traced
+    _, draw, heights = traced
     raised = heights.copy()
     raised[150:170, 100:120] += 2e-4
     renderer = part("tactile_core.pictures.renderer").Renderer(preset="fast")
     for height in (heights, raised):
-        np.testing.assert_array_equal(tracer.draw(height, lambda: False), renderer(height))
+        np.testing.assert_array_equal(draw(height), renderer(height))
+
+
+def test_a_worker_takes_another_unit(traced, part):
+    import dataclasses
+
+    _, draw, heights = traced
+    unit = part("tactile_core.sensors.calibration_file").load_calibration()
+    off = dataclasses.replace(unit, leds=(dataclasses.replace(unit.leds[0], radiance=0.0), *unit.leds[1:]))
+    renderer = part("tactile_core.pictures.renderer").Renderer(off, "fast")
+    draw(heights)
+    np.testing.assert_array_equal(draw(heights, unit=off), renderer(heights))
 
 
 def test_esc_stops_a_worker(traced, part):
     with pytest.raises(part("addon.process.tracer").Stopped):
-        traced[0].draw(traced[1], lambda: True)
+        traced[1](traced[2], lambda: True)
 
 
 def test_a_worker_that_aborts_leaves_blender_alive(traced, part):
-    tracer, heights = traced
+    tracer, draw, heights = traced
     tracer._job._process.kill()
     with pytest.raises(part("tactile_core.errors").TactileError, match="ended"):
-        tracer.draw(heights, lambda: False)
-
-
-def test_live_picture_and_render_are_of_the_same_unit(ready, part):
-    ready.frame_set(80)
-    gel = ready.objects["DIGIT gel"]
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    displacement = part("addon.objects.digit_objects").displacement_of(gel, depsgraph)
-    before = part("addon.operators.pictures").fast_picture(ready, displacement)[0].astype(float)
-    ready.tactile_render.lights = (0.2, 1, 1)
-    after = part("addon.operators.pictures").fast_picture(ready, displacement)[0].astype(float)
-    assert np.abs(after - before)[..., 0].max() > 20
+        draw(heights)
 
 
 def test_a_bound_on_pictures_picks_the_preset(ready, part):

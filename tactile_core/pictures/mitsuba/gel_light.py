@@ -15,6 +15,7 @@ from .direct_light import evened, lookup
 from .gel_mesh import MM, GelMesh, check_mesh
 from .gel_scene import change_numbers, gel_shape, kinds, lamps, walls
 from .led_integrator import DIRECTIONS, bounced, direct, register
+from .surroundings import NOTHING, Surroundings
 from .tracer import MOST_MISSED
 from .variant import LLVM, activate
 
@@ -27,25 +28,30 @@ PATHS_A_PASS = 64  # a pixel: a square, as the sampler's strata want it
 class GelLight:
     """Radiance by one preset; scenes are made once, only the gel's vertices change.
 
-    more : emitters and shapes of Mitsuba's beside the unit's own, by name; seed : of the reference's random numbers
+    surroundings : lamps and bodies beside the unit's own; seed : of the reference's random numbers
     """
 
     def __init__(
-        self, unit: Calibration, preset: Preset, rest: np.ndarray, seed: int, more: dict[str, Any] | None = None
+        self,
+        unit: Calibration,
+        preset: Preset,
+        rest: np.ndarray,
+        seed: int,
+        surroundings: Surroundings = NOTHING,
     ) -> None:
         self.unit, self.preset, self._seed = unit, preset, seed
         self._mesh = GelMesh(unit.camera, preset.spacing)
         mi = activate(LLVM)
         register(mi, LLVM)
-        lights = lamps(unit) | (more or {})
+        lights = lamps(unit) | surroundings.emitters()
         # Black: the unit's own light need not meet them.
         around = {
             name: wall | {"to_world": mi.ScalarTransform4f(wall["to_world"])}
-            for name, wall in (walls(unit, self._mesh) if more else {}).items()
+            for name, wall in (walls(unit, self._mesh) if surroundings else {}).items()
         }
         gel = gel_shape(mi, self._mesh, rest, unit, smooth=bool(preset.paths))
         # What stands in the way, without the LEDs: spheres would make each ray a third dearer, and none is ever met.
-        shadowing = {"type": "scene", "gel": gel, **around}
+        shadowing = {"type": "scene", "gel": gel, **around, **surroundings.shapes(mi)}
         self._scene = mi.load_dict(shadowing | lights if preset.paths else shadowing)
         self._lights = mi.load_dict({"type": "scene", **lights})  # kept, as its emitters do not keep it
         self._emitters = self._lights.emitters()

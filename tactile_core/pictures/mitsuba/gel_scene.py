@@ -6,6 +6,7 @@ the camera makes of them is the calibration's response. LEDs and coating lie in 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -61,14 +62,19 @@ def lamps(unit: Calibration) -> dict[str, Any]:
 
 
 def _lamp(led: Led) -> dict[str, Any]:
-    radiance = [0.0, 0.0, 0.0]
-    radiance[led.channel] = led.radiance
-    if led.radius < POINTLIKE * np.linalg.norm(led.position):
-        intensity = [value * np.pi * (led.radius * MM) ** 2 for value in radiance]  # of an evenly bright disc
-        place = to_scene(led.position)
-        return {"type": "point", "position": place, "intensity": {"type": "rgb", "value": intensity}}
+    brightness = [0.0, 0.0, 0.0]
+    brightness[led.channel] = led.radiance * led.radius**2
+    return sphere_lamp(led.position, led.radius, brightness)
+
+
+def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[float]) -> dict[str, Any]:
+    """A lamp as Mitsuba's plugin; place and radius in m, image frame; brightness : (3,) radiance x radius^2."""
+    if radius < POINTLIKE * np.linalg.norm(position):
+        intensity = [value * np.pi * MM**2 for value in brightness]  # of an evenly bright disc
+        return {"type": "point", "position": to_scene(position), "intensity": {"type": "rgb", "value": intensity}}
+    radiance = [value / radius**2 for value in brightness]
     return {
-        "type": "sphere", "center": to_scene(led.position), "radius": led.radius * MM,
+        "type": "sphere", "center": to_scene(position), "radius": radius * MM,
         "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},
         "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}},
     }  # fmt: skip
@@ -133,6 +139,6 @@ def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
     return found
 
 
-def to_scene(place: tuple[float, float, float]) -> list[float]:
+def to_scene(place: Sequence[float]) -> list[float]:
     """A place right, down, toward the camera in m, in the scene's mm."""
     return [place[0] * MM, -place[1] * MM, place[2] * MM]

@@ -12,6 +12,7 @@ from tactile_core.errors import TactileError
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.gel_light import GelLight
 from tactile_core.pictures.mitsuba.scene_file import square_pixels, write_scene
+from tactile_core.pictures.mitsuba.surroundings import NOTHING, Lamp, Occluder, Surroundings
 from tactile_core.pictures.mitsuba.variant import LLVM, activate
 from tactile_core.pictures.presets import QUALITY, REFERENCE, STANDARD
 from tactile_core.sensors.coating import Coating
@@ -25,10 +26,10 @@ def _llvm() -> None:
     works(LLVM)
 
 
-def drawn(unit, preset=STANDARD, more=None) -> np.ndarray:
+def drawn(unit, preset=STANDARD, surroundings=NOTHING) -> np.ndarray:
     """Radiance (2, H, W, 3), levels, at rest and pressed."""
     rest = rest_height_map(unit.camera)
-    light = GelLight(unit, preset, rest, 0, more)
+    light = GelLight(unit, preset, rest, 0, surroundings)
     return np.stack([light.radiance(height) for height in (rest, PRESS.on(unit.camera))])
 
 
@@ -109,13 +110,25 @@ def test_the_gels_index_bends_the_cameras_rays(small):
 
 
 def test_another_lamp_adds_its_light_unless_the_housing_hides_it(small):
-    def lamp(place: list[float]) -> dict:
-        return {"type": "point", "position": place, "intensity": {"type": "rgb", "value": [9e3] * 3}}
+    def lamp(place: list[float]) -> Surroundings:
+        return Surroundings((Lamp(place, 0.0, [9e-3 / np.pi] * 3),))
 
     whole = drawn(small)
-    over, beside = (drawn(small, more={"lamp": lamp(place)}) for place in ([0, 0, 12.0], [60.0, 0, 3.0]))
+    over, beside = (drawn(small, STANDARD, lamp(place)) for place in ([0, 0, 12e-3], [60e-3, 0, 3e-3]))
     assert ((over - whole).min(-1).mean((1, 2)) > 5).all()
     np.testing.assert_allclose(beside, whole, atol=1e-3)
+
+
+def test_a_body_between_an_led_and_the_gel_casts_a_shadow(small):
+    """A square of 8 mm upright between the red LED and the picture, half way."""
+    along = np.array(small.leds[0].position) / 2
+    across = 4e-3 * np.array([-along[1], along[0], 0]) / np.hypot(*along[:2])
+    up = np.array([0, 0, 4e-3])
+    corners = np.array([along + a * across + b * up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    body = Surroundings(occluders=(Occluder(corners, np.array([[0, 1, 2], [0, 2, 3]])),))
+    darker = (drawn(small) - drawn(small, STANDARD, body))[0]
+    assert darker[..., 0].max() > 20
+    assert np.abs(darker[..., 1]).mean() < 0.2 * darker[..., 0].mean()
 
 
 def test_a_picture_at_rest_has_no_pattern(small):

@@ -1,0 +1,99 @@
+"""Materials of a DIGIT's body for Cycles and EEVEE; the coating's numbers are those that the picture is made with."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...tactile_core.sensors.coating import DIFFUSE, Coating
+
+ALBEDO, ROUGHNESS, GLOSS = "Albedo", "Roughness", "Gloss"
+_PLACES = {ALBEDO: (-300, 200), ROUGHNESS: (-300, 0), GLOSS: (-300, -150)}
+
+
+def is_coating(material: bpy.types.Material) -> bool:
+    """Return true for a material that holds a coating's numbers."""
+    return material.node_tree is not None and ALBEDO in material.node_tree.nodes
+
+
+def new_coating(coating: Coating) -> bpy.types.Material:
+    """The paint on the gel: albedo, roughness and gloss are nodes, which can be keyed and driven."""
+    material, shader = _new("DIGIT coating", (0.75, 0.75, 0.78, 1.0))
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    for name, kind, socket in ((ALBEDO, "ShaderNodeRGB", "Base Color"), (ROUGHNESS, "ShaderNodeValue", "Roughness"),
+                               (GLOSS, "ShaderNodeValue", "Specular IOR Level")):  # fmt: skip
+        node = nodes.new(kind)
+        node.name = node.label = name
+        node.location = _PLACES[name]
+        links.new(node.outputs[0], shader.inputs[socket])
+    set_coating(material, coating)
+    return material
+
+
+def set_coating(material: bpy.types.Material, coating: Coating) -> None:
+    """Write a coating's numbers; a matte one has no gloss."""
+    if material.node_tree.animation_data:
+        material.node_tree.animation_data_clear()
+    sockets = sockets_of(material)
+    sockets[ALBEDO].default_value = (*coating.albedo, 1.0)
+    sockets[ROUGHNESS].default_value = coating.roughness
+    sockets[GLOSS].default_value = 0.0 if coating.bsdf == DIFFUSE else coating.gloss
+
+
+def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
+    """The coating's numbers as sockets, by name; one whose node was deleted is left out."""
+    nodes = material.node_tree.nodes
+    return {name: nodes[name].outputs[0] for name in _PLACES if name in nodes}
+
+
+def glow() -> bpy.types.Material:
+    """An LED package that shines in its object's colour."""
+    found = bpy.data.materials.get("DIGIT LED")
+    if found is not None:
+        return found
+    material, shader = _new("DIGIT LED", (1, 1, 1, 1))
+    colour = material.node_tree.nodes.new("ShaderNodeObjectInfo")
+    material.node_tree.links.new(colour.outputs["Color"], shader.inputs["Emission Color"])
+    shader.inputs["Base Color"].default_value = (0, 0, 0, 1)
+    shader.inputs["Emission Strength"].default_value = 20.0  # shows as lit; the lamp is what lights the gel
+    return material
+
+
+def acrylic() -> bpy.types.Material:
+    """Clear acrylic that lets the LEDs' light through: transparent, with what glass reflects."""
+    found = bpy.data.materials.get("DIGIT acrylic")
+    if found is not None:
+        return found
+    material, shader = _new("DIGIT acrylic", (0.7, 0.8, 0.85, 0.25))
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    clear, gloss, mix = (nodes.new(f"ShaderNode{kind}") for kind in ("BsdfTransparent", "BsdfGlossy", "MixShader"))
+    fresnel = nodes.new("ShaderNodeFresnel")
+    fresnel.inputs["IOR"].default_value = 1.49  # of acrylic
+    clear.inputs["Color"].default_value = (0.93, 0.97, 0.97, 1)
+    gloss.inputs["Roughness"].default_value = 0.05
+    output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
+    nodes.remove(shader)
+    links.new(fresnel.outputs[0], mix.inputs[0])
+    links.new(clear.outputs[0], mix.inputs[1]), links.new(gloss.outputs[0], mix.inputs[2])
+    links.new(mix.outputs[0], output.inputs["Surface"])
+    if hasattr(material, "surface_render_method"):
+        material.surface_render_method = "BLENDED"
+    return material
+
+
+def housing() -> bpy.types.Material:
+    """Black plastic."""
+    found = bpy.data.materials.get("DIGIT housing")
+    if found is not None:
+        return found
+    material, shader = _new("DIGIT housing", (0.03, 0.03, 0.035, 1.0))
+    shader.inputs["Base Color"].default_value = (0.015, 0.015, 0.017, 1)
+    shader.inputs["Roughness"].default_value = 0.45
+    return material
+
+
+def _new(name: str, shown: tuple[float, ...]) -> tuple[bpy.types.Material, bpy.types.Node]:
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    material.diffuse_color = shown  # in the Solid view
+    return material, next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")

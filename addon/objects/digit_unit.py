@@ -1,0 +1,173 @@
+"""The unit that a scene shows: the calibration with LEDs, coating and camera as their objects are now."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import bpy
+import numpy as np
+
+from ...tactile_core.errors import TactileError
+from ...tactile_core.pictures.mitsuba.surroundings import Lamp, Occluder, Surroundings
+from ...tactile_core.sensors.calibration import Calibration
+from ...tactile_core.sensors.camera import Camera
+from ...tactile_core.sensors.coating import DIFFUSE, ROUGH_PLASTIC, Coating
+from . import digit_body, digit_materials, image_frame
+
+_ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
+_STEP = 1e-7  # m: no movement that anybody meant
+_STRAIGHT = 1e-3  # of a turned camera's axes
+_OFF_BAND = 1e-6  # brightness, levels m^2: a hundred-thousandth of an LED's
+
+
+@dataclasses.dataclass(frozen=True)
+class ShownUnit:
+    """unit : the calibration as the scene shows it; around : lamps and bodies that are not the unit's own."""
+
+    unit: Calibration
+    around: Surroundings
+
+
+def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Calibration) -> ShownUnit:
+    """Read the objects; parts that a scene has none of are the calibration's. Raises TactileError."""
+    if not digit_body.leds_of(gel):
+        return ShownUnit(unit, Surroundings())
+    camera = _camera(gel, depsgraph, unit.camera)
+    leds, others = _leds(gel, depsgraph, unit, camera)
+    coating = _coating(gel, depsgraph, unit.coating)
+    lamps = (*others, *_lamps(gel, depsgraph, camera))
+    around = Surroundings(lamps, tuple(_occluders(gel, depsgraph, camera, unit)))
+    changed = (leds, coating, camera) != (unit.leds, unit.coating, unit.camera) or around
+    # A photograph shows the unit's own parts: with others the picture at rest is the model's.
+    photograph = "" if changed else unit.photograph
+    shown = dataclasses.replace(unit, leds=leds, coating=coating, camera=camera, photograph=photograph)
+    return ShownUnit(shown, around)
+
+
+def _places(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: np.ndarray, camera: Camera) -> np.ndarray:
+    """World points (n, 3) in the image frame, m."""
+    inverse = np.array(gel.evaluated_get(depsgraph).matrix_world.inverted())
+    own = np.asarray(points, float) @ inverse[:3, :3].T + inverse[:3, 3]
+    return image_frame.from_gel(own, camera, gel.tactile.per_metre)
+
+
+def _leds(gel, depsgraph, unit: Calibration, camera: Camera):  # noqa: ANN001, ANN202
+    """The unit's LEDs; and, as lamps, what they shine in other bands than their own."""
+    found, others = [], []
+    things = digit_body.leds_of(gel)
+    for k, led in enumerate(unit.leds):
+        thing = things.get(led.colour)
+        if thing is None or thing.hide_render:  # deleted, or switched off
+            found.append(dataclasses.replace(led, radiance=0.0))
+            continue
+        lamp = _lamp(thing, gel, depsgraph, camera)
+        if not lamp.position[2] > lamp.radius:
+            raise TactileError(
+                thing.name, f"{1e3 * (lamp.position[2] - lamp.radius):.1f} mm above the gel's lowest point",
+                "an LED inside the sensor, below the gel's surface", "Move it back, or Reset to Calibration",
+            )  # fmt: skip
+        new = dataclasses.replace(
+            led, position=lamp.position, radius=max(lamp.radius, 1e-6),
+            radiance=lamp.brightness[k] / max(lamp.radius, 1e-6) ** 2,
+        )  # fmt: skip
+        found.append(led if _same(new, led) else new)
+        rest = tuple(0.0 if j == k else value for j, value in enumerate(lamp.brightness))
+        if max(rest) > _OFF_BAND:
+            others.append(dataclasses.replace(lamp, brightness=rest))
+    return tuple(found), others
+
+
+def _same(new, old) -> bool:  # noqa: ANN001
+    numbers = [np.hstack([value for value in dataclasses.astuple(each) if not isinstance(value, str)])
+               for each in (new, old)]  # fmt: skip
+    return bool(np.allclose(*numbers, rtol=_ROUNDING, atol=_STEP))
+
+
+def _lamp(thing: bpy.types.Object, gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera) -> Lamp:
+    now = thing.evaluated_get(depsgraph)
+    place = _places(gel, depsgraph, [now.matrix_world.translation[:]], camera)[0]
+    per_metre = gel.tactile.per_metre
+    brightness = max(now.data.energy, 0.0) / digit_body.watts_per_brightness(per_metre)
+    colour = np.array(now.data.color[:3])
+    return Lamp(tuple(place.tolist()), now.data.shadow_soft_size / per_metre, tuple((brightness * colour).tolist()))
+
+
+def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera) -> list[Lamp]:
+    """Point lamps of the scene that are no LED."""
+    things = [t for t in depsgraph.scene.objects if t.type == "LIGHT" and t.tactile.role != "LED" and not t.hide_render]
+    return [_lamp(t, gel, depsgraph, camera) for t in things if t.data.type == "POINT" and t.data.energy > 0]
+
+
+def left_out(scene: bpy.types.Scene) -> list[str]:
+    """Names of lamps that do not reach the picture: suns, spots and areas."""
+    return [t.name for t in scene.objects if t.type == "LIGHT" and t.data.type != "POINT" and not t.hide_render]
+
+
+def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN001, ANN202
+    """Meshes of the user's own that reach into the housing, on the camera's side of the gel."""
+    reach = max(float(np.abs(np.array(led.position[:2])).max()) + led.radius for led in unit.leds)
+    for thing in depsgraph.scene.objects:
+        if thing.type != "MESH" or thing.tactile.role != "NONE" or thing.hide_render:
+            continue
+        now = thing.evaluated_get(depsgraph)
+        mesh = now.data
+        mesh.calc_loop_triangles()
+        nodes, faces = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
+        mesh.vertices.foreach_get("co", nodes)
+        mesh.loop_triangles.foreach_get("vertices", faces)
+        if not len(faces):
+            continue
+        world = np.array(now.matrix_world)
+        places = _places(gel, depsgraph, nodes.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3], camera)
+        inside = (np.abs(places[:, :2]) < reach).all(1) & (places[:, 2] > 0)
+        if inside.any() and not (places[:, 2] > camera.apparent_height).all():
+            yield Occluder(places, faces.reshape(-1, 3))
+
+
+def _coating(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, coating: Coating) -> Coating:
+    material = digit_body.coating_of(gel)
+    if material is None:
+        return coating
+    sockets = digit_materials.sockets_of(material.evaluated_get(depsgraph))
+    albedo, roughness, gloss = coating.albedo, coating.roughness, coating.gloss
+    if digit_materials.ALBEDO in sockets:
+        albedo = tuple(float(min(max(value, 0.0), 1.0)) for value in sockets[digit_materials.ALBEDO].default_value[:3])
+    if digit_materials.ROUGHNESS in sockets:
+        roughness = float(min(max(sockets[digit_materials.ROUGHNESS].default_value, 0.02), 1.0))
+    matte = coating.bsdf == DIFFUSE
+    shown_gloss = 0.0 if matte else gloss
+    if digit_materials.GLOSS in sockets:
+        shown_gloss = float(min(max(sockets[digit_materials.GLOSS].default_value, 0.0), 1.0))
+    kind = ROUGH_PLASTIC if matte and shown_gloss > 0 else coating.bsdf
+    gloss = gloss if matte and not shown_gloss else shown_gloss
+    new = Coating(kind, albedo, roughness, gloss, coating.metallic)
+    return coating if kind == coating.bsdf and _same(new, coating) else new
+
+
+def _camera(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera) -> Camera:
+    """The calibration's camera, moved and zoomed as its object is; its pixels' aspect stays."""
+    thing = digit_body.camera_of(gel)
+    if thing is None:
+        return camera
+    now = thing.evaluated_get(depsgraph)
+    relative = gel.evaluated_get(depsgraph).matrix_world.inverted() @ now.matrix_world
+    axes = np.array(relative.to_3x3().normalized())
+    forward, right = -axes[:, 2], axes[:, 0]
+    if forward[2] < 1 - _STRAIGHT or abs(abs(right[1]) - 1) > _STRAIGHT:
+        found = f"{math.degrees(math.acos(max(-1.0, min(1.0, forward[2])))):.1f} degrees off the gel's normal"
+        advice = "Clear its rotation, or Reset to Calibration"
+        raise TactileError(thing.name, found, "a camera that looks straight at the gel, turned by 0 or 180", advice)
+    sign = 1 if right[1] * camera.right_z > 0 else -1
+    right_z, down_x = camera.right_z * sign, camera.down_x * sign
+    place = image_frame.from_gel(np.array(relative.translation), camera, gel.tactile.per_metre)
+    view = math.tan(now.data.angle_y / 2) * place[2] if now.data.sensor_fit == "VERTICAL" else None
+    size = 2 * view if view is not None else camera.height * camera.pixel_size[1]
+    scale = camera.height * camera.pixel_size[1] / size
+    new = dataclasses.replace(
+        camera, apparent_height=float(place[2]), right_z=right_z, down_x=down_x,
+        centre_x=camera.centre_x + camera.down_x * float(place[1]),
+        centre_z=camera.centre_z + camera.right_z * float(place[0]),
+        px_per_mm_x=camera.px_per_mm_x * scale, px_per_mm_y=camera.px_per_mm_y * scale,
+    )  # fmt: skip
+    return camera if (right_z, down_x) == (camera.right_z, camera.down_x) and _same(new, camera) else new

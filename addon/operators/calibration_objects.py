@@ -1,0 +1,61 @@
+"""Reset to Calibration and Save as Calibration: LEDs, coating and camera from a unit's file, and to one."""
+
+import dataclasses
+
+import bpy
+from bpy_extras.io_utils import ExportHelper
+
+from ...tactile_core.sensors import calibration_file
+from ..objects import digit_body, digit_unit
+from ..ui import properties, render_settings
+from ..ui.reports import TactileOperator
+
+
+class _OnGel:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return true where there is a gel."""
+        if properties.of_role(context.scene, "DIGIT", context.object) is None:
+            cls.poll_message_set("Translate a recording first, or add a DIGIT")
+            return False
+        return True
+
+
+class TACTILE_OT_reset_to_calibration(_OnGel, TactileOperator):
+    """Put LEDs, coating and camera back to the calibration; their keyframes and drivers are removed"""
+
+    bl_idname = "tactile.reset_to_calibration"
+    bl_label = "Reset to Calibration"
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        gel = properties.of_role(context.scene, "DIGIT", context.object)
+        digit_body.reset(gel, render_settings.calibration_of(context.scene))
+
+
+class TACTILE_OT_save_as_calibration(_OnGel, TactileOperator, ExportHelper):
+    """Write LEDs, coating and camera as they are on this frame as a calibration file, for every `tactile` command"""
+
+    bl_idname = "tactile.save_as_calibration"
+    bl_label = "Save as Calibration"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (changes no scene)
+
+    filename_ext = ".toml"
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        gel = properties.of_role(context.scene, "DIGIT", context.object)
+        base = render_settings.calibration_of(context.scene)
+        shown = digit_unit.shown_unit(gel, context.evaluated_depsgraph_get(), base)
+        path = bpy.path.abspath(self.filepath)
+        unit = dataclasses.replace(shown.unit, unit=f"{base.unit}, changed in Blender") if shown.unit != base else base
+        calibration_file.write_calibration(path, unit)
+        if shown.around:
+            self.report({"WARNING"}, "A calibration holds three LEDs of one colour each: lamps, bodies and other"
+                        " colours in this scene are not in it")  # fmt: skip
+        self.report({"INFO"}, f"{path}: {unit.unit}")
+
+
+CLASSES = (TACTILE_OT_reset_to_calibration, TACTILE_OT_save_as_calibration)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

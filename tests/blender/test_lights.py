@@ -1,0 +1,155 @@
+"""LEDs, coating and camera as objects: what is seen is what the picture is made with."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+
+TRACED = importlib.util.find_spec("mitsuba") is not None
+
+
+@pytest.fixture
+def gel(scene):
+    """A resting DIGIT."""
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    bpy.ops.tactile.set_up_render()
+    return bpy.context.scene.objects["DIGIT gel"]
+
+
+@pytest.fixture
+def drawn(part, gel):
+    """``drawn()``: the picture as the scene is now, float."""
+
+    def draw(preset="fast"):
+        bpy.context.view_layer.update()
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        return part("addon.operators.pictures").draw(gel, depsgraph, preset)[0].astype(float)
+
+    return draw
+
+
+@pytest.fixture
+def shown(part, gel):
+    """``shown()``: the unit and surroundings that the scene shows."""
+
+    def read():
+        bpy.context.view_layer.update()
+        unit = part("addon.ui.render_settings").calibration_of(bpy.context.scene)
+        return part("addon.objects.digit_unit").shown_unit(gel, bpy.context.evaluated_depsgraph_get(), unit)
+
+    return read
+
+
+def lamp(colour):
+    return bpy.data.objects[f"LED {colour}"]
+
+
+def test_a_new_digit_is_the_calibration_to_the_last_digit(shown, part, gel):
+    unit = part("tactile_core.sensors.calibration_file").load_calibration()
+    gel.location, gel.rotation_euler, gel.scale = (30, -20, 5), (0.3, 0.2, 1.0), (2, 2, 2)
+    assert shown().unit == unit and not shown().around
+
+
+@pytest.mark.parametrize("colour", ["red", "green", "blue"])
+def test_dimming_an_led_darkens_its_own_colour(drawn, colour):
+    before = drawn()
+    lamp(colour).data.energy *= 0.3
+    change = (before - drawn()).mean((0, 1))
+    own = ["red", "green", "blue"].index(colour)
+    assert change[own] > 15 and change[own] == change.max()
+
+
+def test_moving_an_led_moves_its_light(drawn):
+    before = drawn()
+    lamp("red").location.z -= 6  # mm: nearer the camera
+    assert np.abs(before - drawn()).max() > 10
+
+
+def test_keys_and_drivers_count(shown):
+    data = lamp("blue").data
+    data.keyframe_insert("energy", frame=1)
+    data.energy = 0
+    data.keyframe_insert("energy", frame=11)
+    bpy.context.scene.frame_set(11)
+    assert shown().unit.leds[2].radiance == 0
+    bpy.context.scene.frame_set(6)
+    assert shown().unit.leds[2].radiance > 1000
+
+
+def test_the_coating_counts(shown, part, gel, drawn):
+    sockets = part("addon.objects.digit_materials").sockets_of(part("addon.objects.digit_body").coating_of(gel))
+    before = drawn()
+    sockets["Albedo"].default_value = (0.25, 0.25, 0.25, 1)
+    assert drawn().mean() < 0.6 * before.mean()
+    sockets["Gloss"].default_value = 0.4
+    assert shown().unit.coating.bsdf == "roughplastic" and shown().unit.coating.gloss == pytest.approx(0.4)
+
+
+def test_moving_the_camera_moves_the_view(shown, gel):
+    before = shown().unit.camera
+    camera = bpy.context.scene.camera
+    camera.location.x += 2
+    assert shown().unit.camera.centre_x == pytest.approx(before.centre_x + 2e-3, abs=1e-8)
+    camera.data.angle *= 0.5
+    assert shown().unit.camera.px_per_mm_x > 1.9 * before.px_per_mm_x
+
+
+def test_a_tilted_camera_is_refused_in_degrees(shown, part):
+    bpy.context.scene.camera.rotation_euler.x += 0.2
+    with pytest.raises(part("tactile_core.errors").TactileError, match=r"DIGIT camera.*11\.5 degrees"):
+        shown()
+
+
+def test_a_deleted_led_is_off_and_a_renamed_one_is_not(shown):
+    lamp("green").name = "my lamp"
+    bpy.data.objects.remove(lamp("red"))
+    leds = shown().unit.leds
+    assert leds[0].radiance == 0 and leds[1].radiance > 0
+
+
+def test_other_colours_lamps_and_bodies_surround_the_unit(shown, gel):
+    lamp("red").data.color = (1, 0.5, 0)
+    more = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))
+    bpy.context.collection.objects.link(more)
+    more.parent, more.location = gel, (-8, 0, -5)
+    bpy.ops.mesh.primitive_cube_add(size=2, location=gel.matrix_world @ Vector((-3, 0, 2)))
+    around = shown().around
+    assert len(around.lamps) == 2 and around.lamps[0].brightness[1] > 0
+    assert len(around.occluders) == 1 and len(around.occluders[0].faces) == 12
+
+
+def test_reset_and_save(shown, part, gel, tmp_path):
+    lamp("red").data.energy *= 0.5
+    bpy.context.scene.camera.location.x += 1
+    path = tmp_path / "unit.toml"
+    assert bpy.ops.tactile.save_as_calibration(filepath=str(path)) == {"FINISHED"}
+    load = part("tactile_core.sensors.calibration_file").load_calibration
+    saved = load(path)
+    assert saved.leds[0].radiance == pytest.approx(load().leds[0].radiance / 2, rel=1e-4)
+    assert bpy.ops.tactile.reset_to_calibration() == {"FINISHED"}
+    assert shown().unit == load()
+    bpy.context.scene.tactile_render.calibration = str(path)
+    assert shown().unit.leds == saved.leds
+
+
+@pytest.mark.skipif(not TRACED, reason="mitsuba is missing")
+def test_mitsuba_sees_a_lamp_and_a_body(drawn, gel):
+    more = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))
+    bpy.context.collection.objects.link(more)
+    more.parent, more.location, more.data.energy = gel, (-8, 0, -8), 5000
+    try:
+        lit = drawn("standard")
+    except Exception as error:
+        if "LLVM" not in str(error):
+            raise
+        pytest.skip("no LLVM, by which Mitsuba draws what is not the unit's own")
+    more.hide_render = True
+    before = drawn("standard")
+    assert (lit - before).min(-1).mean() > 5
+    half_way = (lamp("red").location + Vector((-7.5, 0, 8.3))) / 2
+    bpy.ops.mesh.primitive_cube_add(size=5, location=gel.matrix_world @ half_way)
+    assert (before - drawn("standard"))[..., 0].max() > 20
