@@ -7,7 +7,9 @@ import itertools
 
 import numpy as np
 
+from ...files.compiled import available
 from ..cubic_spline import bspline_slopes, bspline_weights
+from .spline_loops import spline_sums
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,6 +64,9 @@ class SplineGrid:
         cell = np.minimum(place.astype(np.intp), shape - 3)
         along = (place - cell).ravel()
         weights = np.stack([bspline_weights(along), bspline_slopes(along), _bends(along)][:orders])  # (orders, 4, 3 n)
+        if available():
+            by_point = np.ascontiguousarray(weights.reshape(orders, 4, -1, 3).transpose(2, 3, 0, 1))
+            return spline_sums(self.coefficients, place, cell, by_point, orders)
         x, y, z = weights.reshape(orders, 4, -1, 3).transpose(3, 2, 1, 0)  # three times (n, 4, orders)
         steps = np.array([shape[1] * shape[2], shape[2], 1])
         k = np.arange(-1, 3)

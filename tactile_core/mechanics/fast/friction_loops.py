@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...files.compiled import Loop
+from .mirror_symmetry import axes_of
 
 
 @Loop
@@ -67,7 +68,6 @@ def linearise(moved, place, off, gap, normal, moves, slip, gap_then):  # noqa: A
         gap_then[a] = gap[a] + onto
 
 
-@Loop
 def assemble(  # noqa: ANN201
     matrix, k, stuck, core_at, slipping, normal, lean, force, slip, gap, core_gap, moves, curved, bend, direction,  # noqa: ANN001
     friction, ridge, least,  # noqa: ANN001
@@ -76,29 +76,37 @@ def assemble(  # noqa: ANN201
 
     stuck, slipping : nodes (t,), (s,) that stick and slip; core_at : (d,) points that press
     curved : (q,), which of the slipping nodes' normals turn; bend : (q, 3, 3) 1/m
+    Returns system (j, j) float32, right (j, 2), carry (j,), across (s, 3) and pressing (s,) of the slipping nodes.
     """
-    t, d, s, q = len(stuck), len(core_at), len(slipping), len(curved)
-    n = 3 * t + d
-    total, rows = n + 2 * s + 3 * q, n + 3 * s
-    index = np.empty(rows, np.int64)
-    for a in range(t):
-        for i in range(3):
-            index[3 * a + i] = 3 * stuck[a] + i
-    for p in range(d):
-        index[3 * t + p] = 3 * k + core_at[p]
-    for a in range(s):
-        for i in range(3):
-            index[n + 3 * a + i] = 3 * slipping[a] + i
-    across, pressing = np.empty((s, 3)), np.empty(s)
-    turning = np.empty((q, 3, 3))
-    for a in range(s):
+    s, q = len(slipping), len(curved)
+    n = 3 * len(stuck) + len(core_at)
+    base, total = n + 3 * s, n + 2 * s + 3 * q
+    index = np.concatenate([axes_of(stuck), 3 * k + core_at, axes_of(slipping)])
+    across, pressing, turning = np.empty((s, 3)), np.empty(s), np.empty((q, 3, 3))
+    columns, system = np.empty((base, total), np.float32), np.empty((total, total), np.float32)
+    right, carry = np.zeros((total, 2)), np.zeros(total)
+    _slipping_frames(slipping, normal, lean, force, curved, bend, friction, across, pressing, turning)
+    _fill_columns(matrix, index, n, slipping, normal, lean, across, curved, turning, friction, ridge, columns)
+    _fill_rows(columns, n, slipping, normal, across, curved, system)
+    _fill_right(
+        stuck, core_at, slipping, normal, lean, across, pressing, slip, gap, core_gap, moves, curved, turning,
+        direction, friction, least, system, right, carry,
+    )  # fmt: skip
+    return system, right, carry, across, pressing
+
+
+@Loop
+def _slipping_frames(slipping, normal, lean, force, curved, bend, friction, across, pressing, turning):  # noqa: ANN001, ANN202
+    """Directions across friction, normal forces, and the turn of curved nodes' forces; see ``stick_slip.Slipping``."""
+    for a in range(len(slipping)):
         node = slipping[a]
-        u, v = normal[node], lean[node]
-        across[a, 0] = u[1] * v[2] - u[2] * v[1]
-        across[a, 1] = u[2] * v[0] - u[0] * v[2]
-        across[a, 2] = u[0] * v[1] - u[1] * v[0]
-        pressing[a] = force[node, 0] * u[0] + force[node, 1] * u[1] + force[node, 2] * u[2]
-    for p in range(q):
+        across[a, 0] = normal[node, 1] * lean[node, 2] - normal[node, 2] * lean[node, 1]
+        across[a, 1] = normal[node, 2] * lean[node, 0] - normal[node, 0] * lean[node, 2]
+        across[a, 2] = normal[node, 0] * lean[node, 1] - normal[node, 1] * lean[node, 0]
+        pressing[a] = 0.0
+        for i in range(3):
+            pressing[a] += force[node, i] * normal[node, i]
+    for p in range(len(curved)):
         node = slipping[curved[p]]
         for j in range(3):
             onto = 0.0
@@ -106,61 +114,74 @@ def assemble(  # noqa: ANN201
                 onto += lean[node, i] * bend[p, i, j]
             for i in range(3):
                 turning[p, i, j] = pressing[curved[p]] * (bend[p, i, j] - friction * normal[node, i] * onto)
-    columns = np.empty((rows, total), np.float32)  # all base rows, the columns of the unknowns
-    for r in range(rows):
-        line, out = matrix[index[r]], columns[r]
+
+
+@Loop
+def _fill_columns(matrix, index, n, slipping, normal, lean, across, curved, turning, friction, ridge, columns):  # noqa: ANN001, ANN202
+    """Rows ``index`` (m,) of the matrix in the unknowns' columns, (m, total)."""
+    s = len(slipping)
+    line = np.empty(matrix.shape[1], np.float32)
+    for r in range(len(index)):
+        for j in range(len(line)):
+            line[j] = matrix[index[r], j]
+        line[index[r]] *= np.float32(1 + ridge)
         for b in range(n):
-            out[b] = line[index[b]]
-        if r < n:
-            out[r] *= 1 + ridge
+            columns[r, b] = line[index[b]]
         for a in range(s):
-            node = slipping[a]
-            x, y, z = line[3 * node], line[3 * node + 1], line[3 * node + 2]
-            own = r - n - 3 * a
-            if own == 0:
-                x *= 1 + ridge
-            elif own == 1:
-                y *= 1 + ridge
-            elif own == 2:
-                z *= 1 + ridge
-            out[n + a] = (
-                x * (normal[node, 0] + friction * lean[node, 0])
-                + y * (normal[node, 1] + friction * lean[node, 1])
-                + z * (normal[node, 2] + friction * lean[node, 2])
-            )
-            out[n + s + a] = x * across[a, 0] + y * across[a, 1] + z * across[a, 2]
-        for p in range(q):
-            node = slipping[curved[p]]
-            x, y, z = line[3 * node], line[3 * node + 1], line[3 * node + 2]
-            own = r - n - 3 * curved[p]
-            if own == 0:
-                x *= 1 + ridge
-            elif own == 1:
-                y *= 1 + ridge
-            elif own == 2:
-                z *= 1 + ridge
+            pushed, turned = 0.0, 0.0
+            for i in range(3):
+                entry = line[3 * slipping[a] + i]
+                pushed += entry * (normal[slipping[a], i] + friction * lean[slipping[a], i])
+                turned += entry * across[a, i]
+            columns[r, n + a] = pushed
+            columns[r, n + s + a] = turned
+        for p in range(len(curved)):
             for j in range(3):
-                out[n + 2 * s + 3 * p + j] = x * turning[p, 0, j] + y * turning[p, 1, j] + z * turning[p, 2, j]
-    system, right, carry = np.empty((total, total), np.float32), np.zeros((total, 2)), np.zeros(total)
-    system[:n] = columns[:n]
-    for a in range(t):
-        node = stuck[a]
+                felt = 0.0
+                for i in range(3):
+                    felt += line[3 * slipping[curved[p]] + i] * turning[p, i, j]
+                columns[r, n + 2 * s + 3 * p + j] = felt
+
+
+@Loop
+def _fill_rows(columns, n, slipping, normal, across, curved, system):  # noqa: ANN001, ANN202
+    """The system's rows (total, total): those of slipping nodes along their normals and across, and of curved ones."""
+    s, total = len(slipping), system.shape[1]
+    for r in range(n):
+        for b in range(total):
+            system[r, b] = columns[r, b]
+    for a in range(s):
+        node = slipping[a]
+        for b in range(total):
+            x, y, z = columns[n + 3 * a, b], columns[n + 3 * a + 1, b], columns[n + 3 * a + 2, b]
+            system[n + a, b] = x * normal[node, 0] + y * normal[node, 1] + z * normal[node, 2]
+            system[n + s + a, b] = x * across[a, 0] + y * across[a, 1] + z * across[a, 2]
+    for p in range(len(curved)):
         for i in range(3):
-            right[3 * a + i, 0] = -(slip[node, i] + gap[node] * normal[node, i])
-            right[3 * a + i, 1] = carry[3 * a + i] = direction[i]
+            at = n + 2 * s + 3 * p + i
+            for b in range(total):
+                system[at, b] = -columns[n + 3 * curved[p] + i, b]
+            system[at, at] += np.float32(1)
+
+
+@Loop
+def _fill_right(  # noqa: ANN202
+    stuck, core_at, slipping, normal, lean, across, pressing, slip, gap, core_gap, moves, curved, turning, direction,  # noqa: ANN001
+    friction, least, system, right, carry,  # noqa: ANN001
+):  # fmt: skip
+    """Right sides (total, 2), what carries force along the motion (total,), and friction's stiffness in the system."""
+    t, d, s = len(stuck), len(core_at), len(slipping)
+    n = 3 * t + d
+    for a in range(t):
+        for i in range(3):
+            right[3 * a + i, 0] = -(slip[stuck[a], i] + gap[stuck[a]] * normal[stuck[a], i])
+            right[3 * a + i, 1] = direction[i]
+            carry[3 * a + i] = direction[i]
     for p in range(d):
         right[3 * t + p, 0] = -core_gap[core_at[p]]
     for a in range(s):
-        node = slipping[a]
-        against = 0.0
-        for b in range(total):
-            system[n + a, b], system[n + s + a, b] = 0.0, 0.0
+        node, against = slipping[a], 0.0
         for i in range(3):
-            line = columns[n + 3 * a + i]
-            u, w = np.float32(normal[node, i]), np.float32(across[a, i])
-            for b in range(total):
-                system[n + a, b] += u * line[b]
-                system[n + s + a, b] += w * line[b]
             away = slip[node, i] + gap[node] * normal[node, i]
             right[n + a, 0] -= normal[node, i] * away
             right[n + s + a, 0] -= across[a, i] * away
@@ -169,18 +190,14 @@ def assemble(  # noqa: ANN201
             carry[n + a] += direction[i] * (normal[node, i] + friction * lean[node, i])
             carry[n + s + a] += direction[i] * across[a, i]
             against -= slip[node, i] * lean[node, i]
-        system[n + s + a, n + s + a] += max(against, 0.0) / (friction * max(pressing[a], least))
-    for p in range(q):
+        system[n + s + a, n + s + a] += np.float32(max(against, 0.0) / (friction * max(pressing[a], least)))
+    for p in range(len(curved)):
         for i in range(3):
-            line, at = columns[n + 3 * curved[p] + i], n + 2 * s + 3 * p + i
-            for b in range(total):
-                system[at, b] = -line[b]
-            system[at, at] += 1
+            at = n + 2 * s + 3 * p + i
             right[at, 0] = moves[slipping[curved[p]], i]
             right[at, 1] = -direction[i]
             for j in range(3):
                 carry[at] += direction[j] * turning[p, j, i]
-    return system, right, carry, across, pressing
 
 
 @Loop
@@ -197,41 +214,36 @@ def advance(  # noqa: ANN201
             new[stuck[a], i] += answer[3 * a + i, 0] + step * answer[3 * a + i, 1]
     for p in range(d):
         new_core[core_at[p]] += answer[3 * t + p, 0] + step * answer[3 * t + p, 1]
-    place = 0
+    place, u, v, tilt = 0, np.empty(3), np.empty(3), np.empty(3)
     for a in range(s):
         node = slipping[a]
-        limit = friction * max(pressing[a], least)
-        turn = (answer[n + s + a, 0] + step * answer[n + s + a, 1]) / limit
+        turn = (answer[n + s + a, 0] + step * answer[n + s + a, 1]) / (friction * max(pressing[a], least))
         turn = min(max(turn, -largest_turn), largest_turn)
-        u, v = normal[node].copy(), np.empty(3)
         for i in range(3):
+            u[i] = normal[node, i]
             v[i] = np.cos(turn) * lean[node, i] + np.sin(turn) * across[a, i]
-        if len(curved):
-            if place < len(curved) and curved[place] == a:
-                tilt, at = np.zeros(3), n + 2 * s + 3 * place
-                for i in range(3):
-                    for j in range(3):
-                        tilt[i] += bend[place, i, j] * (answer[at + j, 0] + step * answer[at + j, 1])
-                size = np.sqrt(tilt[0] ** 2 + tilt[1] ** 2 + tilt[2] ** 2)
-                share = min(1.0, largest_tilt / max(size, 1e-12))
-                for i in range(3):
-                    u[i] += tilt[i] * share
-                place += 1
-            size = np.sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2)
-            onto = 0.0
+        if place < len(curved) and curved[place] == a:
+            at, size = n + 2 * s + 3 * place, 0.0
             for i in range(3):
-                u[i] /= size
-                onto += v[i] * u[i]
-            size = 0.0
+                tilt[i] = 0.0
+                for j in range(3):
+                    tilt[i] += bend[place, i, j] * (answer[at + j, 0] + step * answer[at + j, 1])
+                size += tilt[i] ** 2
+            share, size = min(1.0, largest_tilt / max(np.sqrt(size), 1e-12)), 0.0
             for i in range(3):
-                v[i] -= onto * u[i]
-                size += v[i] ** 2
-            size = np.sqrt(size)
+                u[i] += share * tilt[i]
+                size += u[i] ** 2
             for i in range(3):
-                v[i] /= size
+                u[i] /= np.sqrt(size)
+            place += 1
+        onto = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+        size = 0.0
+        for i in range(3):
+            v[i] -= onto * u[i]
+            size += v[i] ** 2
         total = pressing[a] + answer[n + a, 0] + step * answer[n + a, 1]
         for i in range(3):
-            new[node, i] = total * (u[i] + friction * v[i])
+            new[node, i] = total * (u[i] + friction * v[i] / np.sqrt(size))
     return new, new_core
 
 
