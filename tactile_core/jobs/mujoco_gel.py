@@ -1,0 +1,191 @@
+"""A fingertip in MuJoCo: contacts of ``mujoco.MjData`` with a gel's geom become contacts of a ``Gel``."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import TactileError
+from ..geometry.indenters import Box, Cylinder, Indenter, LyingCylinder, MeshIndenter, Sphere
+from ..mechanics.placement import FRICTION
+from ..pictures.presets import FAST
+from .gel import Gel, GelContact
+
+if TYPE_CHECKING:
+    import mujoco
+
+_log = logging.getLogger(__name__)
+_EDGE, _MOST_EDGE = 0.4e-3, 0.25  # m, and of the least side: edges of boxes and cylinders, which MuJoCo has sharp
+# Of what is missing, a frame; m a frame; and m in all, where the gel slips before it bears MuJoCo's shear (assumed).
+_SHEAR_GAIN, _SHEAR_STEP, _MOST_SHIFT = 0.5, 0.1e-3, 2e-3
+_BALL_FACES = 4  # subdivisions of the icosphere that ellipsoids are made of: 2,562 vertices
+
+
+class MujocoGel:
+    """A DIGIT's gel or a BioTac's skin on a body of a MuJoCo model; any geom that touches it may press it.
+
+    model : mujoco.MjModel, metres
+    geom : name of the geom that stands for the gel in MuJoCo's contacts
+    site : name of a site whose frame is the sensor's: x along the finger, tip toward -x, y into the gel
+    friction : of the gel, Coulomb's coefficient; preset : of its pictures
+    Where several geoms touch, the gel is pressed by the one that MuJoCo lets press hardest; planes never press it.
+    Raises TactileError for names that the model lacks.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        geom: str,
+        site: str,
+        sensor: str = "digit",
+        *,
+        friction: float = FRICTION,
+        preset: str = FAST,
+    ) -> None:
+        self.model, self.sensor, self.friction, self.preset = model, sensor, friction, preset
+        self._geom = _number(model, "geom", geom)
+        self._site = _number(model, "site", site)
+        self._gels: dict[int, tuple[Gel, np.ndarray]] = {}  # by geom, and where the indenter's frame is in the geom's
+        self._shift = np.zeros(3)  # m, along the gel
+        self._ignored: set[int] = set()
+        self.gel: Gel | None = None  # the one that pressed last
+
+    def __call__(self, data: mujoco.MjData) -> GelContact | None:
+        """The gel's contact at MuJoCo's state; None before anything touched.
+
+        Its force along +y is MuJoCo's; that along the surface follows MuJoCo's within a few frames.
+        Call it after ``mj_step`` or ``mj_forward``, 100 times a second or more often while something moves.
+        """
+        pressing = {geom: force for geom, force in self.forces(data).items() if self._presses(geom)}
+        if not pressing:
+            return None if self.gel is None else self._lift()
+        body = max(pressing, key=lambda geom: (pressing[geom][1], -geom))
+        if body not in self._gels:
+            indenter, offset = indenter_of(self.model, body)
+            gel = Gel(self.sensor, indenter, friction=self.friction, preset=self.preset)
+            self._gels[body] = gel, offset
+        gel, offset = self._gels[body]
+        if gel is not self.gel:
+            gel.reset()
+            self._shift = np.zeros(3)
+        self.gel, force = gel, pressing[body]
+        pose = self._pose(data, body) @ offset
+        pose[:3, 3] += self._shift
+        contact = gel.press(pose, force=max(float(force[1]), 0.0))
+        self._shear(contact, force)
+        return contact
+
+    def _shear(self, contact: GelContact, force: np.ndarray) -> None:
+        """Shift the next pose along the gel so that its force there comes to be MuJoCo's ``force`` (3,) N.
+
+        MuJoCo's contacts creep and have no shear stiffness of their own, so its poses say little about shear. A ball's
+        is Mindlin's: 2 (1 - nu) / (2 - nu), 0.68, of that along the normal, which by Hertz is 3/2 of force over depth.
+        """
+        if contact.force[1] <= 0 or contact.depth <= 0:
+            self._shift = np.zeros(3)
+            return
+        missing = (force - contact.force) * [1, 0, 1]
+        stiffness = 0.68 * 1.5 * contact.force[1] / contact.depth
+        step = _SHEAR_GAIN * missing / stiffness
+        step *= min(1.0, _SHEAR_STEP / max(np.linalg.norm(step), 1e-12))
+        self._shift = np.clip(self._shift + step, -_MOST_SHIFT, _MOST_SHIFT)
+
+    def forces(self, data: mujoco.MjData) -> dict[int, np.ndarray]:
+        """MuJoCo's force (3,) N on the gel by each geom that touches it, in the sensor's frame."""
+        import mujoco
+
+        found: dict[int, np.ndarray] = {}
+        wrench, axes = np.zeros(6), data.site_xmat[self._site].reshape(3, 3)
+        for number in range(data.ncon):
+            contact = data.contact[number]
+            if self._geom not in (first := int(contact.geom[0]), second := int(contact.geom[1])):
+                continue
+            mujoco.mj_contactForce(self.model, data, number, wrench)
+            on_second = contact.frame.reshape(3, 3).T @ wrench[:3]
+            other, sign = (first, 1.0) if second == self._geom else (second, -1.0)
+            found[other] = found.get(other, 0.0) + sign * (axes.T @ on_second)
+        return found
+
+    def _presses(self, geom: int) -> bool:
+        """Return false for planes and height fields, which have no bounds; it is logged once."""
+        import mujoco
+
+        endless = self.model.geom_type[geom] in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+        if endless and geom not in self._ignored:
+            self._ignored.add(geom)
+            name = mujoco.mj_id2name(self.model, mujoco.mjtObj.mjOBJ_GEOM, geom)
+            _log.warning("geom %s touches the gel and is ignored: a plane or height field has no bounds", name or geom)
+        return not endless
+
+    def _pose(self, data: mujoco.MjData, geom: int) -> np.ndarray:
+        """Pose (4, 4) of a geom in the sensor's frame."""
+        axes, pose = data.site_xmat[self._site].reshape(3, 3), np.eye(4)
+        pose[:3, :3] = axes.T @ data.geom_xmat[geom].reshape(3, 3)
+        pose[:3, 3] = axes.T @ (data.geom_xpos[geom] - data.site_xpos[self._site])
+        return pose
+
+    def _lift(self) -> GelContact:
+        self.gel.reset()
+        self._shift = np.zeros(3)
+        return self.gel.contact
+
+
+def indenter_of(model: mujoco.MjModel, geom: int) -> tuple[Indenter, np.ndarray]:
+    """The indenter that a geom is, and its frame (4, 4) in the geom's.
+
+    Spheres, capsules, boxes and cylinders are exact but for edges, which are rounded by 0.4 mm; meshes and ellipsoids
+    go through a grid of their distance, built once. Raises TactileError for planes and height fields.
+    """
+    import mujoco
+
+    kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), np.array(model.geom_size[geom])
+    offset = np.eye(4)
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        offset[2, 3] = -size[0]
+        return Sphere(float(size[0])), offset
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        offset[2, 3] = -size[2]
+        return Box(tuple((2 * size).tolist()), _edge(2 * size.min())), offset
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        offset[2, 3] = -size[1]
+        return Cylinder(float(size[0]), _edge(2 * min(size[0], size[1])), float(2 * size[1])), offset
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:  # a lying cylinder that is all edge
+        offset[:3] = [[0, 0, 1, -size[0]], [0, -1, 0, 0], [1, 0, 0, 0]]
+        return LyingCylinder(float(size[0]), float(size[0]), float(2 * (size[0] + size[1]))), offset
+    return MeshIndenter.from_trimesh(_trimesh(model, geom, kind, size)), offset
+
+
+def _edge(least_side: float) -> float:
+    return float(min(_EDGE, _MOST_EDGE * least_side))
+
+
+def _trimesh(model: mujoco.MjModel, geom: int, kind: Any, size: np.ndarray) -> Any:
+    import mujoco
+    import trimesh
+
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[geom])
+        vertex, face = int(model.mesh_vertadr[mesh]), int(model.mesh_faceadr[mesh])
+        vertices = model.mesh_vert[vertex : vertex + int(model.mesh_vertnum[mesh])]
+        faces = model.mesh_face[face : face + int(model.mesh_facenum[mesh])]
+        return trimesh.Trimesh(np.array(vertices, float), np.array(faces))
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        ball = trimesh.creation.icosphere(_BALL_FACES)
+        return trimesh.Trimesh(ball.vertices * size, ball.faces)
+    found = str(kind).rpartition("mjGEOM_")[2].lower()
+    raise TactileError(f"MuJoCo, geom {geom}", f"a {found}", "a sphere, box, cylinder, capsule, ellipsoid or mesh")
+
+
+def _number(model: mujoco.MjModel, kind: str, name: str) -> int:
+    """Number of a named geom or site."""
+    import mujoco
+
+    wanted = mujoco.mjtObj.mjOBJ_GEOM if kind == "geom" else mujoco.mjtObj.mjOBJ_SITE
+    number = mujoco.mj_name2id(model, wanted, name)
+    if number < 0:
+        count = model.ngeom if kind == "geom" else model.nsite
+        names = [mujoco.mj_id2name(model, wanted, each) for each in range(count)]
+        raise TactileError("MuJoCo model", f"no {kind} {name!r}", f"one of {', '.join(map(str, names)) or 'none'}")
+    return number
