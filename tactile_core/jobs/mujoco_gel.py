@@ -60,7 +60,7 @@ class MujocoGel:
         """
         pressing = {geom: force for geom, force in self.forces(data).items() if self._presses(geom)}
         if not pressing:
-            return None if self.gel is None else self._lift()
+            return None if self.gel is None else self._lift(self.gel)
         body = max(pressing, key=lambda geom: (pressing[geom][1], -geom))
         if body not in self._gels:
             indenter, offset = indenter_of(self.model, body)
@@ -89,7 +89,7 @@ class MujocoGel:
         missing = (force - contact.force) * [1, 0, 1]
         stiffness = 0.68 * 1.5 * contact.force[1] / contact.depth
         step = _SHEAR_GAIN * missing / stiffness
-        step *= min(1.0, _SHEAR_STEP / max(np.linalg.norm(step), 1e-12))
+        step *= min(1.0, _SHEAR_STEP / max(float(np.linalg.norm(step)), 1e-12))
         self._shift = np.clip(self._shift + step, -_MOST_SHIFT, _MOST_SHIFT)
 
     def forces(self, data: mujoco.MjData) -> dict[int, np.ndarray]:
@@ -126,10 +126,10 @@ class MujocoGel:
         pose[:3, 3] = axes.T @ (data.geom_xpos[geom] - data.site_xpos[self._site])
         return pose
 
-    def _lift(self) -> GelContact:
-        self.gel.reset()
+    def _lift(self, gel: Gel) -> GelContact:
+        gel.reset()
         self._shift = np.zeros(3)
-        return self.gel.contact
+        return gel.contact
 
 
 def indenter_of(model: mujoco.MjModel, geom: int) -> tuple[Indenter, np.ndarray]:
