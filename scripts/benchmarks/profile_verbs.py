@@ -30,7 +30,7 @@ from tactile_core.files import atomic, png
 from tactile_core.jobs import live
 from tactile_core.jobs.convert import load_tools
 from tactile_core.recordings import Truth, write_simulated
-from tactile_core.recordings.recording import NOMINAL_RATE
+from tactile_core.sensors import SAMPLE_RATE
 
 ROOT = Path(__file__).resolve().parents[2]
 RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
@@ -222,7 +222,7 @@ def packings() -> list[Row]:
 
 def live_picture() -> list[Row]:
     """Measure the thread time of `tactile watch` from a frame's rows to its picture."""
-    recording, view, work = recordings.read(RECORDING), live.View(load_tools(), NOMINAL_RATE), []
+    recording, view, work = recordings.read(RECORDING), live.View(load_tools(), SAMPLE_RATE), []
     for start, stop in [(0, 60), *((i, i + 1) for i in range(60, 160))]:
         rows = dataclasses.replace(
             recording, electrodes=recording.electrodes[start:stop], pdc=recording.pdc[start:stop]

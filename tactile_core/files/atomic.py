@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import TactileError
+from . import lock
 
 
 @contextlib.contextmanager
@@ -82,11 +83,11 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Ite
 
 def sweep(folder: str | os.PathLike) -> None:
     """Remove what killed writers of folders left in `folder`; running writers and third-party files are left alone."""
-    for lock in Path(folder).glob(".*.tactile-lock"):
-        name = lock.name.removeprefix(".").removesuffix(".tactile-lock")
-        if name in ("", ".", "..") or lock.is_symlink() or not lock.is_file():
+    for file in Path(folder).glob(".*.tactile-lock"):
+        name = file.name.removeprefix(".").removesuffix(".tactile-lock")
+        if name in ("", ".", "..") or file.is_symlink() or not file.is_file():
             continue
-        path = lock.with_name(name)
+        path = file.with_name(name)
         with contextlib.suppress(TactileError), _locked(path):
             _recover(path)
 
@@ -123,21 +124,21 @@ def _recover(path: Path) -> None:
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
     """Hold the lock of a folder's only writer; raises TactileError when another process holds it."""
-    lock = _beside(path, "lock")
+    file = _beside(path, "lock")
     while True:
         try:
-            descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+            descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
-            raise TactileError(lock, f"cannot be opened ({error.strerror})", "no file of others there") from error
+            raise TactileError(file, f"cannot be opened ({error.strerror})", "no file of others there") from error
         try:
-            _lock(descriptor)
+            lock.take(descriptor)
         except OSError:
             os.close(descriptor)
             advice = "Wait for it, or name another folder"
             raise TactileError(path, "another process is writing it", "one writer at a time", advice) from None
         # The last holder may have removed the file between our opening and locking it: then the lock guards nothing.
         with contextlib.suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), os.stat(lock)):
+            if os.path.samestat(os.fstat(descriptor), os.stat(file)):
                 break
         os.close(descriptor)
     try:
@@ -146,22 +147,10 @@ def _locked(path: Path) -> Iterator[None]:
         if os.name == "nt":  # Windows removes only what is closed
             os.close(descriptor)
             with contextlib.suppress(OSError):
-                lock.unlink()
+                file.unlink()
         else:
-            lock.unlink(missing_ok=True)
+            file.unlink(missing_ok=True)
             os.close(descriptor)
-
-
-def _lock(descriptor: int) -> None:
-    """Take an exclusive lock without waiting; raises OSError when it is taken."""
-    if os.name == "nt":
-        import msvcrt
-
-        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _sync(path: Path) -> None:
@@ -199,11 +188,21 @@ def claim(path: str | os.PathLike) -> None:
     path = Path(path)
     if os.path.lexists(path):
         raise TactileError(path, "exists already", "a new file", "Remove it or choose another name")
-    try:
+    with writing(path, "a place in a writable folder", "Choose another --out"):
         path.parent.mkdir(parents=True, exist_ok=True)
         probe = _beside(path, "probe")
         probe.touch()
         probe.unlink()
+
+
+@contextlib.contextmanager
+def writing(
+    path: str | os.PathLike,
+    expected: str = "a writable folder",
+    advice: str = "Make room, or name another --out folder",
+) -> Iterator[None]:
+    """Turn an OSError of writing ``path``, such as that of a full disk, into a TactileError."""
+    try:
+        yield
     except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(path, found, "a place in a writable folder", "Choose another --out") from error
+        raise TactileError(path, f"cannot be written ({error.strerror or error})", expected, advice) from error

@@ -49,7 +49,7 @@ def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
     """Hold a lock on ``file``, which stays afterwards: a lock on a file that others remove protects nothing."""
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:
-        _take(descriptor, shared)
+        take(descriptor, shared=shared)
     except OSError as error:
         os.close(descriptor)
         advice = "Wait for it, watch it with --status, or name another folder"
@@ -60,7 +60,8 @@ def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
         os.close(descriptor)
 
 
-def _take(descriptor: int, shared: bool) -> None:
+def take(descriptor: int, *, shared: bool = False) -> None:
+    """Take the lock of an open file without waiting; raises OSError where another process holds it."""
     if os.name == "nt":
         import msvcrt
 

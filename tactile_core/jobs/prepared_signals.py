@@ -25,8 +25,8 @@ from ..recordings.chunks import read_parts
 from ..recordings.fingers import split
 from ..recordings.flags import Flag
 from ..recordings.polarity import AUTO, FALLS
-from ..recordings.recording import ELECTRODES
 from ..recordings.signals import Rest
+from ..sensors import ELECTRODES
 from .engine import job as jobs
 from .engine.inputs import content_hash
 

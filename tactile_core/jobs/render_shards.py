@@ -46,11 +46,8 @@ def render_in_parts(
     job = plan(path, out, options)
     with result_parts.begun(out, job) as folder:
         result_parts.check(runs.run(folder, job, place(folder), None, progress))
-        try:
+        with atomic.writing(out, advice="Make room, then give the command again"):
             _put_together(folder, job, out, options)
-        except OSError as error:
-            found, advice = f"cannot be written ({error.strerror or error})", "Make room, then give the command again"
-            raise TactileError(out, found, "a writable folder", advice) from error
         result_parts.finished(folder)
     return out
 

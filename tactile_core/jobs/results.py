@@ -85,13 +85,10 @@ def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
 
 def check_writable(out: Path) -> None:
     """Make the folder and try a file in it; raises TactileError."""
-    try:
+    with atomic.writing(out, advice="Name another --out, or allow writing"):
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out):
             pass
-    except OSError as error:
-        found, advice = f"cannot be written ({error.strerror or error})", "Name another --out, or allow writing"
-        raise TactileError(out, found, "a writable folder", advice) from error
 
 
 def is_result(folder: Path, maker: str = "") -> bool:

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import msgspec
 
-from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
 from ..mechanics.electrodes.law import SHEET
 from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
@@ -78,18 +77,15 @@ def plan(
 
 def _put_together(folder: Path, job: Job, out: Path) -> None:
     rows = []
-    try:
-        with atomic.new_folder(out) as partial:
-            for index, one in enumerate(job.inputs):
-                array_pack.unpack(jobs.shard_file(folder, one.name, 0), partial)
-                rows.append({
-                    "file": f"{one.name}.h5", "seed": job.recipe.seed + index, "values": job.recipe.values[index]
-                })  # fmt: skip
-            content = {"format": FORMAT, "scene_sha256": job.inputs[0].sha256, "recordings": rows}
-            atomic.write_json(partial / GRID, content)
-    except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(out, found, "room for it", "Make room, then give the command again") from error
+    advice = "Make room, then give the command again"
+    with atomic.writing(out, "room for it", advice), atomic.new_folder(out) as partial:
+        for index, one in enumerate(job.inputs):
+            array_pack.unpack(jobs.shard_file(folder, one.name, 0), partial)
+            rows.append({
+                "file": f"{one.name}.h5", "seed": job.recipe.seed + index, "values": job.recipe.values[index]
+            })  # fmt: skip
+        content = {"format": FORMAT, "scene_sha256": job.inputs[0].sha256, "recordings": rows}
+        atomic.write_json(partial / GRID, content)
 
 
 def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:

@@ -6,7 +6,6 @@ import base64
 import os
 import struct
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
@@ -156,8 +155,5 @@ def _checked(path: str | os.PathLike, name: str, values: np.ndarray, count: int)
 
 
 def _write(path: str | os.PathLike, content: bytes) -> None:
-    try:
+    with atomic.writing(path, "a place in a writable folder with room", ""):
         atomic.write_bytes(path, content)
-    except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(Path(path), found, "a place in a writable folder with room") from error

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
+from ..sensors import ELECTRODES, SAMPLE_RATE
 from .flags import Flag
-from .recording import ELECTRODES, NOMINAL_RATE, Recording, Truth
+from .recording import Recording, Truth
 
 MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
@@ -89,8 +90,8 @@ def assemble(
     electrodes = np.where(bad, np.nan, electrodes)
     notes = list(warnings)
     if stamps is None:
-        notes.append(f"{os.path.basename(path)}: no time stamps; {NOMINAL_RATE:g} Hz assumed")
-        stamps = np.arange(frames) / NOMINAL_RATE
+        notes.append(f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed")
+        stamps = np.arange(frames) / SAMPLE_RATE
     _check_share(path, bad.any(axis=1), problems, row_word)
     flags = np.where(bad.any(axis=1), Flag.REPAIRED, 0).astype(np.uint16)
     for problem in problems:
@@ -189,10 +190,10 @@ def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
     if len(good) == len(stamps):
         return stamps
     if len(good) == 0:
-        return np.arange(len(stamps)) / NOMINAL_RATE
+        return np.arange(len(stamps)) / SAMPLE_RATE
     index = np.arange(len(stamps))
     filled = np.interp(index, good, stamps[good])
-    step = float(np.median(np.diff(stamps[good]) / np.diff(good))) if len(good) > 1 else 1.0 / NOMINAL_RATE
+    step = float(np.median(np.diff(stamps[good]) / np.diff(good))) if len(good) > 1 else 1.0 / SAMPLE_RATE
     filled[: good[0]] = stamps[good[0]] + (index[: good[0]] - good[0]) * step
     filled[good[-1] + 1 :] = stamps[good[-1]] + (index[good[-1] + 1 :] - good[-1]) * step
     return filled
@@ -202,7 +203,7 @@ def _time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[n
     """Find frames before which the stamp went back, stood still or left a gap; and write sentences about them."""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
-    usual = float(np.median(forward)) if len(forward) else 1.0 / NOMINAL_RATE
+    usual = float(np.median(forward)) if len(forward) else 1.0 / SAMPLE_RATE
     backward, gap = steps <= 0, steps > GAP_STEPS * usual
     sentences = []
     for what, where in (("do not go forward", backward), ("leave a gap", gap)):

@@ -18,10 +18,11 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import outside
+from ..sensors import ELECTRODES
 from .array_store import damage_told
 from .assemble import MAX_FRAMES, assemble, check_electrodes
 from .fingers import named, split
-from .recording import ELECTRODES, Recording
+from .recording import Recording
 
 LOOKED_AT = 100  # frames from which the fingers of a hand are recognised
 STARTS = {b"#ROSBAG V": "ros1", b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite"}

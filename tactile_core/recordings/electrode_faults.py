@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..sensors import COUNT_MAX
 from .flags import Flag
 from .recording import Recording
 
-FULL_SCALE = 4095.0  # counts of the 12-bit converter
 DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
 # counts that the others' median moves by meanwhile; units with less noise stand still in steady grips, as long as
 # nothing moves: by 4 and less in 36 such grips (PHAC, trials 01 to 03)
@@ -22,7 +22,7 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
     """
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
-    ends = (readings <= 0) | (readings >= FULL_SCALE)
+    ends = (readings <= 0) | (readings >= COUNT_MAX)
     frames = np.flatnonzero(ends.any(axis=1))
     if len(frames):
         warnings.append(

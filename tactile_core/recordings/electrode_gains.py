@@ -15,16 +15,15 @@ from msgspec import Meta
 from ..errors import TactileError
 from ..files import atomic
 from ..files.text_file import read_toml_text
-from ..sensors import divider
+from ..sensors import COUNT_MAX, ELECTRODES, divider
 from .fingers import FINGERS
-from .recording import ELECTRODES, Recording
+from .recording import Recording
 from .signals import PrepareOptions, Rest, Signals, prepare
 
 FORMAT = "tactile-sensor-2"
 OLD_FORMAT = "tactile-sensor-1"  # its offsets were of counts that rise where a film thins
 LEAST, MOST = 0.2, 5.0  # a gain beyond is a broken channel or a match gone wrong, not a unit (assumed)
 LARGEST_OFFSET = 500.0  # counts; a raw reading's rest is never that near to a change (assumed)
-LARGEST_COUNT = 4095.0  # 12 bits
 ADVICE = "Make it again with `tactile adapt`"
 Row = Annotated[list[float], Meta(min_length=ELECTRODES, max_length=ELECTRODES)]
 
@@ -128,8 +127,8 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
     if not sensor.sections():
         raise TactileError(where, "no section", "[unit], or [finger0], [finger1], ...", ADVICE)
     limits = {
-        "gain": (LEAST, MOST), "offset_counts": (-LARGEST_OFFSET, LARGEST_OFFSET), "rest_counts": (0.0, LARGEST_COUNT),
-        "rest_spread_counts": (0.0, LARGEST_COUNT),
+        "gain": (LEAST, MOST), "offset_counts": (-LARGEST_OFFSET, LARGEST_OFFSET), "rest_counts": (0.0, COUNT_MAX),
+        "rest_spread_counts": (0.0, COUNT_MAX),
     }  # fmt: skip
     for name, section in sensor.sections().items():
         for field, (least, most) in limits.items():
@@ -137,8 +136,8 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
                 if not least <= value <= most:  # false for nan
                     place = f"{where}, {name}.{field}, E{electrode}"
                     raise TactileError(place, f"{value:g}", f"{least:g} to {most:g}", ADVICE)
-        if section.rest_pdc is not None and not 0 <= section.rest_pdc <= LARGEST_COUNT:
-            raise TactileError(f"{where}, {name}.rest_pdc", f"{section.rest_pdc:g}", f"0 to {LARGEST_COUNT:g}", ADVICE)
+        if section.rest_pdc is not None and not 0 <= section.rest_pdc <= COUNT_MAX:
+            raise TactileError(f"{where}, {name}.rest_pdc", f"{section.rest_pdc:g}", f"0 to {COUNT_MAX:g}", ADVICE)
 
 
 def write(path: str | os.PathLike, sensor: SensorFile) -> None:

@@ -7,9 +7,10 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from ..sensors import ELECTRODES
 from .flags import Flag, names
 from .readers import read
-from .recording import ELECTRODES, Recording
+from .recording import Recording
 from .signals import PrepareOptions, Signals, prepare
 
 

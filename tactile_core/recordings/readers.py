@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
 import os
-import pkgutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,6 +12,7 @@ from types import ModuleType
 
 from ..errors import TactileError
 from ..files import outside
+from ..files.registry import modules_of
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
 from .bag import fingers_of, kind, open_bag, read_bag
@@ -30,8 +29,7 @@ ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
 @cache
 def layouts() -> tuple[ModuleType, ...]:
     """Import all modules of ``formats/``, in the order of their names."""
-    names = sorted(info.name for info in pkgutil.iter_modules(formats.__path__))
-    return tuple(importlib.import_module(f"{formats.__name__}.{name}") for name in names)
+    return tuple(modules_of(formats.__name__).values())
 
 
 def read(path: str | os.PathLike[str]) -> Recording:

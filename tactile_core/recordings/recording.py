@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-ELECTRODES = 19  # of a single BioTac; the BioTac SP has 24
+from ..sensors import SAMPLE_RATE
+
 LEAST_STEP = 1e-6  # s between stamps; less is no time (assumed), and its inverse no number
-NOMINAL_RATE = 100.0  # Hz: 44-word frames of a BioTac (SynTouch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Recording:
         """Frames per second: one over the median step between stamps; the nominal 100 Hz for a single frame."""
         steps = np.diff(self.time)
         steps = steps[steps > 0]
-        return 1.0 / max(float(np.median(steps)), LEAST_STEP) if len(steps) else NOMINAL_RATE
+        return 1.0 / max(float(np.median(steps)), LEAST_STEP) if len(steps) else SAMPLE_RATE
 
     @property
     def duration(self) -> float:

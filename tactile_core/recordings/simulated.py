@@ -20,17 +20,17 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic
+from ..sensors import COUNT_MAX, ELECTRODES
 from .array_store import Store, open_hdf5
 from .assemble import assemble
 from .polarity import FALLS, RISES
-from .recording import ELECTRODES, Recording, Truth
+from .recording import Recording, Truth
 
 if TYPE_CHECKING:
     import h5py
 
 FORMAT = "tactile-recording-1"
 SCALE = 5e-7  # m a unit of the truth's int16: steps of 0.5 um (0.14 um rms, below any error measured), reach +-16 mm
-COUNTS = (0, 4095)  # 12-bit readings
 BLOCK = 16  # frames a chunk of the truth: a chunk stays below 300 kB at 2,700 nodes
 
 
@@ -174,9 +174,9 @@ def _check_shape(path: Path, name: str, value: np.ndarray, shape: tuple[int, ...
 def _counts(path: Path, name: str, value: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     _check_shape(path, name, value, shape)
     rounded = np.rint(np.asarray(value, float))
-    if not np.all((rounded >= COUNTS[0]) & (rounded <= COUNTS[1])):  # false for NaN too
+    if not np.all((rounded >= 0) & (rounded <= COUNT_MAX)):  # false for NaN too
         raise TactileError(
-            f"{path}, {name}", "values outside 12 bits", f"counts {COUNTS[0]}..{COUNTS[1]}", "Clip as the sensor does"
+            f"{path}, {name}", "values outside 12 bits", f"counts 0..{COUNT_MAX}", "Clip as the sensor does"
         )
     return rounded.astype(np.int16)
 
@@ -200,8 +200,5 @@ def _write_whole(path: Path, fill: Any) -> None:
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         fill(file)
-    try:
+    with atomic.writing(path, "room in a folder that can be written to", ""):
         atomic.write_bytes(path, memory.getvalue())
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise TactileError(path, f"cannot be written ({reason})", "room in a folder that can be written to") from error

@@ -34,7 +34,8 @@ BIOTAC_SKIN = Material(youngs=4.1e6, poisson=0.48)  # Poisson's ratio assumed: s
 # Chem. Technol. 31, 1958) E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)) MPa, S = 10.
 DIGIT_GEL = Material(youngs=0.4126e6, poisson=0.48)  # Poisson's ratio assumed
 
-SAMPLE_RATE = 100.0  # Hz, one frame of 19 electrodes (docs/sources.md, BioTac read-out)
+ELECTRODES = 19  # of a single BioTac; the BioTac SP has 24
+SAMPLE_RATE = 100.0  # Hz, one frame of all electrodes (docs/sources.md, BioTac read-out)
 COUNT_MAX = 4095  # 12-bit electrodes
 REST_COUNT = 3300.0  # counts, typical reading without contact (docs/sources.md, BioTac read-out)
 # Raw counts fall where the fluid film over an electrode thins: each electrode is read in a voltage divider, and "as the

@@ -9,7 +9,6 @@ from typing import Any
 
 import msgspec
 
-from ..errors import TactileError
 from ..files import atomic
 from .scene import Scene
 
@@ -36,14 +35,11 @@ def write_scene(folder: str | os.PathLike, scene: Scene, meshes: dict[str, bytes
     Raises TactileError where the folder cannot be written.
     """
     folder = pathlib.Path(folder)
-    try:
+    with atomic.writing(folder, advice="Make room, or choose another one"):
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in meshes.items():
             atomic.write_bytes(folder / name, content)
         atomic.write_bytes(folder / "scene.toml", to_toml(scene).encode())
-    except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(folder, found, "a writable folder", "Make room, or choose another one") from error
     return folder / "scene.toml"
 
 

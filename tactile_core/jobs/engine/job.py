@@ -58,12 +58,9 @@ def make(inputs: list[Input], recipe: Recipe, weights: str | None, calibration: 
 
 def write(folder: Path, job: Job) -> None:
     """Make the job folder, its job file first: all else is made again. Raises TactileError where it cannot be."""
-    try:
+    with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
         atomic.write_json(folder / FILE, msgspec.to_builtins(job))
-    except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(folder, found, "a writable folder", "Name another --out folder") from error
 
 
 def check_empty(folder: Path, advice: str) -> None:

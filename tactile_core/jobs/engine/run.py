@@ -48,13 +48,10 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
     Raises TactileError where another job runs in it, or where it cannot be written.
     """
-    try:
+    with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
         stack = contextlib.ExitStack()
         stack.enter_context(lock.held(folder, part))
-    except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(folder, found, "a writable folder", "Name another --out folder") from error
     with stack:
         _sweep(folder, part)
         try:

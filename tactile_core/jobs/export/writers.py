@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import importlib
 import os
-import pkgutil
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 
 from ...errors import TactileError
 from ...files import atomic, provenance
+from ...files.registry import modules_of
 from . import finished_job, formats
 
 NOTE = "note.json"
 
 
-@cache
 def layouts() -> dict[str, ModuleType]:
     """Name -> module of ``formats/``."""
-    names = sorted(info.name for info in pkgutil.iter_modules(formats.__path__))
-    return {name: importlib.import_module(f"{formats.__name__}.{name}") for name in names}
+    return modules_of(formats.__name__)
 
 
 def export(
@@ -35,14 +31,10 @@ def export(
     if layout not in layouts():
         raise TactileError("--to", repr(layout), " or ".join(layouts()))
     source = finished_job.load(Path(job))
-    try:
-        with atomic.new_folder(out) as partial:
-            layouts()[layout].write(source, partial, progress)
-            note = {"layout": layout, "job": source.id, "left_out": source.aside, "versions": provenance.versions()}
-            atomic.write_json(partial / NOTE, note)
-    except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(out, found, "a writable folder", "Make room, or name another --out folder") from error
+    with atomic.writing(out), atomic.new_folder(out) as partial:
+        layouts()[layout].write(source, partial, progress)
+        note = {"layout": layout, "job": source.id, "left_out": source.aside, "versions": provenance.versions()}
+        atomic.write_json(partial / NOTE, note)
     return source
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...recordings.flags import Flag
 from ...recordings.polarity import AUTO, FALLS, POLARITIES, TOUCHING, Polarity, polarity_of
-from ...recordings.recording import NOMINAL_RATE
 from ...recordings.rest_level import find_quiet, level, window_frames
 from ...recordings.signal_kind import detect
 from ...recordings.signals import Signals
+from ...sensors import SAMPLE_RATE
 
 LONGEST = 10.0  # s that are looked through for rest and polarity; then the calmest so far is taken (assumed)
 AGAIN = 25  # new frames after which the polarity is looked at again
@@ -21,7 +21,7 @@ class LiveSignals:
     rate : Hz; polarity : "falls", "rises" or "auto", which is decided by the first contacts, and "falls" until then
     """
 
-    def __init__(self, rate: float = NOMINAL_RATE, polarity: str = AUTO) -> None:
+    def __init__(self, rate: float = SAMPLE_RATE, polarity: str = AUTO) -> None:
         self._rate = rate
         self._seen, self._pdc, self._looked_at = np.empty((0, 19)), np.empty(0), 0
         self.polarity = _stated_polarity(polarity, "as given")

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from ...sensors import ELECTRODES
 from ..array_store import Store
 from ..assemble import assemble, check_electrodes
-from ..recording import ELECTRODES, Recording
+from ..recording import Recording
 from ..table import Table
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any
 
-from ..recording import ELECTRODES
+from ...sensors import ELECTRODES
 
 CONTAINER = "bag"
 NAME = "bag with biotac_sensors/BioTacHand"

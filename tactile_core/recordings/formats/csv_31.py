@@ -11,8 +11,9 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
+from ...sensors import ELECTRODES
 from ..assemble import check_electrodes
-from ..recording import ELECTRODES, Recording
+from ..recording import Recording
 from ..table import Table
 from . import of_table, share
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from ...sensors import ELECTRODES
 from ..assemble import check_electrodes
-from ..recording import ELECTRODES, Recording
+from ..recording import Recording
 from ..table import Table
 from . import of_table, share
 

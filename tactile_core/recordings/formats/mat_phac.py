@@ -10,9 +10,10 @@ from collections.abc import Collection
 from typing import Any
 
 from ...errors import TactileError
+from ...sensors import ELECTRODES
 from ..array_store import Store
 from ..assemble import MAX_FRAMES, assemble, check_electrodes
-from ..recording import ELECTRODES, Recording
+from ..recording import Recording
 
 CONTAINER = "mat"
 NAME = "MATLAB 5 with F0Electrodes (19, T), optional F0pac, F0pdc, F0tac, F0tdc; F1... of a second finger"

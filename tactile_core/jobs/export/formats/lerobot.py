@@ -19,7 +19,7 @@ import numpy as np
 from ....errors import TactileError
 from ....files import atomic
 from ....files.png import write_png
-from ....recordings.recording import NOMINAL_RATE
+from ....sensors import SAMPLE_RATE
 from ..finished_job import Finished, Recorded
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def _rate(one: Recorded) -> float:
     """Hz, over the first frames; the nominal rate for a single one."""
     steps = np.diff(next(one.blocks())["time"])
     steps = steps[steps > 0]
-    return float(1 / np.median(steps)) if len(steps) else NOMINAL_RATE
+    return float(1 / np.median(steps)) if len(steps) else SAMPLE_RATE
 
 
 def _check_rate(one: Recorded, first: float) -> None:

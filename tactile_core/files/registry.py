@@ -1,0 +1,15 @@
+"""Find what a folder holds: a format, layout, job or indenter is one file, known as soon as it lies there."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+from types import ModuleType
+
+
+@cache
+def modules_of(package: str) -> dict[str, ModuleType]:
+    """Import all modules of a package, by its full name; return them by their own names, in their order."""
+    names = sorted(info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__))
+    return {name: importlib.import_module(f"{package}.{name}") for name in names}
