@@ -83,8 +83,8 @@ def _forces_from_heights(folder: Path, progress: Progress) -> None:
         depth = float((apex - pose.apex) @ pose.direction)
         force = 0.0
         if depth > 0:
-            solution = solve("digit", indenter, place, depth=depth, friction=0.0)
-            force = max(float(solution.force @ pose.direction), 0.0)
+            solution = solve("digit", indenter, place, depth=depth, friction=spec.friction)
+            force = max(solution.axial_force, 0.0)
         points.append(msgspec.structs.replace(point, force_n=force))
         progress(k + 1, 2 * len(apexes))
     # The rest of the scene as it was written: load_scene has made its file names absolute.

@@ -12,14 +12,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from .. import sensors
 from ..errors import TactileError
-from ..geometry.indenters import Box, Indenter, Pose, Ring
+from ..geometry.indenters import Box, Indenter, Ring
 from ..mechanics.electrodes.law import signal_of
-from ..mechanics.fast.compliance import compliance_of
-from ..mechanics.fast.press import CorrectedPress
-from ..mechanics.finite_strain.press import FullContact, FullPress
+from ..mechanics.first_touch import surface_drop
+from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, pose_at
+from ..mechanics.solve import Solution, Step, solve, solve_path
 from ..mechanics.thickness import DEPTH_LIMIT, depth_at
 from .pair_sampling import beyond_digit, draw_place
 from .pairs_file import quantise
@@ -33,7 +34,6 @@ _SLIDING = 4, 11  # of twelve presses, those that end with a slide: one in the w
 # Of eight presses: the box's and the ring's, of which one is in the region; all others share the rest in turn.
 _BOX, _RING, _OTHERS = (0, 5), (2, 7), (1, 3, 4, 6)
 _TRIES = 12  # steps down to a depth that both sensors bear: to a fourteenth
-_SPARE = 1.1  # of the depth guessed for the DIGIT, on which its mesh is fine
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +52,7 @@ class TestPress:
     slide: np.ndarray | None
 
 
-Pair = tuple[np.ndarray, FullContact, FullContact]  # slide (2,) m, and both sensors' contacts
+Pair = tuple[np.ndarray, Solution, Solution]  # slide (2,) m, and both sensors' contacts
 
 
 def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
@@ -78,22 +78,14 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
 def _borne(indenter: Indenter, place: Placement, depth: float, friction: float) -> float:
     """The depth, m, on the BioTac, or less, in steps of a fifth, until the DIGIT bears its force by the fast tier."""
     for _ in range(_TRIES):
-        biotac, digit = (_fast(sensor, indenter, place, friction) for sensor in ("biotac", "digit"))
         try:
-            force = biotac.at_depth(depth).axial_force
-            if force <= 0 or digit.at_force(force) is not None:
-                break
-        except PenetrationError:
-            pass  # it bears it with an edge between its nodes: no contact that the full tier follows either
-        depth *= 0.8
+            force = solve("biotac", indenter, place, depth=depth, friction=friction).axial_force
+            if force > 0:
+                solve("digit", indenter, place, force=force, friction=friction)
+            break
+        except (UnreachableError, PenetrationError):
+            depth *= 0.8  # where an edge sinks in between nodes the full tier does not follow either
     return depth
-
-
-def _fast(sensor: str, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
-    pose = pose_at(sensor, indenter, place)
-    return CorrectedPress(
-        compliance_of(sensor), indenter, pose, depth_at(DEPTH_LIMIT, sensor, indenter, pose), friction
-    )
 
 
 def _turn(scene: Scene, number: int) -> int:
@@ -137,56 +129,35 @@ def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray
 def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float) -> Iterator[Pair]:
     """Slide and both contacts of each step; raises TactileError where the next one is not found on one sensor."""
     on_biotac, trouble = _on_biotac(press, steps, friction)
-    pose = pose_at("digit", press.indenter, press.place)
-    slides = [slide for _, slide in steps[: len(on_biotac)]]
-    guesses = _guesses(press, pose, [contact.axial_force for contact in on_biotac], slides, friction)
-    if guesses:
-        digit = FullPress("digit", press.indenter, pose, _SPARE * max(guesses), friction)
-    better = 1.0
-    for slide, biotac, guess in zip(slides, on_biotac, guesses, strict=False):
-        found = digit.at_force(biotac.axial_force, better * guess, pose.slid(*slide))
-        better = found.depth / guess
-        yield slide, biotac, found
-    if len(guesses) < len(on_biotac):
-        force = on_biotac[len(guesses)].axial_force
-        raise TactileError("fast tier, digit", f"{force:.4g} N", "a force within 60 % of its thickness")
+    if on_biotac:
+        slides = [slide for _, slide in steps[: len(on_biotac)]]
+        pose = pose_at("digit", press.indenter, press.place)
+        limit = depth_at(DEPTH_LIMIT, "digit", press.indenter, pose)
+        asked = [Step(force=found.axial_force, slide=tuple(to)) for to, found in zip(slides, on_biotac, strict=True)]
+        on_digit = solve_path("digit", press.indenter, pose, asked, "full", friction, limit)
+        yield from zip(slides, on_biotac, on_digit, strict=True)
     if trouble:
         raise trouble
 
 
 def _on_biotac(
     press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float
-) -> tuple[list[FullContact], TactileError | None]:
-    """The contacts that were found, and the error that ended them."""
-    pose = pose_at("biotac", press.indenter, press.place)
-    biotac, found = FullPress("biotac", press.indenter, pose, press.depth, friction), []
+) -> tuple[list[Solution], TactileError | None]:
+    """The contacts that were found, and the error that ended them. A slide keeps its depth under the surface."""
+    pose, surface, found = pose_at("biotac", press.indenter, press.place), sensors.biotac_surface(), []
+    drops = [surface_drop(surface, press.indenter, pose, pose.slid(*slide)) for _, slide in steps]
+    asked = [Step(max(depth + drop, 0.0), slide=tuple(to)) for (depth, to), drop in zip(steps, drops, strict=True)]
     try:
-        for depth, slide in steps:
-            there = pose.slid(*slide)
-            found.append(biotac.at_depth(depth + biotac.surface_drop(there), there))
-            if found[-1].axial_force <= 0:
-                del found[-1]
+        for contact in solve_path("biotac", press.indenter, pose, asked, "full", friction):
+            if contact.axial_force <= 0:
                 raise TactileError("full tier, biotac", "no force", "a contact")
+            found.append(contact)
     except TactileError as error:
         return found, error
     return found, None
 
 
-def _guesses(
-    press: TestPress, pose: Pose, forces: list[float], slides: list[np.ndarray], friction: float
-) -> list[float]:
-    """Depths, m, at which the fast tier finds the DIGIT to bear forces, N, as far as it does."""
-    fast = _fast("digit", press.indenter, press.place, friction)
-    depths = []
-    for force, slide in zip(forces, slides, strict=True):
-        contact = fast.at_force(force, pose.slid(*slide))
-        if contact is None:
-            break
-        depths.append(contact.linear.depth)
-    return depths
-
-
-def _row(biotac: FullContact, digit: FullContact) -> dict[str, np.ndarray]:
+def _row(biotac: Solution, digit: Solution) -> dict[str, np.ndarray]:
     return {
         "displacement_biotac": quantise(biotac.displacement),
         "displacement_digit": quantise(digit.displacement),
@@ -198,7 +169,7 @@ def _row(biotac: FullContact, digit: FullContact) -> dict[str, np.ndarray]:
         "depth_biotac": np.float32(biotac.depth),
         "depth_digit": np.float32(digit.depth),
         "contact_center": digit.centre.astype(np.float32),
-        "beyond_digit": beyond_digit(biotac.patch),
-        "contact_patch_biotac": biotac.patch,
-        "contact_patch_digit": digit.patch,
+        "beyond_digit": beyond_digit(biotac.contact_patch),
+        "contact_patch_biotac": biotac.contact_patch,
+        "contact_patch_digit": digit.contact_patch,
     }

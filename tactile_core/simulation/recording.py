@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,21 +12,38 @@ from .. import __version__, sensors
 from ..errors import TactileError
 from ..files import atomic
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.law import SHEET
+from ..mechanics.electrodes.law import SHEET, signal_of
 from ..mechanics.electrodes.wiring import Wiring, readings
+from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement, on_gel
+from ..mechanics.solve import Sensor, Solution, Tier, solve
 from ..recordings import Truth, write_simulated
-from .frame_contact import FrameContact, frame_contact
 from .scene import RecordingSpec, Scene, load_scene
 
 PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (docs/sources.md, BioTac fluid)
 _STILL_COUNT = 2000  # TDC and TAC, not simulated: a constant reading
 
 # What a file may hold beside time, force and, where there is a DIGIT, the contact's centre; and the sensor it needs.
-OUTPUTS = {"electrodes": "biotac", "displacement_biotac": "biotac", "displacement_digit": "digit"}
+OUTPUTS: dict[str, Sensor] = {
+    "electrodes": "biotac",
+    "displacement_biotac": "biotac",
+    "displacement_digit": "digit",
+}
 ALL = tuple(OUTPUTS)
 
-Solved = dict[str, FrameContact]  # by sensor; empty without contact
+
+class _Frame(NamedTuple):
+    """What is kept of a frame.
+
+    moved : by sensor, (n, 3) float32 m; force : (3,) N; pressure : Pa, rise of the fluid's
+    change : (19,) counts of the electrodes; centre : (2,) m, of pressure on the DIGIT
+    """
+
+    moved: dict[Sensor, np.ndarray]
+    force: np.ndarray
+    pressure: float
+    change: np.ndarray
+    centre: np.ndarray
 
 
 def simulate_recording(
@@ -36,14 +54,15 @@ def simulate_recording(
     wiring: Wiring | None = None,
     *,
     keep: Collection[str] = ALL,
-    tiers: Mapping[str, str] | None = None,
+    tiers: Mapping[Sensor, Tier] | None = None,
     loaded: tuple[Scene, str] | None = None,
     electrodes: str = SHEET,
 ) -> None:
     """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
 
-    The motion is linear between the scene's points; rolling and sliding differ in nothing else, for contact is without
-    friction here. progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
+    The motion is linear between the scene's points. Each frame is a press of its own, straight to its force with the
+    scene's friction, so rolling and sliding differ in nothing: no frame drags what the one before has moved.
+    progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
     keep : words of OUTPUTS; a sensor that none of them needs is not solved. tiers : of each sensor, fast by default.
     loaded : a scene and its text in place of the file's, which is then named in messages alone.
     electrodes : the law of their counts, of ``law.LAWS``.
@@ -52,7 +71,7 @@ def simulate_recording(
     """
     scene, text = loaded or load_scene(scene_path)
     spec = recording_of(scene, scene_path)
-    sensors_used = sensors_of(keep)
+    used = sensors_of(keep)
     wiring = wiring or _wiring(spec)
     if wiring.tared:
         raise TactileError("wiring, tared", "True", "raw counts in a simulated recording", "Tare it when it is read")
@@ -60,16 +79,18 @@ def simulate_recording(
     check_places(scene_path, spec)
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     time, place, force = motion(spec)
-    frames: list[Solved] = []
+    frames: list[_Frame] = []
     for t, (x, z), newtons in zip(time, place, force, strict=True):
         at = Placement(x, z, np.radians(spec.tilt_deg))
-        frames.append(_solve(scene_path, indenter, at, newtons, t, sensors_used, tiers or {}))
+        where = f"{scene_path}, recording, {t:.2f} s"
+        frames.append(_frame(_solve(where, indenter, at, newtons, spec.friction, used, tiers or {}), keep, electrodes))
         if progress:
             progress(len(frames), len(time))
     fluid, counts = "", {}
     if "electrodes" in keep:
         pressure, still = _pressure(frames), np.full(len(time), _STILL_COUNT, np.int16)
-        counts = {"electrodes": readings(_signals(frames, electrodes), time, wiring, seed), "pdc": pdc_counts(pressure)}
+        change = np.stack([frame.change for frame in frames])
+        counts = {"electrodes": readings(change, time, wiring, seed), "pdc": pdc_counts(pressure)}
         counts |= {"tac": still, "tdc": still}
         fluid = " " + _describe_fluid(pressure, electrodes)
     write_simulated(
@@ -79,7 +100,7 @@ def simulate_recording(
     )  # fmt: skip
 
 
-def sensors_of(keep: Collection[str]) -> tuple[str, ...]:
+def sensors_of(keep: Collection[str]) -> tuple[Sensor, ...]:
     """The sensors that outputs need, of ``"biotac"`` and ``"digit"``."""
     return tuple(dict.fromkeys(sensor for word, sensor in OUTPUTS.items() if word in keep))
 
@@ -92,7 +113,7 @@ def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
     return scene.recording
 
 
-def _tiers_told(tiers: Mapping[str, str] | None) -> str:
+def _tiers_told(tiers: Mapping[Sensor, Tier] | None) -> str:
     return "" if not tiers else ", " + ", ".join(f"{sensor} {tier}" for sensor, tier in sorted(tiers.items()))
 
 
@@ -116,30 +137,42 @@ def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _solve(
-    scene_path: str | os.PathLike, indenter: Indenter, place: Placement, force: float, time: float,
-    sensors_used: tuple[str, ...], tiers: Mapping[str, str],
-) -> Solved:  # fmt: skip
-    if not force > 0:
-        return {}
-    found = {name: frame_contact(name, indenter, place, force, tiers.get(name, "fast")) for name in sensors_used}
-    for name, contact in found.items():
-        if contact is None:
-            which = "BioTac" if name == "biotac" else "DIGIT"
+    where: str, indenter: Indenter, place: Placement, force: float, friction: float, used: Collection[Sensor],
+    tiers: Mapping[Sensor, Tier],
+) -> dict[Sensor, Solution]:  # fmt: skip
+    """The contacts of a frame by sensor; none where nothing presses."""
+    found = {}
+    for sensor in used if force > 0 else ():
+        try:
+            tier = tiers.get(sensor, "fast")
+            found[sensor] = solve(sensor, indenter, place, force=force, tier=tier, friction=friction)
+        except UnreachableError as error:
+            which = "BioTac" if sensor == "biotac" else "DIGIT"
             raise TactileError(
-                f"{scene_path}, recording, {time:.2f} s",
-                f"{force:.3g} N at ({place.x * 1e3:.1f}, {place.z * 1e3:.1f}) mm",
+                where, f"{force:.3g} N at ({place.x * 1e3:.1f}, {place.z * 1e3:.1f}) mm",
                 f"a force that the {which} bears within 60 % of its thickness", "Lower force_n there",
-            )  # fmt: skip
+            ) from error  # fmt: skip
     return found
 
 
-def _signals(frames: list[Solved], law: str) -> np.ndarray:
-    return np.stack([found["biotac"].signal(law) if found else np.zeros(19) for found in frames])
+def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str], law: str) -> _Frame:
+    """Extract what is kept of a frame's contacts. The force is the BioTac's, or the DIGIT's where that is alone."""
+    moved = {}
+    for sensor in sensors_of(keep):
+        if f"displacement_{sensor}" in keep:
+            rest = sensors.sensor_surface(sensor).rest
+            moved[sensor] = (solved[sensor].displacement if solved else np.zeros_like(rest)).astype(np.float32)
+    if not solved:
+        return _Frame(moved, np.zeros(3), 0.0, np.zeros(19), np.full(2, np.nan))
+    biotac, digit, first = solved.get("biotac"), solved.get("digit"), next(iter(solved.values()))
+    change = signal_of(biotac, law) if "electrodes" in keep else np.zeros(19)
+    centre = digit.centre if digit else np.full(2, np.nan)
+    return _Frame(moved, first.force, first.pressure, change, centre)
 
 
-def _pressure(frames: list[Solved]) -> np.ndarray:
+def _pressure(frames: list[_Frame]) -> np.ndarray:
     """The fluid's pressure (T,) Pa over the surrounding air."""
-    return PRESSURE_AT_REST + np.array([found["biotac"].pressure if found else 0.0 for found in frames])
+    return PRESSURE_AT_REST + np.array([frame.pressure for frame in frames])
 
 
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
@@ -160,19 +193,11 @@ def _wiring(spec: RecordingSpec) -> Wiring:
     return Wiring(noise=spec.noise_counts, drift=spec.drift_counts / lasts)
 
 
-def _truth(frames: list[Solved], keep: Collection[str]) -> Truth:
-    """Displacements as far as they are kept; the force is the BioTac's, or the DIGIT's where that is solved alone."""
+def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
+    """Displacements as far as they are kept, force, and the centre of pressure where the DIGIT is solved."""
 
-    def moved(sensor: str) -> np.ndarray | None:
-        if f"displacement_{sensor}" not in keep:
-            return None
-        nodes = len(sensors.sensor_surface(sensor).rest)
-        arrays = (found[sensor].displacement if found else np.zeros((nodes, 3)) for found in frames)
-        return np.stack([array.astype(np.float32) for array in arrays])
+    def moved(sensor: Sensor) -> np.ndarray | None:
+        return np.stack([frame.moved[sensor] for frame in frames]) if sensor in frames[0].moved else None
 
-    first, *_ = solved = sensors_of(keep)
-    centre = None
-    if "digit" in solved:
-        centre = np.stack([found["digit"].centre if found else np.full(2, np.nan) for found in frames])
-    force = np.stack([found[first].force if found else np.zeros(3) for found in frames])
-    return Truth(moved("biotac"), moved("digit"), force, centre)
+    centre = np.stack([frame.centre for frame in frames]) if "digit" in sensors_of(keep) else None
+    return Truth(moved("biotac"), moved("digit"), np.stack([frame.force for frame in frames]), centre)

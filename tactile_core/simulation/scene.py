@@ -12,9 +12,11 @@ from msgspec import Meta
 
 from ..errors import TactileError
 from ..files.text_file import read_toml_text
+from ..mechanics.placement import FRICTION
 from .indenter_specs import IndenterSpec, NotNegative, Positive, with_files_of
 
 FORMAT = "tactile-scene-1"
+Friction = Annotated[float, Meta(ge=0, le=5)]  # Coulomb's coefficient
 LARGEST = 1e9  # of any number: none that means something comes near, squares of far larger ones are infinite (assumed)
 
 
@@ -28,7 +30,7 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     tilt_max_deg: Annotated[float, Meta(ge=0, le=45)] = 20.0
     rim_margin_mm: Annotated[float, Meta(ge=0, le=8)] = 1.0
     depth_max_percent: Annotated[float, Meta(gt=0, le=60)] = 60.0  # of the thickness under the first touch
-    friction: Annotated[float, Meta(ge=0, le=5)] = 0.78  # Coulomb's coefficient (docs/sources.md, BioTac skin)
+    friction: Friction = FRICTION
     slide_share: Annotated[float, Meta(ge=0, le=1)] = 0.0  # of the presses end with a slide at constant force
     slide_max_mm: Annotated[float, Meta(ge=0, le=3)] = 0.0  # slides are evenly long up to this
     depth_steps: Annotated[int, Meta(ge=0, le=100)] = 0  # contacts a press, paired by depth; 0: paired by force
@@ -53,6 +55,7 @@ class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     noise_counts: NotNegative = 1.0
     drift_counts: NotNegative = 3.0
     tilt_deg: Annotated[float, Meta(ge=0, le=45)] = 0.0
+    friction: Friction = FRICTION
 
 
 class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

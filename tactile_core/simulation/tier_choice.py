@@ -11,12 +11,11 @@ import numpy as np
 from ..accuracy import Candidate, cheapest
 from ..mechanics.error_estimate import expected_error, measured
 from ..mechanics.fast.compliance import stored
+from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement
+from ..mechanics.solve import TIERS, solve
 from ..mechanics.thickness import DEPTH_LIMIT
-from .frame_contact import frame_contact
 from .scene import RecordingSpec, load_scene
-
-TIERS = ("fast", "full", "reference")
 
 
 class TierChoice(NamedTuple):
@@ -90,6 +89,9 @@ def depth_share(sensor: str, indenter, spec: RecordingSpec) -> float:  # noqa: A
     for point in spec.points:
         if point.force_n > 0:
             place = Placement(point.x_mm * 1e-3, point.z_mm * 1e-3, np.radians(spec.tilt_deg))
-            found = frame_contact(sensor, indenter, place, point.force_n)
-            share = max(share, DEPTH_LIMIT if found is None else found.depth / found.thickness)
+            try:
+                found = solve(sensor, indenter, place, force=point.force_n, friction=spec.friction)
+            except UnreachableError:
+                return DEPTH_LIMIT
+            share = max(share, found.depth / found.thickness)
     return min(share, DEPTH_LIMIT)

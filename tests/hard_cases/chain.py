@@ -9,11 +9,12 @@ import numpy as np
 
 from tactile_core import accuracy
 from tactile_core.mechanics.electrodes.law import signal_of
+from tactile_core.mechanics.force_search import UnreachableError
+from tactile_core.mechanics.solve import solve
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors import REST_COUNT
 
 from .case import TRANSLATION, Found, case
-from .contacts import press
 from .shapes import CONTACTS, SUNK
 from .signals import prepared, translator
 
@@ -23,11 +24,12 @@ WORDS = Flag.OUT_OF_RANGE | Flag.BEYOND_DIGIT
 def _translated(name: str, share: float) -> Found:
     """A contact of the BioTac at a share of its depth and the DIGIT's at the same force, against the translation."""
     _, indenter, place, depth, friction = CONTACTS[name]
-    biotac = press("biotac", indenter, place, friction).at_depth(share * depth)
-    digit = press("digit", indenter, place, friction).at_force(biotac.axial_force)
-    if digit is None:
+    biotac = solve("biotac", indenter, place, depth=share * depth, friction=friction)
+    try:
+        digit = solve("digit", indenter, place, force=biotac.axial_force, friction=friction)
+    except UnreachableError:
         return Found(1.0, "said", 1.0, at_least=True, words="the fast tier says that it finds no contact of this force")
-    change = signal_of(biotac.linear)[None]
+    change = signal_of(biotac)[None]
     signals = dataclasses.replace(
         prepared()[1],
         change=change,
@@ -40,9 +42,7 @@ def _translated(name: str, share: float) -> Found:
     found = translator()(signals)
     worst, words = 0.0, []
     for sensor, truth in (("biotac", biotac), ("digit", digit)):
-        error = float(
-            accuracy.max_error(getattr(found, f"displacement_{sensor}"), truth.corrected.displacement[None])[0]
-        )
+        error = float(accuracy.max_error(getattr(found, f"displacement_{sensor}"), truth.displacement[None])[0])
         bound = float(getattr(found, f"error_bound_{sensor}")[0])
         worst = max(worst, error / bound)
         words.append(f"{sensor} {error * 1e6:.0f} um (bound {bound * 1e6:.0f})")

@@ -14,9 +14,8 @@ from tactile_core.jobs.engine import result_parts
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine.local import Here
 from tactile_core.jobs.pairs import make_pairs, plan, wanted
-from tactile_core.mechanics.fast.compliance import compliance_of
-from tactile_core.mechanics.fast.press import CorrectedPress
-from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.placement import Placement
+from tactile_core.mechanics.solve import solve
 from tactile_core.simulation import pairs_file
 from tactile_core.simulation.pair_sampling import pair_row, press_rows
 from tactile_core.simulation.pairs_card import card, card_path
@@ -166,7 +165,7 @@ def test_a_contact_that_reaches_beside_the_gel_is_marked(z, beyond):
     """A 14 mm ball 0.8 mm deep touches the BioTac some 2 mm around; the gel ends at 9.17 mm."""
     ball, place = Sphere(7e-3), Placement(-8e-3, z)
     pressed = [
-        CorrectedPress(compliance_of(sensor), ball, pose_at(sensor, ball, place), 2e-3).at_depth(depth)
+        solve(sensor, ball, place, depth=depth, friction=0.0)
         for sensor, depth in (("biotac", 0.8e-3), ("digit", 0.2e-3))
     ]
     assert pair_row(*pressed)["beyond_digit"] == beyond

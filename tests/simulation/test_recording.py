@@ -113,13 +113,13 @@ def unsolved(monkeypatch):
     """``unsolved("digit")``: solving a contact on that sensor fails the test."""
 
     def forbid(sensor):
-        solve = recording_room.frame_contact
+        solve = recording_room.solve
 
-        def guarded(name, *given):
+        def guarded(name, *given, **named):
             assert name != sensor
-            return solve(name, *given)
+            return solve(name, *given, **named)
 
-        monkeypatch.setattr(recording_room, "frame_contact", guarded)
+        monkeypatch.setattr(recording_room, "solve", guarded)
 
     return forbid
 

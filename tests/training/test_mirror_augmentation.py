@@ -9,9 +9,8 @@ from small_pairs import frame, write_pairs
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from tactile_core.geometry.indenters import Sphere  # noqa: E402
-from tactile_core.mechanics.fast.compliance import compliance_of  # noqa: E402
-from tactile_core.mechanics.fast.press import CorrectedPress  # noqa: E402
-from tactile_core.mechanics.placement import Placement, pose_at  # noqa: E402
+from tactile_core.mechanics.placement import Placement  # noqa: E402
+from tactile_core.mechanics.solve import solve  # noqa: E402
 from tactile_core.sensors import electrodes, sensor_surface  # noqa: E402
 from tactile_core.simulation.pair_sampling import pair_row  # noqa: E402
 from tactile_core.simulation.pairs_file import read_pairs, split_presses  # noqa: E402
@@ -26,8 +25,7 @@ def pressed(side: float) -> dict[str, np.ndarray]:
     """A leaning ball beside the middle of the finger, to one side or the other."""
     place, ball, found = Placement(-3e-3, side * 2e-3, 0.2, side * 0.7), Sphere(3.5e-3), []
     for sensor in ("biotac", "digit"):
-        pose = pose_at(sensor, ball, place)
-        found.append(CorrectedPress(compliance_of(sensor), ball, pose, 1.5e-3, 0.78).at_force(0.3, pose))
+        found.append(solve(sensor, ball, place, force=0.3))
     return pair_row(*found)
 
 

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactile_core import accuracy, sensors
-from tactile_core.mechanics.fast.compliance import compliance_of
-from tactile_core.mechanics.fast.press import CorrectedPress
 from tactile_core.mechanics.first_touch import surface_drop
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Sensor, Solution, Step, Tier, solve_path
@@ -55,18 +53,16 @@ def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
         indenter = scene.indenters[int(pairs.indenter[rows[0]])].build()
         place = Placement(*map(float, pairs.place[rows[0]]))
         pose, turned = pose_at(sensor, indenter, place), pose_at("biotac", indenter, place)
-        limit, thick = depth_at(DEPTH_LIMIT, sensor, indenter, pose), thickness_under(sensor, indenter, pose)
-        fast = CorrectedPress(compliance_of(sensor), indenter, pose, limit, scene.pairs.friction)
-        for row in rows:
-            slid = pose.slid(*map(float, pairs.slide[row]))
-            found = fast.at_depth(float(getattr(pairs, f"depth_{sensor}")[row]), slid)
-            if found.linear.converged:
+        depths, slides = getattr(pairs, f"depth_{sensor}")[rows].astype(float), pairs.slide[rows].astype(float)
+        steps = [Step(depth, slide=tuple(slide)) for depth, slide in zip(depths, slides, strict=True)]
+        path = solve_path(sensor, indenter, pose, steps, friction=scene.pairs.friction, limit=1.001 * max(depths))
+        for row, slide, found in zip(rows, slides, path, strict=True):
+            if found.converged:
                 true = true_displacement(pairs, sensor, np.array([row]))[0]
                 along = float(pairs.force[row] @ turned.direction)  # the same on both sensors
-                share = (
-                    found.linear.depth - surface_drop(sensors.sensor_surface(sensor), indenter, pose, slid)
-                ) / thick
-                yield miss(int(press), share, found.corrected.displacement, found.axial_force, true, along)
+                drop = surface_drop(sensors.sensor_surface(sensor), indenter, pose, pose.slid(*slide))
+                share = (found.depth - drop) / found.thickness
+                yield miss(int(press), share, found.displacement, found.axial_force, true, along)
 
 
 def drawn(count: int, seed: int) -> list[RandomContact]:

@@ -9,6 +9,7 @@ grips of hard flat objects in the PHAC set, trials 01 to 03, whose pressure is c
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,10 +19,10 @@ import numpy as np
 from tactile_core import recordings, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.mechanics.electrodes.law import signal_of
-from tactile_core.mechanics.fast.compliance import biotac_compliance
-from tactile_core.mechanics.fast.press import CorrectedPress
+from tactile_core.mechanics.force_search import UnreachableError
 from tactile_core.mechanics.penetration import PenetrationError
 from tactile_core.mechanics.placement import pose_at
+from tactile_core.mechanics.solve import Step, solve_path
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, depth_at
 from tactile_core.recordings.readers import each_finger
 from tactile_core.sensors import PRESSURE_PER_COUNT, REST_COUNT, divider
@@ -70,16 +71,11 @@ def _simulated(presses: int) -> tuple[np.ndarray, np.ndarray]:
         indenter = scene.indenters[random.integers(len(scene.indenters))].build()
         pose = pose_at("biotac", indenter, draw_place(random, spec))
         limit = depth_at(DEPTH_LIMIT, "biotac", indenter, pose)
-        press = CorrectedPress(biotac_compliance(), indenter, pose, limit, spec.friction)
         start = spec.force_min_n * spec.force_ratio ** random.uniform()
-        for step in itertools.count():
-            try:
-                contact = press.at_force(start * spec.force_ratio**step)
-            except PenetrationError:
-                break
-            if contact is None:
-                break
-            found.append((signal_of(contact.linear), contact.pressure))
+        steps = (Step(force=start * spec.force_ratio**step) for step in itertools.count())
+        with contextlib.suppress(UnreachableError, PenetrationError):
+            for contact in solve_path("biotac", indenter, pose, steps, friction=spec.friction, limit=limit):
+                found.append((signal_of(contact), contact.pressure))
     return np.stack([signal for signal, _ in found]), np.array([pressure for _, pressure in found])
 
 

@@ -8,7 +8,7 @@ from ... import sensors
 from ...errors import TactileError
 from ...sensors import divider
 from ..fast.contact_state import Contact
-from ..finite_strain.press import FullContact
+from ..solution import Solution
 from .biotac_sheet import sensing_films
 from .gap_law import signal_of_gaps
 from .reduced_sheet import reduced_sheet
@@ -16,14 +16,14 @@ from .reduced_sheet import reduced_sheet
 SHEET, GAP = LAWS = ("sheet", "gap")
 
 
-def signal_of(contact: Contact | FullContact, law: str = SHEET) -> np.ndarray:
+def signal_of(contact: Contact | Solution, law: str = SHEET) -> np.ndarray:
     """Noise-free change (19,) of the raw counts against rest, of a unit that rests at ``sensors.REST_COUNT``.
 
     law : ``"sheet"``, the film as a conducting sheet, 3 ms; ``"gap"``, one over the film's thickness, at no cost
     Raises TactileError for another law.
     """
     if law == SHEET:
-        films = contact.films if isinstance(contact, FullContact) else sensing_films(contact)
+        films = sensing_films(contact) if isinstance(contact, Contact) else contact.films
         return divider.reading(reduced_sheet().growth(films), sensors.REST_COUNT) - sensors.REST_COUNT
     if law == GAP:
         return signal_of_gaps(contact.electrode_gaps)

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
 from ..first_touch import surface_drop
-from ..force_search import touch_at_force
+from ..force_search import FORCE_TOLERANCE, touch_at_force
 from ..penetration import PenetrationError
 from ..pose_path import same_line
 from ..sharpness import BENDS, sharpest
@@ -21,7 +21,6 @@ from .contact_state import Contact
 from .correction import Corrected, correct, force_factor
 from .edge_contact import EdgeContactProblem
 
-FORCE_TOLERANCE = 1e-3  # relative, of the force asked for: a fiftieth of the error of the corrected force
 _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
 _GROWTH = 1.6  # largest change of force in one step of a search, which a warm start follows safely
 _LEAST_DEPTH = 1e-6  # m, of a contact that has slid: friction may hold it where the resting surface is not reached
@@ -148,7 +147,7 @@ class CorrectedPress:
         start = self.last or self.problem.at_pose(pose.moved(fall))
         begin = self._with_correction(start, fall)
         try:
-            found = touch_at_force(move, begin, pose.direction, force, self.limit, "", FORCE_TOLERANCE)
+            found = touch_at_force(move, begin, pose.direction, force, self.limit, "")
         except PenetrationError:
             raise
         except TactileError:  # beyond the limit

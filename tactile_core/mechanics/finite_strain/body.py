@@ -19,11 +19,10 @@ from ..solids.graded_mesh import Footprint, GradedMesh, graded_gel, graded_skin
 from ..solids.hex_mesh import inner_faces, outer_faces
 from ..solids.neo_hookean import NeoHookean
 from ..solids.split_bulk_modulus import SplitBulkModulus
+from ..solution import Sensor
 from .contact_state import ContactState
 from .newton import FiniteStrainContact
 from .tolerance import EXACT, Tolerance
-
-Sensor = Literal["biotac", "digit"]
 
 # m of a load step: without friction one is enough from rest, unless it fails and is halved; friction follows a path.
 ONE_STEP, FRICTION_STEP = 5e-3, 0.25e-3

@@ -1,0 +1,158 @@
+"""A path of contacts in the full and the reference tier, on a mesh graded round the deepest of them."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from ...geometry.indenters import Indenter, Pose
+from ...sensors import biotac, sensor_surface
+from .. import error_estimate
+from ..electrodes.biotac_sheet import biotac_sheet
+from ..fast.sensing_points import electrode_feet
+from ..first_touch import surface_drop
+from ..force_search import touch_at_force
+from ..penetration import PenetrationError
+from ..pose_path import same_line
+from ..sharpness import sharpest
+from ..solution import OnDemand, Sensor, Solution, Step, centre_of_pressure
+from .body import FRICTION_STEP, ONE_STEP, Body, graded_body
+from .contact_state import ContactState
+from .newton import FiniteStrainContact, NoEquilibriumError
+
+# Of the full tier's spacing, where its own mesh finds no contact: 8 of 14 rings at random depths settled then, and five
+# of five deeper than their wire's radius that had not, or had gone through.
+_FINER = 0.5
+# Of load steps without friction, on the tier's own mesh and on the finer one, before another way is shorter (assumed).
+_FEW_FAILURES = 4, 2
+_SPARE = 1.1  # of the depths that the fast tier finds, for which the mesh is made where forces are asked for
+
+
+class LoadPath:
+    """A path of one indenter on one sensor; ``to`` goes on from the step before.
+
+    pose : at first touch; thickness, limit : m, of the sensor there, and the greatest depth
+    depths : m, of the steps to come, as far as they are known
+    """
+
+    body: Body
+    problem: FiniteStrainContact
+
+    def __init__(
+        self, sensor: Sensor, indenter: Indenter, pose: Pose, thickness: float, limit: float, depths: Sequence[float],
+        tier: Literal["full", "reference"], friction: float,
+    ) -> None:  # fmt: skip
+        self.sensor, self.indenter, self.pose, self.tier, self.friction = sensor, indenter, pose, tier, friction
+        self.thickness, self.limit = thickness, limit
+        self.spacing = 1.0  # of the mesh's nodes, over the tier's own
+        self.way: list[Pose] = []  # what was solved, which friction remembers
+        self.made_for = max(depths, default=0.0)
+        self.deeper = 1.0  # how deep the last force was found, over the guess
+        self._make()
+
+    def _make(self) -> None:
+        """The mesh, with nothing pressed yet."""
+        self.body = graded_body(self.sensor, self.indenter, self.pose, self.made_for, self.tier, self.spacing)
+        self.problem = self.body.contact(self.indenter, self.pose, self.made_for, self.friction)
+        self.step = FRICTION_STEP if self.friction or self.spacing < 1 else ONE_STEP
+        if self.tier == "full" and not self.friction:
+            self.problem.most_failures = _FEW_FAILURES[self.spacing < 1]
+        self.last = self.problem.start()
+
+    def to(self, step: Step, guess: float) -> Solution:
+        """See ``solve_path``. Where the full tier's mesh does not hold the indenter, on a finer one from the start.
+
+        guess : m, about where a force is found
+        """
+        try:
+            found = self._to(step, guess)
+        except (NoEquilibriumError, PenetrationError):
+            if self.tier != "full" or self.spacing < 1:
+                raise
+            self._refine()
+            found = self._to(step, guess)
+        self.way.append(self.last.pose)
+        return found
+
+    def _refine(self) -> None:
+        self.spacing = _FINER
+        self._make()
+        for pose in self.way if self.friction else ():
+            self.last = self.problem.move(pose, self.last, self.step)
+
+    def _to(self, step: Step, guess: float) -> Solution:
+        pose = self.pose.slid(*step.slide)
+        if step.force:
+            self.last = self._at_force(pose, step.force, self.deeper * guess)
+            self.deeper = self.last.depth / guess
+        elif step.depth or self.last.depth:
+            self.last = self.problem.move(pose.moved(step.depth or 0.0), self.last, self.step)
+        return self._solution(self.last)
+
+    def _at_force(self, pose: Pose, force: float, guess: float) -> ContactState:
+        """The contact at a force, N, along the motion, near the depth ``guess``, m."""
+
+        def move(depth: float, before: ContactState) -> ContactState:
+            return self.problem.move(pose.moved(depth), before, self.step)
+
+        where, slid_to = f"solve, {self.sensor}, {self.tier} tier", None
+        if not same_line(self.last.pose, pose):
+            slid_to = surface_drop(sensor_surface(self.sensor), self.indenter, self.pose, pose)
+        return touch_at_force(move, self.last, pose.direction, force, self.limit, where, guess, slid_to)
+
+    def _solution(self, touch: ContactState) -> Solution:
+        mesh = self.body.solid.mesh
+        below = self.body.penetration_depth(touch, self.indenter)
+        gap = touch.outer.gaps(mesh.nodes + touch.state.displacement)
+        table = error_estimate.expected_error(self.tier, self.sensor, touch.depth / self.thickness)
+        pressing = int((touch.pressing > 0).sum())
+        stated = error_estimate.of_finite_strain(table, touch.depth, pressing, self._nodes_across(touch), below)
+        slips = touch.outer.slipping[touch.outer.active]
+        skin = len(mesh.inner) > 0
+        return Solution(
+            self.tier, True, touch.iterations, self.body.displacement(touch), self.body.contact_patch(touch),
+            self.thickness, touch.force, float(touch.force @ touch.pose.direction), touch.depth, touch.fluid,
+            centre_of_pressure(mesh.nodes[touch.nodes], touch.outer.forces), float(-gap.min(initial=0.0)),
+            float(slips.mean()) if len(slips) and self.friction else 0.0, len(touch.inner.nodes),
+            OnDemand(
+                electrode_gaps=functools.partial(_electrode_gaps, self.body, touch) if skin else _nothing,
+                films=functools.partial(_films, self.body, touch) if skin else _nothing,
+                errors=lambda: stated,
+            ),
+            touch.steps, (self.body.solid, touch.state),
+            touch.push.loads(len(touch.state.displacement)) if touch.guarded else None,
+        )  # fmt: skip
+
+    def _nodes_across(self, touch: ContactState) -> float:
+        """Count the nodes of the full tier's mesh across the contact where the indenter is sharpest."""
+        mesh = self.body.solid.mesh
+        rest = mesh.nodes[mesh.surface]
+        nearest = rest[int(np.argmin(touch.pose.distance(self.indenter, rest)[0]))]
+        spacing = float(np.partition(np.linalg.norm(rest - nearest, axis=1), 1)[1])
+        radius = sharpest(self.indenter, touch.pose, rest + touch.state.displacement[mesh.surface])
+        spacing *= 1 if self.tier == "full" else 2
+        return float(2 * np.sqrt(min(radius, 1.0) * max(touch.depth, 0.0)) / spacing)
+
+
+def _electrode_gaps(body: Body, touch: ContactState) -> np.ndarray:
+    """Film (19,) m over each electrode of the BioTac."""
+    feet, inner = electrode_feet(), biotac.skin_surface("inner")
+    at_feet = np.einsum("ek,ekj->ej", feet.weights, _inner_skin(body, touch)[inner.faces[feet.face]])
+    return feet.gap + np.einsum("ej,ej->e", at_feet, feet.outward)
+
+
+def _films(body: Body, touch: ContactState) -> np.ndarray:
+    """Film (k,) m at the nodes of the conducting sheet."""
+    return biotac_sheet().films(_inner_skin(body, touch))
+
+
+def _inner_skin(body: Body, touch: ContactState) -> np.ndarray:
+    """Displacement (n, 3) m of the inner skin's lattice."""
+    return body.graded.on_lattice(touch.state.displacement[body.solid.mesh.inner])
+
+
+def _nothing() -> np.ndarray:
+    return np.empty(0)

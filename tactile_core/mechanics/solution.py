@@ -1,0 +1,103 @@
+"""What is asked of contact mechanics (``Step``) and what it answers (``Solution``), the same in every tier."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from .solids.finite_strain import FiniteStrainSolid, State
+
+Sensor = Literal["biotac", "digit"]
+Tier = Literal["fast", "full", "reference"]
+TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """A place on a path: ``depth`` m or ``force`` N along the motion, and how far the indenter has slid, m.
+
+    slide : along the finger and across, in the indenter's own axes, from where it first touched
+    """
+
+    depth: float | None = None
+    force: float | None = None
+    slide: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class OnDemand:
+    """Functions that compute the costly parts of a ``Solution``: its properties of the same names."""
+
+    electrode_gaps: Callable[[], np.ndarray]
+    films: Callable[[], np.ndarray]
+    errors: Callable[[], tuple[float, float]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Solution:
+    """A solved contact, SI units, whatever the tier.
+
+    tier : which solver made it; converged : whether it may be used; iterations : of its last step
+    displacement : (n, 3) m of the sensor's surface nodes; contact_patch : (n,) bool, nodes that carry force
+    thickness : m, of the sensor where it was first touched
+    force : (3,) N, exerted by the indenter on the sensor; axial_force : N, along the motion; depth : m from first touch
+    pressure : Pa, rise of the BioTac's fluid pressure, 0 for the DIGIT
+    centre : (2,) = (x, z) m, of pressure, on the resting surface; NaN without contact
+    penetration : m, deepest place of a node in the indenter or the core; slipping : share of the touching nodes
+    core_nodes : inner-skin nodes that press on the core; load_steps : how many it took to get here from the last
+    volume : the solid and its state, of the full and the reference tier
+    between : (m, 3) N, what the indenter's force on the surface between nodes is on the solid's nodes, if there is any
+    """
+
+    tier: Tier
+    converged: bool
+    iterations: int
+    displacement: np.ndarray
+    contact_patch: np.ndarray
+    thickness: float
+    force: np.ndarray
+    axial_force: float
+    depth: float
+    pressure: float
+    centre: np.ndarray
+    penetration: float
+    slipping: float
+    core_nodes: int
+    on_demand: OnDemand = dataclasses.field(repr=False)
+    load_steps: int = 1
+    volume: tuple[FiniteStrainSolid, State] | None = dataclasses.field(default=None, repr=False)
+    between: np.ndarray | None = None
+
+    @functools.cached_property
+    def electrode_gaps(self) -> np.ndarray:
+        """Film (19,) m over each electrode of the BioTac; (0,) on the DIGIT. The fast tier's is not corrected."""
+        return self.on_demand.electrode_gaps()
+
+    @functools.cached_property
+    def films(self) -> np.ndarray:
+        """Film (k,) m at the nodes of the conducting sheet; (0,) on the DIGIT. The fast tier's is not corrected."""
+        return self.on_demand.films()
+
+    @property
+    def shape_error(self) -> float:
+        """Error, m rms over nodes that move more than 10 um, that 95 of 100 such contacts stay below."""
+        return self._errors[0]
+
+    @property
+    def force_error(self) -> float:
+        """Relative error of the force that 95 of 100 such contacts stay below."""
+        return self._errors[1]
+
+    @functools.cached_property
+    def _errors(self) -> tuple[float, float]:
+        return self.on_demand.errors()
+
+
+def centre_of_pressure(places: np.ndarray, nodal_force: np.ndarray) -> np.ndarray:
+    """Centre (2,) = (x, z) m of places (k, 3) m, weighted by the size of the forces (k, 3) N there; NaN without any."""
+    weight = np.linalg.norm(nodal_force, axis=1)
+    return weight @ places[:, [0, 2]] / weight.sum() if weight.any() else np.full(2, np.nan)
