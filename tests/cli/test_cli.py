@@ -240,7 +240,7 @@ def test_info_may_be_cut_by_its_reader(slide_csv):
         (["pairs", "absent.toml", "--count", "4", "--out", "p.h5", "--workers", "0"], "--workers"),
         (["pairs", "absent.toml", "--count", "4", "--out", "p.h5", "--seed", "-1"], "--seed"),
         (["simulate", "absent.toml", "--out", "r.h5"], "absent.toml"),
-        (["simulate", "absent.toml", "--out", "r.h5", "--isaac-like", "absent.tet"], "absent.toml"),
+        (["simulate", "absent.toml", "--out", "r.h5", "--error", "50um"], "absent.toml"),
         (["simulate", "absent.toml", "--out", "r.h5", "--core", "core.obj"], "--core"),
         (["simulate", "absent.toml", "--out", "r.h5", "--seed", "-1"], "--seed"),
         (["train", "absent.h5", "--out", "t", "--seed", "-1"], "--seed"),
@@ -253,18 +253,6 @@ def test_bad_jobs_end_in_one_message(arguments, words, tactile, tmp_path, monkey
     assert status == 2
     assert words in only_line(err)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_frames_that_an_isaac_like_run_missed_are_told(tactile, tmp_path, monkeypatch):
-    from tactile_core.simulation import isaac_recording
-
-    asked = []
-    monkeypatch.setattr(isaac_recording, "simulate_isaac_like", lambda *given: asked.append(given[:4]) or 3)
-    given = ("simulate", "scene", "--isaac-like", "skin.tet", "--core", "core.obj", "--out", tmp_path / "a.h5")
-    status, out, err = tactile(*given)
-    assert (status, out) == (0, f"{tmp_path / 'a.h5'}\n")
-    assert "3 frames did not reach their force" in only_line(err)
-    assert asked == [("scene", "skin.tet", str(tmp_path / "a.h5"), "core.obj")]
 
 
 def test_a_verb_names_the_extra_it_lacks(tactile, monkeypatch, tmp_path):

@@ -27,6 +27,7 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
+from benchmarks.isaac import tet_file  # noqa: E402
 from small_pairs import write_pairs  # noqa: E402
 
 from tactile_core import recordings  # noqa: E402
@@ -37,7 +38,6 @@ from tactile_core.jobs import gel_frames, prepared_signals  # noqa: E402
 from tactile_core.jobs.engine import dask_cluster, inputs, recipes  # noqa: E402
 from tactile_core.jobs.engine import job as jobs  # noqa: E402
 from tactile_core.jobs.live import Growing  # noqa: E402
-from tactile_core.mechanics.isaac import tet_file  # noqa: E402
 from tactile_core.pictures import background  # noqa: E402
 from tactile_core.recordings import chunks, electrode_gains  # noqa: E402
 from tactile_core.sensors import calibration_file  # noqa: E402

@@ -17,6 +17,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from benchmarks.isaac import tet_file
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
@@ -26,7 +27,6 @@ from tactile_core.geometry.indenters import mesh_file
 from tactile_core.jobs import prepared_signals
 from tactile_core.jobs.engine import dask_cluster, inputs
 from tactile_core.jobs.gel_frames import read_frames
-from tactile_core.mechanics.isaac import tet_file
 from tactile_core.pictures.background import read_photograph
 from tactile_core.pictures.shading import Shader
 from tactile_core.recordings import chunks, electrode_gains

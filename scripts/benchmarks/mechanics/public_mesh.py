@@ -19,11 +19,12 @@ from tactile_core.geometry.indenters import Pose, Sphere
 from tactile_core.geometry.lattice import Lattice
 from tactile_core.mechanics.finite_strain.body import ONE_STEP, Body, graded_body
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
-from tactile_core.mechanics.isaac import contact as isaac_like
-from tactile_core.mechanics.isaac.tet_file import TetMesh, checked, read_tet
 from tactile_core.mechanics.placement import Placement, biotac_pose, digit_pose
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.sensors import Material, unrolling
+
+from ..isaac import pressed_tets as isaac_like
+from ..isaac.tet_file import TetMesh, checked, read_tet
 
 _BALL, _PLACE = Sphere(3.5e-3), Placement(-8e-3, 0.0)
 _MOVES = 10e-6  # m, nodes that move more count, as in metrics

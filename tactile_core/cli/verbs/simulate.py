@@ -19,10 +19,6 @@ needs is not solved: electrodes and displacement_biotac need the BioTac, displac
 contacts stay below), to the depth that the scene reaches, is at most that, and says which; fast without it. What the
 full or the reference tier will cost is printed first; over a minute is asked about, or needs --yes.
 
-With --isaac-like the scene's motion presses a BioTac skin of your own, as Isaac Gym computed it: linear tetrahedra,
-E 1.552 MPa, nu 0.316, no fluid, hence no electrodes, and no friction. Ten frames a second of displacement, force and
-depth come out, for comparison with data that was made that way. Such meshes lock: the force is too high.
-
 With --grid many recordings are simulated into a folder, with grid.json, which lists the values of each. They wait in
 OUT.parts until all are there, and the same command goes on after any interruption."""
 EPILOG = """\
@@ -30,7 +26,6 @@ examples:
   tactile simulate scenes/press_roll_slide/scene.toml --seed 1 --out press_roll_slide.h5
   tactile simulate scenes/press --keep electrodes --out press.h5          the BioTac alone
   tactile simulate scenes/press --error 50um --out press.h5
-  tactile simulate scenes/press_roll_slide --isaac-like skin.tet --core core.obj --out isaac.h5
   tactile simulate scenes/press_roll_slide --grid force_n=0.2:1:5 --grid recording.tilt_deg=0,10 --out many"""
 LEAVES = NOTHING
 
@@ -49,18 +44,6 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     error_argument(verb, "um of the surface, such as 50um")
     verb.add_argument(
         "--yes", action="store_true", help="begin at once, however long the tier that --error picks will take"
-    )
-    verb.add_argument(
-        "--isaac-like",
-        metavar="FILE.tet",
-        help="a skin in Isaac Gym's text layout (lines `v x y z` in metres and `t a b c d`), in the frame"
-        " of the public BioTac mesh; a frame takes some seconds, and --seed changes nothing",
-    )
-    verb.add_argument(
-        "--core",
-        metavar="FILE.obj",
-        help="for --isaac-like: the rigid core that holds the skin, a closed triangle mesh in metres"
-        " (default: our own table of it, which moves forces by 1 %%)",
     )
     verb.add_argument(
         "--grid",
@@ -83,28 +66,16 @@ def run(options: argparse.Namespace) -> int:
     for name in ("workers", "cluster", "restart", "plan"):
         if getattr(options, name):
             raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
-    if options.core and not options.isaac_like:
-        raise TactileError("--core", options.core, "--isaac-like FILE.tet beside it", "Our own skin has its core")
-    for name in ("keep", "error"):
-        if getattr(options, name) is not None and options.isaac_like:
-            raise TactileError(f"--{name}", getattr(options, name), "no --isaac-like beside it, which has its own way")
     bound = None if options.error is None else _bound(options.error)
     with bar("simulate", "frame", options.progress) as shown:
-        if options.isaac_like:
-            from ...simulation.isaac_recording import simulate_isaac_like
+        from ...jobs import results
+        from ...simulation.recording import ALL, simulate_recording
 
-            missed = simulate_isaac_like(options.scene, options.isaac_like, options.out, options.core, shown)
-            if missed:
-                say(f"warning: {missed} frames did not reach their force and are marked (converged is false)")
-        else:
-            from ...jobs import results
-            from ...simulation.recording import ALL, simulate_recording
-
-            keep = results.parse_words(options.keep, ALL)
-            tiers = {} if bound is None else _tiers(options, keep, bound)
-            simulate_recording(
-                options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers, electrodes=options.electrodes
-            )
+        keep = results.parse_words(options.keep, ALL)
+        tiers = {} if bound is None else _tiers(options, keep, bound)
+        simulate_recording(
+            options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers, electrodes=options.electrodes
+        )
     tell(options.out)
     return 0
 
@@ -137,9 +108,8 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> 
 def _run_grid(options: argparse.Namespace) -> int:
     """Simulate many."""
     engine.check_counts(options, "workers", "restart")
-    for name in ("isaac_like", "error"):
-        if getattr(options, name):
-            raise TactileError("--grid", f"given with --{name.replace('_', '-')}", "one of the two")
+    if options.error:
+        raise TactileError("--grid", "given with --error", "one of the two")
     from ...jobs import results, simulate
     from ...jobs.engine import result_parts
     from ...simulation.recording import ALL

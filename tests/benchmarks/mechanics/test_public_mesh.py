@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from benchmarks.isaac.tet_file import read_tet
 from benchmarks.mechanics import public_mesh
 
 from tactile_core import sensors
-from tactile_core.mechanics.isaac.tet_file import read_tet
 from tactile_core.mechanics.placement import biotac_pose
 
 

@@ -58,7 +58,7 @@ def test_a_grid_of_recordings(scene, tmp_path):
 def test_a_grid_is_refused_before_any_work(scene, tmp_path, capsys):
     for words, told in (
         (["--grid", "recording.tilt=1"], "no such field"),
-        (["--grid", "force_n=1", "--isaac-like", "x"], "one of the two"),
+        (["--grid", "force_n=1", "--error", "5um"], "one of the two"),
         (["--plan"], "without --grid"),
         (["--workers", "2"], "without --grid"),
     ):

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import TactileError
-from ...geometry.indenters import Indenter, Pose, mesh_file
-from ...sensors import Material, biotac, digit
-from ..finite_strain.contact_state import ContactState
-from ..finite_strain.newton import FiniteStrainContact
-from ..pose_path import between
+from tactile_core.errors import TactileError
+from tactile_core.geometry.indenters import Indenter, Pose, mesh_file
+from tactile_core.mechanics.finite_strain.contact_state import ContactState
+from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
+from tactile_core.mechanics.pose_path import between
+from tactile_core.sensors import Material, biotac, digit
+
 from .corotated_tets import CorotatedTets
 from .tet_file import TetMesh
 

@@ -7,10 +7,11 @@ import functools
 
 import numpy as np
 
-from ...sensors import Material
-from ..solids.block_pattern import BlockPattern
-from ..solids.finite_strain import State
-from ..solids.neo_hookean import NeoHookean
+from tactile_core.mechanics.solids.block_pattern import BlockPattern
+from tactile_core.mechanics.solids.finite_strain import State
+from tactile_core.mechanics.solids.neo_hookean import NeoHookean
+from tactile_core.sensors import Material
+
 from .tet_file import TetMesh
 
 

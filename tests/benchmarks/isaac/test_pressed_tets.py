@@ -4,14 +4,14 @@ import itertools
 
 import numpy as np
 import pytest
+from benchmarks.isaac.corotated_tets import CorotatedTets
+from benchmarks.isaac.pressed_tets import SKIN, Press, attached_to, first_touch, near_body, press
+from benchmarks.isaac.tet_file import checked, read_tet
 from slab import slab_mesh
 
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere, pose_on
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
-from tactile_core.mechanics.isaac.contact import SKIN, Press, attached_to, first_touch, near_body, press
-from tactile_core.mechanics.isaac.corotated_tets import CorotatedTets
-from tactile_core.mechanics.isaac.tet_file import checked, read_tet
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, State
 from tactile_core.sensors import Material, unrolling
 

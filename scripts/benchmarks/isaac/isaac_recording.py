@@ -15,15 +15,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from .. import __version__
-from ..errors import TactileError
-from ..files import atomic
-from ..geometry.indenters import Pose
-from ..mechanics.isaac import contact
-from ..mechanics.isaac.contact import Press, Solution, attached_to, first_touch, near_body
-from ..mechanics.isaac.tet_file import TetMesh, read_tet
-from ..mechanics.placement import Placement, biotac_pose, on_gel
-from .scene import RecordingSpec, load_scene
+from tactile_core import __version__
+from tactile_core.errors import TactileError
+from tactile_core.files import atomic
+from tactile_core.geometry.indenters import Pose
+from tactile_core.mechanics.placement import Placement, biotac_pose, on_gel
+from tactile_core.simulation.scene import RecordingSpec, load_scene
+
+from .pressed_tets import SKIN, Press, Solution, attached_to, first_touch, near_body
+from .tet_file import TetMesh, read_tet
 
 FORMAT = "tactile-isaac-like-1"
 RATE = 10.0  # Hz: a tenth of the sensor's, for each frame takes seconds
@@ -40,7 +40,7 @@ def simulate_isaac_like(
     """Press a BioTac skin of linear tetrahedra as the [recording] of a scene says, ten frames a second, into ``out``.
 
     tet_path : the skin in Isaac Gym's layout, in the frame of the public mesh; core_path : its rigid core, a closed
-    triangle mesh; without it the nodes on our own table of the core are held, see ``isaac.contact.attached_to``
+    triangle mesh; without it the nodes on our own table of the core are held, see ``pressed_tets.attached_to``
     progress : called with (frames done, frames). Returns how many frames did not reach their force; they are marked.
     Raises TactileError for what cannot be read or computed with, and for a place off the pad.
     """
@@ -61,7 +61,7 @@ def simulate_isaac_like(
             progress(len(frames), len(time))
     attributes = {
         "format": FORMAT, "simulated": True, "method": frames[0].report["method"], "scene": text,
-        "youngs": contact.SKIN.youngs, "poisson": contact.SKIN.poisson, "made_by": f"tactile {__version__}",
+        "youngs": SKIN.youngs, "poisson": SKIN.poisson, "made_by": f"tactile {__version__}",
     }  # fmt: skip
     arrays = {
         "nodes": mesh.nodes, "cells": mesh.cells.astype(np.int32), "attached": attached, "time": time,
@@ -116,8 +116,5 @@ def _write(out: str | os.PathLike, attributes: dict, arrays: dict[str, np.ndarra
         file.attrs.update(attributes)
         for name, values in arrays.items():
             file.create_dataset(name, data=values, compression="gzip", shuffle=True, track_times=False)
-    try:
+    with atomic.writing(out, "room in a folder that can be written to", ""):
         atomic.write_bytes(out, memory.getvalue())
-    except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(out, found, "room in a folder that can be written to") from error

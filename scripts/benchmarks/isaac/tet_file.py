@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import TactileError
-from ...files import outside
+from tactile_core.errors import TactileError
+from tactile_core.files import outside
 
 MAX_CELLS = 100_000  # the public BioTac mesh holds 15,410; a solve of 100,000 takes minutes and gigabytes
 MAX_BYTES = 16 * 2**20  # assumed: three times what MAX_CELLS cells take; its lines take 200 MB at most

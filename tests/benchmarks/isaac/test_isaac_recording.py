@@ -4,12 +4,12 @@ import h5py
 import numpy as np
 import pytest
 from ball_scene import ball_scene
+from benchmarks.isaac import isaac_recording
+from benchmarks.isaac.isaac_recording import simulate_isaac_like
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.sensors import biotac
-from tactile_core.simulation import isaac_recording
-from tactile_core.simulation.isaac_recording import simulate_isaac_like
 
 
 @pytest.fixture(scope="module")

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from benchmarks.isaac import tet_file
+from benchmarks.isaac.tet_file import checked, read_tet
 
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.isaac import tet_file
-from tactile_core.mechanics.isaac.tet_file import checked, read_tet
 
 # two tetrahedra that share a face, 10 mm on a side
 NODES = [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [0.01, 0.01, 0.01]]

@@ -1,1 +1,0 @@
-"""Contacts as Isaac Gym simulates them: corotated linear tetrahedra."""
