@@ -8,8 +8,8 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 from ..errors import TactileError
 
@@ -26,7 +26,7 @@ def check(path: str | os.PathLike, expected: str = "a regular file") -> os.stat_
     return _regular(path, os.stat(path), expected)
 
 
-def open_file(path: str | os.PathLike, expected: str = "a regular file") -> BinaryIO:
+def open_file(path: str | os.PathLike, expected: str = "a regular file") -> BufferedReader:
     """Open a regular file to read its bytes. Raises what `check` raises; waits for nothing."""
     check(path, expected)  # before opening: some devices act when they are opened
     file = open(path, "rb", opener=_open)  # noqa: SIM115 - the caller closes it

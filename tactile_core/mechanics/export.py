@@ -11,9 +11,8 @@ import numpy as np
 from ..errors import TactileError
 from ..sensors import sensor_surface
 from . import mesh_files
-from .finite_strain.body import Sensor
 from .solids.hex_mesh import HexMesh, gel_mesh, skin_mesh
-from .solve import Solution
+from .solution import Sensor, Solution
 
 SUFFIXES = (".ply", ".stl", ".vtu")
 
