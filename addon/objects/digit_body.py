@@ -17,7 +17,7 @@ from . import digit_materials, image_frame, surfaces
 CAMERA = "DIGIT camera"
 _CHIP = np.array([1.6e-3, 0.8e-3, 0.6e-3])  # m, sides of an LED package (0603)
 _WALL = 1.5e-3  # m of housing beyond the LEDs' reach, and its depth below them
-_DEPTH = 24e-3  # m from the gel's lowest point to the housing's lower end (assumed; it hides nothing)
+_DEPTH = 13e-3  # m from the gel's lowest point to the housing's lower end: below the LEDs (assumed)
 _RIM = 2.2e-3  # m over height zero: the cover round the gel, below the LEDs
 _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
 

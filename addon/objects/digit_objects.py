@@ -7,12 +7,11 @@ import numpy as np
 
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
-from ...tactile_core.sensors import digit
 from ..ui import properties
 from . import axes, surfaces
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
-BESIDE = 7.1e-3 + digit.HALF_WIDTH + 6e-3  # m: half widths of both (docs/sources.md, BioTac skin), a gap
+BESIDE = 7.1e-3 + 23e-3 + 5e-3  # m: half widths of BioTac (docs/sources.md) and of a housing round the LEDs, a gap
 
 
 def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None) -> bpy.types.Object:

@@ -14,7 +14,7 @@ def new_image(name: str, width: int, height: int, *, floats: bool = False) -> bp
     Bytes are a picture in sRGB, which editors show as it is; floats are data.
     """
     found = bpy.data.images.get(name)
-    if found is not None and (tuple(found.size) != (width, height) or found.is_float != floats or found.packed_file):
+    if found is not None and (tuple(found.size) != (width, height) or found.is_float != floats):
         bpy.data.images.remove(found)
         found = None
     if found is None:
@@ -33,6 +33,7 @@ def fill(image: bpy.types.Image, values: np.ndarray) -> None:
 def show_picture(picture: np.ndarray) -> bpy.types.Image:
     """The picture (H, W, 3) uint8 in its datablock."""
     image = new_image(PICTURE, picture.shape[1], picture.shape[0])
+    image.use_fake_user = True  # kept in the file, even while no editor shows it
     fill(image, picture.astype(np.float32) / 255)
     return image
 
@@ -40,5 +41,14 @@ def show_picture(picture: np.ndarray) -> bpy.types.Image:
 def show_heights(heights: np.ndarray) -> bpy.types.Image:
     """The height map (H, W) m in its datablock, in millimetres."""
     image = new_image(HEIGHTS, heights.shape[1], heights.shape[0], floats=True)
+    image.use_fake_user = True
     fill(image, 1e3 * heights)
     return image
+
+
+def pack() -> None:
+    """Pack picture and height map, so that a saved file holds them as they are."""
+    for name in (PICTURE, HEIGHTS):
+        image = bpy.data.images.get(name)
+        if image is not None:
+            image.pack()

@@ -9,13 +9,14 @@ from bpy_extras.io_utils import ImportHelper
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ..objects import axes, biotac_objects, custom_properties, electrode_markers, motion
-from ..ui import timeline, view
+from ..ui import properties, timeline, view
 from ..ui.progress import shown
 from ..ui.properties import MOTIONS, POLARITIES, POLARITY_TOLD
 from ..ui.reports import TactileOperator
 from . import recording_data
 
 SUFFIXES = "*.csv;*.h5;*.hdf5;*.npz"
+_APART = 85e-3  # m between the recordings of a scene: a BioTac, a DIGIT's housing and a gap
 LONG = 2000  # frames; beyond it a mesh cache loads and saves faster than shape keys
 
 
@@ -26,6 +27,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
     bl_label = "Import BioTac Recording"
     bl_options = {"REGISTER", "UNDO", "PRESET"}  # noqa: RUF012
 
+    filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"})
     filename_ext = ".csv"
     filter_glob: bpy.props.StringProperty(default=SUFFIXES, options={"HIDDEN"})
     tare: bpy.props.StringProperty(
@@ -57,8 +59,8 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         with shown(context) as progress:
             found = recording_data.load(path, self.tare, self.frames, progress, self.polarity)
         scene = context.scene
-        if self.millimetres:
-            axes.use_millimetres(scene)
+        view.hide_untouched(scene)
+        kept = self._keep_scene(scene)
         frames = self.first_frame + found.chosen.astype(float)
         skin = self._objects(scene, path, found, frames)
         summary = motion.animate(
@@ -66,18 +68,39 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         )
         if self.set_timeline:
             timeline.set_timeline(scene, found.recording.rate, int(frames[0]), int(frames[-1]))
+            firmest = np.linalg.norm(found.translation.force, axis=1).argmax()
+            scene.frame_set(int(frames[firmest]))
         view.show(context, [skin])
+        view.open_tab(context)
         for warning in found.signals.warnings:
             self.report({"WARNING"}, warning)
         if len(frames) > LONG and self.motion != "MESH_CACHE":
             self.report({"WARNING"}, f"{len(frames)} frames: a mesh cache makes a smaller, faster file")
-        self.report({"INFO"}, f"{len(frames)} frames at {found.recording.rate:.4g} Hz. {summary}")
+        self.report({"INFO"}, f"{len(frames)} frames at {found.recording.rate:.4g} Hz. {summary}{kept}")
+
+    def _keep_scene(self, scene: bpy.types.Scene) -> str:
+        """Leave units and frame rate of a scene that holds something already, unless asked for; what was kept."""
+        if self.millimetres and (view.is_new(scene) or self.properties.is_property_set("millimetres")):
+            axes.use_millimetres(scene)
+        if view.is_new(scene) and properties.of_role(scene, "BIOTAC") is None:
+            return ""
+        if not self.properties.is_property_set("set_timeline"):
+            self.set_timeline = False
+        return "" if self.set_timeline else ". The scene's own frame rate and range are kept"
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """A file that was dropped opens a small popup, the menu the file browser."""
+        return self.invoke_popup(context) if self.filepath else super().invoke(context, event)
 
     def _objects(
         self, scene: bpy.types.Scene, path: str, found: recording_data.Translated, frames: np.ndarray
     ) -> bpy.types.Object:
         group = biotac_objects.new_collection(scene, found.recording.name)
+        before = [thing for thing in scene.objects if thing.tactile.role == "BIOTAC"]
         skin = biotac_objects.add_skin(group, axes.units_per_metre(scene))
+        if before:  # beside the last pair of sensors
+            skin.location = before[-1].location
+            skin.location.y -= _APART * skin.tactile.per_metre
         about = skin.tactile
         about.recording = bpy.path.relpath(path) if bpy.data.is_saved else os.path.abspath(path)
         about.tare, about.frames, about.first_frame = self.tare, self.frames, self.first_frame

@@ -8,7 +8,7 @@ from bpy.app.handlers import persistent
 from ...tactile_core.errors import TactileError
 from ..objects import images
 from ..process import tracer
-from ..ui import properties, render_settings
+from ..ui import properties, render_settings, view
 from ..ui.reports import TactileOperator
 from . import pictures
 
@@ -57,6 +57,12 @@ def _end(*_: object) -> None:
     switch_off()
 
 
+@persistent
+def _keep_images(*_: object) -> None:
+    """Called before a file is saved."""
+    images.pack()
+
+
 def switch_off() -> None:
     """Remove the handlers, and end the worker."""
     for handlers, function in _handlers():
@@ -94,17 +100,17 @@ class TACTILE_OT_live_picture(TactileOperator):
         image = pictures.update(gel, context.evaluated_depsgraph_get())
         for handlers, function in _handlers():
             handlers.append(function)
-        for area in context.screen.areas if context.screen else ():
-            if area.type == "IMAGE_EDITOR":
-                area.spaces.active.image = image
+        view.show_picture(context, image)
 
 
 def register() -> None:
     """Called by the package."""
     bpy.utils.register_class(TACTILE_OT_live_picture)
+    bpy.app.handlers.save_pre.append(_keep_images)
 
 
 def unregister() -> None:
     """Called by the package."""
     switch_off()
+    bpy.app.handlers.save_pre.remove(_keep_images)
     bpy.utils.unregister_class(TACTILE_OT_live_picture)

@@ -67,7 +67,7 @@ def authored(context: bpy.types.Context) -> Authored:
     kept = document.pop("recording", None) or {}
     by_height = thing.tactile.press_by == "HEIGHT"
     frames = _sampled(scene) if by_height else _key_frames(scene, thing, sensor)
-    values = _motion(context, thing, sensor, frames)
+    values = motion_of(context, thing, sensor, frames)
     points = _points(scene, frames, values, kept.get("points", []))
     pressing = specs[0].name
     order = {name: k for k, name in enumerate(document.pop("order", []))}
@@ -117,7 +117,7 @@ def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.typ
     return np.array(sorted(inside | {float(scene.frame_start), float(scene.frame_end)}))
 
 
-def _motion(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001
+def motion_of(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001
     """Apex (P, 3) m in the sensor's frame and force (P,) N; the scene is left on the frame it was on."""
     scene, now = context.scene, (context.scene.frame_current, context.scene.frame_subframe)
     apex, force = [], []

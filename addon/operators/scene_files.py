@@ -36,6 +36,7 @@ class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
         shapes = [_shape_needs(spec) for spec in found.indenters]
         require(*(name for needed in shapes for name in needed))
         scene = context.scene
+        view.hide_untouched(scene)
         axes.use_millimetres(scene)
         group = biotac_objects.new_collection(scene, found.name)
         skin = biotac_objects.add_skin(group, axes.units_per_metre(scene))

@@ -21,6 +21,10 @@ def _outputs(scene: bpy.types.Scene) -> list[str]:
     return [word for role, words in of.items() if properties.of_role(scene, role) for word in words]
 
 
+def _rate(scene: bpy.types.Scene) -> float:
+    return scene.render.fps / scene.render.fps_base
+
+
 class TACTILE_OT_simulate(TactileOperator):
     """Press the indenter into both sensors over the frame range, and bake what they feel (Esc stops)"""
 
@@ -43,7 +47,8 @@ class TACTILE_OT_simulate(TactileOperator):
         if found.apexes is not None:
             np.savez(self._folder.path / "heights.npz", apex=found.apexes)
         bound = render_settings.budget_of(context.scene).um
-        self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(context.scene), um=bound)
+        self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(context.scene), um=bound,
+                        first_frame=context.scene.frame_start, rate=_rate(context.scene))  # fmt: skip
 
     def _bake(self, context: bpy.types.Context) -> None:
         thing = context.scene.objects.get(self._thing)

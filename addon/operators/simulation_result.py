@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 
 import bpy
@@ -15,6 +16,7 @@ from ..ui import properties
 from . import pictures
 
 STANDING = "{} simulated"
+_BOUNDS = {"sphere": "SPHERE", "cylinder": "CYLINDER"}  # Blender's outlines; the others are boxes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,7 +76,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
 def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarray) -> None:  # noqa: ANN001
     """A solid twin of the indenter that stands where the mechanics had it; the one to move by hand turns to wires."""
     from ..objects import indenter_objects
-    from .scene_bridge import sensor_of
+    from .scene_bridge import motion_of, sensor_of
 
     sensor = sensor_of(context)
     name = STANDING.format(thing.name)
@@ -82,8 +84,11 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
     if twin is None:
         twin = bpy.data.objects.new(name, thing.data)
         thing.users_collection[0].objects.link(twin)
-        twin.color = thing.color
-    twin.parent, twin.rotation_mode, thing.display_type, thing.hide_render = sensor, "QUATERNION", "WIRE", True
+    twin.tactile.role = "TWIN"
+    twin.parent, twin.rotation_mode, thing.hide_render = sensor, "QUATERNION", True
+    # A few thin lines and a body that is seen through: twin and dent stay in view.
+    thing.display_type, thing.display_bounds_type = "BOUNDS", _BOUNDS.get(_kind(thing), "BOX")
+    twin.color, twin.show_transparent = (*thing.color[:3], 0.4), True
     relative = indenter_objects.world_axes(thing, sensor)
     foot = indenter_objects.foot_of(thing, relative, context.evaluated_depsgraph_get())
     size = np.linalg.norm(relative, axis=0)
@@ -101,5 +106,14 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
             found.negate()  # the same turn, on the near side: curves between keys then take the short way
         quaternions.append(found)
     places = places - np.einsum("tij,j->ti", turns, foot)
+    if thing.tactile.press_by == "HEIGHT":
+        # Where it does not touch, nothing but its keys says where it is.
+        lifted = np.linalg.norm(result.force[sample], axis=1) == 0
+        keyed = motion_of(context, thing, sensor, frames)["apex"]
+        places[lifted] = (axes.to_blender(keyed, sensor.tactile.per_metre) - foot)[lifted]
     curves.write_curves(twin, "location", frames, places)
     curves.write_curves(twin, "rotation_quaternion", frames, np.array([q[:] for q in quaternions]))
+
+
+def _kind(thing: bpy.types.Object) -> str:
+    return json.loads(thing.tactile.spec)["kind"] if thing.tactile.spec else ""

@@ -52,7 +52,7 @@ class TACTILE_OT_translate(TactileOperator):
         custom_properties.write(gel, told_of_gel, frames)
         low = timeline.mark_low_confidence(context.scene, found.translation.confidence, frames)
         view.show(context, [skin, gel])
-        pictures.update(gel, context.evaluated_depsgraph_get())
+        view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))
         self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -26,7 +27,7 @@ def main(folder: Path) -> int:
     try:
         JOBS[job["kind"]](folder, job, lambda done, total: say(done=done, total=total))
     except TactileError as error:
-        say(error=str(error))
+        say(error=str(error).replace(f"{folder}/", ""))
         return 2
     except ModuleNotFoundError as error:
         say(error=f"{error.name} is missing in Blender's Python. Install the extension's zip for this platform")
@@ -50,22 +51,26 @@ def simulate(folder: Path, job: dict, progress: Progress) -> None:
     job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None.
     With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
     """
+    from tactile_core.errors import TactileError
     from tactile_core.simulation.recording import sensors_of, simulate_recording
     from tactile_core.simulation.tier_choice import choose_for_scene
 
-    if (folder / "heights.npz").exists():
-        _forces_from_heights(folder, progress)
+    depths = _forces_from_heights(folder, job, progress) if (folder / "heights.npz").exists() else None
     choices = {} if job["um"] is None else choose_for_scene(folder, sensors_of(job["keep"]), job["um"])
     tiers = {sensor: choice.tier for sensor, choice in choices.items()}
     scene, out = folder / "scene.toml", folder / "recording.h5"
-    simulate_recording(scene, out, job["seed"], progress, keep=job["keep"], tiers=tiers)
+    try:
+        simulate_recording(scene, out, job["seed"], progress, keep=job["keep"], tiers=tiers)
+    except TactileError as error:
+        raise _in_scene(error, folder, job, depths) from error
     _result(folder, [choice.describe(sensor) for sensor, choice in choices.items()])
 
 
-def _forces_from_heights(folder: Path, progress: Progress) -> None:
-    """Replace the scene's forces by those that the DIGIT answers at each depth."""
+def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[float]:
+    """Replace the scene's forces by those that the DIGIT answers at each depth; returns the depths, m."""
     import msgspec
 
+    from tactile_core.errors import TactileError
     from tactile_core.mechanics.placement import Placement, pose_at
     from tactile_core.mechanics.solve import solve
     from tactile_core.simulation.scene import load_scene
@@ -76,21 +81,49 @@ def _forces_from_heights(folder: Path, progress: Progress) -> None:
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     with np.load(folder / "heights.npz") as stored:
         apexes = stored["apex"]
-    points = []
+    points, depths = [], []
     for k, (point, apex) in enumerate(zip(spec.points, apexes, strict=True)):
         place = Placement(point.x_mm * 1e-3, point.z_mm * 1e-3, np.radians(spec.tilt_deg))
         pose = pose_at("digit", indenter, place)
         depth = float((apex - pose.apex) @ pose.direction)
         force = 0.0
         if depth > 0:
-            solution = solve("digit", indenter, place, depth=depth, friction=spec.friction)
+            try:
+                solution = solve("digit", indenter, place, depth=depth, friction=spec.friction)
+            except TactileError as error:
+                raise _at_frame(spec.indenter, job, k, depth, error.found, error.expected) from error
             force = max(solution.axial_force, 0.0)
         points.append(msgspec.structs.replace(point, force_n=force))
+        depths.append(depth)
         progress(k + 1, 2 * len(apexes))
     # The rest of the scene as it was written: load_scene has made its file names absolute.
     text = msgspec.toml.decode((folder / "scene.toml").read_bytes(), type=type(scene))
     recording = msgspec.structs.replace(text.recording, points=points)
     (folder / "scene.toml").write_text(to_toml(msgspec.structs.replace(text, recording=recording)), encoding="utf-8")
+    return depths
+
+
+def _at_frame(indenter: str, job: dict, k: int, depth: float | None, found: str, expected: str) -> Exception:
+    """A TactileError in the words of the scene: object, frame and depth."""
+    from tactile_core.errors import TactileError
+
+    deep = "" if depth is None else f", {1e3 * depth:.1f} mm below the gel's surface"
+    advice = "Lift it there, or let it press with less force"
+    return TactileError(f"{indenter}, frame {job['first_frame'] + k:g}{deep}", found, expected, advice)
+
+
+def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -> Exception:
+    """The same error in the words of the scene, where it names a moment or a point of its file."""
+    from tactile_core.simulation.scene import load_scene
+
+    spec, where = load_scene(folder)[0].recording, str(error.where)
+    moment, point = re.search(r"recording, ([\d.]+) s$", where), re.search(r"point (\d+)$", where)
+    if moment is None and point is None:
+        return error
+    second = float(moment[1]) - spec.points[0].time_s if moment else spec.points[int(point[1]) - 1].time_s
+    k = round(second * job["rate"])
+    depth = depths[k] if depths is not None and k < len(depths) else None
+    return _at_frame(spec.indenter, job, k, depth, error.found, error.expected)
 
 
 def _result(folder: Path, picked: list[str]) -> None:

@@ -40,6 +40,7 @@ class TACTILE_OT_add_sensor(TactileOperator):
         scene = context.scene
         if properties.of_role(scene, self.sensor) is not None:
             raise TactileError(self.sensor, "already in the scene", "one of each sensor", "Use a scene for each pair")
+        view.hide_untouched(scene)
         if self.millimetres:
             axes.use_millimetres(scene)
         group, per_metre = context.collection, axes.units_per_metre(scene)

@@ -135,6 +135,16 @@ def test_simulating_bakes_what_the_command_line_computes(scene, nodes_of, part, 
     assert low == pytest.approx(nodes_of(gel)[np.argmax(truth.displacement_digit[10, :, 1]), 2], abs=0.15)
 
 
+def test_too_deep_a_press_is_reported_by_object_frame_and_depth(sensors):
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
+    sensors.render.fps, sensors.frame_start, sensors.frame_end = 100, 41, 43
+    for frame, height in ((41, 9.3), (43, 8.3 - 3.5)):
+        _key(bpy.context.object, frame, z=height)
+    with pytest.raises(RuntimeError, match=r"sphere, frame 4[23], \d\.\d mm below the gel") as caught:
+        bpy.ops.tactile.simulate()
+    assert "/tmp" not in str(caught.value) and "scene.toml" not in str(caught.value)
+
+
 def test_pressing_by_height_finds_the_force(sensors, part):
     bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
     ball = bpy.context.object
@@ -145,7 +155,12 @@ def test_pressing_by_height_finds_the_force(sensors, part):
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     sensors.frame_set(1)
     assert ball.tactile.force == 0
+    # Lifted off, its twin is where its keys are; pressing, it is lower than they say by no more than the dent's slack.
+    gel, twin = sensors.objects["DIGIT gel"], sensors.objects["sphere simulated"]
+    assert (twin.matrix_world.translation - gel.matrix_world.translation).z == pytest.approx(touch + 1, abs=0.01)
+    assert ball.display_type == "BOUNDS" and twin.color[3] < 1
     sensors.frame_set(3)
+    assert (twin.matrix_world.translation - gel.matrix_world.translation).z == pytest.approx(touch - 0.5, abs=0.1)
     place = part("tactile_core.mechanics.placement").Placement(-8e-3, 0.0)
     ball_shape = part("tactile_core.geometry.indenters").Sphere(3.5e-3)
     wanted = part("tactile_core.mechanics.solve").solve("digit", ball_shape, place, depth=0.5e-3, friction=0.0)

@@ -1,0 +1,59 @@
+"""Import and show: what a new file begins with is hidden, a second recording stands apart, images stay."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def new_file(scene):
+    """A file as File > New > General makes it."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    return bpy.context.scene
+
+
+def test_untouched_objects_of_a_new_file_are_hidden(new_file, imported):
+    imported(frames="70:90")
+    scene = bpy.context.scene
+    assert all(scene.objects[name].hide_viewport and scene.objects[name].hide_render for name in ("Cube", "Light"))
+    assert scene.unit_settings.scale_length == pytest.approx(1e-3)
+
+
+def test_a_moved_cube_stays_and_with_it_the_scene_s_units_and_rate(new_file, imported):
+    new_file.objects["Cube"].location.x = 3
+    imported(frames="70:90")
+    scene = bpy.context.scene
+    assert not scene.objects["Cube"].hide_viewport
+    assert scene.unit_settings.scale_length == 1 and scene.render.fps == 24
+
+
+def test_the_firmest_frame_is_shown(imported):
+    skin = imported()
+    scene = bpy.context.scene
+    shown, forces = scene.frame_current, []
+    for frame in range(scene.frame_start, scene.frame_end + 1):
+        scene.frame_set(frame)
+        forces.append(np.linalg.norm(skin["force"]))
+    assert shown == scene.frame_start + int(np.argmax(forces))
+
+
+def test_a_second_recording_stands_apart_and_leaves_the_range(imported):
+    first = imported(frames="70:90")
+    scene = bpy.context.scene
+    before = scene.frame_start, scene.frame_end
+    second = imported(frames="100:140")
+    assert abs(second.location.y - first.location.y) > 50
+    assert (scene.frame_start, scene.frame_end) == before
+
+
+def test_images_survive_save_and_reopen(imported, tmp_path):
+    imported(frames="70:90")
+    bpy.ops.tactile.translate()
+    image = bpy.data.images["DIGIT picture"]
+    before = np.array(image.pixels[:])
+    for _ in range(2):  # packed once, and packed again
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    assert np.abs(np.array(bpy.data.images["DIGIT picture"].pixels[:]) - before).max() < 0.01
