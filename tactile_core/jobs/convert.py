@@ -135,7 +135,7 @@ def convert(
                 made.draw_sheet(partial / results.SHEET)
             atomic.write_json(partial / results.NOTE, note(recording, made, options, tools))
             machine = provenance.machine()
-            timings = {"ms_a_frame": clock.per_frame(len(frames)), "frames": len(frames), "machine": machine}
+            timings = {**clock.per_frame(len(frames)), "frames": len(frames), "machine": machine}
             atomic.write_json(partial / results.TIMINGS, timings)
     except OSError as error:
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""

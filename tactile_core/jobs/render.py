@@ -117,7 +117,7 @@ def render(
             if bound.um is not None and scene:
                 note["input"]["tier"] = tier
             atomic.write_json(folder / results.NOTE, note)
-            timings = {"ms_a_frame": clock.per_frame(len(rows)), "frames": len(rows), "machine": provenance.machine()}
+            timings = {**clock.per_frame(len(rows)), "frames": len(rows), "machine": provenance.machine()}
             atomic.write_json(folder / results.TIMINGS, timings)
     except OSError as error:
         found, advice = f"cannot be written ({error.strerror or error})", "Make room, or name another --out folder"
