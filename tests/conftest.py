@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -72,3 +72,19 @@ def press():
     from gel_pictures import Press
 
     return Press()
+
+
+@pytest.fixture
+def compiled_loops(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bool], None]]:
+    """``compiled_loops(False)`` leaves everything to numpy; a skip where the extra [fast] is not installed."""
+    from tactile_core.files import compiled
+
+    pytest.importorskip("numba", reason="the extra [fast] is not installed")
+
+    def switch(on: bool) -> None:
+        monkeypatch.setenv(compiled.SWITCH, "1" if on else "0")
+        compiled.available.cache_clear()
+
+    yield switch
+    monkeypatch.undo()
+    compiled.available.cache_clear()

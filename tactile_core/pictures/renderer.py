@@ -8,11 +8,13 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import TactileError
+from ..files.compiled import available
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from .background import resting_picture
 from .camera_noise import camera_noise
 from .height_map import digit_mapper, of_unit, rest_height_map
+from .level_loops import in_picture
 from .mitsuba.direct_light import Hits, direct_light
 from .mitsuba.gel_light import ASIDE, GelLight
 from .mitsuba.gel_mesh import GelMesh
@@ -117,6 +119,8 @@ class Renderer:
 
         noise : makes the camera's noise, as measured on the unit; None for none
         """
+        if noise is None and available() and radiance.dtype == self.rest_radiance.dtype == np.float32:
+            return in_picture(radiance, self.rest_radiance, self._response, self.background, LARGEST_LEVEL)
         levels = self.in_levels(radiance - self.rest_radiance)
         levels += self.background
         if noise is not None:

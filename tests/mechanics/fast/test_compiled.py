@@ -12,21 +12,7 @@ from tactile_core.mechanics.fast.press import CorrectedPress, FastContact
 from tactile_core.mechanics.placement import FRICTION, pose_at
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
 
-pytest.importorskip("numba", reason="the extra [fast] is not installed")
 SEED, EACH = 20261124, 500  # contacts a sensor, with friction and without
-
-
-@pytest.fixture
-def switch(monkeypatch):
-    """``switch(False)`` leaves everything to numpy."""
-
-    def turn(on: bool) -> None:
-        monkeypatch.setenv(compiled.SWITCH, "1" if on else "0")
-        compiled.available.cache_clear()
-
-    yield turn
-    monkeypatch.undo()
-    compiled.available.cache_clear()
 
 
 def pressed(sensor, contact, friction) -> FastContact | None:
@@ -42,16 +28,16 @@ def pressed(sensor, contact, friction) -> FastContact | None:
 
 @pytest.mark.parametrize("friction", [0.0, FRICTION])
 @pytest.mark.parametrize("sensor", ["digit", "biotac"])
-def test_contacts_are_numpys_within_rounding(sensor, friction, switch):
+def test_contacts_are_numpys_within_rounding(sensor, friction, compiled_loops):
     """Sums are taken in another order: gaps agree to nanometres, but where an edge's contact is nearly indifferent.
 
     Solvers end where gaps are below 0.2 um, so that answers may differ by a few times that at worst.
     """
     apart, force, settled = [], [], []
     for contact in random_contacts(EACH, SEED):
-        switch(False)
+        compiled_loops(False)
         plain = pressed(sensor, contact, friction)
-        switch(True)
+        compiled_loops(True)
         fast = pressed(sensor, contact, friction)
         settled.append((plain is not None, fast is not None))
         if plain and fast:
@@ -65,8 +51,8 @@ def test_contacts_are_numpys_within_rounding(sensor, friction, switch):
     assert np.mean(np.array(apart) > 5e-6) <= 0.004  # another of two equilibria, as at an edge
 
 
-def test_the_switch_leaves_everything_to_numpy(switch):
-    switch(False)
+def test_the_switch_leaves_everything_to_numpy(compiled_loops):
+    compiled_loops(False)
     assert not compiled.available()
-    switch(True)
+    compiled_loops(True)
     assert compiled.available()
