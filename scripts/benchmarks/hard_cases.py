@@ -17,7 +17,7 @@ import traceback
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / each) for each in (".", "scripts", "tests")]
+sys.path[:0] = [str(ROOT / each) for each in (".", "scripts", "tests", "tests/helpers")]
 
 from hard_cases.case import Case  # noqa: E402
 from hard_cases.table import CASES, HARD  # noqa: E402

@@ -6,8 +6,17 @@ import pytest
 torch = pytest.importorskip("torch", reason="the baseline needs torch")
 pytest.importorskip("trimesh", reason="the baseline's meshes are raised with trimesh")
 
-from across_networks import ORDER, Across, Chebyshev, Fixed, MeshVae, halved, raised, scaled_laplacian  # noqa: E402
-from across_training import run_epoch, shuffled, vae_loss  # noqa: E402
+from benchmarks.competitors.across_networks import (  # noqa: E402
+    ORDER,
+    Across,
+    Chebyshev,
+    Fixed,
+    MeshVae,
+    halved,
+    raised,
+    scaled_laplacian,
+)
+from benchmarks.competitors.across_training import run_epoch, shuffled, vae_loss  # noqa: E402
 from small_pairs import dents, grid  # noqa: E402
 
 from tactile_core.geometry.lattice import Lattice, grid_faces  # noqa: E402

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("torch", reason="needs torch")
 
-from torch_chain import TorchChain
+from benchmarks.competitors.torch_chain import TorchChain
 
 from tactile_core.translation import networks
 

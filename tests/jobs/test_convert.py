@@ -186,7 +186,14 @@ def interrupt(how: int, path: Path, out: Path) -> subprocess.Popen:
     """Start a conversion that stops at its second chunk, interrupt it when pictures are there, wait for its end."""
     root = Path(__file__).parents[2]
     environment = {**os.environ, "FAKE_HOLD": "1", "PYTHONPATH": str(root)}
-    command = [sys.executable, str(root / "tests" / "fake_tools.py"), "convert", str(path), "--out", str(out)]
+    command = [
+        sys.executable,
+        str(root / "tests" / "helpers" / "fake_tools.py"),
+        "convert",
+        str(path),
+        "--out",
+        str(out),
+    ]
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     partial = out / f".{path.stem}.tactile-partial" / "images"
     while process.poll() is None and not (partial.exists() and len(list(partial.iterdir())) > CHUNK // 2):
@@ -207,7 +214,7 @@ def test_a_full_disk_costs_one_recording_and_no_half_result_is_left(keep, slide_
         "resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000)); runpy.run_path(sys.argv[0], None, '__main__')"
     )
     done = subprocess.run(
-        [sys.executable, "-c", limited, str(root / "tests" / "fake_tools.py"),
+        [sys.executable, "-c", limited, str(root / "tests" / "helpers" / "fake_tools.py"),
          "convert", *map(str, paths), "--out", str(out), "--keep", keep],
         env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True, text=True, timeout=120,
     )  # fmt: skip

@@ -2,14 +2,13 @@
 
 Photographs are of a 6 mm ball pressed into a DIGIT; those that the calibration was not fitted on are the truth. Null is
 the background alone; a table after Taxim is fitted on the photographs the calibration was fitted on
-(tests/benchmarks/taxim_like.py); each preset of `tactile render`. Where and how deep the ball was pressed is three
-numbers a photograph, found once by the fast picture; the table finds its own.
+(scripts/benchmarks/competitors/taxim_like.py); each preset of `tactile render`. Where and how deep the ball was pressed
+is three numbers a photograph, found once by the fast picture; the table finds its own.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from taxim_like import TableBench, fit_table, try_table
 
 from tactile_core.accuracy import row
 from tactile_core.pictures.calibrate.ball_pictures import BallPictures
@@ -22,6 +21,7 @@ from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
 
+from ..competitors.taxim_like import TableBench, fit_table, try_table
 from .method import Method, best_ms, peak_mb
 
 BALL = 3e-3  # m, radius

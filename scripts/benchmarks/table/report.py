@@ -33,10 +33,10 @@ doing nothing. `docs/benchmark.json` holds every row. What is missing: {missing}
 SAME = """\
 ## Ours and ACROSS's networks on the same {count:,} pairs
 
-{how}, {date}. ACROSS's networks (`tests/benchmarks/across_networks.py`) have the published sizes, losses and rates, and
-as many passes over the data as about the CPU time of our training holds: one of the mesh networks in place of 300. So
-the rows tell what a budget buys, not how far those networks come in hours. Errors: um rms over moving nodes of the test
-contacts, solved by the full tier.
+{how}, {date}. ACROSS's networks (`scripts/benchmarks/competitors/across_networks.py`) have the published sizes,
+losses and rates, and as many passes over the data as about the CPU time of our training holds: one of the mesh
+networks in place of 300. So the rows tell what a budget buys, not how far those networks come in hours. Errors: um rms
+over moving nodes of the test contacts, solved by the full tier.
 
 | step | ACROSS's shapes | ours | doing nothing |
 |---|---|---|---|

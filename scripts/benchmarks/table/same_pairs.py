@@ -27,9 +27,9 @@ STEPS = "MVB", "MVD", "S2MPN", "M2MPN", "chain"
 
 def train_both(pairs: Path) -> None:
     """Train both on a file of pairs, measure both on the test contacts, write ``across_rows.json``."""
-    from across_training import measure
-
     from tactile_core.training.train import train
+
+    from ..competitors.across_training import measure
 
     with tempfile.TemporaryDirectory() as folder:
         began = time.process_time()

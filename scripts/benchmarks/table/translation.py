@@ -27,7 +27,8 @@ NAMES = (
     "numpy_same_pairs_1",
 )
 QUOTED = {"across": "across", "numpy_same_pairs": "ours"}  # whose errors come from SAME_PAIRS
-SAME_PAIRS = ROOT / "tests" / "benchmarks" / "across_rows.json"  # ours and ACROSS's, trained on the same pairs
+# Rows of ours and of ACROSS's networks, trained on the same pairs.
+SAME_PAIRS = ROOT / "scripts" / "benchmarks" / "competitors" / "across_rows.json"
 EVERY = 3  # of as many test presses one, in a quick run; prime to how box, ring and others take turns
 Change = np.ndarray  # (B, 19) counts
 Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
@@ -93,13 +94,13 @@ def plain_signals(change: Change) -> Any:
 
 
 def _torch() -> Surfaces:
-    from torch_chain import TorchChain
+    from ..competitors.torch_chain import TorchChain
 
     return TorchChain(load_translator().nets)
 
 
 def _across() -> Surfaces:
-    from across_networks import untrained
+    from ..competitors.across_networks import untrained
 
     surfaces = untrained(sensors.biotac_surface(), sensors.digit_surface())  # its time does not depend on its weights
     return lambda change: surfaces(np.arcsinh(change / np.float32(COUNT_SCALE)))

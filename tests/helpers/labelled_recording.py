@@ -9,7 +9,7 @@ import numpy as np
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.translation import networks
 
-PAIRS = Path(__file__).resolve().parent.parent / "scenes" / "training" / "test_contacts.h5"
+PAIRS = Path(__file__).resolve().parents[2] / "scenes" / "training" / "test_contacts.h5"
 HELD, PAUSE = 6, 4  # frames a contact is held, and without contact before it
 BALANCED = 200  # presses from here on are of box and ring alone, in a part of the pad
 MM = 1e3

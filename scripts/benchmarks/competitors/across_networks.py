@@ -9,6 +9,7 @@ shortest edges, displacements over one rms, signals compressed and roughened as 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -76,13 +77,13 @@ class Apply(torch.autograd.Function):
     """A fixed sparse matrix times a dense one; its transpose carries the gradient."""
 
     @staticmethod
-    def forward(ctx, matrix: Tensor, turned: Tensor, x: Tensor) -> Tensor:
+    def forward(ctx: Any, matrix: Tensor, turned: Tensor, x: Tensor) -> Tensor:
         """(n, m) sparse, its transpose, (m, c) -> (n, c)."""
         ctx.turned = turned
         return matrix @ x
 
     @staticmethod
-    def backward(ctx, gradient: Tensor) -> tuple[None, None, Tensor]:
+    def backward(ctx: Any, gradient: Tensor) -> tuple[None, None, Tensor]:
         """Of x alone."""
         return None, None, ctx.turned @ gradient.contiguous()
 

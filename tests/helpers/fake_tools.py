@@ -1,8 +1,8 @@
 """A conversion without networks: one dent whose depth follows the electrodes; pictures in two grey levels.
 
-Run as a script it is the command ``tactile`` with these tools: ``python tests/fake_tools.py convert touch.csv --out
-results``. FAKE_HOLD names a chunk of frames, counted from 0 in each process, at which it stops for good, so that tests
-can interrupt it there.
+Run as a script it is the command ``tactile`` with these tools: ``python tests/helpers/fake_tools.py convert touch.csv
+--out results``. FAKE_HOLD names a chunk of frames, counted from 0 in each process, at which it stops for good, so that
+tests can interrupt it there.
 """
 
 from __future__ import annotations

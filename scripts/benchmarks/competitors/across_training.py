@@ -17,11 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from across_networks import Across, MeshVae, SignalVae
-from benchmarks.translation.noise import as_read
-from benchmarks.translation.test_set import SEED
 from torch import Tensor, nn
 
+from benchmarks.translation.noise import as_read
+from benchmarks.translation.test_set import SEED
 from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.simulation.pairs_file import Pairs, read_pairs, split_presses
@@ -30,6 +29,8 @@ from tactile_core.training.noise_model import measured
 from tactile_core.training.options import Options
 from tactile_core.training.step_errors import mesh_columns, true_displacement
 from tactile_core.translation.networks import COUNT_SCALE
+
+from .across_networks import Across, MeshVae, SignalVae
 
 SENSORS = "biotac", "digit"
 KL = 0.005  # weight, of the divergence a number of the latent: the mildest reading of what is published
