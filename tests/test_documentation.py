@@ -52,6 +52,7 @@ ELSEWHERE = {
     "python3 scripts/dev.py test-blender": (".ci/run", "dev.py test-blender"),
     "python3 scripts/dev.py test": (".ci/run", "dev.py test"),
     "python -m pip install": ("scripts/dev.py", '"install"'),
+    "python scenes/mujoco_grasp/grasp.py": ("tests/jobs/test_mujoco_gel.py", "--no-speed"),
     "python3 scripts/build_extension.py": ("tests/blender/test_extension_zip.py", "build_extension"),
     "blender ": ("tests/blender/test_command_line.py", "tactile"),
     "sbatch ": ("tests/jobs/engine/test_batch_slurm.py", "sbatch"),
