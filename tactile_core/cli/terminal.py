@@ -10,13 +10,18 @@ from ..errors import TactileError
 
 
 def tell(text: str) -> None:
-    """A result, on stdout."""
-    sys.stdout.write(text + "\n")
+    """A result, on stdout; its lines stay lines."""
+    sys.stdout.write("\n".join(map(printable, text.split("\n"))) + "\n")
 
 
 def say(text: str) -> None:
     """Print one line on stderr, whatever the text holds."""
-    sys.stderr.write("tactile: " + " ".join(text.split()) + "\n")
+    sys.stderr.write("tactile: " + printable(" ".join(text.split())) + "\n")
+
+
+def printable(text: str) -> str:
+    """The text with control characters as escapes: in a file's name they could move the cursor or change the title."""
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
 
 
 def complain(text: str) -> None:

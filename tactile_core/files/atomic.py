@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import secrets
@@ -13,6 +14,8 @@ from typing import Any
 
 from ..errors import TactileError
 from . import lock
+
+_LONGEST = 200  # bytes of a name; with a dot, a word and a token it stays below the 255 of common file systems
 
 
 @contextlib.contextmanager
@@ -27,7 +30,7 @@ def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]
     path = Path(path)
     partial = _beside(path, "partial")
     if shared:
-        partial = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tactile-partial")
+        partial = path.with_name(f".{_short(path.name)}.{secrets.token_hex(6)}.tactile-partial")
     if os.path.lexists(partial):  # a killed writer's, or what a stranger put there: a link would be written through
         partial.unlink()
     try:
@@ -106,7 +109,15 @@ def _beside(path: Path, role: str) -> Path:
     """
     if not path.name:
         raise TactileError(path, "no name", "a new file or folder")
-    return path.with_name(f".{path.name}.tactile-{role}")
+    return path.with_name(f".{_short(path.name)}.tactile-{role}")
+
+
+def _short(name: str) -> str:
+    """The name, or its beginning and hash where hidden names made from it would be longer than file systems take."""
+    encoded = os.fsencode(name)
+    if len(encoded) <= _LONGEST:
+        return name
+    return f"{os.fsdecode(encoded[:60])}-{hashlib.sha256(encoded).hexdigest()[:16]}"
 
 
 def _recover(path: Path) -> None:
@@ -186,6 +197,9 @@ def claim(path: str | os.PathLike) -> None:
     if not os.fspath(path):
         raise TactileError("--out", "an empty name", "a file to write")
     path = Path(path)
+    if len(os.fsencode(path.name)) > 255:
+        found = f"a name of {len(os.fsencode(path.name))} bytes, which cannot be written"
+        raise TactileError(path.parent, found, "at most 255, as file systems take", "Choose a shorter --out")
     if os.path.lexists(path):
         raise TactileError(path, "exists already", "a new file", "Remove it or choose another name")
     with writing(path, "a place in a writable folder", "Choose another --out"):

@@ -22,6 +22,7 @@ MAX_RATIO = 1032  # the most that deflate packs (zlib, technical details); lzf a
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}  # that are undone; the numbers are HDF5's
 DEFLATE, CHECKSUM, STEP = 1, 3, 2**20
 WIDTHS = {2, 4, 8, 16, 32}  # bytes of an address and of a size; the library opens no file with others
+MAX_DEPTH = 32  # groups within groups, whose names the library looks up again and again (assumed enough; ours have 2)
 MAX_PLAIN_CHUNK = 2**24  # bytes of a chunk in a file of our own; they have 0.2 MB
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -39,9 +40,11 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
 
     check_before_opening(path)
     with h5py.File(path, "r") as file:
-        outside = file.id.links.visit(_outside, info=True)
-        if outside is not None:
-            raise _refused(path, outside, "a link to another file", "data inside this file")
+        beyond = file.id.links.visit(_outside, info=True)
+        if beyond is not None:
+            if beyond.count(b"/") >= MAX_DEPTH:
+                raise _refused(path, beyond[:40], f"groups over {MAX_DEPTH} deep", "a few")
+            raise _refused(path, beyond, "a link to another file", "data inside this file")
         file.visititems(lambda name, item: _check(path, name, item) if isinstance(item, h5py.Dataset) else None)
         yield file
 
@@ -102,10 +105,10 @@ def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
 
 
 def _outside(name: bytes, link: h5py.h5l.LinkInfo) -> bytes | None:
-    """Return the name of a link to another file, None for other links."""
+    """Return the name of a link to another file or too deep in groups, which ends the walk; None for other links."""
     import h5py
 
-    return name if link.type == h5py.h5l.TYPE_EXTERNAL else None
+    return name if link.type == h5py.h5l.TYPE_EXTERNAL or name.count(b"/") >= MAX_DEPTH else None
 
 
 def _check(path: str | os.PathLike, name: str | bytes, data: h5py.Dataset) -> None:

@@ -19,6 +19,7 @@ MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
 MAX_READING = 1e5  # counts; nothing a 12-bit sensor gives, in any unit seen, comes near (assumed)
 GAP_STEPS = 1.9  # a missing frame is 2 median steps; jitter of whole recordings reaches 1.8 (18 ms: docs/sources.md)
+OTHER_RATE = 1.6  # times the usual rate, or a share of it, from which on it is said; 62.5 to 160 Hz are fine (assumed)
 MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 STAMP_UNITS = ((1e17, 1e-9, "nanoseconds"), (1e14, 1e-6, "microseconds"), (1e11, 1e-3, "milliseconds"))  # of unix time
 MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory
@@ -85,9 +86,10 @@ def assemble(
     _check_size(path, electrodes)
     rows = np.arange(frames) if rows is None else rows
     names = names or [f"E{j + 1}" for j in range(ELECTRODES)]
-    bad = ~(np.abs(electrodes) <= MAX_READING)  # NaN compares false
+    bad = ~((electrodes <= MAX_READING) & (electrodes >= -MAX_READING))  # NaN compares false
     problems = [*problems, *_unreadable(electrodes, bad, names, rows, problems)]
-    electrodes = np.where(bad, np.nan, electrodes)
+    if bad.any():
+        electrodes = np.where(bad, np.nan, electrodes)
     notes = list(warnings)
     if stamps is None:
         notes.append(f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed")
@@ -98,9 +100,10 @@ def assemble(
         flags[problem.frame] |= np.uint16(Flag.REPAIRED)
     notes += tell_problems(problems, row_word)
     seconds, start, more = _seconds(stamps)
+    more += _tell_rate(seconds)
     jumps, jump_notes = _time_jumps(seconds, rows, row_word)
     flags[jumps] |= np.uint16(Flag.TIME_JUMP)
-    clean = {key: np.where(np.isfinite(value), value, np.nan) for key, value in channels.items() if value is not None}
+    clean = {key: _finite(value) for key, value in channels.items() if value is not None}
     return Recording(
         name=Path(path).stem,
         path=path,
@@ -116,6 +119,12 @@ def assemble(
         about=about or {},
         **clean,
     )
+
+
+def _finite(values: np.ndarray) -> np.ndarray:
+    """The values, NaN for infinity; no copy where there is none."""
+    finite = np.isfinite(values)
+    return values if finite.all() else np.where(finite, values, np.nan)
 
 
 def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
@@ -173,8 +182,12 @@ def _check_share(path: str, bad: np.ndarray, problems: Sequence[Problem], row_wo
 def _seconds(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
     """Return time from the first frame (s), unix start time (s, 0.0 if unknown) and warnings."""
     stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)
+    warnings, missing = [], int(np.isnan(stamps).sum())
+    if missing == len(stamps):
+        warnings.append(f"none of {missing} time stamps is a time; {NOMINAL_RATE:g} Hz assumed")
+    elif missing:
+        warnings.append(f"{missing} of {len(stamps)} time stamps are no times; filled from those around them")
     stamps = _fill_stamps(stamps)
-    warnings = []
     for limit, unit, word in STAMP_UNITS:
         if np.median(np.abs(stamps)) > limit:
             stamps = stamps * unit
@@ -182,6 +195,21 @@ def _seconds(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
             break
     start = float(stamps[0]) if stamps[0] > 1e8 else 0.0  # below: seconds since something else than 1970
     return stamps - stamps[0], start, warnings
+
+
+def _tell_rate(seconds: np.ndarray) -> list[str]:
+    """Write a sentence on frames that come much faster or slower than those that the filters were made for."""
+    steps = np.diff(seconds)
+    forward = steps[steps > 0]
+    if not len(forward):
+        return []
+    rate = 1.0 / float(np.median(forward))
+    if NOMINAL_RATE / OTHER_RATE <= rate <= NOMINAL_RATE * OTHER_RATE:
+        return []
+    return [
+        f"{rate:.4g} frames a second, where {NOMINAL_RATE:g} are expected: what looks at the frames before and after"
+        f" (glitches, smoothing, following a contact) sees another time; resample to {NOMINAL_RATE:g} Hz to be sure"
+    ]
 
 
 def _fill_stamps(stamps: np.ndarray) -> np.ndarray:

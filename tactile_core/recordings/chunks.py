@@ -10,7 +10,7 @@ from .array_store import Store, open_hdf5
 from .bag import open_bag, read_bag
 from .readers import container_of, layout_of, names, read, reading
 from .recording import Recording
-from .table import read_header_of_start, read_tables
+from .table import read_header, read_tables
 
 TEXT_BYTES = 32 * 2**20  # a part's text: about 150,000 frames, 25 minutes at 100 Hz
 ARRAY_BYTES = 256 * 2**20  # of a part's arrays, as the file declares them; a simulated one has 150 kB a frame
@@ -44,7 +44,7 @@ def _parts(path: str) -> Iterator[Part]:
     with reading(path):
         container = container_of(path)
         if container == "csv" and os.path.getsize(path) > TEXT_BYTES:
-            layout = layout_of(path, container, read_header_of_start(path))
+            layout = layout_of(path, container, read_header(path))
             for table, repeated in read_tables(path, TEXT_BYTES, CONTEXT):
                 yield Part(layout.read(table), repeated)
         elif container == "hdf5":

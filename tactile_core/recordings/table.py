@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import islice, pairwise
+from dataclasses import dataclass, field, replace
+from itertools import chain, islice, pairwise
 from typing import BinaryIO
 
 import numpy as np
@@ -16,13 +17,17 @@ from .truncated_cell import doubt_last_cell, shown
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
 MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)
+MAX_COLUMNS = 1000  # the widest layout has 50 (assumed enough)
+BLOCK = 8 * 2**20  # bytes of text that are parsed at a time
+OVERLAP = 200  # rows of the block before by which the last cell of a file is judged
 MAX_BLANK = 8  # blank lines that a message names
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
     """Parsed table; header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, header is
-    line 1.
+    line 1; exact : (T,) float64 of the columns that values, if float32, would round, such as time stamps; start : line
+    after which the rows begin
     """
 
     path: str
@@ -31,9 +36,11 @@ class Table:
     lines: np.ndarray
     problems: tuple[Problem, ...]
     warnings: tuple[str, ...] = ()
+    exact: dict[int, np.ndarray] = field(default_factory=dict)
+    start: int = 0
 
-    def columns(self, names: list[str]) -> np.ndarray:
-        """Values (T, len(names)) float of the columns. Raises TactileError naming a column that is missing."""
+    def columns(self, names: list[str], dtype: type = np.float64) -> np.ndarray:
+        """Values (T, len(names)) of the columns. Raises TactileError naming a column that is missing."""
         missing = [name for name in names if name not in self.header]
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
@@ -43,7 +50,11 @@ class Table:
                 f"{names[0]} .. {names[-1]}" if len(names) > 1 else names[0],
                 "Export the recording again with all columns",
             )
-        return self.values[:, [self.header.index(name) for name in names]]
+        found = np.empty((len(self.values), len(names)), dtype)
+        with np.errstate(over="ignore"):
+            for place, column in enumerate(self.header.index(name) for name in names):
+                found[:, place] = self.exact.get(column, self.values[:, column])
+        return found
 
     def column(self, name: str) -> np.ndarray:
         """Values (T,) float of a column."""
@@ -81,21 +92,73 @@ def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | N
 
 
 def read_header(path: str) -> tuple[str, ...]:
-    """Lower-case column names of the first line that is not empty."""
-    return _header(path, _lines(path))[0]
-
-
-def read_header_of_start(path: str) -> tuple[str, ...]:
-    """Read the header like `read_header`, from a file of any length."""
+    """Lower-case column names of the first line that is not empty, in the file's first megabyte."""
     with outside.open_file(path, "a recording") as file:
-        return _header(path, _text(path, _whole_lines(path, file, file.read(MAX_LINE))))[0]
+        lines = _text(path, _whole_lines(path, file, file.read(MAX_LINE)))
+    if not any(line.strip() for line in lines):
+        raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
+    return _header(path, lines)[0]
 
 
 def read_table(path: str) -> Table:
-    """Parse the file. Raises TactileError: not text, empty, no header, no data rows, columns named twice."""
-    lines = _lines(path)
-    header, first, separator = _header(path, lines)
-    return _parsed(path, header, separator, lines[first:], first)
+    """Parse the file, a block at a time. Raises TactileError: not text, empty, no header, no data, twin columns."""
+    size = os.stat(path).st_size
+    if size > MAX_BYTES:
+        found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split the recording"
+        raise TactileError(path, found, "a recording of some hours", advice)
+    blocks = read_tables(path, BLOCK, OVERLAP)
+    first, _ = next(blocks)
+    return first if size <= BLOCK else _joined(first, blocks, size)
+
+
+def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int) -> Table:
+    """Put blocks together in half the memory: what single precision holds exactly, as counts, is kept in it.
+
+    size : bytes of the whole file, from which the number of rows is guessed
+    """
+    path, header = first.path, first.header
+    guess = int(1.05 * len(first.values) * size / BLOCK) + 1000
+    values, lines = np.empty((guess, len(header)), np.float32), np.empty(guess, int)
+    exact: dict[int, list[tuple[int, np.ndarray]]] = {}
+    problems: list[Problem] = []
+    count = 0
+    for table, repeated in chain([(first, 0)], blocks):
+        block = table.values[repeated:]
+        end = count + len(block)
+        if end > MAX_FRAMES:
+            raise TactileError(path, f"over {MAX_FRAMES:,} data rows", f"at most {MAX_FRAMES:,}", "Split the recording")
+        if end > len(values):
+            more = end - len(values) + guess // 8
+            values = np.concatenate([values, np.empty((more, len(header)), np.float32)])
+            lines = np.concatenate([lines, np.empty(more, int)])
+        with np.errstate(over="ignore"):
+            values[count:end] = block
+        lines[count:end] = table.lines[repeated:]
+        rounded = (values[count:end] != block) & ~np.isnan(block)
+        for column in np.flatnonzero(rounded.any(axis=0)).tolist():
+            exact.setdefault(column, []).append((count, block[:, column].copy()))
+        shift = count - repeated
+        problems += [replace(one, frame=one.frame + shift) for one in table.problems if one.frame >= repeated]
+        _check_problems(path, problems, int(table.lines[-1]))
+        count = end
+    values, lines = values[:count], lines[:count]
+    columns = {}
+    for column, parts in exact.items():
+        columns[column] = values[:, column].astype(float)
+        for start, part in parts:
+            columns[column][start : start + len(part)] = part
+    blank = _tell_blank_lines(first.start, lines)
+    return Table(path, header, values, lines, tuple(problems), blank, columns)
+
+
+def _check_problems(path: str, problems: list[Problem], line: int) -> None:
+    if len(problems) > MAX_PROBLEMS:
+        raise TactileError(
+            f"{path}, line {problems[0].row}, {problems[0].field}",
+            f"{problems[0].found}; more than {MAX_PROBLEMS:,} bad cells up to line {line}",
+            "numbers",
+            "Check the export of this file",
+        )
 
 
 def read_tables(path: str, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
@@ -147,17 +210,11 @@ def _parsed(
     problems: list[Problem] = []
     for frame, (number, line) in enumerate(kept):
         values[frame] = _row(line, header, separator, frame, number, problems)
-        if len(problems) > MAX_PROBLEMS:
-            raise TactileError(
-                f"{path}, line {problems[0].row}, {problems[0].field}",
-                f"{problems[0].found}; more than {MAX_PROBLEMS:,} bad cells up to line {number}",
-                "numbers",
-                "Check the export of this file",
-            )
+        _check_problems(path, problems, number)
     if last and not ended:
         doubt_last_cell(kept, header, separator, values, problems)
     rows = np.array([number for number, _ in kept])
-    return Table(path, header, values, rows, tuple(problems), _tell_blank_lines(first, rows))
+    return Table(path, header, values, rows, tuple(problems), _tell_blank_lines(first, rows), start=first)
 
 
 def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
@@ -171,19 +228,6 @@ def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
     if count == 1:
         return (f"line {where}: blank; no frame is made of it",)
     return (f"lines {where}: blank ({count} in all); no frames are made of them",)
-
-
-def _lines(path: str) -> list[str]:
-    with outside.open_file(path, "a recording") as file:
-        data = file.read(MAX_BYTES + 1)
-    if len(data) > MAX_BYTES:
-        raise TactileError(
-            path, f"more than {MAX_BYTES // 2**20} MB of text", "a recording of some hours", "Split the recording"
-        )
-    lines = _text(path, data)
-    if not any(line.strip() for line in lines):
-        raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
-    return lines
 
 
 def _text(path: str, data: bytes) -> list[str]:
@@ -201,7 +245,10 @@ def _text(path: str, data: bytes) -> list[str]:
             "a CSV, HDF5, NPZ or MATLAB 5 recording",
             "Save a text file as UTF-8",
         ) from None
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    if max(map(len, lines)) > MAX_LINE:
+        raise TactileError(path, f"a line of over {MAX_LINE // 2**20} MB", "a line for each frame")
+    return lines
 
 
 def _header(path: str, lines: list[str]) -> tuple[tuple[str, ...], int, str]:
@@ -211,6 +258,9 @@ def _header(path: str, lines: list[str]) -> tuple[tuple[str, ...], int, str]:
         raise TactileError(path, "no text", "a header line", "Check that the recording was written to its end")
     line = lines[first]
     separator = max(",;\t", key=line.count)
+    if line.count(separator) >= MAX_COLUMNS:
+        found = f"{line.count(separator) + 1:,} columns"
+        raise TactileError(f"{path}, line {first + 1}", found, f"at most {MAX_COLUMNS:,}", "Export it again")
     cells = [cell.strip().lower() for cell in line.split(separator)]
     while len(cells) > 1 and not cells[-1]:
         cells.pop()

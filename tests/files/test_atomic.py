@@ -157,3 +157,14 @@ def test_odd_names_beside_a_folder_are_let_alone_or_told(tmp_path, monkeypatch):
     with atomic.new_folder(".", overwrite=True) as folder:
         (folder / "new").touch()
     assert [path.name for path in (tmp_path / "y").iterdir()] == ["new"]
+
+
+def test_a_name_as_long_as_file_systems_take(tmp_path):
+    path = tmp_path / ("n" * 250 + ".csv")
+    atomic.claim(path)
+    atomic.write_bytes(path, b"x")
+    atomic.write_bytes(path, b"y", shared=True)
+    assert path.read_bytes() == b"y"
+    with atomic.new_folder(tmp_path / ("m" * 254)) as folder:
+        (folder / "a").write_bytes(b"x")
+    assert sorted(len(each.name) for each in tmp_path.iterdir()) == [254, 254]

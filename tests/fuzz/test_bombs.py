@@ -182,6 +182,15 @@ def test_hdf5(make, words, load, tmp_path):
     refused(load, tmp_path / "a.h5", words)
 
 
+def test_groups_within_groups(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        group = file
+        for _ in range(3000):
+            group = group.create_group("g")
+    for load in (prepare, pairs_file.read_pairs, array_pack.read):
+        refused(load, tmp_path / "a.h5", "deep")
+
+
 SPOILED = {
     "change": [
         ({"shape": (8, 19), "compression": "gzip"}, "packed values"),
@@ -268,6 +277,21 @@ def test_npz(content, words, tmp_path):
         return
     for load in (prepare, read_frames):
         refused(load, tmp_path / "a.npz", words if load is prepare else "")
+
+
+@pytest.mark.parametrize(
+    ("start", "stretch", "words"),
+    [(b"timestamp", b",a" * 2**19, "a line of over 1 MB"), (b"timestamp,", b"a" * 2**20, "a line of over 1 MB"),
+     (b"timestamp" + b",a" * 2000 + b"\n", b"1\n" * 2**19, "2,001 columns")],
+)  # fmt: skip
+def test_wide_texts(start, stretch, words, tmp_path):
+    """A header of 10^8 cells, a cell of 200 MB, and many columns."""
+    with open(tmp_path / "a.csv", "wb") as file:
+        file.write(start)
+        for _ in range(200):
+            file.write(stretch)
+    for load in (prepare, recordings.read):
+        refused(load, tmp_path / "a.csv", words)
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])

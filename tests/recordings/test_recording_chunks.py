@@ -52,3 +52,16 @@ def test_a_text_without_lines_costs_no_memory(tmp_path, monkeypatch):
     (tmp_path / "a.csv").write_bytes(b"7" * 5000)
     with pytest.raises(TactileError, match="a line of over"):
         list(chunks.read_parts(tmp_path / "a.csv"))
+
+
+def test_a_long_text_is_read_in_blocks_like_a_short_one(slide_lines, write, monkeypatch):
+    slide_lines[600] = slide_lines[600].replace("2000", "x", 1)
+    slide_lines.insert(400, "")
+    slide_lines[-1] = slide_lines[-1].rstrip(",")[:-3]  # cut in its last cell
+    path = write(slide_lines, end="")
+    whole = recordings.read(path)
+    monkeypatch.setattr(table, "BLOCK", 20_000)
+    found = recordings.read(path)
+    assert found.warnings == whole.warnings and any("line 602" in text for text in found.warnings)
+    for name in ("time", "electrodes", "pdc", "pac", "tdc", "rows", "flags"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))

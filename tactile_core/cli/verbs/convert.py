@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import os
+from contextlib import suppress
 
 from ...errors import TactileError
 from ...files.threads import one_thread
@@ -87,6 +89,7 @@ def run(options: argparse.Namespace) -> int:
     budget = None if options.error is None else accuracy.parse_budget(options.error)
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget)
     paths, failed = _fingers(options.recordings), 0
+    made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(options.weights, answer=answer_words(options))
     if budget is not None and budget.levels is not None:
@@ -106,6 +109,9 @@ def run(options: argparse.Namespace) -> int:
             for sentence in filter(None, (done.added, done.left)):
                 say(f"{folder.name}: {sentence}")
         tell(str(done.folder))
+    if made and failed == len(folders):
+        with suppress(OSError):  # it holds something
+            os.rmdir(options.out)
     if failed and len(folders) > 1:
         complain(f"{failed} of {len(folders)} recordings were not converted")
     return 2 if failed else 0

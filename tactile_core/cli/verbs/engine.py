@@ -20,6 +20,11 @@ def place_arguments(verb: argparse.ArgumentParser) -> None:
     where = verb.add_mutually_exclusive_group()
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; changes no byte")
     where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
+    verb.add_argument(
+        "--insecure",
+        action="store_true",
+        help="of --cluster: do without TLS, in a network that is yours alone; Dask's messages run code",
+    )
     verb.add_argument("--restart", type=int, metavar="N", help="replace a worker after N tasks (default: 200)")
 
 
@@ -57,11 +62,7 @@ def place(folder: Path, options: argparse.Namespace) -> Place:
     if options.cluster is not None:
         from ...jobs.engine.dask_cluster import Cluster
 
-        if options.cluster.startswith("tcp://") and not options.cluster.startswith("tcp://127."):
-            say(
-                "warning: tcp:// is neither secret nor signed, and Dask's messages run code: private network, or tls://"
-            )
-        return Cluster(folder, options.cluster, say)
+        return Cluster(folder, options.cluster, say, options.insecure)
     from ...jobs.engine.local import RESTART, Local
 
     return Local(folder.resolve(), options.workers or 1, options.restart or RESTART)

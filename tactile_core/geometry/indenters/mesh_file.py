@@ -81,6 +81,7 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
     import trimesh
 
     _check_length(content, path)
+    _check_whole(content, path)
     options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     try:  # from memory: neither materials nor textures that the file names are looked up
         mesh = trimesh.load_mesh(io.BytesIO(content), file_type=path.suffix[1:].lower(), process=False, **options)
@@ -90,6 +91,16 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
     check_triangles(path, vertices, faces)
     vertices = vertices[np.unique(faces)]
     return vertices, np.unique(faces, return_inverse=True)[1].reshape(-1, 3)
+
+
+def _check_whole(content: bytes, path: pathlib.Path) -> None:
+    """Raise TactileError for a binary STL that is shorter than it declares: it would be taken for text."""
+    if path.suffix.lower() != ".stl" or b"\0" not in content[:84]:  # text has no zero byte
+        return
+    count = int.from_bytes(content[80:84], "little")
+    if len(content) < 84 + 50 * count or len(content) < 84:
+        found = f"cut short: {len(content)} bytes for {count:,} triangles"
+        raise TactileError(path, found, f"{84 + 50 * count:,} bytes", "Copy or export it again")
 
 
 def check_triangles(where: str | os.PathLike, vertices: np.ndarray, faces: np.ndarray) -> None:

@@ -1,7 +1,8 @@
 """Dask workers on any machines that see the same job folder under the same path.
 
-Dask's messages are pickles, which run code: a scheduler on ``tcp://`` obeys whoever reaches it. Use it in a private
-network, or ``tls://`` with certificates (Dask's own settings ``distributed.comm.tls`` name the files).
+Dask's messages are pickles, which run code: a scheduler on ``tcp://`` obeys whoever reaches it. So a scheduler that is
+started here for a queue speaks TLS, with keys made for this run alone; ``tcp://`` to other machines has to be asked
+for. ``tls://`` takes the certificates that Dask's own settings ``distributed.comm.tls`` name.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import asyncio
 import functools
 import gc
 import queue
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -43,9 +45,16 @@ class Cluster:
     say : called when all tasks wait because no worker has come yet, as in a full queue
     """
 
-    def __init__(self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None) -> None:
-        """Raise TactileError for an address or a file that is neither."""
-        self._say = say
+    def __init__(
+        self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None, insecure: bool = False
+    ) -> None:
+        """Raise TactileError for an address or a file that is neither, and for other machines without TLS.
+
+        insecure : do without TLS, as in a private network
+        """
+        self._say, self._insecure = say, insecure
+        if address.startswith(("tcp://", "ucx://")) and not _here(address):
+            self._without_tls(address)
         self._folder = str(folder.resolve())
         self._address = address
         self._queue = None if address.startswith(SCHEMES) else _read(address)
@@ -88,10 +97,28 @@ class Cluster:
 
     def __enter__(self) -> Cluster:
         with ExitStack() as stack:
-            place = self._address if self._queue is None else stack.enter_context(_closing(_start(self._queue)))
+            place = self._address if self._queue is None else stack.enter_context(self._started(stack))
             self._client = stack.enter_context(self._connected(place))
             self._open = stack.pop_all()
         return self
+
+    def _started(self, stack: ExitStack) -> Any:
+        """A context manager of a queue's cluster: by TLS with keys of this run, in the job's folder until its end."""
+        options = {"worker_extra_args": ["--no-dashboard"], **self._queue.options}
+        options["scheduler_options"] = {"dashboard_address": "127.0.0.1:0", **options.get("scheduler_options", {})}
+        if self._insecure:
+            self._without_tls("--cluster")
+        else:
+            keys = stack.enter_context(tempfile.TemporaryDirectory(prefix=".tls-", dir=self._folder))
+            options |= {"protocol": "tls://", "security": _one_time_keys(), "shared_temp_directory": keys}
+        return _closing(_start(self._queue, options))
+
+    def _without_tls(self, where: str) -> None:
+        """Warn of a scheduler without TLS. Raises TactileError where nobody has accepted that."""
+        found = "no TLS: Dask's messages run code, and whoever reaches the scheduler or listens can send them"
+        if not self._insecure:
+            raise TactileError(where, found, "tls://", "In a network that is yours alone, add --insecure")
+        self._say(f"warning: {where}: {found}")
 
     def _connected(self, place: Any) -> Any:
         """A client of the scheduler. Raises TactileError where none answers."""
@@ -128,9 +155,28 @@ def _closing(cluster: Any) -> Iterator[Any]:
     finally:
         with suppress(AssertionError):  # the last of what closing does
             cluster.close()
+        for name, value in vars(cluster).items():
+            if name.startswith("_job_") and hasattr(value, "close"):
+                value.close()  # the workers' keys, which it would remove some time
 
 
-def _start(wanted: QueueFile) -> Any:
+def _here(address: str) -> bool:
+    """Return true for an address of this machine's own loopback."""
+    return address.split("://", 1)[1].rsplit(":", 1)[0].strip("[]") in ("127.0.0.1", "::1", "localhost")
+
+
+def _one_time_keys() -> Any:
+    """Make a key and certificate that nobody else has. Raises TactileError where the library for it is missing."""
+    from distributed import Security
+
+    try:
+        return Security.temporary()
+    except ImportError as error:
+        advice = "Install it: python -m pip install cryptography; or do without TLS: --insecure"
+        raise TactileError("--cluster", "no cryptography, which makes TLS keys", "it", advice) from error
+
+
+def _start(wanted: QueueFile, options: dict[str, Any]) -> Any:
     """A cluster whose workers are jobs of a queue. Raises TactileError for options it does not know."""
     import dask
     import dask_jobqueue
@@ -138,7 +184,7 @@ def _start(wanted: QueueFile) -> Any:
     dask.config.set({"distributed.scheduler.allowed-failures": KILLS - 1})
     names = {"slurm": "SLURM", "pbs": "PBS", "sge": "SGE", "lsf": "LSF", "htcondor": "HTCondor"}
     try:
-        cluster = getattr(dask_jobqueue, f"{names[wanted.queue]}Cluster")(loop=loop(), **wanted.options)
+        cluster = getattr(dask_jobqueue, f"{names[wanted.queue]}Cluster")(loop=loop(), **options)
     except (TypeError, ValueError) as error:
         raise TactileError("--cluster, options", str(error), f"options of dask_jobqueue's {wanted.queue}") from error
     cluster.scale(jobs=wanted.jobs)

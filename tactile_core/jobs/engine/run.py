@@ -48,6 +48,7 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
     Raises TactileError where another job runs in it, or where it cannot be written.
     """
+    made = not folder.exists()
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
         stack = contextlib.ExitStack()
@@ -56,8 +57,22 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
         _sweep(folder, part)
         try:
             yield
+        except BaseException:
+            if made and not jobs.exists(folder):
+                _unmake(folder)
+            raise
         finally:
-            _sweep(folder, part)
+            if folder.exists():
+                _sweep(folder, part)
+
+
+def _unmake(folder: Path) -> None:
+    """Remove a folder that holds nothing but our locks, after a job that was refused."""
+    if all(path.name.startswith(lock.FILE) for path in folder.iterdir()):
+        with contextlib.suppress(OSError):
+            for path in folder.iterdir():
+                path.unlink()
+            folder.rmdir()
 
 
 def _sweep(folder: Path, part: tuple[int, int] | None) -> None:

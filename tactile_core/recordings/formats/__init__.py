@@ -34,7 +34,7 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
 
     Raises TactileError for a missing column, and the errors of ``assemble``.
     """
-    columns: dict[str, Any] = {channel: table.columns(names) for channel, names in channels.items()}
+    columns: dict[str, Any] = {channel: table.columns(names, np.float32) for channel, names in channels.items()}
     return assemble(
         table.path,
         layout,

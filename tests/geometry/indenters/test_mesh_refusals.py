@@ -169,3 +169,12 @@ def test_inside_counts_layers():
     assert not within[[0, -1]].any() and not within[:, [0, -1]].any() and not within[:, :, [0, -1]].any()
     with pytest.raises(OverlapError):
         inside(np.concatenate([box, box]), np.full(3, -1.5), 0.5, (7, 7, 7))
+
+
+def test_a_binary_stl_that_is_cut_short_says_so(tmp_path):
+    sphere().export(tmp_path / "ball.stl")
+    whole = (tmp_path / "ball.stl").read_bytes()
+    for length in (len(whole) // 2, 84, 83, 10):
+        (tmp_path / "ball.stl").write_bytes(whole[:length])
+        with pytest.raises(TactileError, match="cut short"):
+            MeshIndenter.from_file(tmp_path / "ball.stl")

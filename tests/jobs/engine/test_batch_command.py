@@ -131,3 +131,11 @@ def test_a_job_file_of_others_is_checked(new_job):
         (folder / jobs.FILE).write_text(text)
         with pytest.raises(TactileError, match=r"job\.json"):
             jobs.read(folder)
+
+
+def test_a_refused_batch_leaves_no_folder(tmp_path, capsys):
+    assert main(["batch", str(tmp_path / "absent.csv"), "--out", str(tmp_path / "job")]) == 2
+    assert not (tmp_path / "job").exists()
+    (tmp_path / "kept").mkdir()
+    assert main(["batch", str(tmp_path / "absent.csv"), "--out", str(tmp_path / "kept")]) == 2
+    assert (tmp_path / "kept").exists()

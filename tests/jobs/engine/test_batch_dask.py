@@ -161,3 +161,31 @@ def test_the_script_that_a_slurm_cluster_would_submit(tmp_path):
     with jobqueue.SLURMCluster(**options, scheduler_options={"dashboard_address": None}) as cluster:
         script = cluster.job_script()
     assert "#SBATCH -p cpu" in script and "#SBATCH -t 01:00:00" in script and "distributed.cli.dask_worker" in script
+
+
+@pytest.mark.parametrize("address", ["tcp://10.0.0.1:8786", "tcp://head:8786", "tcp://127.0.0.1.evil.example:8786"])
+def test_a_scheduler_elsewhere_without_tls_has_to_be_asked_for(address, tmp_path):
+    with pytest.raises(TactileError, match="--insecure"):
+        Cluster(tmp_path, address)
+    said = []
+    Cluster(tmp_path, address, said.append, insecure=True)
+    assert len(said) == 1 and "run code" in said[0]
+    for fine in ("tcp://127.0.0.1:1", "tcp://localhost:1", "tcp://[::1]:1", "tls://head:8786"):
+        Cluster(tmp_path, fine)
+
+
+@pytest.mark.parametrize("insecure", [False, True])
+def test_a_queue_s_scheduler_speaks_tls_and_keeps_its_dashboard_to_itself(insecure, tmp_path, monkeypatch):
+    pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
+    file, said, seen = tmp_path / "slurm.toml", [], []
+    file.write_text('queue = "slurm"\njobs = 0\n[options]\ncores = 1\nmemory = "1GB"\n')
+    monkeypatch.setattr(Cluster, "_connected", lambda self, place: seen.append(place) or nullcontext())
+    with Cluster(tmp_path, str(file), said.append, insecure):
+        (cluster,) = seen
+        assert cluster.scheduler_address.startswith("tcp://" if insecure else "tls://")
+        listening = cluster.scheduler.http_server
+        ports = {one.getsockname()[0] for one in listening._sockets.values()}
+        assert ports == {"127.0.0.1"} and "--no-dashboard" in cluster.job_script()
+        keys = list(tmp_path.glob(".tls-*/*"))
+        assert bool(keys) != insecure and all(key.stat().st_mode & 0o077 == 0 for key in keys)
+    assert bool(said) == insecure and not list(tmp_path.glob(".tls-*"))
