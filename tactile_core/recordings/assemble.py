@@ -184,7 +184,7 @@ def _seconds(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
     stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)
     warnings, missing = [], int(np.isnan(stamps).sum())
     if missing == len(stamps):
-        warnings.append(f"none of {missing} time stamps is a time; {NOMINAL_RATE:g} Hz assumed")
+        warnings.append(f"none of {missing} time stamps is a time; {SAMPLE_RATE:g} Hz assumed")
     elif missing:
         warnings.append(f"{missing} of {len(stamps)} time stamps are no times; filled from those around them")
     stamps = _fill_stamps(stamps)
@@ -204,11 +204,11 @@ def _tell_rate(seconds: np.ndarray) -> list[str]:
     if not len(forward):
         return []
     rate = 1.0 / float(np.median(forward))
-    if NOMINAL_RATE / OTHER_RATE <= rate <= NOMINAL_RATE * OTHER_RATE:
+    if SAMPLE_RATE / OTHER_RATE <= rate <= SAMPLE_RATE * OTHER_RATE:
         return []
     return [
-        f"{rate:.4g} frames a second, where {NOMINAL_RATE:g} are expected: what looks at the frames before and after"
-        f" (glitches, smoothing, following a contact) sees another time; resample to {NOMINAL_RATE:g} Hz to be sure"
+        f"{rate:.4g} frames a second, where {SAMPLE_RATE:g} are expected: what looks at the frames before and after"
+        f" (glitches, smoothing, following a contact) sees another time; resample to {SAMPLE_RATE:g} Hz to be sure"
     ]
 
 
