@@ -32,19 +32,25 @@ from tactile_core.files import atomic, provenance
 from tactile_core.mechanics.placement import pose_at
 from tactile_core.mechanics.solve import solve
 from tactile_core.mechanics.thickness import thickness_under
+from tactile_core.pictures.calibrate.ball_pictures import FastPictures
+from tactile_core.pictures.coating_spread import CoatingSpread
 from tactile_core.pictures.height_map import digit_mapper, of_unit, rest_height_map
+from tactile_core.pictures.mitsuba.gel_light import GelLight
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR, choose_variant
-from tactile_core.pictures.presets import FAST, NAMES, PRESETS, REFERENCE, TABLE, Preset
+from tactile_core.pictures.presets import FAST, NAMES, PRESETS, QUALITY, REFERENCE, TABLE, Preset
 from tactile_core.pictures.renderer import MitsubaLight, Renderer
 from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
+from tactile_core.sensors.coating import Coating
 
 SEED = 20261122  # of the fields
 FIELDS = 10
 # Depths are drawn evenly up to this share of the gel's thickness: 1.2 mm, as deep as a ball of 6 mm is photographed.
 # Farther down, the walls round a small punch fold over, where a height map is a guess.
 DEEPEST = 0.3
-LARGE = (480, 640)
+SMALL, LARGE = (120, 160), (480, 640)
+PATHS_TARGET = {1.2e-3: 0.5, 2e-3: 0.9}  # levels from paths, by the depth of a ball, m
+COATINGS = (Coating(), Coating("roughplastic"), Coating("principled", roughness=0.4))
 # Grey levels and ms on one core that the presets are meant to reach, by variant.
 DIRECT_TARGET = {FAST: 0.5, "standard": 0.6}
 FULL_TARGET = {"quality": 1.0}
@@ -83,6 +89,8 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
     yield from errors(unit, heights, best, dataclasses.replace(REFERENCE, passes=QUICK_PASSES) if quick else REFERENCE)
     if len(variants) == 2:
         yield from agreement(unit, heights[0])
+    if best == LLVM and not quick:
+        yield from against_paths(unit)
     for variant in variants:
         for name in NAMES:
             slow = name == REFERENCE.name and (quick or variant != best)
@@ -126,12 +134,26 @@ def working_variants() -> list[str]:
 def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset) -> Iterator[Row]:
     """Rows of every preset's error, from converged direct light and from the full model; null: the background alone."""
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
-    of, levels = f"{len(heights)} fields", renderers[FAST].in_levels
+    of, levels, spread = (
+        f"{len(heights)} fields",
+        renderers[FAST].in_levels,
+        CoatingSpread(unit.camera, unit.coating.spread),
+    )
     changes = {
         name: [levels(renderer.radiance(height) - renderer.rest_radiance) for height in heights]
         for name, renderer in renderers.items()
     }
-    converged, full = zip(*converge(unit, heights, variant, truth, seed=0, levels=levels), strict=True)
+    converged, full = zip(
+        *converge(
+            unit,
+            heights,
+            variant,
+            truth,
+            seed=0,
+            levels=lambda radiance: levels(np.moveaxis(spread(np.moveaxis(radiance, -1, 0)), 0, -1)),
+        ),
+        strict=True,
+    )
     for name, change in changes.items():
         yield row(f"{name}_error_direct", rms(change, converged), "levels", DIRECT_TARGET.get(name),
                   null=rms(converged), of=of)  # fmt: skip
@@ -161,6 +183,30 @@ def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> f
     """Root mean square of all numbers, or of their differences."""
     difference = np.asarray(pictures) - (0 if others is None else np.asarray(others))
     return float(np.sqrt(np.mean(np.square(difference, dtype=float))))
+
+
+def against_paths(unit: Calibration) -> Iterator[Row]:
+    """Rows of quality against Mitsuba's path integrator, pixel by pixel, by coating and depth of a ball.
+
+    At 120 x 160, as everything there is a quarter of the work; the paths' noise, half the difference of two seeds, is
+    taken off.
+    """
+    unit = unit.at_size(*SMALL)
+    quality, half = dataclasses.replace(QUALITY, bounce_step=QUALITY.bounce_step // 2), REFERENCE.paths
+    for coating in COATINGS:
+        painted = dataclasses.replace(unit, coating=coating).with_gain(unit.gain)
+        bench = FastPictures(painted)
+        heights = [bench.rest, *(bench.heights((1e-3, 0.5e-3, depth, 3e-3)) for depth in PATHS_TARGET)]
+        ways = [(quality, 0), (REFERENCE, 0), (REFERENCE, 1)]
+        lights = [GelLight(painted, preset, bench.rest, seed) for preset, seed in ways]
+        found = np.array([[light.radiance(height) for height in heights] for light in lights])
+        ours, one, other = (found[:, 1:] - found[:, :1]) @ np.asarray(painted.response.centre).T
+        for k, (depth, target) in enumerate(PATHS_TARGET.items()):
+            noise = np.mean(np.square(one[k] - other[k])) / 4
+            error = np.sqrt(max(np.mean(np.square(ours[k] - (one[k] + other[k]) / 2)) - noise, 0))
+            of = f"rms, {128 * half} paths, their noise of {np.sqrt(noise):.2f} taken off"
+            name, null = f"quality_{coating.bsdf}_{1e3 * depth:g}mm_from_paths", rms([(one[k] + other[k]) / 2])
+            yield row(name, float(error), "levels", target, null=null, of=of)
 
 
 def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:

@@ -104,6 +104,10 @@ def render(
         made = pictures(
             options.calibration, preset, options.variant, shape, options.size, options.noise, options.exr, clock
         )
+    about = background_of(made.renderer)
+    if isinstance(about, dict):
+        by = about["corrects_lights_by"]
+        say(f"at rest: {about['photograph']}, {by['mean_levels']:g} levels from the lights' own picture in the mean")
     try:
         with atomic.new_folder(out, overwrite=options.overwrite) as folder, progress(preset) as shown:
             made.begin(folder)
@@ -271,6 +275,7 @@ def note_of(
         "input": {"file": file.name, "sha256": provenance.sha256(file), "kind": kind},
         "frames": {"selected": frames_text(options.frames), "rendered": count},
         "calibration": {"file": calibration.name, "sha256": provenance.sha256(calibration), "unit": unit},
+        "background": background_of(renderer),
         "noise": options.noise,
         "size": {"width": renderer.camera.width, "height": renderer.camera.height},
         "preset": {
@@ -279,6 +284,14 @@ def note_of(
         },
         "versions": provenance.versions("PIL") | _mitsuba_versions(renderer.variant),
     }  # fmt: skip
+
+
+def background_of(renderer: Renderer) -> dict[str, Any] | str:
+    """Describe what makes the picture at rest, and by how much a photograph corrects the lights'."""
+    photograph = renderer.calibration.photograph
+    return (
+        {"photograph": Path(photograph).name, "corrects_lights_by": renderer.correction()} if photograph else "lights"
+    )
 
 
 def _mitsuba_versions(variant: str | None) -> dict[str, str]:

@@ -6,6 +6,7 @@ Each LED has its own share of it, a smooth polynomial, that goes with the LED's 
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterator
 
@@ -15,20 +16,45 @@ from ..errors import TactileError
 from ..files import outside
 from ..sensors.calibration import AMBIENT_DEGREE, AMBIENT_UNIT, Calibration
 from ..sensors.camera import Camera
+from .height_map import of_unit, rest_height_map
+from .mitsuba.direct_light import Hits, direct_light
+from .perspective import slopes
 
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF")  # of photographs; for others the library may start programs (EPS: Ghostscript)
+DARK = 1.0  # grey levels: what a darker place of the lights' own picture gives is no ratio
 MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 million
 
 
 def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
     """Picture (H, W, 3) float32, grey levels, of the untouched gel, whose coating shows radiance (H, W, 3).
 
-    Of the calibration's photograph where it has one. Raises TactileError for a photograph that cannot be read or has
+    Of the calibration's photograph where it has one; where LEDs or albedo are others than when it was taken, as much
+    brighter or darker as they make the untouched gel. Raises TactileError for a photograph that cannot be read or has
     another size than the camera's pictures.
     """
-    if unit.photograph:
-        return read_photograph(unit.photograph, unit.camera).astype(np.float32)
-    return by_led(unit, radiance).sum(-1)
+    if not unit.photograph:
+        return by_led(unit, radiance).sum(-1)
+    photograph = read_photograph(unit.photograph, unit.camera).astype(np.float32)
+    if unit.photographed in (None, (unit.leds, unit.coating.albedo)):
+        return photograph
+    leds, albedo = unit.photographed
+    coating = dataclasses.replace(unit.coating, albedo=albedo)
+    now, then = _open_light(unit), _open_light(dataclasses.replace(unit, leds=leds, coating=coating))
+    return photograph * np.maximum(now, 0) / np.maximum(then, DARK)
+
+
+def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> dict[str, float]:
+    """Levels by which a picture at rest (H, W, 3) differs from the lights' own: mean and largest, absolute."""
+    off = np.abs(picture - by_led(unit, radiance).sum(-1))
+    return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
+
+
+def _open_light(unit: Calibration) -> np.ndarray:
+    """Picture (H, W, 3) of the untouched gel where nothing is in the LEDs' way, as nothing is on a smooth dome."""
+    height = of_unit(rest_height_map(unit.camera), unit).astype(np.float32)
+    right, down = np.meshgrid(unit.camera.right, unit.camera.down)
+    hits = Hits.from_slopes(np.stack([right, down, height], -1).astype(np.float32), *slopes(height, unit.camera))
+    return by_led(unit, direct_light(hits, None, [np.array([led.position]) for led in unit.leds], unit)).sum(-1)
 
 
 def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:

@@ -11,8 +11,9 @@ from ..errors import TactileError
 from ..files.compiled import available
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
-from .background import resting_picture
+from .background import correction, resting_picture
 from .camera_noise import camera_noise
+from .coating_spread import CoatingSpread
 from .height_map import digit_mapper, of_unit, rest_height_map
 from .level_loops import in_picture
 from .mitsuba.direct_light import Hits, direct_light
@@ -75,6 +76,8 @@ class Renderer:
         self._response = np.ascontiguousarray(
             calibration.response.matrices(self.camera).transpose(2, 3, 0, 1), np.float32
         )
+        # The fast one spreads its own.
+        self._spread = CoatingSpread(self.camera, 0.0 if preset == FAST else calibration.coating.spread)
         if preset == FAST:
             self.variant = None
             self._light: Light = Shader(calibration, rest=resting)
@@ -88,7 +91,7 @@ class Renderer:
         if surroundings and self.variant != LLVM:
             found = f"{len(surroundings.lamps)} more lamps and {len(surroundings.occluders)} bodies in the light's way"
             raise TactileError(f"preset {preset}", found, "a unit's own LEDs", "Choose standard, with LLVM (doctor)")
-        self.rest_radiance = self._light.radiance(resting)
+        self.rest_radiance = self._spread_radiance(resting)
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")
 
@@ -112,7 +115,11 @@ class Renderer:
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3) float32, levels of its band, that each LED gives to what pixels see."""
-        return self._light.radiance(self._heights(height_map, "height map"))
+        return self._spread_radiance(self._heights(height_map, "height map"))
+
+    def _spread_radiance(self, heights: np.ndarray) -> np.ndarray:
+        found = self._light.radiance(heights)
+        return np.moveaxis(self._spread(np.moveaxis(found, -1, 0)), 0, -1)
 
     def picture(self, radiance: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
         """Picture (H, W, 3) uint8: background + response (radiance - radiance at rest).
@@ -127,6 +134,10 @@ class Renderer:
             levels += camera_noise(self.calibration, noise)
         np.rint(levels, out=levels)
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
+
+    def correction(self) -> dict[str, float]:
+        """Levels by which the picture at rest differs from what the lights alone make: mean and largest."""
+        return correction(self.calibration, self.rest_radiance, self.background)
 
     def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
         """The unit's heights (H, W) float32 m, checked."""

@@ -14,6 +14,7 @@ from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import COLOURS, Camera, Led
 from .background import resting_picture
 from .cast_shadows import ShadowCaster, bounding_box, disc_share
+from .coating_spread import CoatingSpread
 from .height_map import of_unit, rest_height_map
 from .perspective import Perspective, slopes
 
@@ -47,6 +48,7 @@ class Shader:
         self._view = Perspective(camera, rest)
         check_reach(rest, calibration, "rest height map")
         self.rest = self._view(rest)
+        self._spread = CoatingSpread(camera, calibration.coating.spread)
         self._lamps = [Lamp(camera, led) for led in calibration.leds]
         self._rest_radiance = self._seen_radiance(self.rest)
         if background is None:
@@ -81,7 +83,9 @@ class Shader:
         """Radiance (3, H, W) of heights (H, W) that the pixels see."""
         surface = SeenSurface(self._view, seen)
         scale = self.calibration.facing.astype(np.float32)
-        return np.stack([lamp.radiance(surface) * level for lamp, level in zip(self._lamps, scale, strict=True)])
+        return self._spread(
+            np.stack([lamp.radiance(surface) * level for lamp, level in zip(self._lamps, scale, strict=True)])
+        )
 
 
 class SeenSurface:

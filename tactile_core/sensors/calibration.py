@@ -95,6 +95,7 @@ class Calibration:
     gel_index : refractive index of gel and acrylic, taken as equal
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
     photograph : path of a photograph of the untouched gel, which then is the picture at rest; "" for none
+    photographed : LEDs and albedo when it was taken, which a file's are; None for a calibration's that never changed
     noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for
     """
 
@@ -109,6 +110,7 @@ class Calibration:
     photograph: str
     noise: tuple[float, float, float]
     fit: Fit
+    photographed: tuple[tuple[Led, Led, Led], tuple[float, float, float]] | None = None
 
     def __post_init__(self) -> None:
         if tuple(led.colour for led in self.leds) != COLOURS:

@@ -20,7 +20,8 @@ from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
 from .camera import COLOURS, Camera, Led
 from .coating import Coating
 
-FORMAT, FORMER = "tactile-calibration-2", "tactile-calibration-1"
+FORMAT, FORMER = "tactile-calibration-3", "tactile-calibration-1"
+WITHOUT_SPREAD = "tactile-calibration-2"  # whose coatings do not spread light
 SHIPPED = shipped("calibrations/default.toml")
 LARGEST = 1e8  # of a unit's numbers, as the radiance of a spot of 0.05 mm; a fit's errors may be larger
 ADVICE = "Make it again with `tactile calibrate`"
@@ -32,7 +33,7 @@ _TABLES = {
     "leds": COLOURS,
     "response": ("centre", "along_right_per_mm", "along_down_per_mm"),
     "ambient": COLOURS,
-    "coating": ("bsdf", "albedo", "roughness", "gloss", "metallic"),
+    "coating": ("bsdf", "albedo", "roughness", "gloss", "metallic", "spread_mm"),
     "gel": ("dome_scale", "index"),
     "background": ("photograph",),
     "noise": ("levels",),
@@ -87,6 +88,8 @@ class _Reader:
         if content.get("format") == FORMER:
             expected = f"{FORMAT!r}, in which LEDs and coating make the picture at rest too"
             raise TactileError("format", f"{FORMER!r}, of an older version", expected)
+        if content.get("format") == WITHOUT_SPREAD and isinstance(content.get("coating"), dict):
+            self._content = content | {"format": FORMAT, "coating": {"spread_mm": 0.0} | content["coating"]}
         for table, names in _TABLES.items():
             self._check_names(table or "top level", self._content if not table else self._table(table), names)
 
@@ -106,18 +109,21 @@ class _Reader:
     def calibration(self, folder: Path) -> Calibration:
         if self._content["format"] != FORMAT:
             raise TactileError("format", repr(self._content["format"]), repr(FORMAT))
+        leds = self._led("red"), self._led("green"), self._led("blue")
+        coating, photograph = self._coating(), self._photograph(folder)
         return Calibration(
             unit=_text("unit", self._content["unit"]),
             camera=self._camera(),
-            leds=(self._led("red"), self._led("green"), self._led("blue")),
+            leds=leds,
             response=self._response(),
             ambient=tuple(_numbers(f"ambient, {led}", self._content["ambient"][led], AMBIENT_TERMS) for led in COLOURS),
-            coating=self._coating(),
+            coating=coating,
             gel_index=_number("gel, index", self._content["gel"]["index"]),
             dome_scale=_number("gel, dome_scale", self._content["gel"]["dome_scale"]),
-            photograph=self._photograph(folder),
+            photograph=photograph,
             noise=_three("noise, levels", self._content["noise"]["levels"]),
             fit=self._fit(),
+            photographed=(leds, coating.albedo) if photograph else None,
         )
 
     def _camera(self) -> Camera:
@@ -157,7 +163,8 @@ class _Reader:
         table = self._content["coating"]
         numbers = {name: _number(f"coating, {name}", table[name]) for name in ("roughness", "gloss", "metallic")}
         albedo = _three("coating, albedo", table["albedo"])
-        return Coating(_text("coating, bsdf", table["bsdf"]), albedo, **numbers)
+        spread = 1e-3 * _number("coating, spread_mm", table["spread_mm"])
+        return Coating(_text("coating, bsdf", table["bsdf"]), albedo, **numbers, spread=spread)
 
     def _photograph(self, folder: Path) -> str:
         name = _text("background, photograph", self._content["background"]["photograph"])
@@ -273,6 +280,7 @@ def _as_text(calibration: Calibration) -> str:
         f"bsdf = {_quoted(coating.bsdf)}",
         f"albedo = {_list(coating.albedo)}",
         *[f"{name} = {_digits(getattr(coating, name))}" for name in ("roughness", "gloss", "metallic")],
+        f"spread_mm = {_digits(1e3 * coating.spread)}  # of light, sideways in it: standard deviation",
         "",
         "[gel]",
         f"dome_scale = {_digits(calibration.dome_scale)}  # of the public mesh's dome",

@@ -7,6 +7,7 @@ import dataclasses
 from ..errors import TactileError
 
 DIFFUSE, ROUGH_PLASTIC, PRINCIPLED = MATERIALS = ("diffuse", "roughplastic", "principled")
+MOST_SPREAD = 2e-3  # m; the gel is 4 mm thick, its coating far thinner
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,6 +19,7 @@ class Coating:
     roughness : 0.02..1, width of highlights: GGX's alpha of roughplastic, Burley's roughness; not of diffuse
     gloss : 0..1, size of highlights; not of diffuse
     metallic : 0..1, of principled alone; 1 reflects like metal of that albedo
+    spread : m, standard deviation of how far light goes sideways in it, at most 2 mm; over the picture, in every preset
     """
 
     bsdf: str = DIFFUSE
@@ -25,6 +27,7 @@ class Coating:
     roughness: float = 0.3
     gloss: float = 0.5
     metallic: float = 0.0
+    spread: float = 0.0
 
     def __post_init__(self) -> None:
         if self.bsdf not in MATERIALS:
@@ -36,3 +39,5 @@ class Coating:
         for name, value, least in ranges:
             if not least <= value <= 1:  # false for NaN
                 raise TactileError(f"coating, {name}", f"{value:g}", f"{least:g} to 1")
+        if not 0 <= self.spread <= MOST_SPREAD:
+            raise TactileError("coating, spread_mm", f"{1e3 * self.spread:g}", f"0 to {1e3 * MOST_SPREAD:g}")

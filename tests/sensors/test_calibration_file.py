@@ -1,6 +1,7 @@
 """Calibration files: what is written is read back, what is wrong is named."""
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,13 @@ def test_shipped_file_is_written_as_this_version_writes_it(tmp_path: Path) -> No
     assert (tmp_path / "again.toml").read_bytes() == SHIPPED.read_bytes()
 
 
+def test_a_file_of_before_coatings_spread_light_is_read_as_one_that_does_not(tmp_path: Path) -> None:
+    text = re.sub(r"spread_mm = .*\n", "", SHIPPED.read_text()).replace("calibration-3", "calibration-2")
+    (tmp_path / "older.toml").write_text(text)
+    found, shipped = load_calibration(tmp_path / "older.toml"), load_calibration()
+    assert found == dataclasses.replace(shipped, coating=dataclasses.replace(shipped.coating, spread=0.0))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "where"),
     [
@@ -44,13 +52,15 @@ def test_shipped_file_is_written_as_this_version_writes_it(tmp_path: Path) -> No
         ("albedo =", "# albedo =", "coating: albedo missing"),
         ("radius_mm =", "radius =", "leds, .*unknown radius"),
         ("[noise]", "[other]", "unknown other"),
-        ('format = "tactile-calibration-2"', 'format = "tactile-calibration-9"', "format"),
-        ('format = "tactile-calibration-2"', 'format = "tactile-calibration-1"', "of an older version"),
+        ('format = "tactile-calibration-3"', 'format = "tactile-calibration-9"', "format"),
+        ('format = "tactile-calibration-3"', 'format = "tactile-calibration-1"', "of an older version"),
         ("radiance = ", "radiance = -", "leds?,? red, radiance"),
         ("radius_mm = ", "radius_mm = 9", "above the gel"),
         ("index = 1", "index = 0", "gel, index"),
         ("albedo = [0", "albedo = [2", "coating, albedo"),
         ('bsdf = "diffuse"', 'bsdf = "bitmap"', "coating, bsdf"),
+        ("spread_mm = ", "spread_mm = -", "coating, spread_mm"),
+        ("spread_mm = ", "spread_mm = 7", "coating, spread_mm"),
         ("width_px = 240", "width_px = 240.5", "width_px"),
         ("height_px = 320", "height_px = true", "height_px"),
         ("down_x = 1", "down_x = 0", "down_x"),

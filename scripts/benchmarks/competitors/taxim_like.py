@@ -11,7 +11,7 @@ import dataclasses
 
 import numpy as np
 
-from tactile_core.pictures.calibrate.ball_pictures import BallPictures, working_factor
+from tactile_core.pictures.calibrate.ball_pictures import BallPictures, FastPictures, working_factor
 from tactile_core.pictures.calibrate.ball_print import print_on
 from tactile_core.pictures.calibrate.photo_metrics import figures
 from tactile_core.pictures.calibrate.photographs import Photographs
@@ -67,7 +67,7 @@ def fit_table(calibration: Calibration, photographs: Photographs, radius: float)
 def try_table(table: Table, calibration: Calibration, photographs: Photographs, radius: float) -> list[dict]:
     """The figures of ``tactile calibrate --test`` but for the radius, one a press."""
     working = TableBench(_working(calibration), table)
-    whole = TableBench(BallPictures(calibration), table)
+    whole = TableBench(FastPictures(calibration), table)
     found = []
     for press in photographs.presses:
         ball, _ = fit_ball(working, Sight(press), radius)
@@ -79,7 +79,7 @@ def try_table(table: Table, calibration: Calibration, photographs: Photographs, 
 def _working(calibration: Calibration) -> BallPictures:
     camera = calibration.camera
     factor = working_factor(camera.width, camera.height)
-    return BallPictures(calibration.at_size(camera.width // factor, camera.height // factor))
+    return FastPictures(calibration.at_size(camera.width // factor, camera.height // factor))
 
 
 def _terms(bench: BallPictures) -> np.ndarray:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_core.accuracy import row
-from tactile_core.pictures.calibrate.ball_pictures import BallPictures
+from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.calibrate.ball_print import print_on
 from tactile_core.pictures.calibrate.evaluate import Evaluation, evaluate_unit, mean_figures
 from tactile_core.pictures.calibrate.photo_metrics import figures
@@ -43,11 +43,11 @@ def measure(name: str, quick: bool, presses: str) -> Method:
     label = name
     if name == TABLE:
         table = fit_table(unit, chosen(photographs, fitted), BALL)
-        change = TableBench(BallPictures(unit), table).change
+        change = TableBench(FastPictures(unit), table).change
         ms = best_ms(lambda: change(tried[0].ball.numbers))
         each = try_table(table, unit, test, BALL)
     else:
-        renderer = Renderer(unit, name, background=test.background, rest=BallPictures(unit).rest)
+        renderer = Renderer(unit, name, background=test.background, rest=FastPictures(unit).rest)
         label = name if name == "fast" else f"{name}_{choose_variant().name}"
         heights = [_heights(unit, each) for each in tried]
         ms = best_ms(lambda: renderer(heights[0]))
@@ -68,7 +68,7 @@ def measure(name: str, quick: bool, presses: str) -> Method:
 
 
 def _heights(unit: Calibration, tried: Evaluation) -> np.ndarray:
-    bench = BallPictures(unit)
+    bench = FastPictures(unit)
     return print_on(bench.rest, bench.right, bench.down, tried.ball.numbers).astype(np.float32)
 
 

@@ -11,7 +11,11 @@ from ..terminal import bar, say, tell
 from .common import NOTHING, progress_argument
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ...pictures.calibrate.ball_pictures import BallPictures
     from ...pictures.calibrate.photographs import Photographs
+    from ...sensors.calibration import Calibration
 
 BRIEF = "camera, lights and colours of a DIGIT, from presses of a ball"
 TEXT = """\
@@ -20,14 +24,18 @@ and lights, their extent, colours, scale. Without a photograph of the untouched 
 takes its place. Ten presses spread over the gel tell most; one or five do, from a calibration of another unit. What
 they tell too little of is held near that one, and named. Writes the calibration, and a sheet to look at (.png).
 
+The fit ends on Mitsuba's own pictures, with the light of one bounce, where LLVM works; --quick leaves that out.
+
 With --test, a calibration is tried on photographs instead: place and depth of each press are fitted, all else is the
-calibration's, and the picture is compared with the photograph, beside the null answer of the background alone."""
+calibration's, and the picture is compared with the photograph, beside the null answer of the background alone. So is
+light that comes through the coating where the ball touches it, if any; rows named opaque are without such light."""
 EPILOG = """\
 examples:
   tactile calibrate presses/ --ball-diameter 6 --out unit.toml
   tactile calibrate presses/ --ball-diameter 6 --background untouched.png --out unit.toml
   tactile calibrate --test unit.toml more_presses/ --json trial.json"""
 LEAVES = NOTHING
+TRIED = ("fast", "standard", "quality")  # presets
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
@@ -39,7 +47,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
     verb.add_argument("--unit", metavar="TEXT", help="the unit's name in the file (default: the file's)")
     verb.add_argument("--only", metavar="NAMES", help="photographs to use, file names separated by commas")
+    verb.add_argument("--quick", action="store_true", help="fit the fast picture alone: a minute in place of five")
     verb.add_argument("--test", metavar="FILE", help="try this calibration instead of fitting one")
+    verb.add_argument("--preset", choices=TRIED, help="with --test: what draws the pictures (default: fast)")
     verb.add_argument("--json", metavar="FILE", help="with --test: write the rows")
     verb.add_argument("--sheet", metavar="FILE", help="with --test: write photographs, renders, differences as PNG")
     progress_argument(verb)
@@ -72,7 +82,7 @@ def _check_options(options: argparse.Namespace) -> None:
         if options.ball_diameter is not None:
             check_diameter(1e-3 * options.ball_diameter)
         return
-    for name in ("json", "sheet"):
+    for name in ("json", "sheet", "preset"):
         if getattr(options, name) is not None:
             raise TactileError(f"--{name}", "given without --test", "a trial", "Name a calibration: --test FILE")
     if options.out is None or options.ball_diameter is None:
@@ -98,10 +108,10 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     start, diameter = load_calibration(options.start), 1e-3 * options.ball_diameter
     check_orientation(photographs, diameter, start)
     with bar("trial on presses kept apart", "third", options.progress) as progress:
-        apart = tried_apart(photographs, diameter, start, progress)
+        apart = tried_apart(photographs, diameter, start, quick=options.quick, progress=progress)
     with bar("calibrate", "step", options.progress) as progress:
         name = options.unit or Path(options.out).stem
-        done = calibrate(photographs, diameter, start, unit=name, progress=progress)
+        done = calibrate(photographs, diameter, start, unit=name, quick=options.quick, progress=progress)
     for warning in done.warnings:
         say(f"warning: {warning}")
     for each in done.tried:
@@ -127,7 +137,8 @@ def _test(options: argparse.Namespace, photographs: Photographs) -> int:
     calibration = load_calibration(options.test)
     diameter = calibration.fit.ball_diameter if options.ball_diameter is None else 1e-3 * options.ball_diameter
     with bar("test", "press", options.progress) as progress:
-        tried = evaluate_unit(calibration, photographs, diameter / 2, progress=progress)
+        pictures = _pictures(options.preset or TRIED[0])
+        tried = evaluate_unit(calibration, photographs, diameter / 2, pictures=pictures, progress=progress)
     for each in tried:
         for flag in each.flags:
             say(f"warning: {each.press.name}: {flag}")
@@ -138,6 +149,20 @@ def _test(options: argparse.Namespace, photographs: Photographs) -> int:
         write_sheet(options.sheet, tried)
     _tell_rows(rows)
     return 0
+
+
+def _pictures(preset: str) -> Callable[[Calibration], BallPictures]:
+    """What draws balls' pictures by a preset; raises TactileError where LLVM is needed and does not work."""
+    from ...pictures.calibrate.ball_pictures import FastPictures
+    from ...pictures.calibrate.fit import finishing_trouble
+    from ...pictures.calibrate.mitsuba_pictures import MitsubaPictures
+    from ...pictures.presets import PRESETS
+
+    if preset == TRIED[0]:
+        return FastPictures
+    if trouble := finishing_trouble():
+        raise TactileError("--preset", f"{preset!r}, but {trouble}", "LLVM 18 or newer", "See `tactile doctor`")
+    return MitsubaPictures(PRESETS[preset])
 
 
 def _tell_rows(rows: list[dict]) -> None:

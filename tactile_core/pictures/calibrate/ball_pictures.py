@@ -1,12 +1,15 @@
-"""A unit under test: pictures of balls pressed into it, by the fast model, and their change with single numbers."""
+"""A unit under test: pictures of balls pressed into it, and their change with single numbers."""
 
 from __future__ import annotations
+
+import abc
 
 import numpy as np
 
 from ...sensors.calibration import Calibration
-from ...sensors.camera import HEIGHT_ZERO_Y, Camera, Led
+from ...sensors.camera import HEIGHT_ZERO_Y, Camera
 from ...sensors.digit import BACK_Y, dome_height
+from ..coating_spread import CoatingSpread
 from ..perspective import Perspective
 from ..shading import Lamp, SeenSurface
 from .ball_print import print_on
@@ -14,8 +17,8 @@ from .ball_print import print_on
 WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors down to this width
 
 
-class BallPictures:
-    """The fast picture of ``shading`` taken apart: gel, view and lamps of one calibration."""
+class BallPictures(abc.ABC):
+    """Gel and camera of one calibration under a ball; what makes the light is the subclass's."""
 
     def __init__(self, calibration: Calibration) -> None:
         self.calibration = calibration
@@ -23,32 +26,41 @@ class BallPictures:
         x, z = np.meshgrid(self.camera.gel_x, self.camera.gel_z, indexing="ij")
         self.rest = (calibration.dome_scale * (BACK_Y - dome_height(x, z) - HEIGHT_ZERO_Y)).astype(np.float32)
         self.right, self.down = np.meshgrid(self.camera.right, self.camera.down)
-        self.view = Perspective(self.camera, self.rest)
-        self._flat = SeenSurface(self.view, self.view(self.rest))
-        self.lamps = [self.lamp(led) for led in calibration.leds]
+        self.spread = CoatingSpread(self.camera, calibration.coating.spread)
         self.gain = np.moveaxis(calibration.gain.matrices(self.camera), (2, 3), (0, 1))
 
-    def lamp(self, led: Led) -> tuple[Lamp, np.ndarray]:
-        """A lamp in place of the calibration's, and its radiance (H, W) on the resting gel."""
-        lamp = Lamp(self.camera, led)
-        return lamp, lamp.radiance(self._flat)
-
-    def surface(self, ball: tuple[float, float, float, float]) -> SeenSurface:
-        """The gel that the pixels see under a ball (right, down, depth, radius), m."""
-        return SeenSurface(self.view, self.view(print_on(self.rest, self.right, self.down, ball)))
-
-    def light(self, surface: SeenSurface, lamp: tuple[Lamp, np.ndarray]) -> np.ndarray:
-        """Change (H, W) of one lamp's radiance by a press."""
-        return lamp[0].radiance(surface) - lamp[1]
-
+    @abc.abstractmethod
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Change (3, H, W) of the radiance by a press."""
-        surface = self.surface(ball)
-        return np.stack([self.light(surface, lamp) for lamp in self.lamps])
+        """Change (3, H, W) by a press of each LED's light, in what it gives on a coating that faces it.
+
+        ball : right, down, depth, radius, m
+        """
+
+    def heights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
+        """Heights (H, W) float32, m, of the gel under a ball (right, down, depth, radius), m."""
+        return print_on(self.rest, self.right, self.down, ball)
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Change (H, W, 3) of the picture by a press, grey levels."""
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
+
+
+class FastPictures(BallPictures):
+    """By the fast picture of ``shading``."""
+
+    def __init__(self, calibration: Calibration) -> None:
+        super().__init__(calibration)
+        self._view = Perspective(self.camera, self.rest)
+        self._lamps = [Lamp(self.camera, led) for led in calibration.leds]
+        self._resting = self._radiance(self.rest)
+
+    def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
+        """Change (3, H, W) by a press of each LED's light."""
+        return self.spread(self._radiance(self.heights(ball)) - self._resting)
+
+    def _radiance(self, heights: np.ndarray) -> np.ndarray:
+        surface = SeenSurface(self._view, self._view(heights))
+        return np.stack([lamp.radiance(surface) for lamp in self._lamps])
 
 
 def working_factor(width: int, height: int) -> int:

@@ -12,17 +12,19 @@ import numpy as np
 
 from ...errors import TactileError
 from ...sensors.calibration import LARGEST_LEVEL, Calibration
-from .ball_pictures import BallPictures, working_factor
+from .ball_pictures import BallPictures, FastPictures, working_factor
+from .contact_light import contact_disc, contact_radius, fitted_light
 from .photo_metrics import figures
 from .photographs import Photographs, Press
-from .press_fit import Ball, Sight, fit_ball
+from .press_fit import MODEL_ERROR, Ball, Sight, fit_ball
 
-CONTACT_SHARE = 0.8  # radius of the contact over sqrt(2 R depth), by the table of prints
 RADIUS_STARTS = (2e-3, 4.5e-3)  # m, from which the ball's radius is searched
-FIGURES = ("roi_l1", "roi_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error")
+FIGURES = ("roi_l1", "roi_psnr", "opaque_l1", "opaque_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error")
+BRIGHT = 15.0  # grey levels of light through the coating, in some channel, from which on a press is flagged
 # name -> (unit, target, which way is better); targets of presses that were not fitted
 TARGETS = {
-    "roi_l1": ("levels", 8.0, -1), "roi_psnr": ("dB", 26.0, 1), "roi_ssim": ("", None, 1),
+    "roi_l1": ("levels", 8.0, -1), "roi_psnr": ("dB", 26.0, 1),
+    "opaque_l1": ("levels", None, -1), "opaque_psnr": ("dB", None, 1), "roi_ssim": ("", None, 1),
     "frame_l1": ("levels", None, -1), "lobe_iou": ("", 0.6, 1), "ball_radius_error": ("", 0.1, -1),
 }  # fmt: skip
 
@@ -32,11 +34,14 @@ class Evaluation:
     """Result of a calibration on one photograph.
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
+    through : (3,) levels of light that comes through the coating where the ball touches it, fitted as well
     picture : (H, W, 3) uint8, rendered; figures, null : by the names of FIGURES; flags : in words
+    Figures named opaque are of another picture, with three numbers a press and no such light.
     """
 
     press: Press
     ball: Ball
+    through: np.ndarray
     free_radius: float
     picture: np.ndarray
     figures: dict[str, float]
@@ -50,16 +55,18 @@ def evaluate_unit(
     radius: float,
     *,
     search_radius: bool = True,
+    pictures: Callable[[Calibration], BallPictures] = FastPictures,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
     """Evaluate a calibration on each press of the photographs; radius : m, of the ball.
 
+    pictures : what makes a unit's; places and depths are found by the fast ones
     Raises TactileError for photographs of another shape than the calibration's pictures.
     """
     unit = fitted_size(calibration, photographs)
     factor = working_factor(unit.camera.width, unit.camera.height)
-    working = BallPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
-    whole = BallPictures(unit)
+    working = FastPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
+    whole = pictures(unit)
     tried = []
     for press in photographs.presses:
         tried.append(_try_press(whole, working, press, photographs.background, radius, search_radius))
@@ -81,25 +88,38 @@ def _try_press(
     whole: BallPictures, working: BallPictures, press: Press, background: np.ndarray, radius: float, search_radius: bool
 ) -> Evaluation:
     sight = Sight(press)
-    ball, _ = fit_ball(working, sight, radius)
     untouched = background + press.drift  # the null knows how the light drifted as well
-    picture = np.rint(untouched + whole.change(ball.numbers)).clip(0, LARGEST_LEVEL).astype(np.uint8)
-    rounded = np.rint(untouched).clip(0, LARGEST_LEVEL).astype(np.uint8)
-    ours = figures(picture, press.picture, background, press.region)
-    null = figures(rounded, press.picture, background, press.region)
+
+    def compared(change: np.ndarray | float) -> tuple[np.ndarray, dict[str, float]]:
+        picture = np.rint(untouched + change).clip(0, LARGEST_LEVEL).astype(np.uint8)
+        return picture, figures(picture, press.picture, background, press.region)
+
+    plain, _ = fit_ball(working, sight, radius)
+    ball, _ = fit_ball(working, sight, radius, opaque=False)
+    change, disc = whole.change(ball.numbers), contact_disc(whole, ball.numbers)
+    left = (press.change - change)[press.touched & (press.picture.max(-1) < LARGEST_LEVEL)]
+    through = fitted_light(left, disc[press.touched & (press.picture.max(-1) < LARGEST_LEVEL)], MODEL_ERROR)
+    picture, ours = compared(change + disc[..., None] * through)
+    _, opaque = compared(whole.change(plain.numbers))
+    _, null = compared(0.0)
+    ours |= {"opaque_l1": opaque["roi_l1"], "opaque_psnr": opaque["roi_psnr"]}
+    null |= {"opaque_l1": null["roi_l1"], "opaque_psnr": null["roi_psnr"]}
     free = float("nan")
     if search_radius:
-        ends = [fit_ball(working, sight, start, free_radius=True) for start in RADIUS_STARTS]
+        ends = [fit_ball(working, sight, start, free_radius=True, opaque=False) for start in RADIUS_STARTS]
         free = min(ends, key=lambda end: end[1])[0].radius
         ours["ball_radius_error"] = abs(free - radius) / radius
         null["ball_radius_error"] = float(np.mean([abs(start - radius) / radius for start in RADIUS_STARTS]))
-    return Evaluation(press, ball, free, picture, ours, null, _flags(press, ball, whole))
+    flags = _flags(press, ball, whole)
+    if through.max() > BRIGHT:
+        flags += (f"{through.max():.0f} levels of light through the coating, where the ball touches it",)
+    return Evaluation(press, ball, through, free, picture, ours, null, flags)
 
 
 def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
     """Describe what is wrong with a photograph; as the ball's place is known by now, also whether the edge cuts it."""
     camera = bench.camera
-    contact = CONTACT_SHARE * np.sqrt(2 * ball.radius * ball.depth)
+    contact = contact_radius(ball.depth, ball.radius)
     over_right = abs(ball.right) + contact > camera.width / 2 * camera.pixel_size[0]
     over_down = abs(ball.down) + contact > camera.height / 2 * camera.pixel_size[1]
     return (*press.flags, "the print is cut by the picture's edge") if over_right or over_down else press.flags

@@ -1,8 +1,12 @@
-"""A unit's calibration from photographs of a ball pressed into it, by Gauss-Newton's method on the fast picture."""
+"""A unit's calibration from photographs of a ball pressed into it, by Gauss-Newton's method.
+
+On the fast picture first, then on Mitsuba's own, which has the light of one bounce too.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Callable
 
 import numpy as np
@@ -11,20 +15,25 @@ from ...errors import TactileError
 from ...sensors.calibration import Calibration, Fit
 from ..background import fit_ambient
 from ..height_map import rest_height_map
+from ..mitsuba.variant import llvm_trouble
+from ..presets import QUALITY
 from ..shading import Shader
-from .ball_pictures import BallPictures, working_factor
+from .ball_pictures import BallPictures, FastPictures, working_factor
 from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_figures
 from .levenberg_marquardt import minimise
+from .mitsuba_pictures import MitsubaPictures, working_preset
 from .parameters import FIRST_LED, NAMES, SPREAD, parameters_of
 from .photographs import Photographs, Press
-from .press_fit import Sight, fit_ball
-from .residuals import GAIN_SPREAD, MODEL_ERROR, UnitResiduals
+from .press_fit import MODEL_ERROR, Sight, fit_ball
+from .residuals import GAIN_SPREAD, UnitResiduals
 
-PLACING_STEPS, STEPS, TOLERANCE = 6, 14, 1e-3  # of the search; a step that gains less than 0.1 % of the cost is noise
+PLACING_STEPS, STEPS, FINISHING_STEPS = 6, 14, 8  # of the search
+TOLERANCE = 1e-3  # a step that gains less than 0.1 % of the cost is noise
 UNEXPLAINED = 0.5  # share of a photograph's squares that is left: more, and it does not show this ball
 IDENTIFIED = 0.5  # of the assumed spread of units; a number whose standard error is larger stays called unknown
-# What the fast picture has no light for, or what a press does not move: kept from the start.
-NEVER_IDENTIFIED = ("albedo", "centre_x_mm", "centre_z_mm")
+NEVER_IDENTIFIED = ("centre_x_mm", "centre_z_mm")  # what a press does not move: kept from the start
+# mm, at which a fit begins: at none, a little more does not change the picture, and no step would be taken.
+LEAST_SPREAD = 0.1
 MM_LIMITS = (1.0, 16.0)  # mm, ball diameters that fit on the gel
 
 
@@ -53,25 +62,33 @@ def calibrate(
     start: Calibration,
     *,
     unit: str,
+    quick: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Calibrated:
-    """Fit camera, dome, lights and gain of a unit from a start's; ball_diameter : m; unit : its name.
+    """Fit camera, dome, coating, lights and gain of a unit from a start's; ball_diameter : m; unit : its name.
 
+    quick : stop after the fast picture, as where Mitsuba by LLVM does not work
     Raises TactileError for a ball that does not fit on the gel, and where no photograph shows such a ball.
     """
     check_diameter(ball_diameter)
-    whole = fitted_size(start, photographs)
+    coating = dataclasses.replace(start.coating, spread=max(start.coating.spread, 1e-3 * LEAST_SPREAD))
+    whole = fitted_size(dataclasses.replace(start, coating=coating), photographs)
     factor = working_factor(whole.camera.width, whole.camera.height)
     working = whole.at_size(whole.camera.width // factor, whole.camera.height // factor)
-    total = PLACING_STEPS + 3 * STEPS + 1
+    trouble = "" if quick else finishing_trouble()
+    finish = not quick and not trouble
+    total = PLACING_STEPS + 3 * STEPS + finish * FINISHING_STEPS + 1
     search = _Search(working, photographs, ball_diameter / 2, lambda done: progress(done, total))
-    lights = np.arange(len(NAMES)) >= FIRST_LED
+    every = np.ones(len(NAMES), bool)
+    lights, seen = np.arange(len(NAMES)) >= FIRST_LED, np.array(NAMES) != "albedo"  # the fast picture has no bounce
     search.place()
     search.put_aside()
     search.fit(lights)
     if search.readmit():
         search.fit(lights)
-    search.fit(np.ones(len(NAMES), bool))
+    search.fit(seen)
+    if finish:
+        search.fit(every, MitsubaPictures(working_preset(QUALITY, factor)), FINISHING_STEPS)
     fitted = search.calibration().at_size(whole.camera.width, whole.camera.height)
     used = dataclasses.replace(photographs, presses=tuple(search.presses))
     tried = evaluate_unit(fitted, used, ball_diameter / 2, search_radius=False)
@@ -79,7 +96,8 @@ def calibrate(
     errors, unknown = search.identified(factor)
     figures = {name: value for name, value in mean_figures(tried)[0].items() if np.isfinite(value)}
     names = tuple(press.name for press in search.presses)
-    note = f"fast picture; {len(names)} presses; background {'estimated' if photographs.estimated else 'photographed'}"
+    light, rest = "Mitsuba" if finish else "fast picture", "estimated" if photographs.estimated else "photographed"
+    note = f"{light}; {len(names)} presses; background {rest}"
     calibration = dataclasses.replace(
         fitted,
         unit=unit,
@@ -88,7 +106,10 @@ def calibrate(
         noise=photographs.noise,
         fit=Fit(note, names, ball_diameter, figures, errors, (*unknown, *NEVER_IDENTIFIED)),
     )
-    return Calibrated(calibration, tried, _warnings(photographs, tried, search.aside))
+    warnings = _warnings(photographs, tried, search.aside)
+    if trouble:
+        warnings = (f"fitted by the fast picture alone: {trouble}", *warnings)
+    return Calibrated(calibration, tried, warnings)
 
 
 class _Search:
@@ -106,7 +127,7 @@ class _Search:
 
     def place(self) -> None:
         """Presses and gain alone, the unit's numbers as in the start."""
-        bench = BallPictures(self.start)
+        bench = FastPictures(self.start)
         balls = [1e3 * np.array(fit_ball(bench, sight, self.radius)[0].numbers[:3]) for sight in self._sights]
         self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
         self._minimise(np.concatenate(balls), PLACING_STEPS)
@@ -129,7 +150,7 @@ class _Search:
         """Take photographs back that show the ball under this unit's own lights; whether there are any."""
         if not self.aside:
             return False
-        bench, balls, taken = BallPictures(self.calibration()), self._problem.balls(self._x).tolist(), []
+        bench, balls, taken = FastPictures(self.calibration()), self._problem.balls(self._x).tolist(), []
         placed = {press.name: ball for press, ball in zip(self.presses, balls, strict=True)}
         for press in self._all:
             if press.name in self.aside:
@@ -152,11 +173,13 @@ class _Search:
         self._x = balls.ravel()
         self._problem.cost(self._x)
 
-    def fit(self, free: np.ndarray) -> None:
+    def fit(
+        self, free: np.ndarray, pictures: Callable[[Calibration], BallPictures] = FastPictures, steps: int = STEPS
+    ) -> None:
         """Go on from where the search stands with some of the unit's numbers free."""
         numbers, balls = parameters_of(self._problem.unit(self._x)), self._problem.balls(self._x)
-        self._problem = UnitResiduals(self.start, self._sights, self.radius, free)
-        self._minimise(np.concatenate([numbers[free], balls.ravel()]), STEPS)
+        self._problem, self._free = UnitResiduals(self.start, self._sights, self.radius, free, pictures), free
+        self._minimise(np.concatenate([numbers[free], balls.ravel()]), steps)
 
     def _minimise(self, x: np.ndarray, steps: int) -> None:
         done = self._done
@@ -175,7 +198,8 @@ class _Search:
         The errors count what is assumed of units as one more measurement; misfits of the model as MODEL_ERROR.
         """
         matrix, _ = self._problem.normal_equations(self._x)
-        errors = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: len(NAMES)]
+        errors = SPREAD.copy()  # of what was not fitted
+        errors[self._free] = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: self._free.sum()]
         unknown = [
             name for name, error, spread in zip(NAMES, errors, SPREAD, strict=True) if error > IDENTIFIED * spread
         ]
@@ -189,6 +213,15 @@ class _Search:
             if error > IDENTIFIED * spread:
                 unknown.append(name)
         return named, tuple(unknown)
+
+
+def finishing_trouble() -> str:
+    """Describe why a fit cannot be finished on Mitsuba's pictures; "" where it can."""
+    try:
+        import mitsuba  # noqa: F401
+    except ModuleNotFoundError:
+        return 'Mitsuba is not installed (pip install "tactile-core[render]")'
+    return llvm_trouble(os.environ.get("DRJIT_LIBLLVM_PATH", ""))
 
 
 def unexplained_share(sight: Sight, left: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...sensors.calibration import Calibration
-from .ball_pictures import BallPictures, working_factor
+from .ball_pictures import BallPictures, FastPictures, working_factor
 from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_figures
 from .fit import calibrate, unexplained_share
 from .photographs import Photographs, Press, chosen, turned
@@ -34,7 +34,7 @@ def check_orientation(photographs: Photographs, ball_diameter: float, start: Cal
     plain = sorted(photographs.presses, key=lambda press: -float(np.square(press.change).sum()))[:LOOKED_AT]
     unit = fitted_size(start, photographs)
     factor = working_factor(unit.camera.width, unit.camera.height)
-    bench = BallPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
+    bench = FastPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
     given = _median_unexplained(plain, bench, ball_diameter / 2)
     for (rows, columns), name in WAYS.items():
         left = _median_unexplained([turned(press, rows, columns) for press in plain], bench, ball_diameter / 2)
@@ -53,6 +53,8 @@ def tried_apart(
     photographs: Photographs,
     ball_diameter: float,
     start: Calibration,
+    *,
+    quick: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
     """Evaluate each press with a calibration fitted on the others, by thirds; none for a single press.
@@ -64,7 +66,7 @@ def tried_apart(
     for fold in range(folds if folds > 1 else 0):
         apart = names[fold::folds]
         others = chosen(photographs, [name for name in names if name not in apart])
-        done = calibrate(others, ball_diameter, start, unit="others").calibration
+        done = calibrate(others, ball_diameter, start, unit="others", quick=quick).calibration
         tried += evaluate_unit(done, chosen(photographs, apart), ball_diameter / 2)
         progress(fold + 1, folds)
     return tried

@@ -96,7 +96,7 @@ def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | 
         raise TactileError(folder, found, f"{FEWEST_FOR_MEDIAN} or more", advice)
     else:
         rest = estimated_background(np.stack(list(pictures.values())))
-    tried = {name: _press(name, picture, rest) for name, picture in pictures.items()}
+    tried = {name: press_of(name, picture, rest) for name, picture in pictures.items()}
     presses = tuple(press for press in tried.values() if press is not None)
     if not presses:
         advice = "Give the background with --background, or press harder"
@@ -183,7 +183,7 @@ def _files(folder: Path) -> list[Path]:
     return files
 
 
-def _press(name: str, picture: np.ndarray, background: np.ndarray) -> Press | None:
+def press_of(name: str, picture: np.ndarray, background: np.ndarray) -> Press | None:
     """The press that a photograph shows; None where it shows none."""
     difference = picture.astype(np.float32) - background
     drift = lighting_drift(difference)

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from .ball_pictures import BallPictures, smaller, working_factor
+from .contact_light import contact_disc, fitted_light
 from .levenberg_marquardt import minimise
 from .photo_metrics import windowed
 from .photographs import Press, dilated
@@ -18,6 +19,9 @@ SMALLEST_BALL, LARGEST_BALL = 1e-3, 8e-3  # m, radius
 MARGIN = 3  # working px round the region that count too: a print must not shade what the photograph shows untouched
 STEP = 10e-6  # m, of the differences that make the Jacobian
 STEPS, TOLERANCE = 25, 1e-5
+# Grey levels: what a pixel's misfit weighs against the assumed spread of units. Misfits of 5 to 9 levels are those of
+# the model, alike over whole parts of a print: thousands of pixels count as some fifty.
+MODEL_ERROR = 80.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,12 +59,15 @@ class Sight:
         return [middle, (float(bench.right[largest]), float(bench.down[largest]))]
 
 
-def fit_ball(bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False) -> tuple[Ball, float]:
+def fit_ball(
+    bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, opaque: bool = True
+) -> tuple[Ball, float]:
     """The ball whose picture is nearest the photograph's, and the mean square of what is left, grey levels squared.
 
     bench : in working pixels; radius : m, the ball's, or where its search starts
+    opaque : whether no light comes through the coating; else it is fitted as well (``contact_light``)
     """
-    problem = _PressProblem(bench, sight, radius)
+    problem = _PressProblem(bench, sight, radius, opaque)
     starts = [
         np.array([*place, depth, radius][: 4 if free_radius else 3])
         for place in sight.guesses(bench)
@@ -75,12 +82,16 @@ def fit_ball(bench: BallPictures, sight: Sight, radius: float, *, free_radius: b
 class _PressProblem:
     """Squares of what a ball's picture misses; x = right, down, depth and, where it is free, radius."""
 
-    def __init__(self, bench: BallPictures, sight: Sight, radius: float) -> None:
-        self._bench, self._sight, self._radius = bench, sight, radius
+    def __init__(self, bench: BallPictures, sight: Sight, radius: float, opaque: bool) -> None:
+        self._bench, self._sight, self._radius, self._opaque = bench, sight, radius, opaque
 
     def _missed(self, x: np.ndarray) -> np.ndarray:
         ball = (*x[:3], x[3] if len(x) > 3 else self._radius)
-        return (self._bench.change(ball) - self._sight.change)[self._sight.counts].ravel()
+        missed = (self._bench.change(ball) - self._sight.change)[self._sight.counts]
+        if not self._opaque:
+            disc = contact_disc(self._bench, ball)[self._sight.counts]
+            missed += disc[:, None] * fitted_light(-missed, disc, MODEL_ERROR)
+        return missed.ravel()
 
     def cost(self, x: np.ndarray) -> float:
         """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off the picture

@@ -1,4 +1,4 @@
-"""The sum of squares that a unit's calibration makes small: photographs of presses against their fast pictures.
+"""The sum of squares that a unit's calibration makes small: photographs of presses against their pictures.
 
 The unknowns are the unit's numbers and three numbers a press. The gain C is linear in the picture, so that it is solved
 for at each step and eliminated (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). What is
@@ -8,28 +8,33 @@ assumed of units holds the numbers that few photographs do not tell: one more sq
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
 from ...errors import TactileError
 from ...sensors.calibration import Calibration, Response
-from ..shading import SeenSurface
-from .ball_pictures import BallPictures
-from .parameters import FIRST_LED, LARGEST_RADIUS, SMALLEST_RADIUS, SPREAD, STEP, parameters_of, with_parameters
-from .press_fit import DEEPEST, SHALLOWEST, Sight
+from .ball_pictures import BallPictures, FastPictures
+from .parameters import (
+    FIRST_LED,
+    LARGEST_RADIUS,
+    SMALLEST_RADIUS,
+    SPREAD,
+    STEP,
+    TOGETHER,
+    parameters_of,
+    with_parameters,
+)  # fmt: skip
+from .press_fit import DEEPEST, MODEL_ERROR, SHALLOWEST, Sight
 
-# Grey levels: what a pixel's misfit weighs against the assumed spread of units. Misfits of 5 to 9 levels are those of
-# the model, alike over whole parts of a print: thousands of pixels count as some fifty.
-MODEL_ERROR = 80.0
 GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels a unit of radiance, of C; levels a mm, of its slopes; assumed
 PRESS_STEP = 10e-3  # mm
 
 
 @dataclasses.dataclass(frozen=True)
 class _Lights:
-    """Radiance of a press: by LED and counted pixel (3, p), times 1, right, down in mm (9, p); the gel behind it."""
+    """Radiance of a press: by LED and counted pixel (3, p), times 1, right, down in mm (9, p)."""
 
-    surface: SeenSurface
     changes: np.ndarray
     terms: np.ndarray
 
@@ -38,11 +43,19 @@ class UnitResiduals:
     """Cost and normal equations of x = the unit's free numbers, then right, down, depth of each press in mm.
 
     start : the calibration that the spread of units is centred on, in working pixels; radius : m, the ball's
-    free : (16,) bool, which of the unit's numbers may change
+    free : (18,) bool, which of the unit's numbers may change; pictures : what makes a unit's
     """
 
-    def __init__(self, start: Calibration, sights: list[Sight], radius: float, free: np.ndarray) -> None:
+    def __init__(
+        self,
+        start: Calibration,
+        sights: list[Sight],
+        radius: float,
+        free: np.ndarray,
+        pictures: Callable[[Calibration], BallPictures] = FastPictures,
+    ) -> None:
         self._start, self._sights, self._radius, self._free = start, sights, radius, free
+        self._pictures = pictures
         self._numbers = parameters_of(start)
         self._seen = [sight.change[sight.counts].T.astype(float) for sight in sights]  # (3, p) each
         gain = start.gain
@@ -73,7 +86,7 @@ class UnitResiduals:
         if not self._sensible(x):
             return np.inf
         try:
-            bench = BallPictures(self.unit(x))
+            bench = self._pictures(self.unit(x))
         except TactileError:  # an LED over the picture or as high as the camera
             return np.inf
         lights = [self._lights(bench, ball, sight) for ball, sight in zip(self.balls(x), self._sights, strict=True)]
@@ -107,9 +120,8 @@ class UnitResiduals:
         return bool(inside and (radii >= SMALLEST_RADIUS).all() and (radii <= LARGEST_RADIUS).all())
 
     def _lights(self, bench: BallPictures, ball: np.ndarray, sight: Sight) -> _Lights:
-        surface = bench.surface((*(1e-3 * ball), self._radius))
-        changes = np.stack([bench.light(surface, lamp)[sight.counts] for lamp in bench.lamps])
-        return _Lights(surface, changes, self._terms(bench, changes, sight))
+        changes = bench.lights((*(1e-3 * ball), self._radius))[:, sight.counts]
+        return _Lights(changes, self._terms(bench, changes, sight))
 
     def _terms(self, bench: BallPictures, changes: np.ndarray, sight: Sight) -> np.ndarray:
         right, down = (1e3 * values[sight.counts] for values in (bench.right, bench.down))
@@ -152,22 +164,29 @@ class UnitResiduals:
     def _steps_of_unit(self, numbers: np.ndarray) -> list[np.ndarray]:
         """Slopes (3, free, p) of each press's picture by the unit's numbers, forward differences."""
         slopes = [np.zeros((3, int(self._free.sum()), lights.changes.shape[1])) for lights in self._last]
-        for column, number in enumerate(np.flatnonzero(self._free)):
-            moved = numbers.copy()
-            moved[number] += STEP[number]
-            unit = with_parameters(self._bench.calibration, moved)
-            led = (number - FIRST_LED) // 4
-            bench = BallPictures(unit) if number < FIRST_LED else self._bench
-            lamp = None if number < FIRST_LED else bench.lamp(unit.leds[led])
+        column = {number: k for k, number in enumerate(np.flatnonzero(self._free).tolist())}
+        for group in TOGETHER:
+            wanted = [number for number in group if number in column]
+            bench, way = self._moved(numbers, group) if wanted else (self._bench, 1)
             for k, (lights, sight) in enumerate(zip(self._last, self._sights, strict=True)):
-                if lamp is None:
-                    after = self._lights(bench, self._balls_now[k], sight).terms
-                else:
-                    changes = lights.changes.copy()
-                    changes[led] = bench.light(lights.surface, lamp)[sight.counts]
-                    after = self._terms(bench, changes, sight)
-                slopes[k][:, column] = self.gain @ (after - lights.terms) / STEP[number]
+                after = self._lights(bench, self._balls_now[k], sight) if wanted else lights
+                for number in wanted:
+                    terms = after.terms
+                    if number >= FIRST_LED:  # of this LED alone
+                        changes, led = lights.changes.copy(), (number - FIRST_LED) // 4
+                        changes[led] = after.changes[led]
+                        terms = self._terms(bench, changes, sight)
+                    slopes[k][:, column[number]] = self.gain @ (terms - lights.terms) / (way * STEP[number])
         return slopes
+
+    def _moved(self, numbers: np.ndarray, group: tuple[int, ...]) -> tuple[BallPictures, int]:
+        """Pictures with some numbers a step larger, or, where a unit cannot have that, smaller; and which way."""
+        moved = np.zeros_like(numbers)
+        moved[list(group)] = STEP[list(group)]
+        try:
+            return self._pictures(with_parameters(self._bench.calibration, numbers + moved)), 1
+        except TactileError:  # at an end of its range, as an LED that touches the gel
+            return self._pictures(with_parameters(self._bench.calibration, numbers - moved)), -1
 
     def _steps_of_press(self, x: np.ndarray, k: int) -> np.ndarray:
         """Slopes (3, 3, p) of a press's picture by its right, down and depth."""

@@ -46,7 +46,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def found(folder: Path) -> Calibrated:
     photographs = read_photographs(folder, folder.parent / "untouched.png")
-    return calibrate(photographs, 2 * BALL, plain_unit(), unit="other")
+    return calibrate(photographs, 2 * BALL, plain_unit(), unit="other", quick=True)
 
 
 def test_known_numbers_are_found_again(found: Calibrated) -> None:
@@ -83,7 +83,7 @@ def test_file_says_what_was_fitted_and_what_was_not(found: Calibrated) -> None:
 
 def test_one_press_tells_less_than_five(folder: Path, found: Calibrated) -> None:
     photographs = read_photographs(folder, folder.parent / "untouched.png")
-    one = calibrate(chosen(photographs, ["press_0.png"]), 2 * BALL, plain_unit(), unit="one")
+    one = calibrate(chosen(photographs, ["press_0.png"]), 2 * BALL, plain_unit(), unit="one", quick=True)
     assert set(found.calibration.fit.not_identified) < set(one.calibration.fit.not_identified)
     assert one.calibration.fit.standard_errors["red_right_mm"] > found.calibration.fit.standard_errors["red_right_mm"]
     tried, _ = mean_figures(evaluate_unit(one.calibration, photographs, BALL, search_radius=False))
@@ -98,7 +98,7 @@ def test_photograph_of_something_else_is_left_out(folder: Path, tmp_path: Path) 
     strange[60:260, 100:110] = (20, 220, 20)
     Image.fromarray(strange).save(tmp_path / "strange.png")
     photographs = chosen(read_photographs(tmp_path, folder.parent / "untouched.png"), ["press_0.png", "strange.png"])
-    done = calibrate(photographs, 2 * BALL, plain_unit(), unit="other")
+    done = calibrate(photographs, 2 * BALL, plain_unit(), unit="other", quick=True)
     assert done.calibration.fit.photographs == ("press_0.png",)
     assert any("strange.png" in warning and "left out" in warning for warning in done.warnings)
 
@@ -142,7 +142,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     write_calibration(start, other_unit())
     untouched = str(folder.parent / "untouched.png")
     common = [str(folder), "--background", untouched, "--only", "press_0.png,press_3.png"]
-    words = ["calibrate", *common, "--ball-diameter", "6", "--start", str(start), "--out", str(out)]
+    words = ["calibrate", *common, "--quick", "--ball-diameter", "6", "--start", str(start), "--out", str(out)]
     assert main(words) == 0
     told = capsys.readouterr()
     assert "roi_psnr" in told.out and str(out) in told.out and "tell too little of" in told.err

@@ -18,7 +18,7 @@ def start(tmp_path):
 
 def fit(folder, tmp_path, start):
     words = ["--background", str(tmp_path / "untouched.png"), "--start", start, "--ball-diameter", "6"]
-    return main(["calibrate", str(folder), *words, "--out", str(tmp_path / "unit.toml")])
+    return main(["calibrate", str(folder), "--quick", *words, "--out", str(tmp_path / "unit.toml")])
 
 
 @pytest.mark.parametrize(("turn", "told"), [((True, True), "180 degrees"), ((False, True), "left to right")])

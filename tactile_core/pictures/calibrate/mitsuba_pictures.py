@@ -1,0 +1,51 @@
+"""Pictures of pressed balls by Mitsuba: our integrator with one bounce, on a scene that only changes its numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...sensors.calibration import Calibration
+from ..mitsuba.gel_light import GelLight
+from ..mitsuba.gel_scene import kinds
+from ..presets import Preset
+from .ball_pictures import BallPictures
+
+
+class MitsubaPictures:
+    """Makes the pictures of one unit after another by a preset that has LLVM compile one scene for all of them."""
+
+    def __init__(self, preset: Preset) -> None:
+        self.preset = preset
+        self._light: GelLight | None = None
+
+    def __call__(self, calibration: Calibration) -> BallPictures:
+        """The pictures of a unit; LEDs must shine and the coating scatter."""
+        return _OfUnit(calibration, self)
+
+    def radiance(self, unit: Calibration, heights: np.ndarray) -> np.ndarray:
+        """Radiance (H, W, 3), levels, of heights (H, W) m of a unit's gel."""
+        light = self._light
+        if light is None or light.unit.camera.shape != unit.camera.shape or kinds(light.unit) != kinds(unit):
+            self._light = light = GelLight(unit, self.preset, heights, 0)
+        elif light.unit is not unit:
+            light.change_unit(unit)
+        return light.radiance(heights)
+
+
+class _OfUnit(BallPictures):
+    def __init__(self, calibration: Calibration, maker: MitsubaPictures) -> None:
+        super().__init__(calibration)
+        self._maker = maker
+        self._resting = self._maker.radiance(calibration, self.rest)
+
+    def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
+        """Change (3, H, W) by a press of each LED's light."""
+        change = self._maker.radiance(self.calibration, self.heights(ball)) - self._resting
+        return self.spread(np.moveaxis(change / self.calibration.facing.astype(np.float32), -1, 0))
+
+
+def working_preset(preset: Preset, factor: int) -> Preset:
+    """A preset for pictures smaller by a factor: the bounce on as many places of the gel, or half as many."""
+    return dataclasses.replace(preset, bounce_step=max(preset.bounce_step // factor, 4) if preset.bounce_step else 0)

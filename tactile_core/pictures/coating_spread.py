@@ -1,0 +1,49 @@
+"""Light that goes sideways in the coating before it comes out: each place shows the mean of what falls round it.
+
+Paint scatters light some tenths of a millimetre far (docs/calibration.md says what photographs tell of it). A Gaussian
+over the picture stands for that, the same in every preset; it makes the rim of a print as soft as it is seen.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..sensors.camera import Camera
+
+FINE = 2.5  # coarse pixels in a standard deviation: the sum of such Gaussians is even to 1e-8 of its size
+REACH = 4.0  # standard deviations; beyond lie 6e-5 of the light
+
+
+class CoatingSpread:
+    """Evens out pictures of one camera with a Gaussian of a standard deviation, m; 0 leaves them as they are."""
+
+    def __init__(self, camera: Camera, deviation: float) -> None:
+        self._none = deviation == 0
+        if not self._none:
+            right, down = camera.pixel_size
+            self._starts_down, self._down = _means(camera.height, deviation / down)
+            self._starts_right, self._right = _means(camera.width, deviation / right)
+
+    def __call__(self, pictures: np.ndarray) -> np.ndarray:
+        """Pictures (..., H, W) float32, evened out; near an edge, the mean of what is in the picture."""
+        if self._none:
+            return pictures
+        sums = np.add.reduceat(pictures, self._starts_right, axis=-1)
+        sums = np.add.reduceat(sums, self._starts_down, axis=-2)
+        return self._down @ sums @ self._right.T
+
+
+def _means(count: int, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+    """Starts (n,) of runs of pixels along a side, and weights (count, n) of their sums at each pixel; deviation : px.
+
+    Runs first, then Gaussians on these, which interpolate as well: a fraction of the work.
+    """
+    step = max(int(deviation / FINE), 1)
+    starts = step * np.arange(-(-count // step))
+    ends = np.minimum(starts + step, count)
+    narrower = np.sqrt(max(deviation**2 - (step**2 - 1) / 12, 1e-4))  # a run has spread the light already
+    distance = (np.arange(count)[:, None] - (starts + ends - 1) / 2) / narrower
+    weights = np.where(np.abs(distance) < REACH, np.exp(-(distance**2) / 2), 0)
+    weights[np.arange(count), np.arange(count) // step] += 1e-12  # a width far below a pixel leaves its own alone
+    weights /= (weights * (ends - starts)).sum(1, keepdims=True)
+    return starts, weights.astype(np.float32)

@@ -1,0 +1,58 @@
+"""A fit that is finished on Mitsuba's own pictures finds what the fast picture has no light for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from gel_pictures import works
+from plain_unit import plain_unit
+from pressed_unit import BALL, GREY, PLACES
+
+from tactile_core.pictures.calibrate.ball_pictures import FastPictures
+from tactile_core.pictures.calibrate.fit import calibrate
+from tactile_core.pictures.calibrate.mitsuba_pictures import MitsubaPictures
+from tactile_core.pictures.calibrate.photographs import Photographs, press_of
+from tactile_core.pictures.mitsuba.variant import LLVM
+from tactile_core.pictures.presets import QUALITY, STANDARD
+
+BALLS = [(*(1e-3 * value for value in place), BALL) for place in PLACES[:3]]
+
+
+@pytest.fixture(autouse=True)
+def _llvm() -> None:
+    works(LLVM)
+
+
+@pytest.fixture
+def unit():
+    """A unit of 120 x 160 pixels whose coating scatters much and spreads light."""
+    small = plain_unit().at_size(120, 160)
+    return dataclasses.replace(small, coating=dataclasses.replace(small.coating, spread=0.25e-3))
+
+
+def test_direct_light_is_that_of_the_fast_picture_for_one_unit_after_another(unit):
+    made = MitsubaPictures(STANDARD)
+    brighter = dataclasses.replace(
+        unit, leds=tuple(dataclasses.replace(led, radius=2 * led.radius) for led in unit.leds)
+    )
+    for each in (unit, brighter, unit):
+        off = made(each).change(BALLS[0]) - FastPictures(each).change(BALLS[0])
+        assert np.sqrt(np.mean(off**2)) < 1.0  # levels rms; measured 0.3
+
+
+def test_albedo_and_spread_are_found_again(unit, tmp_path):
+    true = dataclasses.replace(unit, coating=dataclasses.replace(unit.coating, albedo=(0.8,) * 3))
+    true = true.with_gain(unit.gain)  # as bright as the start, of which the bounce alone tells the albedo
+    made, rest = MitsubaPictures(QUALITY)(true), np.full((*unit.camera.shape, 3), float(GREY), np.float32)
+    presses = []
+    for k, ball in enumerate(BALLS):
+        picture = np.rint(rest + made.change(ball)).clip(0, 255).astype(np.uint8)
+        presses.append(press_of(f"{k}.png", picture, rest))
+    photographs = Photographs(tmp_path, tuple(presses), rest, False, (), (1.0, 1.0, 1.0))
+    start = dataclasses.replace(unit, coating=dataclasses.replace(unit.coating, spread=0.15e-3))
+    found = calibrate(photographs, 2 * BALL, start, unit="small").calibration
+    assert found.fit.note.startswith("Mitsuba")
+    assert found.coating.spread == pytest.approx(0.25e-3, abs=0.04e-3)
+    assert 0.6 < found.coating.albedo[0] <= 1  # 0.5 at first; what is assumed of units pulls it back
+    quick = calibrate(photographs, 2 * BALL, start, unit="small", quick=True).calibration
+    assert quick.coating.albedo == start.coating.albedo and "albedo" in quick.fit.not_identified

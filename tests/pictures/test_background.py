@@ -1,0 +1,57 @@
+"""The picture at rest: a photograph of the untouched gel follows the lights that are changed after it was taken."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tactile_core.pictures.background import resting_picture
+from tactile_core.pictures.renderer import Renderer
+from tactile_core.sensors.calibration_file import load_calibration, write_calibration
+
+
+@pytest.fixture
+def unit(tmp_path):
+    """A unit from a file, with a photograph: the lights' own picture with some dirt on it, which no light explains."""
+    small = load_calibration().at_size(60, 80)
+    shown = Renderer(small, "fast").background.copy()
+    shown[30:40, 20:30] *= 0.8
+    Image.fromarray(np.rint(shown).clip(0, 255).astype(np.uint8)).save(tmp_path / "untouched.png")
+    write_calibration(tmp_path / "unit.toml", dataclasses.replace(small, photograph=str(tmp_path / "untouched.png")))
+    return load_calibration(tmp_path / "unit.toml")
+
+
+def at_rest(unit, **led) -> np.ndarray:
+    """Picture (H, W, 3) at rest with some numbers of each LED changed."""
+    leds = tuple(dataclasses.replace(each, **{name: f(each) for name, f in led.items()}) for each in unit.leds)
+    return Renderer(dataclasses.replace(unit, leds=leds), "fast").background
+
+
+def test_a_photograph_is_the_picture_at_rest_as_long_as_the_lights_are_its_own(unit):
+    with Image.open(unit.photograph) as image:
+        np.testing.assert_array_equal(at_rest(unit), np.asarray(image))
+
+
+def test_lights_that_are_off_or_doubled_act_on_a_photograph(unit):
+    photograph = at_rest(unit)
+    np.testing.assert_array_equal(at_rest(unit, radiance=lambda led: 0.0), 0)
+    np.testing.assert_allclose(at_rest(unit, radiance=lambda led: 2 * led.radiance), 2 * photograph, rtol=1e-4)
+    red = at_rest(unit, radiance=lambda led: 0.0 if led.colour == "red" else led.radiance)
+    assert red[..., 0].mean() < 0.4 * photograph[..., 0].mean()
+    assert red[..., 2].mean() > 0.8 * photograph[..., 2].mean()
+
+
+def test_a_moved_light_and_another_albedo_act_on_a_photograph(unit):
+    photograph = at_rest(unit)
+    moved = at_rest(unit, position=lambda led: (*led.position[:2], 1.2 * led.position[2]))
+    assert np.abs(moved - photograph).mean() > 2
+    coating = dataclasses.replace(unit.coating, albedo=tuple(share / 2 for share in unit.coating.albedo))
+    darker = dataclasses.replace(unit, coating=coating)
+    np.testing.assert_allclose(Renderer(darker, "fast").background, photograph / 2, rtol=1e-4)
+
+
+def test_a_calibration_in_memory_keeps_its_photograph(unit):
+    radiance = np.zeros((*unit.camera.shape, 3), np.float32)
+    unknown = dataclasses.replace(unit, photographed=None)
+    np.testing.assert_array_equal(resting_picture(unknown, radiance), at_rest(unit))
