@@ -19,12 +19,12 @@ from .photographs import Photographs, Press
 from .press_fit import MODEL_ERROR, Ball, Sight, fit_ball
 
 RADIUS_STARTS = (2e-3, 4.5e-3)  # m, from which the ball's radius is searched
-FIGURES = ("roi_l1", "roi_psnr", "opaque_l1", "opaque_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error")
+FIGURES = ("roi_l1", "roi_psnr", "through_l1", "through_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error")
 BRIGHT = 15.0  # grey levels of light through the coating, in some channel, from which on a press is flagged
 # name -> (unit, target, which way is better); targets of presses that were not fitted
 TARGETS = {
     "roi_l1": ("levels", 8.0, -1), "roi_psnr": ("dB", 26.0, 1),
-    "opaque_l1": ("levels", None, -1), "opaque_psnr": ("dB", None, 1), "roi_ssim": ("", None, 1),
+    "through_l1": ("levels", None, -1), "through_psnr": ("dB", None, 1), "roi_ssim": ("", None, 1),
     "frame_l1": ("levels", None, -1), "lobe_iou": ("", 0.6, 1), "ball_radius_error": ("", 0.1, -1),
 }  # fmt: skip
 
@@ -34,16 +34,16 @@ class Evaluation:
     """Result of a calibration on one photograph.
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
-    through : (3,) levels of light that comes through the coating where the ball touches it, fitted as well
     picture : (H, W, 3) uint8, rendered; figures, null : by the names of FIGURES; flags : in words
-    Figures named opaque are of another picture, with three numbers a press and no such light.
+    through : (3,) levels of light that comes through the coating where the ball touches it. Figures of that name are of
+        another picture, in which it is fitted as well; all others know nothing of it.
     """
 
     press: Press
     ball: Ball
-    through: np.ndarray
     free_radius: float
     picture: np.ndarray
+    through: np.ndarray
     figures: dict[str, float]
     null: dict[str, float]
     flags: tuple[str, ...]
@@ -94,26 +94,31 @@ def _try_press(
         picture = np.rint(untouched + change).clip(0, LARGEST_LEVEL).astype(np.uint8)
         return picture, figures(picture, press.picture, background, press.region)
 
-    plain, _ = fit_ball(working, sight, radius)
-    ball, _ = fit_ball(working, sight, radius, opaque=False)
-    change, disc = whole.change(ball.numbers), contact_disc(whole, ball.numbers)
-    left = (press.change - change)[press.touched & (press.picture.max(-1) < LARGEST_LEVEL)]
-    through = fitted_light(left, disc[press.touched & (press.picture.max(-1) < LARGEST_LEVEL)], MODEL_ERROR)
-    picture, ours = compared(change + disc[..., None] * through)
-    _, opaque = compared(whole.change(plain.numbers))
+    ball, _ = fit_ball(working, sight, radius)
+    picture, ours = compared(whole.change(ball.numbers))
+    through, lit = _with_light(whole, fit_ball(working, sight, radius, opaque=False)[0], press)
+    _, with_light = compared(lit)
     _, null = compared(0.0)
-    ours |= {"opaque_l1": opaque["roi_l1"], "opaque_psnr": opaque["roi_psnr"]}
-    null |= {"opaque_l1": null["roi_l1"], "opaque_psnr": null["roi_psnr"]}
+    ours |= {"through_l1": with_light["roi_l1"], "through_psnr": with_light["roi_psnr"]}
+    null |= {"through_l1": null["roi_l1"], "through_psnr": null["roi_psnr"]}
     free = float("nan")
     if search_radius:
-        ends = [fit_ball(working, sight, start, free_radius=True, opaque=False) for start in RADIUS_STARTS]
+        ends = [fit_ball(working, sight, start, free_radius=True) for start in RADIUS_STARTS]
         free = min(ends, key=lambda end: end[1])[0].radius
         ours["ball_radius_error"] = abs(free - radius) / radius
         null["ball_radius_error"] = float(np.mean([abs(start - radius) / radius for start in RADIUS_STARTS]))
     flags = _flags(press, ball, whole)
     if through.max() > BRIGHT:
         flags += (f"{through.max():.0f} levels of light through the coating, where the ball touches it",)
-    return Evaluation(press, ball, through, free, picture, ours, null, flags)
+    return Evaluation(press, ball, free, picture, through, ours, null, flags)
+
+
+def _with_light(bench: BallPictures, ball: Ball, press: Press) -> tuple[np.ndarray, np.ndarray]:
+    """Light (3,) through the coating in a photograph of a ball, levels, and the change (H, W, 3) with it."""
+    change, disc = bench.change(ball.numbers), contact_disc(bench, ball.numbers)
+    counts = press.touched & (press.picture.max(-1) < LARGEST_LEVEL)
+    through = fitted_light((press.change - change)[counts], disc[counts], MODEL_ERROR)
+    return through, change + disc[..., None] * through
 
 
 def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:

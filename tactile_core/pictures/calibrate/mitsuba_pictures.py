@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 
+from ...errors import TactileError
 from ...sensors.calibration import Calibration
 from ..mitsuba.gel_light import GelLight
-from ..mitsuba.gel_scene import kinds
 from ..presets import Preset
 from .ball_pictures import BallPictures
 
@@ -26,12 +26,14 @@ class MitsubaPictures:
 
     def radiance(self, unit: Calibration, heights: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3), levels, of heights (H, W) m of a unit's gel."""
-        light = self._light
-        if light is None or light.unit.camera.shape != unit.camera.shape or kinds(light.unit) != kinds(unit):
-            self._light = light = GelLight(unit, self.preset, heights, 0)
-        elif light.unit is not unit:
-            light.change_unit(unit)
-        return light.radiance(heights)
+        if self._light is None:
+            self._light = GelLight(unit, self.preset, heights, 0)
+        elif self._light.unit is not unit:
+            try:
+                self._light.change_unit(unit)
+            except TactileError:  # of another kind, as with a LED that has become a point
+                self._light = GelLight(unit, self.preset, heights, 0)
+        return self._light.radiance(heights)
 
 
 class _OfUnit(BallPictures):
