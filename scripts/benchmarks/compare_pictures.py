@@ -20,12 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-# No packages that are installed.
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
-from taxim_like import TableBench, fit_table
 
+from benchmarks.competitors.taxim_like import TableBench, fit_table
 from benchmarks.measure_presets import best_ms, one_thread, working_variants
 from tactile_core.accuracy import HEADER, Row, line, row
 from tactile_core.files import atomic
