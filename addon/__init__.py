@@ -9,6 +9,7 @@ from .operators import (
     render_engine,
     render_setup,
     scene_files,
+    set_style,
     simulate,
     translate_recording,
 )
@@ -22,6 +23,7 @@ PARTS = (
     preferences,
     import_recording,
     translate_recording,
+    set_style,
     preview,
     render_engine,
     render_setup,

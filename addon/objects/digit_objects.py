@@ -9,6 +9,7 @@ from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ..ui import properties
 from . import axes, surfaces
+from .styles import DISPLACEMENT
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
 BESIDE = 7.1e-3 + 23e-3 + 5e-3  # m: half widths of BioTac (docs/sources.md) and of a housing round the LEDs, a gap
@@ -33,12 +34,17 @@ def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np
     Raises TactileError where modifiers have changed the number of vertices.
     """
     rest = sensors.digit_surface().rest
-    vertices = gel.evaluated_get(depsgraph).data.vertices
+    mesh = gel.evaluated_get(depsgraph).data
+    vertices = mesh.vertices
     if len(vertices) != len(rest):
         raise TactileError(
             gel.name, f"{len(vertices)} vertices", f"the gel's {len(rest)}", "Remove modifiers that add or merge some"
         )
     nodes = np.empty(len(rest) * 3, np.float32)
+    styled = mesh.attributes.get(DISPLACEMENT)
+    if styled is not None:  # a style may draw the dent larger than it is
+        styled.data.foreach_get("vector", nodes)
+        return axes.to_sensor(nodes.reshape(-1, 3), gel.tactile.per_metre)
     vertices.foreach_get("co", nodes)
     # Less the rest as Blender holds it: rounded to float32, so that an untouched gel gives zeros.
     rest = axes.to_blender(rest, gel.tactile.per_metre)

@@ -18,6 +18,7 @@ def animate(
     per_metre = thing.tactile.per_metre
     moved, nodes = axes.to_blender(displacement, per_metre), axes.to_blender(rest, per_metre)
     thing.tactile.motion = motion
+    thing.tactile.largest = float(np.sqrt(np.square(displacement).sum(-1).max(initial=0.0)))
     if motion == "MESH_CACHE":
         path = mesh_cache.write_cache(thing, nodes, moved, frames)
         return f"{thing.name}: mesh cache {path.name}"

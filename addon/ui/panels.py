@@ -36,6 +36,7 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
             box.prop(skin.tactile, "tare")
             box.prop(skin.tactile, "polarity")
         layout.operator(TACTILE_OT_translate.bl_idname, icon="MOD_MESHDEFORM")
+        layout.operator_menu_enum("tactile.set_style", "style", icon="COLOR")
         _numbers(layout, skin)
 
 

@@ -19,6 +19,7 @@ ROLES = (
     ("LED", "LED", "A lamp of the DIGIT"),
     ("BODY", "DIGIT body", "A part of the DIGIT that is there to be seen"),
     ("TWIN", "Simulated indenter", "Where the simulation had the indenter"),
+    ("LEGEND", "Legend", "A colour bar or a scale bar"),
 )
 PRESS_BY = (
     ("HEIGHT", "Height", "It presses as deep as it is moved into the DIGIT's gel"),
@@ -66,6 +67,9 @@ class TactileObject(bpy.types.PropertyGroup):
         name="Force", description="Force of the press, in newtons; keyframe it like a location", min=0.0, soft_max=2.0,
         default=0.0, precision=3, options={"ANIMATABLE"},
     )  # fmt: skip
+    largest: bpy.props.FloatProperty(
+        name="Largest", description="Largest displacement of the animation, metres", default=0.0, min=0.0
+    )
     first_frame: bpy.props.IntProperty(name="First Frame", description="Scene frame of the recording's first frame")
 
 

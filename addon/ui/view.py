@@ -72,3 +72,10 @@ def show(context: bpy.types.Context, things: list[bpy.types.Object]) -> None:
         if region is not None:
             with context.temp_override(window=window, area=area, region=region):
                 bpy.ops.view3d.view_selected()
+
+
+def colour_by(context: bpy.types.Context, kind: str) -> None:
+    """Colour Solid views by object, or by the surfaces' own colours where they have some ("VERTEX")."""
+    for area in context.window.screen.areas if context.window else ():
+        if area.type == "VIEW_3D":
+            area.spaces.active.shading.color_type = kind
