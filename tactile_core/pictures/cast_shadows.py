@@ -12,7 +12,9 @@ import functools
 import numpy as np
 
 from ..errors import TactileError
+from ..files.compiled import available
 from ..sensors.camera import Camera, Led
+from .lamp_loops import march
 from .perspective import bilinear
 
 GRID_STEP = 0.1e-3  # m, of the polar grid along a ray, and across rays in the picture's middle
@@ -108,6 +110,10 @@ class ShadowCaster:
         return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1
 
     def _march(self, field: np.ndarray, polar: tuple[slice, slice], reach: int) -> np.ndarray:
+        if available():
+            steps = np.array(march_steps(min(reach, field.shape[1] - 1)), np.int64)
+            foot = np.float32(self._foot[2])
+            return march(field, foot, self.distance[polar[1]], self._radii[polar], steps, GRID_STEP)
         horizon = np.full_like(field, -np.inf)
         for k in march_steps(min(reach, field.shape[1] - 1)):
             rise = field[:, :-k] - field[:, k:]

@@ -127,7 +127,8 @@ class Renderer:
         noise : makes the camera's noise, as measured on the unit; None for none
         """
         if noise is None and available() and radiance.dtype == self.rest_radiance.dtype == np.float32:
-            return in_picture(radiance, self.rest_radiance, self._response, self.background, LARGEST_LEVEL)
+            now, at_rest = np.moveaxis(radiance, -1, 0), np.moveaxis(self.rest_radiance, -1, 0)
+            return in_picture(now, at_rest, self._response, self.background, np.float32(LARGEST_LEVEL))
         levels = self.in_levels(radiance - self.rest_radiance)
         levels += self.background
         if noise is not None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import TactileError
+from ..files.compiled import available
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import COLOURS, Camera, Led
@@ -16,6 +17,7 @@ from .background import resting_picture
 from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .coating_spread import CoatingSpread
 from .height_map import of_unit, rest_height_map
+from .lamp_loops import lamp_light
 from .perspective import Perspective, slopes
 
 # A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
@@ -124,6 +126,8 @@ class Lamp:
 
     def radiance(self, surface: SeenSurface) -> np.ndarray:
         """Radiance (H, W) float32, in what the LED gives on a coating that faces it from the picture's middle."""
+        if available():
+            return self._compiled_radiance(surface)
         right, down, up = np.asarray(self.led.position, np.float32)
         distance = self._over_picture * surface.near
         distance += up * surface.height
@@ -143,6 +147,28 @@ class Lamp:
         distance *= surface.normal
         light /= distance
         light *= np.float32(np.square(self.led.position).sum())
+        return light
+
+    def _compiled_radiance(self, surface: SeenSurface) -> np.ndarray:
+        """The same, by a compiled loop; shadows are numpy's."""
+        strength = np.float32(np.square(self.led.position).sum())
+        facing, distance, light = np.empty((3, *surface.near.shape), np.float32)
+        first_row, last_row, first_column, last_column = lamp_light(
+            np.asarray(self.led.position, np.float32), strength, np.float32(TANGENT * self.led.radius),
+            self._over_picture, surface.near, surface.height, surface.square, surface.tilt, surface.slope_right,
+            surface.slope_down, surface.own, surface.normal, facing, distance, light,
+        )  # fmt: skip
+        if last_row < 0:
+            return light
+        margin, (rows, columns) = TANGENT_MARGIN, light.shape
+        edge = (
+            slice(max(first_row - margin, 0), min(last_row + 1 + margin, rows)),
+            slice(max(first_column - margin, 0), min(last_column + 1 + margin, columns)),
+        )
+        sight, box = self._caster.sight(surface.mapped, edge)
+        square = distance[box]
+        shadowed = self._shadowed(sight, facing[box], square, surface, box)
+        light[box] = shadowed / (square * np.sqrt(square) * surface.normal[box]) * strength
         return light
 
     def _shadowed(

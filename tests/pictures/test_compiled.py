@@ -23,9 +23,9 @@ def test_heights_and_pictures_are_numpys(compiled_loops):
     for on in (False, True):
         compiled_loops(on)
         heights = mapper(dents(12))
-        found[on] = heights, [renderer.picture(renderer.radiance(height)) for height in heights]
+        found[on] = heights, [renderer(height) for height in heights]
     assert np.abs(found[True][0] - found[False][0]).max() < 1e-9  # m, float32's rounding of a height
     compiled_loops(True)
     for height, picture in zip(*found[False], strict=True):
-        np.testing.assert_array_equal(renderer.picture(renderer.radiance(height)), picture)
+        np.testing.assert_array_equal(renderer(height), picture)  # light, shadows and levels, to the bit
     assert np.ptp(found[True][1][0].astype(int) - found[True][1][1]) > 20  # grey levels: something is seen
