@@ -150,7 +150,7 @@ def test_support_of_hollow_shapes_lies_on_them(name):
     np.testing.assert_allclose(SHAPES[name].distance(surface)[0], 0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", set(SHAPES) - {"several"})
+@pytest.mark.parametrize("name", sorted(SHAPES.keys() - {"several"}))
 def test_flats_and_circles_are_met_in_their_middle(name):
     np.testing.assert_allclose(SHAPES[name].support(np.array([0.0, 0.0, -1.0])), 0, atol=1e-12)
 
