@@ -21,7 +21,7 @@ Depth = Callable[[np.ndarray], np.ndarray]  # (C, n, 3) m -> (C, n) m
 MOVING = 10e-6  # m: nodes that move less do not belong to a contact (docs/sources.md, Networks)
 CORE = 0.3  # share of the peak height above which a node belongs to the core of a contact (docs/sources.md)
 Row = dict[str, Any]
-HEADER = "| name | value | unit | target | null | set | |\n|---|---|---|---|---|---|---|"
+HEADER = "| name | value | unit | target | baseline | set | |\n|---|---|---|---|---|---|---|"
 COSTS = ("s", "ms", "MB")  # units of time and memory: their rows may miss a target without failing a run
 EXPECTED = "a number and its unit, such as 5um or 0.6levels, or both: 5um,0.6levels"
 
@@ -116,6 +116,7 @@ def row(
 ) -> Row:
     """Make a report row of one value, rounded to four digits; ``of`` names the data it was measured on.
 
+    null : the baseline's value: of doing nothing, or of the strongest simple answer
     ok : |value| <= target, or value >= target for ``at_least``; None where there is no target
     """
     ok = None

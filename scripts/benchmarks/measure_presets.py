@@ -132,7 +132,7 @@ def working_variants() -> list[str]:
 
 
 def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset) -> Iterator[Row]:
-    """Rows of every preset's error, from converged direct light and from the full model; null: the background alone."""
+    """Rows of every preset's error, from converged direct light and the full model; baseline: the background alone."""
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
     of, levels, spread = (
         f"{len(heights)} fields",

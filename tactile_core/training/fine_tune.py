@@ -131,7 +131,7 @@ def _module(nets: Networks, net: str) -> ContactPosterior:
 
 
 def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
-    """Median miss of place and force on the presses kept for it; null: always the training's median."""
+    """Median miss of place and force on the presses kept for it; baseline: always the training's median."""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVB"]
     latent = nets.encode_signal(data.change[test], data.rectified)

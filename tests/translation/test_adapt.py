@@ -86,7 +86,7 @@ def test_offsets_are_found_where_signs_are_known(typical):
     offset = np.random.default_rng(3).normal(0, 5, 19)
     truth = touched(contacts(600, seed=1))
     found = adapt.fit(readings(truth, np.ones(19), offset, False, 0), False, typical, "test")
-    assert rms(np.array(found.sensor.offset_counts) - offset) < 0.4 * rms(offset)  # null: 1
+    assert rms(np.array(found.sensor.offset_counts) - offset) < 0.4 * rms(offset)  # baseline: 1
     folded = adapt.fit(readings(truth, np.ones(19), offset, True, 0), True, typical, "test")
     assert folded.sensor.offset_counts == ZEROS and "no offsets" in folded.sensor.note
 

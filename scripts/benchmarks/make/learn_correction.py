@@ -206,7 +206,7 @@ def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -
         for what, after, before, scale, unit in measures:
             value, null = (float(np.median(np.abs(errors[here, k])) * scale) for k in (after, before))
             name = f"{sensor}_friction_{friction:g}_corrected_{low:g}_to_{high:g}_{what}"
-            of = f"{here.sum()} contacts of presses kept apart, median; null: uncorrected"
+            of = f"{here.sum()} contacts of presses kept apart, median; baseline: uncorrected"
             yield row(name, value, unit, null=null, of=of)
 
 

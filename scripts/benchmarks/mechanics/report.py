@@ -15,8 +15,9 @@ from .bonded_layer import GOLDEN_FORCE
 
 _INTRODUCTION = """# Contact mechanics against known answers
 
-Made by `python scripts/validate_mechanics.py`. `null` is the answer of doing nothing; shape errors are vector rms over
-surface nodes that move more than 10 um, and the maximum. Times are from one shared 2-core machine.
+Made by `python scripts/validate_mechanics.py`. *Baseline* is the error of doing nothing (`null` in
+the rows of `--json`); shape errors are vector rms over surface nodes that move more than 10 um, and the maximum. Times
+are from one shared 2-core machine.
 
 The golden forces, Hertz and the layers run the reference tier's material and contact (`newton.FiniteStrainContact`) on
 an axisymmetric mesh of the same element (`validation/axisymmetric.py`), so that nodes can lie 0.05 mm apart; the rows

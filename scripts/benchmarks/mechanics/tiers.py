@@ -88,7 +88,7 @@ def gel_normals(displacement: np.ndarray) -> np.ndarray:
 
 
 def _normal_error(where: str, found: Solution, exact: Solution) -> Iterator[Row]:
-    """Angle between normals inside the contact, mean and largest, degrees; null: a gel that is not pressed."""
+    """Angle between normals inside the contact, mean and largest, degrees; baseline: a gel that is not pressed."""
     surface = digit.gel_surface()
     patch = surface.grid(exact.contact_patch[:, None].astype(float))[surface.window][..., 0]
     fine = np.kron(patch > 0, np.ones((4, 4), bool))[: 4 * patch.shape[0] - 3, : 4 * patch.shape[1] - 3]

@@ -39,7 +39,7 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
         for figure in ("place_mm", "force_size_percent", "peak_percent", "iou"):
             likely, mean, null = (_median(answers[f"{who}_{figure}"][inside]) for who in ("likely", "mean", "nearest"))
             unit, at_least = figure.rsplit("_", 1)[-1].replace("percent", "%").replace("iou", "1"), figure == "iou"
-            of = f"{inside.sum()} contacts {name}; null: the nearest example"
+            of = f"{inside.sum()} contacts {name}; baseline: the nearest example"
             found.append(
                 row(f"likely_{figure}", likely, unit, targets.get(figure), null=null, of=of, at_least=at_least)
             )
@@ -66,7 +66,7 @@ def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
     others = accuracy.lengths(truth[:, None] - truth).mean(0)
     null = float((others - 0.5 * others.mean()).mean())
     likely = 1e3 * on_skin(frame, posterior.heaviest[:, :PLACE])
-    of = "all test contacts; null: all their places alike"
+    of = "all test contacts; baseline: all their places alike"
     found.append(row("place_energy_score", float(score.mean()), "mm", null=null, of=of))
     alone = float(accuracy.lengths(likely - truth).mean())
     found.append(row("place_energy_score_of_one_answer", alone, "mm", null=null, of=of))

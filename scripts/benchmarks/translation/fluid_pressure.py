@@ -36,10 +36,10 @@ def slide_rows(folder: Path, network: Translator, most: int | None, sensor: Elec
     of = f"{len(estimated)} frames above {CONTACT:g} Pa, {len(report)} recordings"
     constant = np.median(seen[:, 0])
     value, null = _error(estimated[:, 1], estimated[:, 0]), _error(np.full(len(estimated), constant), estimated[:, 0])
-    yield row("pressure_error", value, "%", AS_IT_COMES, null=null, of=f"{of}; null: a constant, {constant:.0f} Pa")
+    yield row("pressure_error", value, "%", AS_IT_COMES, null=null, of=f"{of}; baseline: a constant, {constant:.0f} Pa")
     scale = [np.median(seen[:, 0] / seen[:, k]) for k in (1, 2)]
     value, null = (_error(scale[k - 1] * estimated[:, k], estimated[:, 0]) for k in (1, 2))
-    whole_set = f"{of}; scale {scale[0]:.3f} from sample {slide_set.CHOOSING}; null: sum of electrodes, scaled likewise"
+    whole_set = f"{of}; scale {scale[0]:.3f} from sample {slide_set.CHOOSING}; baseline: sum of electrodes, scaled too"
     yield row("pressure_error_scaled", value, "%", SCALED, null=null, of=whole_set)
     largest = network.card["pairs"]["largest_pressure_Pa"]
     above = float((estimated[:, 0] > largest).mean())
@@ -47,7 +47,7 @@ def slide_rows(folder: Path, network: Translator, most: int | None, sensor: Elec
 
 
 def grip_row(prepared: Iterable[Signals], network: Translator) -> Row:
-    """Median rank correlation within grips whose pressure changes; null: the electrodes' sum of absolute changes."""
+    """Median rank correlation within grips whose pressure changes; baseline: sum of the absolute changes."""
     ranks, sums = [], []
     for signals in prepared:
         measured = PRESSURE_PER_COUNT * signals.pdc
@@ -55,7 +55,7 @@ def grip_row(prepared: Iterable[Signals], network: Translator) -> Row:
             ranks.append(rank_correlation(network(signals).pressure, measured))
             sums.append(rank_correlation(np.abs(signals.change).sum(axis=1), measured))
     value, null = (float(np.median(each)) if each else None for each in (ranks, sums))
-    of = f"{len(ranks)} grips whose pressure changes by {SWING:g} Pa; null: sum of electrodes"
+    of = f"{len(ranks)} grips whose pressure changes by {SWING:g} Pa; baseline: sum of electrodes"
     return row("grip_pressure_rank", value, "1", null=null, of=of, at_least=True)
 
 

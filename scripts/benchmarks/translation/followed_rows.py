@@ -30,7 +30,7 @@ def rows(network: Translator, file: Path = SHIPPED) -> list[Row]:
     units = [_read_by(signals, np.random.default_rng(seed)) for seed in range(UNITS)]
     followed = _judged(recording, [network.followed(unit, recording.time) for unit in units])
     alone = _judged(recording, [network(unit) for unit in units])
-    of = f"{len(followed['place'])} frames of {UNITS} units; null: each frame alone"
+    of = f"{len(followed['place'])} frames of {UNITS} units; baseline: each frame alone"
     figures = [
         ("followed_place", "place", 50, "mm", PLACE), ("followed_place_90", "place", 90, "mm", None),
         ("followed_step", "step", 50, "mm", None), ("followed_force", "force", 50, "%", FORCE),

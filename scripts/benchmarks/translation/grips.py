@@ -88,7 +88,7 @@ def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> li
             unit = sensor.gains_for(one, finger, SOFT)
             results.append(_judged(recordings.read(one), unit, network))
             null.append(_judged(recordings.read(one), unit, network, shuffle))
-    of = f"{len(results)} grips of hard flat objects, trials 04 and 05; null: electrodes shuffled"
+    of = f"{len(results)} grips of hard flat objects, trials 04 and 05; baseline: electrodes shuffled"
     figures = [np.array([one[k] for one in results]) for k in range(3)]
     shuffled = [np.array([one[k] for one in null]) for k in range(3)]
     return [
@@ -107,7 +107,8 @@ def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
     scale = np.float32(pairs.scale_digit)
     true = contact_center(pairs.displacement_digit[deep] * scale, digit_surface().rest, 0.0)
     away, nothing = (1e3 * np.linalg.norm(each - true, axis=1) for each in (found, np.median(true, axis=0)))
-    of = f"{deep.sum()} test contacts deeper than {1e3 * DEEP:g} mm, {np.isnan(away).sum()} lost; null: their middle"
+    lost = np.isnan(away).sum()
+    of = f"{deep.sum()} test contacts deeper than {1e3 * DEEP:g} mm, {lost} lost; baseline: their middle"
     away[np.isnan(away)] = np.inf  # a contact that is not found is not near
     return row("simulated_place_error", float(np.median(away)), "mm", 0.6, null=float(np.median(nothing)), of=of)
 

@@ -64,7 +64,7 @@ def write_model_card(
         "",
         f"Test set: {len(pairs.press)} contacts of {len(np.unique(pairs.press))} presses, solved by the full tier of"
         " mechanics on both sensors; signals read with 1.5 counts of noise and gains 10 % off. Depth bins (0.1-0.3,"
-        " 0.3-0.6, 0.6-0.9, 0.9-1.2 mm on the BioTac) and indenters count alike, without slides; null: no deformation.",
+        " 0.3-0.6, 0.6-0.9, 0.9-1.2 mm on the BioTac) and indenters count alike, no slides; baseline: no deformation.",
         "",
         *([_apart([each.card["options"] for each in apart]), ""] if apart else []),
         HEADER,

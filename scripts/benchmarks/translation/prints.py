@@ -31,14 +31,14 @@ CHUNK = 32  # frames in memory at a time
 def rows(name: str, prepared: Iterable[Signals], network: Translator) -> list[Row]:
     """Rows ``<name>_print_...`` of recordings with their pressure.
 
-    Judged are frames above 550 Pa whose contact lies inside the picture; null: frames that lost contact.
+    Judged are frames above 550 Pa whose contact lies inside the picture; baseline: frames that lost contact.
     """
     frames = np.concatenate([_frames(signals, network) for signals in prepared])
     pressure, seen, level = frames.T
     contact, lost = pressure > CONTACT, pressure < LOST
     inside = contact & (seen > 0)
     of = f"{inside.sum()} of {contact.sum()} frames above {CONTACT:g} Pa have their contact in the picture"
-    null = f"; null: {lost.sum()} frames below {LOST:g} Pa"
+    null = f"; baseline: {lost.sum()} frames below {LOST:g} Pa"
 
     found = [row(f"{name}_contact_in_picture", _over(np.mean, seen[contact]), "1", of=f"{contact.sum()} frames")]
     if inside.any():

@@ -185,7 +185,7 @@ def rows_of(judged: list[Judged]) -> list[Row]:
         table.append(_row(f"centre_spread_{word}", value, "mm", SPREAD_MM, null=null, of=of))
     table.append(_row("contact_missed", [one.missed for one in judged], "1", None, null=[1.0], of=of))
     step, unrepaired = ([getattr(one, name) for one in judged] for name in ("step", "step_unrepaired"))
-    bad = f"worst of {np.isfinite(step).sum()} recordings with bad samples; null: not repaired"
+    bad = f"worst of {np.isfinite(step).sum()} recordings with bad samples; baseline: not repaired"
     table.append(_row("step_at_repaired", step, "1", NO_LARGER, null=unrepaired, of=bad, over=np.max))
     numbers = [one.not_finite for one in judged]
     table.append(_row("not_finite", numbers, "numbers", 0, of=f"all frames of {len(judged)} recordings", over=np.sum))

@@ -25,7 +25,7 @@ LOAD = 10e3  # ohm
 
 
 def rows(quick: bool, data: Path) -> Iterator[Row]:
-    """Rows of each model; null: one number for all electrodes, fitted likewise. None without the outside data."""
+    """Rows of each model; baseline: one number for all electrodes, fitted likewise. None without the outside data."""
     folder = data / "biotac_phac"
     if not folder.exists():
         return

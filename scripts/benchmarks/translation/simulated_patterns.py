@@ -37,7 +37,7 @@ SIZE = 0.5  # a contact's change may be smaller or larger by this share of the r
 
 
 def rows(quick: bool, data: Path) -> Iterator[Row]:
-    """Median cosines of each law, free and with the size held; null: electrodes shuffled. None without the data."""
+    """Median cosines of each law, free and with the size held; baseline: electrodes shuffled. None without the data."""
     folders = data / "biotac_phac", data / "biotac_recordings"
     if not all(folder.exists() for folder in folders):
         return
@@ -47,7 +47,7 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
     grip, rest = grip_changes(files, grips.hard_to_report(files))
     slide, _ = slide_changes(slide_set.reporting(folders[1]))
     typical = np.full(slide.shape, float(REST_COUNT))
-    of = f"{len(contacts)} simulated contacts; null: electrodes shuffled"
+    of = f"{len(contacts)} simulated contacts; baseline: electrodes shuffled"
     yield from _cosines("grip", grip, rest, laws, (0.92, 0.88), f"{len(grip)} grips, {of}")
     sizes = {name: lambda at_rest, law=law: np.abs(law(at_rest)) for name, law in laws.items() if name != "wrong_sign"}
     yield from _cosines("slide", slide, typical, sizes, (None, 0.95), f"{len(slide)} frames, {of}")

@@ -27,8 +27,8 @@ they tell too little of is held near that one, and named. Writes the calibration
 The fit ends on Mitsuba's own pictures, with the light of one bounce, where LLVM works; --quick leaves that out.
 
 With --test, a calibration is tried on photographs instead: place and depth of each press are fitted, all else is the
-calibration's, and the picture is compared with the photograph, beside the null answer of the background alone. Rows
-named through also fit light that comes through the coating where the ball touches it; others know nothing of it."""
+calibration's, and the picture is compared with the photograph, beside that of the background alone, the baseline.
+Rows named through also fit light that comes through the coating where the ball touches it; the others leave it out."""
 EPILOG = """\
 examples:
   tactile calibrate presses/ --ball-diameter 6 --out unit.toml
