@@ -8,6 +8,9 @@ import numpy as np
 from ..ui import properties
 from . import styles, surfaces
 
+_BEFORE = 8  # mm in front of the sensor
+_INK = (0.95, 0.95, 0.95, 1.0)
+
 
 def add_legend(thing: bpy.types.Object, largest: float, shown: bool = True) -> None:
     """A colour bar with its range, and a scale bar of 5 mm, in front of a sensor; one that is there is replaced."""
@@ -18,7 +21,7 @@ def add_legend(thing: bpy.types.Object, largest: float, shown: bool = True) -> N
     per_mm = thing.tactile.per_metre * 1e-3
     corners = np.array(thing.bound_box)
     low, high = corners.min(0), corners.max(0)
-    left, front, top = float(low[0]), float(low[1]) - 3 * per_mm, float(high[2])
+    left, front, top = float(low[0]), float(low[1]) - _BEFORE * per_mm, float(high[2])
     steps = np.linspace(0, 1, 33)
     corners = np.array([[left + 12 * per_mm * s, front - w * per_mm, top] for s in steps for w in (0, 1.2)])
     index = np.arange(32)[:, None] * 2
@@ -46,11 +49,13 @@ def _legend_part(thing: bpy.types.Object, name: str, data: bpy.types.ID) -> bpy.
     part = bpy.data.objects.new(name, data)
     properties.set_up(part, "LEGEND", thing.tactile.per_metre)
     thing.users_collection[0].objects.link(part)
-    part.parent, part.hide_select = thing, True
+    part.parent, part.hide_select, part.color = thing, True, _INK
     return part
 
 
 def _write(thing: bpy.types.Object, text: str, place: tuple[float, float, float], per_mm: float) -> None:
     letters = bpy.data.curves.new("legend", "FONT")
     letters.body, letters.size = text, 1.8 * per_mm
-    _legend_part(thing, f"Legend {text}", letters).location = place
+    # Moved within its plane: an origin over the sensor's own draws no dashed line across the view.
+    letters.offset_x, letters.offset_y = place[0], place[1]
+    _legend_part(thing, f"Legend {text}", letters).location.z = place[2]
