@@ -53,10 +53,10 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
             thing.name, "its scale is negative or zero", "a scale above 0", "Apply the scale (Ctrl A) and flip normals"
         )
     if thing.tactile.spec and not np.allclose(relative, np.eye(3), atol=1e-4):
-        advice = "Clear its rotation and scale, or clear its Shape in the sidebar to press with the mesh as it is"
+        advice = "Clear its rotation and scale, or choose Press with Mesh in the sidebar"
         raise TactileError(thing.name, "turned or scaled", "an upright body of the sizes it was made with", advice)
     if thing.tactile.spec and (thing.modifiers or fingerprint(thing) != thing.get("tactile_shape")):
-        advice = "Undo that, or clear its Shape in the sidebar to press with the mesh as it is"
+        advice = "Undo that, or choose Press with Mesh in the sidebar"
         raise TactileError(thing.name, "its mesh was edited or has modifiers", "the body it was made as", advice)
 
 

@@ -3,7 +3,6 @@
 import bpy
 
 from ...tactile_core import sensors
-from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import contact_patch
 from ..objects import custom_properties, digit_body, digit_objects, motion, patch_nodes
 from ..ui import properties, render_settings, timeline, view
@@ -21,8 +20,9 @@ class TACTILE_OT_translate(TactileOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return true where there is a BioTac to translate."""
-        if properties.of_role(context.scene, "BIOTAC", context.object) is None:
-            cls.poll_message_set("Import a BioTac recording first")
+        skin = properties.of_role(context.scene, "BIOTAC", context.object)
+        if skin is None or not skin.tactile.recording:
+            cls.poll_message_set("Import a BioTac recording first, or simulate one in a saved file")
             return False
         return True
 
@@ -31,8 +31,6 @@ class TACTILE_OT_translate(TactileOperator):
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
         about = skin.tactile
-        if not about.recording:
-            raise TactileError(skin.name, "no recording", "an imported BioTac", "Import a BioTac recording")
         with shown(context) as progress:
             path = bpy.path.abspath(about.recording)
             found = recording_data.load(path, about.tare, about.frames, progress, about.polarity)

@@ -1,5 +1,7 @@
 """The tab "Tactile" in the 3D view's sidebar."""
 
+import json
+
 import bpy
 
 from ..operators import preview
@@ -50,9 +52,10 @@ def _numbers(layout: bpy.types.UILayout, skin: bpy.types.Object | None) -> None:
     column.label(text=f"Force {size:.3f} N", icon="FORCE_FORCE")
     if "confidence" in skin:
         trusted = skin["confidence"] >= timeline.LOW
-        column.label(text=f"Confidence {skin['confidence']:.2f}", icon="CHECKMARK" if trusted else "ERROR")
-    if "expected_error_um" in skin:
-        column.label(text=f"Expected error {skin['expected_error_um']:.0f} µm", icon="BLANK1")
+        words = "Signals like those of the training" if trusted else "Signals far from the training's: a guess"
+        if "expected_error_um" in skin:
+            words += f", expected error {1e-3 * skin['expected_error_um']:.2f} mm"
+        column.label(text=words, icon="CHECKMARK" if trusted else "ERROR")
 
 
 class TACTILE_PT_picture(_Panel, bpy.types.Panel):
@@ -69,6 +72,13 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
         if preview.failure():
             layout.label(text=preview.failure(), icon="ERROR")
         draw_settings(layout, context)
+
+
+def _shape(spec: str) -> str:
+    """An indenter's kind and sizes: "sphere, radius 3 mm"."""
+    about = json.loads(spec)
+    sizes = [f"{name[:-3].replace('_', ' ')} {value} mm" for name, value in about.items() if name.endswith("_mm")]
+    return ", ".join([about["kind"].replace("_", " "), *sizes])
 
 
 class TACTILE_PT_author(_Panel, bpy.types.Panel):
@@ -89,7 +99,9 @@ class TACTILE_PT_author(_Panel, bpy.types.Panel):
             if thing.tactile.press_by == "FORCE":
                 column.prop(thing.tactile, "force")
             if thing.tactile.spec:
-                column.prop(thing.tactile, "spec")
+                row = column.row(align=True)
+                row.label(text=_shape(thing.tactile.spec))
+                row.operator("tactile.use_as_indenter", text="Press with Mesh")
         layout.prop(context.scene.tactile_render, "error")
         layout.operator(TACTILE_OT_simulate.bl_idname, icon="PHYSICS")
         row = layout.row(align=True)

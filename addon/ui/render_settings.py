@@ -31,7 +31,7 @@ class TactileRender(bpy.types.PropertyGroup):
         subtype="FILE_PATH", options=_RELATIVE, update=lambda settings, context: _take_calibration(settings, context),
     )  # fmt: skip
     error: bpy.props.StringProperty(
-        name="Error", description="Largest error that the toolkit itself may add: 50um of a simulated surface,"
+        name="Largest Error", description="Largest error that the toolkit itself may add: 50um of a simulated surface,"
         " 0.6levels of a picture, or both with a comma. Picks tier and preset; empty: the fast tier, the preset above",
     )  # fmt: skip
 

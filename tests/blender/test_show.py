@@ -57,3 +57,14 @@ def test_images_survive_save_and_reopen(imported, tmp_path):
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     assert np.abs(np.array(bpy.data.images["DIGIT picture"].pixels[:]) - before).max() < 0.01
+
+
+def test_there_is_nothing_to_translate_without_a_recording(scene):
+    bpy.ops.tactile.add_sensor(sensor="BIOTAC")
+    assert not bpy.ops.tactile.translate.poll()
+
+
+def test_the_panel_says_an_indenter_s_shape_in_words(scene, part):
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
+    assert part("addon.ui.panels")._shape(bpy.context.object.tactile.spec) == "sphere, radius 3.5 mm"
