@@ -94,7 +94,7 @@ def assemble(
     if stamps is None:
         notes.append(f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed")
         stamps = np.arange(frames) / SAMPLE_RATE
-    _check_share(path, bad.any(axis=1), problems, row_word)
+    _check_share(path, np.any(bad, axis=1), problems, row_word)
     flags = np.where(bad.any(axis=1), Flag.REPAIRED, 0).astype(np.uint16)
     for problem in problems:
         flags[problem.frame] |= np.uint16(Flag.REPAIRED)

@@ -50,7 +50,7 @@ class Table:
                 f"{names[0]} .. {names[-1]}" if len(names) > 1 else names[0],
                 "Export the recording again with all columns",
             )
-        found = np.empty((len(self.values), len(names)), dtype)
+        found: np.ndarray = np.empty((len(self.values), len(names)), dtype)
         with np.errstate(over="ignore"):
             for place, column in enumerate(self.header.index(name) for name in names):
                 found[:, place] = self.exact.get(column, self.values[:, column])
