@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 from .. import __version__
+from ..files.installed import advice
 from ..pictures.mitsuba.variant import LLVM, OLDEST_LLVM, llvm_trouble
 
 TRY_SECONDS = 60.0  # torch takes five on a slow disk
@@ -72,7 +73,7 @@ def report() -> Iterator[str]:
 
 def try_library(library: Library) -> tuple[str, str]:
     """Import a library; returns (version, "") if it imports, or ("", what is wrong, in words)."""
-    install = f'pip install "tactile-core[{library.extra}]"' if library.extra else f"pip install {library.package}"
+    install = advice(library.extra) if library.extra else f"python -m pip install {library.package}"
     try:
         if importlib.util.find_spec(library.module) is None:
             return "", f"missing, {install}"

@@ -11,6 +11,7 @@ from contextlib import suppress
 
 from .. import __version__
 from ..errors import TactileError
+from ..files.installed import advice
 from .stop_signals import Stopped, stopping
 from .terminal import complain, say
 from .verbs import VERBS
@@ -56,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         if error.name not in EXTRAS:
             raise
-        complain(f'this verb needs {error.name}. Install it: pip install "tactile-core[{EXTRAS[error.name]}]"')
+        complain(f"this verb needs {error.name}. Install it: {advice(EXTRAS[error.name])}")
         return 2
     except KeyboardInterrupt as stop:
         return _stopped(stop, options.leaves)

@@ -178,6 +178,15 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
         "prepared": made.signals.report,
         "warnings": list(made.warnings()),
         "flagged_frames": made.flagged,
-        "weights": {"sha256": tools.sha256, "card": tools.card},
+        "weights": weights_entry(tools),
         "versions": provenance.versions("PIL", "matplotlib"),
     }  # fmt: skip
+
+
+def weights_entry(tools: Tools) -> dict:
+    """Return the weights' hash, which stands for their card, and their error and null, um, as the card has them."""
+    from ..translation.card_errors import chain_error
+
+    found = chain_error(tools.card)
+    errors = {} if found is None else {"kept_apart_rms_um": found[0], "null_rms_um": found[1]}
+    return {"sha256": tools.sha256, **errors}

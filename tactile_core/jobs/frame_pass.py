@@ -17,6 +17,7 @@ from ..recordings.signals import FRAMEWISE
 from ..sensors import PRESSURE_PER_COUNT
 from ..sensors.camera import Camera
 from ..translation.answer import Answer
+from ..translation.card_errors import doubt
 from ..translation.contact_track import Tracked
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet
@@ -141,7 +142,7 @@ class FramePass:
 
     def warnings(self) -> tuple[str, ...]:
         """Warnings for the user: of the recording, and of its translated frames."""
-        found = [*self.signals.warnings, *self.tools.answer.describe_shift()]
+        found = [*self.signals.warnings, *self.tools.answer.describe_shift(), *filter(None, [doubt(self.tools.card)])]
         for name, meaning in REMARKABLE.items():
             if self.flagged[name]:
                 found.append(f"{self.flagged[name]} of {len(self.frames)} frames: {meaning} (flag {name})")

@@ -12,7 +12,7 @@ from typing import IO
 import numpy as np
 
 from ..errors import TactileError
-from ..files import outside
+from ..files import installed, outside
 from .array_store import Store, damage_told
 
 START, START_OF_HDF5 = b"MATLAB 5", b"MATLAB 7"
@@ -37,7 +37,7 @@ def open_matlab(path: str) -> Iterator[Store]:
     try:
         from scipy.io import loadmat, whosmat
     except ModuleNotFoundError as error:
-        advice = 'pip install "tactile-core[matlab]"'
+        advice = installed.advice("matlab")
         raise TactileError(path, "a MATLAB file, which scipy reads", "scipy", advice) from error
     with damage_told(path, "MATLAB file"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of variables that are there twice: the first is read

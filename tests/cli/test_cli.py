@@ -262,7 +262,7 @@ def test_a_verb_names_the_extra_it_lacks(tactile, monkeypatch, tmp_path):
     monkeypatch.setattr(VERBS["train"], "run", absent)
     status, _, err = tactile("train", "pairs.h5", "--out", tmp_path)
     assert status == 2
-    assert 'pip install "tactile-core[train]"' in only_line(err)
+    assert '-e ".[train]"' in only_line(err)
 
 
 def test_ctrl_c_ends_in_one_line(tactile, slide_csv, tmp_path, monkeypatch):

@@ -176,7 +176,7 @@ def test_a_missing_mitsuba_is_named(render, heights, monkeypatch):
     monkeypatch.setattr(renderer, "choose_variant", absent)
     status, _, err = render(heights, "--preset", "quality")
     assert status == 2
-    assert 'pip install "tactile-core[render]"' in err
+    assert '-e ".[render]"' in err
     assert NO_MITSUBA.endswith('"tactile-core[render]"')
 
 

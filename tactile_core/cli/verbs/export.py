@@ -13,8 +13,8 @@ Write the shards of a finished job (see `tactile batch`) as
   npz      one NPZ file a recording, all arrays
   png      a folder of pictures a recording (the job must have kept image)
   exr      a folder of OpenEXR files a recording: heights in metres and pictures, as far as they were kept
-           (needs OpenEXR: pip install "tactile-core[render]")
-  lerobot  a LeRobot v3.0 data set: one recording is one episode (needs pyarrow: pip install "tactile-core[batch]")"""
+           (needs OpenEXR: see `tactile doctor`)
+  lerobot  a LeRobot v3.0 data set: one recording is one episode (needs pyarrow: see `tactile doctor`)"""
 EPILOG = """\
 example:
   tactile export job --to lerobot --out dataset"""

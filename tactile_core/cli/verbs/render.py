@@ -29,7 +29,7 @@ DIR is a new folder, which appears whole or not at all:
   FILE.xml         with --scene-out: the first frame's LEDs, coating and gel for `mitsuba FILE.xml`, FILE.ply beside it
   note.json        input, calibration, preset, versions;  timings.json  ms a frame
 
-Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (pip install "tactile-core[render]").
+Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (`tactile doctor` says how).
   fast       direct light, soft shadows            standard   direct light, traced
   quality    and the light of one bounce           reference  Mitsuba's path integrator, half a minute a frame
 With LLVM a scene of Mitsuba's makes the light: LEDs that shine, the coating as a material, the window. Without it the

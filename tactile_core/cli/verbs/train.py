@@ -6,7 +6,7 @@ import argparse
 
 from ...errors import TactileError
 from ...training.options import DEVICES
-from ..terminal import bar, tell
+from ..terminal import bar, say, tell
 from .common import RESUMES, check_seed, progress_argument, seed_argument
 
 BRIEF = "train the networks on pairs"
@@ -20,7 +20,7 @@ example:
   tactile convert touch.csv --out results --weights trained/weights
   tactile train s2mpn --real labelled.hdf5 --out tuned      starts from the shipped weights, or from --weights DIR
 
-Needs torch: pip install "tactile-core[train]". An interrupted run goes on where it stopped."""
+Needs torch: `tactile doctor` says how to install it. An interrupted run goes on where it stopped."""
 LEAVES = RESUMES
 MAX_EFFORT = 1000.0
 
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     region = None if options.without_below_x is None else 1e-3 * options.without_below_x
     chosen = Options(effort=options.effort, without=tuple(options.without), without_below_x=region)
     with bar("training", "%", options.progress) as shown:
-        train(
+        card = train(
             options.pairs,
             options.out,
             options.seed,
@@ -66,8 +66,20 @@ def run(options: argparse.Namespace) -> int:
             overwrite=options.overwrite,
             device=options.device,
         )
+    _say_error(card)
     tell(options.out)
     return 0
+
+
+def _say_error(card: dict) -> None:
+    """Print the error of the weights on presses kept apart, and a warning where it is hardly below the null."""
+    from ...translation.card_errors import chain_error, doubt
+
+    found = chain_error(card)
+    if found is not None:
+        say(f"presses kept apart: the gel is off by {found[0]:.3g} um rms; no displacement at all: {found[1]:.3g} um")
+    if doubt(card):
+        say(f"warning: {doubt(card)}")
 
 
 def _fine_tune(options: argparse.Namespace) -> int:

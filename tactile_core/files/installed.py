@@ -1,0 +1,36 @@
+"""Advice on how to install an extra, by how this package was installed; its name is not on the package index."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+PACKAGE = "tactile-core"
+
+
+def advice(extra: str) -> str:
+    """Return the command that installs the libraries of an extra: from the checkout, or each by its own name."""
+    root = Path(__file__).resolve().parents[2]
+    size = " (torch on Linux fetches CUDA's libraries too, some GB)" if extra == "train" else ""
+    if (root / "pyproject.toml").is_file() and (root / "constraints.txt").is_file():
+        return f'python -m pip install -c constraints.txt -e ".[{extra}]" in {root}{size}'
+    found = libraries(extra)
+    return f"python -m pip install {' '.join(found)}{size}" if found else f"the libraries of the extra [{extra}]"
+
+
+def libraries(extra: str) -> list[str]:
+    """List the requirements of an extra, quoted where a shell needs it; [] where the package has no metadata."""
+    from importlib import metadata
+
+    try:
+        required = metadata.requires(PACKAGE) or []
+    except metadata.PackageNotFoundError:
+        return []
+    names = []
+    for line in required:
+        name, _, marker = line.partition(";")
+        if not re.search(rf"extra == ['\"]{re.escape(extra)}['\"]", marker):
+            continue
+        nested = re.fullmatch(rf"{PACKAGE}\[(.+)\]", name.strip())
+        names += [each for part in nested[1].split(",") for each in libraries(part)] if nested else [name.strip()]
+    return [f'"{name}"' if re.search(r"[<>=\[]", name) and not name.startswith('"') else name for name in names]

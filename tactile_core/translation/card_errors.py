@@ -1,0 +1,31 @@
+"""Error of a set of weights on presses kept apart from their training, as their card states it, beside the null."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+ROW, SET = "chain_rms_um", "test presses"  # BioTac signals to the gel's displacement, rms over its nodes
+WORSE = 0.8  # of the null, the error of no displacement at all: above it weights hardly translate (assumed)
+
+
+def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return error and null, um, of the translation on presses kept apart; None where the card has no such row."""
+    rows = card.get("errors")
+    for row in rows if isinstance(rows, list) else []:
+        if isinstance(row, dict) and (row.get("name"), row.get("set")) == (ROW, SET):
+            value, null = row.get("value"), row.get("null")
+            if isinstance(value, int | float) and isinstance(null, int | float):
+                return float(value), float(null)
+    return None
+
+
+def doubt(card: Mapping[str, Any]) -> str:
+    """Write a sentence on weights that are hardly better than nothing; "" for those that are."""
+    found = chain_error(card)
+    if found is None or found[0] <= WORSE * found[1]:
+        return ""
+    return (
+        f"these weights are off by {found[0]:.3g} um (rms of the gel) on presses kept apart from their training, where"
+        f" no displacement at all is off by {found[1]:.3g} um: train on more pairs, or longer"
+    )

@@ -1,0 +1,36 @@
+"""Advice on extras names no package of the index that is not ours, and what it names is required."""
+
+from importlib import metadata
+
+import pytest
+
+from tactile_core.files import installed
+
+REQUIRED = [
+    "numpy>=1.26", 'scipy; extra == "fem"', 'trimesh; extra == "fem"', 'tactile-core[fem]; extra == "mkl"',
+    "pypardiso; (sys_platform != 'darwin') and extra == 'mkl'", 'torch==2.13.0; extra == "train"',
+]  # fmt: skip
+
+
+def test_a_checkout_is_installed_from():
+    told = installed.advice("fem")
+    assert told.startswith('python -m pip install -c constraints.txt -e ".[fem]"')
+    assert installed.PACKAGE not in told
+
+
+@pytest.fixture
+def no_checkout(monkeypatch, tmp_path):
+    monkeypatch.setattr(installed, "__file__", str(tmp_path / "a" / "b" / "c.py"))
+
+
+def test_a_wheel_s_libraries_are_named_one_by_one(no_checkout, monkeypatch):
+    monkeypatch.setattr(metadata, "requires", lambda package: REQUIRED)
+    assert installed.advice("fem") == "python -m pip install scipy trimesh"
+    assert installed.advice("mkl") == "python -m pip install scipy trimesh pypardiso"
+    told = installed.advice("train")
+    assert told.startswith('python -m pip install "torch==2.13.0" (') and "CUDA" in told
+
+
+def test_without_metadata_the_extra_is_named(no_checkout, monkeypatch):
+    monkeypatch.setattr(installed, "PACKAGE", "no-such-package")
+    assert "[fem]" in installed.advice("fem")
