@@ -20,7 +20,11 @@ def test_every_library_is_named(capsys, monkeypatch):
 
 @pytest.mark.parametrize(
     ("module", "words"),
-    [("no_such_library", "missing, python -m pip install"), ("broken_library", "ValueError: torn"), ("crashing_library", "exit")],
+    [
+        ("no_such_library", "missing, python -m pip install"),
+        ("broken_library", "ValueError: torn"),
+        ("crashing_library", "exit"),
+    ],
 )
 def test_a_library_that_fails_is_told(module, words, tmp_path, monkeypatch):
     (tmp_path / "broken_library.py").write_text("raise ValueError('torn')")
