@@ -143,7 +143,7 @@ def test_a_damaged_recording_ends_in_one_message_or_in_flagged_frames(damage, ta
     assert words in err
     if status:
         assert only_line(err).startswith(f"tactile: error: {path}")
-        assert list((tmp_path / "out").iterdir()) == []
+        assert not any((tmp_path / "out").glob("*"))
     else:
         assert (Path(only_line(out)) / "contact_sheet.png").exists()
 
