@@ -141,7 +141,7 @@ def _coating(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, coating: Coa
         shown_gloss = float(min(max(sockets[digit_materials.GLOSS].default_value, 0.0), 1.0))
     kind = ROUGH_PLASTIC if matte and shown_gloss > 0 else coating.bsdf
     gloss = gloss if matte and not shown_gloss else shown_gloss
-    new = Coating(kind, albedo, roughness, gloss, coating.metallic)
+    new = dataclasses.replace(coating, bsdf=kind, albedo=albedo, roughness=roughness, gloss=gloss)
     return coating if kind == coating.bsdf and _same(new, coating) else new
 
 
