@@ -13,7 +13,7 @@ from pressed_unit import BALL, PLACES, write_photographs
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.pictures.calibrate.evaluate import evaluate_unit, mean_figures
+from tactile_core.pictures.calibrate.evaluate import FIGURES, evaluate_unit, mean_figures
 from tactile_core.pictures.calibrate.fit import Calibrated, calibrate
 from tactile_core.pictures.calibrate.photographs import chosen, read_photographs
 from tactile_core.sensors.calibration import Calibration, Response
@@ -153,7 +153,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     words = ["calibrate", "--test", str(out), *common, "--json", str(rows), "--sheet", str(sheet)]
     assert main(words) == 0
     written = {row["name"]: row for row in json.loads(rows.read_text()) if row["set"] == folder.name}
-    assert set(written) == {"roi_l1", "roi_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error"}
+    assert set(written) == set(FIGURES)
     assert written["roi_l1"]["value"] < 2 < written["roi_l1"]["null"]
     assert written["ball_radius_error"]["value"] < 0.03
     assert sheet.exists()
