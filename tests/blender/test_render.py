@@ -87,8 +87,8 @@ def test_lights_change_their_own_colour(ready, tmp_path):
         bpy.ops.render.render(write_still=True)
         levels.append(_pixels(tmp_path / f"{factor}.png"))
     change = np.abs(levels[0] - levels[1]).max(axis=(0, 1))
-    # A unit's LEDs leak into the other colours (its gain matrix), by far less than they light their own.
-    assert change[0] > 0.1 and change[0] > 4 * max(change[1], change[2])
+    # A unit's LEDs leak into the other colours: the shipped response has at most 0.26 of the red one, in a corner.
+    assert change[0] > 0.1 and change[0] > 3 * max(change[1], change[2])
 
 
 def test_a_calibration_that_is_none_is_reported(ready, tmp_path):
