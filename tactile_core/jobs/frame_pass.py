@@ -39,6 +39,7 @@ REMARKABLE = {
     "out_of_range": "signals unlike those the networks were trained on",
     "beyond_digit": "the contact has no counterpart on the DIGIT's gel",
     "beyond_picture": "the contact lies on the gel beside its picture",
+    "undecided_place": "by its own signals the contact may as well lie elsewhere",
 }
 
 

@@ -19,6 +19,7 @@ class Flag(enum.IntFlag):
     POLARITY_ASSUMED = 256  # whether counts fall or rise where a film thins is not shown: taken to fall, as raw ones do
     POLARITY_DOUBTED = 512  # the user's word on it, or the file's, contradicts what the recording shows
     BEYOND_PICTURE = 1024  # the contact lies on the DIGIT's gel, beside what its camera sees
+    UNDECIDED_PLACE = 2048  # the signals of this frame alone may as well come from a contact 3 mm or more away
 
 
 def names() -> dict[str, int]:

@@ -112,7 +112,7 @@ class Signals:
 
     @property
     def typical(self) -> np.ndarray:
-        """Change (T, 19) counts, converted to a unit that rests at ``sensors.REST_COUNT``, the networks' input.
+        """Change (T, 19) counts, converted to a unit that rests at ``sensors.REST_COUNTS``, the networks' input.
 
         Only raw readings show their unit's rest counts; other changes are not converted.
         """

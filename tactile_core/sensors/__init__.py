@@ -25,7 +25,8 @@ class Material:
 # Skin: fitted to real fingers. Films over electrodes tell how far the skin has moved, PDC what pressure that took: with
 # 0.905 MPa, 6 (C10 + C01) of the independent COMSOL model of the BioTac SP, simulated pressures are a fourth to a fifth
 # of real ones (``benchmarks.translation.skin_stiffness``). With 4.1 MPa real ones are .81 times as high in 12 firm
-# grips (quartiles .76 and .99), 1.19 times on slides (.81 and 1.41). The 1.552 MPa of the Isaac Gym authors were fitted
+# grips (quartiles .76 and .99), .70 times on slides (.58 and 1.05), whose counts at rest are a typical unit's: the skin
+# may be a quarter too stiff. The 1.552 MPa of the Isaac Gym authors were fitted
 # to forces on a mesh that locks (docs/sources.md, Mechanics): a ball bears there 2.3 times what it does on ours
 # with 0.905 MPa, as if that were 2.1 MPa.
 BIOTAC_SKIN = Material(youngs=4.1e6, poisson=0.48)  # Poisson's ratio assumed: silicone, nearly incompressible
@@ -37,7 +38,11 @@ DIGIT_GEL = Material(youngs=0.4126e6, poisson=0.48)  # Poisson's ratio assumed
 ELECTRODES = 19  # of a single BioTac; the BioTac SP has 24
 SAMPLE_RATE = 100.0  # Hz, one frame of all electrodes (docs/sources.md, BioTac read-out)
 COUNT_MAX = 4095  # 12-bit electrodes
-REST_COUNT = 3300.0  # counts, typical reading without contact (docs/sources.md, BioTac read-out)
+# Counts E1..E19 of a typical unit without contact: mean impedance of two real units, made even across the finger
+# (docs/sources.md, BioTac read-out). E1 and E11, whose film is thinnest, respond 1.8 times as strongly as E2 to E5.
+REST_COUNTS = np.array([
+    3135, 3623, 3641, 3522, 3622, 3477, 3245, 3355, 3355, 3448, 3135, 3623, 3641, 3522, 3622, 3477, 3570, 3637, 3530,
+], float)  # fmt: skip
 # Raw counts fall where the fluid film over an electrode thins: each electrode is read in a voltage divider, and "as the
 # impedance over the sensing electrode increases, the measured voltage decreases" (SynTouch, BioTac SP manual). Fingers
 # that hold a flat object agree: where they are squeezed, counts fall as the fluid's pressure rises (docs/sources.md,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import COUNT_MAX, REST_COUNT
+from . import COUNT_MAX, REST_COUNTS
 
 _ENDS = 0.4, COUNT_MAX - 0.4  # counts, which round to the converter's ends: there nothing is known of the impedance
 # Counts that an electrode may rest at; real ones rest at 3,010 to 3,670 (two units, PHAC). One that is dead or
@@ -32,18 +32,18 @@ def growth(counts: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
 
 def typical(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of a unit that rests at
-    ``REST_COUNT``.
+    ``REST_COUNTS``.
 
     A unit at 3,500 counts responds to a contact with four fifths, one at 2,800 with seven fifths of the latter's
     change.
     """
     rest = np.clip(rest, *_RESTS)
-    return reading(growth(rest + change, rest), REST_COUNT) - REST_COUNT
+    return reading(growth(rest + change, rest), REST_COUNTS) - REST_COUNTS
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Convert changes of a unit that rests at ``REST_COUNT`` to one at rest counts (19,): the inverse of
+    """Convert changes of a unit that rests at ``REST_COUNTS`` to one at rest counts (19,): the inverse of
     ``typical``.
     """
     rest = np.clip(rest, *_RESTS)
-    return reading(growth(REST_COUNT + change, REST_COUNT), rest) - rest
+    return reading(growth(REST_COUNTS + change, REST_COUNTS), rest) - rest

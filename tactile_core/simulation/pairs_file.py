@@ -19,7 +19,7 @@ from ..files.hdf5_writer import Disk
 from ..mechanics.electrodes.law import LAWS, SHEET
 from ..recordings.polarity import FALLS
 
-FORMAT = "tactile-pairs-1"
+FORMAT = "tactile-pairs-2"
 ELECTRODES = 19
 ADVICE = "Make the file again with `tactile pairs`"
 ATTRIBUTES = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..sensors import COUNT_MAX, COUNT_SIGN, REST_COUNT
+from ..sensors import COUNT_MAX, COUNT_SIGN, REST_COUNTS
 from .options import Options
 
 
@@ -15,27 +15,29 @@ def measured(
 
     Rectified changes are given with the sign of a thinning film, as the networks read them.
 
-    Gain error a channel, noise, whole counts, the ends of 12 bits. The rest lies near 3,300 counts (docs/sources.md)
-    and between whole counts, as the mean of many readings does.
+    Gain error a channel, noise, whole counts, the ends of 12 bits. The rest lies near that of a typical unit
+    (``sensors.REST_COUNTS``) and between whole counts, as the mean of many readings does.
     unit : share of frames read as a real unit is known: its gains spread more, its rest is off
     rectified : share of frames that lose their sign. They stand for recordings of unknown units, whose tare cannot be
-        mended once folded: gains spread more, rest is off, channels may be missing, and the skin bulges more or less
+        mended once folded: gains spread more, rest is off, channels may be missing
+    Both are off by a share of the signal's size too, as no simulated contact is quite like a real one.
     """
     folded = rng.random((len(change), 1)) < rectified
     gain = 1.0 + options.gain * rng.standard_normal(change.shape)
-    rest = REST_COUNT + rng.random(change.shape)
+    rest = REST_COUNTS + rng.random(change.shape)
     noise = options.noise * rng.standard_normal(change.shape)
+    real = rng.random((len(change), 1)) < unit
     if unit:
-        real = rng.random((len(change), 1)) < unit
         gain = np.where(real, np.exp(options.unit_gain * rng.standard_normal(change.shape)), gain)
         noise += real * options.unit_offset * rng.standard_normal(change.shape)
     if rectified:
         strange = np.exp(options.rectified_gain * rng.standard_normal(change.shape))
         strange *= rng.random(change.shape) >= options.rectified_missing
         gain = np.where(folded, strange, gain)
-        bulge = np.exp(options.rectified_bulge * rng.standard_normal((len(change), 1)))
-        change = np.where(folded & (COUNT_SIGN * change < 0), bulge * change, change)
         noise += folded * options.rectified_offset * rng.standard_normal(change.shape)
+    if unit or rectified:
+        size = np.linalg.norm(change, axis=1, keepdims=True)
+        noise += (real | folded) * options.misfit * size * rng.standard_normal(change.shape)
     found = np.clip(np.round(rest + gain * change + noise), 0, COUNT_MAX) - rest
     found = np.where(folded, COUNT_SIGN * np.abs(found), found)
     return np.concatenate([found, folded], -1).astype(np.float32)

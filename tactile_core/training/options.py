@@ -23,11 +23,13 @@ class Options:
     unit : share of training samples that keep their sign and are read as a real unit is known, its rest found from
         recordings that never touch nothing: unit_gain, standard deviation of the logarithm of a channel's gain,
         unit_offset, counts, of its rest (10 to 60 counts between two halves of a unit's recordings; docs/convert.md)
+    misfit : of samples read as a real unit is known and of rectified ones, share of the whole signal's size that each
+        channel is off by besides: the simulated contacts nearest to real ones leave .29 of it, .07 a channel,
+        part of it gains and noise (``benchmarks.translation.simulated_patterns``, slides to choose by)
     rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
         rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
-        from the simulated ones by), rectified_bulge, the same of all falling signals of a sample together,
-        rectified_offset, counts, of the tare before the fold, rectified_missing, share of channels that read nothing.
-        Each was chosen among a few values as it let strength follow fluid pressure better on the sample recordings
+        from the simulated ones by), rectified_offset, counts, of the tare before the fold, rectified_missing, share of
+        channels that read nothing
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
     mirrored : share of training samples that are mirrored, both sensors being even in z
     without : names of indenters that are kept from the training; without_below_x : m, as much of the pad beyond x
@@ -59,12 +61,12 @@ class Options:
     gain: float = 0.1
     unit: float = 0.3
     unit_gain: float = 0.3
-    unit_offset: float = 15.0
+    unit_offset: float = 20.0
+    misfit: float = 0.1
     rectified: float = 0.25
-    rectified_gain: float = 0.5
-    rectified_bulge: float = 0.5
+    rectified_gain: float = 0.4
     rectified_offset: float = 3.0
-    rectified_missing: float = 0.2
+    rectified_missing: float = 0.1
     silence: float = 0.05
     mirrored: float = 0.5
     without: tuple[str, ...] = ()

@@ -17,7 +17,7 @@ from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
 from . import error_bounds, gel_place, networks, plausible
 from .answer import MEAN, Answer
-from .contact_frame import STILL
+from .contact_frame import STILL, ContactFrame, on_skin
 from .contact_track import LEAST_FORCE, track
 from .error_bounds import KINDS
 from .network_sizes import PLACE, SURFACES
@@ -28,7 +28,11 @@ from .weights import ADVICE
 UNTRAINED_CONFIDENCE = 0.2  # assumed
 # Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
 # (scripts/evaluate_translation.py --kept-apart) it flags half of that part's frames, and most of those it should.
-IN_RANGE = 0.99
+# The largest change is another matter: signals of deep contacts at the tip are three times those that 99 % of the
+# contacts stay below, and training knows them. What exceeds all but one in a thousand is out of its range.
+IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
+# A place is undecided where more than this share of the posterior lies as far away, m, as two contacts are told apart.
+UNDECIDED, APART = 0.3, 3e-3  # assumed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,7 +47,8 @@ class Translation:
     confidence : (T,), 1 as in training, 0 far from it
     expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
         below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
-    flags : (T,) uint16, bits of ``flags.Flag``: those of the signals and OUT_OF_RANGE, BEYOND_DIGIT
+    flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
+        BEYOND_DIGIT and UNDECIDED_PLACE
     """
 
     latent_signal: np.ndarray
@@ -78,6 +83,16 @@ def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) ->
     center = accuracy.dent_center(displacement, rest).astype(np.float32)
     center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
     return center
+
+
+def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
+    """Share (T,) of the posterior in contacts whose place on the skin is ``APART`` m and more from that of states
+    (T, STATE).
+    """
+    place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
+    points = on_skin(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 3)
+    far = accuracy.lengths(points - on_skin(frame, place)[:, None]) > APART
+    return (posterior.weight * (far & (posterior.mean[..., PLACE] > LEAST_FORCE))).sum(-1)
 
 
 class Translator:
@@ -120,13 +135,16 @@ class Translator:
         change = np.asarray(signals.typical, np.float32)
         latent_signal = nets.encode_signal(change, rectified)
         alone = state is None
+        posterior = nets.posterior(latent_signal, rectified)
         if state is None:
-            posterior = nets.posterior(latent_signal, rectified)
             state = posterior.average if self.answer.kind == MEAN else posterior.heaviest
         latent_biotac = nets.given(latent_signal, state, rectified)
         latent_digit = nets.m2m(latent_biotac)
-        touched = (state[:, PLACE] > LEAST_FORCE)[:, None, None]
-        biotac, digit = nets.decode_biotac(latent_biotac) * touched, nets.decode_digit(latent_digit) * touched
+        touched = state[:, PLACE] > LEAST_FORCE
+        biotac, digit = (
+            decode(latent) * touched[:, None, None]
+            for decode, latent in ((nets.decode_biotac, latent_biotac), (nets.decode_digit, latent_digit))
+        )
         if self._shift is not None:
             digit = self._shift(digit)
         # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
@@ -136,6 +154,8 @@ class Translator:
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
+        undecided = touched & (elsewhere(posterior, state, nets.frames["MVB"]) > UNDECIDED)
+        flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(
             latent_signal, latent_biotac, latent_digit, biotac, digit,
             force=np.where(silent[:, None], np.float32(0), nets.force_in(state, latent_biotac)),
@@ -165,7 +185,7 @@ class Translator:
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Mark (T,) bool the changes (T, 19) counts outside those of the training, by any distance's quantile."""
-        return np.any(self._distances(change, rectified) > self._quantile(IN_RANGE, rectified), axis=0)
+        return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
 
     def _confidence(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> np.ndarray:
         """Confidence (T,): 1 for signals like those of the training, 0 far from them.
@@ -173,7 +193,7 @@ class Translator:
         Each distance to the training signals counts against its quantiles in validation: it is 1 up to the 95 %
         quantile, 0 at the outermost. Not a calibrated probability: that is what bounds are for.
         """
-        usual, far = self._quantile(0.95, rectified), self._quantile(1.0, rectified)
+        usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))
         confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
         confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
@@ -184,11 +204,15 @@ class Translator:
         distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
         return np.stack([getattr(distance, name) for name in networks.DISTANCES])
 
-    def _quantile(self, level: float, rectified: np.ndarray | bool) -> np.ndarray:
-        """Quantile (distances, T) or (distances, 1) at this level over validation frames of the same kind."""
+    def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
+        """Quantiles (distances, T) or (distances, 1) at each distance's level over validation frames of the same
+        kind.
+        """
         table = self.card["distance"]
         limits = {
-            kind: np.array([[np.interp(level, table["levels"], table[kind][name])] for name in networks.DISTANCES])
+            kind: np.array(
+                [[np.interp(level[name], table["levels"], table[kind][name])] for name in networks.DISTANCES]
+            )
             for kind in KINDS
         }
         return np.where(rectified, limits["rectified"], limits["signed"])

@@ -12,7 +12,7 @@ from tactile_core.mechanics.electrodes.law import signal_of
 from tactile_core.mechanics.force_search import UnreachableError
 from tactile_core.mechanics.solve import solve
 from tactile_core.recordings.flags import Flag
-from tactile_core.sensors import REST_COUNT
+from tactile_core.sensors import REST_COUNTS
 
 from .case import TRANSLATION, Found, case
 from .shapes import CONTACTS, SUNK
@@ -33,8 +33,8 @@ def _translated(name: str, share: float) -> Found:
     signals = dataclasses.replace(
         prepared()[1],
         change=change,
-        rest=np.full(19, REST_COUNT),
-        electrodes=REST_COUNT + change,
+        rest=REST_COUNTS.copy(),
+        electrodes=REST_COUNTS + change,
         quiet=np.zeros(1, bool),
         flags=np.zeros(1, np.uint16),
         pdc=np.zeros(1),

@@ -76,7 +76,7 @@ def write_pairs(
                 "seed": seed,
                 "version": "0",
                 "indenters": json.dumps(["sphere"]),
-                "format": "tactile-pairs-1",
+                "format": "tactile-pairs-2",
                 "polarity": "falls",
                 "electrodes": "gap",
             }

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tactile_core.sensors import COUNT_MAX, REST_COUNT, divider
+from tactile_core.sensors import COUNT_MAX, REST_COUNTS, divider
 
 REST = np.linspace(3000.0, 3700.0, 19)
 
@@ -21,12 +21,12 @@ def test_growth_is_the_inverse_of_reading():
 def test_units_turn_into_the_typical_one_and_back():
     change = np.random.default_rng(0).uniform(-800, 80, (20, 19))
     np.testing.assert_allclose(divider.typical(divider.of_unit(change, REST), REST), change, atol=1e-6)
-    np.testing.assert_allclose(divider.typical(change, np.full(19, REST_COUNT)), change, atol=1e-6)
+    np.testing.assert_allclose(divider.typical(change, REST_COUNTS), change, atol=1e-6)
     small = divider.typical(np.full((1, 19), -1.0), REST)[0]  # near rest: by E (1 - E / 4095)
     slope = REST * (1 - REST / COUNT_MAX)
-    np.testing.assert_allclose(small, -REST_COUNT * (1 - REST_COUNT / COUNT_MAX) / slope, rtol=2e-3)
+    np.testing.assert_allclose(small, -REST_COUNTS * (1 - REST_COUNTS / COUNT_MAX) / slope, rtol=2e-3)
 
 
 def test_noise_of_dead_and_saturated_electrodes_is_not_blown_up():
     for rest in (0.0, 1.0, 4094.0, 4095.0):
-        assert np.abs(divider.typical(np.array([[-1.0, 0.0, 1.0]]), np.full(3, rest))).max() < 5
+        assert np.abs(divider.typical(np.array([-1.0, 0.0, 1.0])[:, None] * np.ones(19), np.full(19, rest))).max() < 5

@@ -56,7 +56,7 @@ def poison(file):
     [
         (
             lambda file: file.attrs.update(format="tactile-pairs-9"),
-            "format 'tactile-pairs-9'; expected format 'tactile-pairs-1'",
+            "format 'tactile-pairs-9'; expected format 'tactile-pairs-2'",
         ),
         (lambda file: file.attrs.pop("format"), "format ''"),
         (lambda file: file.attrs.pop("digit_nodes_sha256"), "no attribute digit_nodes_sha256"),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from small_pairs import frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
+from tactile_core.sensors import REST_COUNTS  # noqa: E402
 from tactile_core.simulation.pairs_file import read_pairs, split_presses  # noqa: E402
 from tactile_core.training.data import Contacts  # noqa: E402
 from tactile_core.training.noise_model import measured  # noqa: E402
@@ -61,29 +64,37 @@ def test_readings_have_the_errors_they_should():
     assert firm.mean() == pytest.approx(400, abs=1.0)
     assert firm.std() == pytest.approx(40, rel=0.02)
     far = readings(true + 2000, 2)
-    assert far.max() <= 4095 - 3300  # the sensor's 12 bits end here
-    assert readings(true - 9000, 2).min() >= -3301
+    assert (far <= 4095 - REST_COUNTS).all()  # the sensor's 12 bits end here
+    assert (readings(true - 9000, 2) >= -1 - REST_COUNTS).all()
 
 
 def test_a_real_unit_s_rest_is_off_and_its_gains_spread():
     true = np.zeros((4000, 19), np.float32)
-    read = [measured(true + size, np.random.default_rng(0), OPTIONS, 0.0, 1.0)[:, :-1] for size in (0, 400)]
+    alike = dataclasses.replace(OPTIONS, misfit=0.0)
+    read = [measured(true + size, np.random.default_rng(0), alike, 0.0, 1.0)[:, :-1] for size in (0, -400)]
     assert read[0].std() == pytest.approx(np.hypot(OPTIONS.unit_offset, OPTIONS.noise), rel=0.02)  # 76,000 draws
-    assert np.log((read[1] - read[0]) / 400).std() == pytest.approx(OPTIONS.unit_gain, rel=0.02)
+    assert np.log((read[1] - read[0]) / -400).std() == pytest.approx(OPTIONS.unit_gain, rel=0.02)
+
+
+def test_a_real_unit_is_off_by_a_share_of_the_signal_s_size():
+    true = np.full((4000, 19), -100, np.float32)
+    alike = dataclasses.replace(OPTIONS, misfit=0.0)
+    off, own = (measured(true, np.random.default_rng(0), each, 0.0, 1.0)[:, :-1] for each in (OPTIONS, alike))
+    expected = OPTIONS.misfit * np.linalg.norm(true[0])
+    assert np.sqrt(off.var() - own.var()) == pytest.approx(expected, rel=0.02)  # 76,000 draws
 
 
 def test_rectified_readings_lose_their_sign_and_some_channels():
     true = np.full((4000, 19), 120, np.float32)  # a bulge; six times the offset's noise, a sixth of what the bits hold
-    read = measured(true, np.random.default_rng(0), OPTIONS, 0.5)
+    alike = dataclasses.replace(OPTIONS, misfit=0.0)
+    read = measured(true, np.random.default_rng(0), alike, 0.5)
     folded = read[:, -1] == 1
     assert folded.mean() == pytest.approx(0.5, abs=0.04)  # 4,000 draws: five standard errors
     assert (read[folded, :-1] <= 0).all() and (read[~folded, :-1] > 0).all()
     missing = -read[folded, :-1] < 6 * OPTIONS.rectified_offset
     assert missing.mean() == pytest.approx(OPTIONS.rectified_missing, abs=0.01)  # 38,000 draws; whose true is 120
     size = np.log(-read[folded, :-1][~missing] / 120)
-    # a frame's bulge and a channel's gain, independent; five standard errors of 2,000 frames' bulges
-    expected = np.hypot(OPTIONS.rectified_gain, OPTIONS.rectified_bulge)
-    assert size.std() == pytest.approx(expected, abs=0.04)
+    assert size.std() == pytest.approx(OPTIONS.rectified_gain, abs=0.02)  # the widest gains meet the converter's ends
 
 
 def test_a_batch_tells_the_state_of_each_contact(contacts):

@@ -15,7 +15,7 @@ from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.recordings import electrode_gains, prepare, read
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile
-from tactile_core.sensors import electrodes
+from tactile_core.sensors import REST_COUNTS, electrodes
 from tactile_core.translation import adapt, reference_signals, weights
 
 ONES, ZEROS = [1.0] * 19, [0.0] * 19
@@ -143,14 +143,14 @@ def test_a_card_without_typical_signals_is_told(entry, tmp_path):
 
 
 def write_recording(path, change: np.ndarray, kind: str) -> None:
-    """A slide file of these changes with 0.5 s of rest around: "rectified", or "raw" with rest at 3,000 counts."""
+    """A slide file of these changes with 0.5 s of rest around: "rectified", or "raw" with rest at a typical unit's."""
     quiet = np.zeros((50, 19))
     change = np.concatenate([quiet, np.repeat(change, 4, axis=0), quiet])
     random = np.random.default_rng(0)
     change = change + random.normal(0, 1, change.shape)
     rows = np.zeros((len(change), len(SLIDE_HEADER)))
     rows[:, 0] = 1.6e9 + np.arange(len(change)) / 100
-    rows[:, 26:] = np.floor(np.abs(change)) if kind == "rectified" else np.rint(3000 + change)
+    rows[:, 26:] = np.floor(np.abs(change)) if kind == "rectified" else np.rint(REST_COUNTS + change)
     rows[50:-50, 3] = 50
     header = ",".join(SLIDE_HEADER)
     np.savetxt(path, rows, fmt=["%.6f"] + ["%d"] * 44, delimiter=",", header=header, comments="")

@@ -73,9 +73,9 @@ def test_the_mean_is_another_answer(touched):
 def test_drawn_contacts_spread_as_the_posterior_says(touched):
     signals, frames = touched
     told = load_translator().posterior(signals)
-    drawn = plausible.draw(told, frames, 4000)
+    drawn = plausible.draw(told, frames, 40_000)
     spread = np.sqrt((told.weight[..., None] * (told.spread**2 + (told.mean - told.average[:, None]) ** 2)).sum(1))
-    assert np.abs((drawn.mean(1) - told.average) / spread).max() < 5 / np.sqrt(4000)  # 80 means, 5 standard errors
+    assert np.abs((drawn.mean(1) - told.average) / spread).max() < 5 / np.sqrt(40_000)  # 80 means, 5 standard errors
     assert np.allclose(drawn.std(1) / spread, 1, atol=0.25)  # rare far components are drawn a few times
     assert np.array_equal(plausible.draw(told, frames, 7), plausible.draw(told, frames, 7))
 

@@ -10,7 +10,7 @@ import pytest
 from tactile_core import accuracy, recordings, sensors
 from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
-from tactile_core.translation import network_sizes, networks, translate
+from tactile_core.translation import contact_frame, network_sizes, networks, translate
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +140,18 @@ def test_a_contact_beyond_the_gel_is_flagged(translator):
         near = np.linalg.norm(rolled - place, axis=1) < 1.5e-3
         moved[frame, near] = [0, 5e-4, 0]
     assert translator._beyond_digit(moved).tolist() == [False, True, True]
+
+
+def test_a_place_is_undecided_by_what_lies_elsewhere(translator):
+    frame = translator.nets.frames["MVB"]
+    rows = frame.rows - 1
+    mean = np.zeros((3, 2, network_sizes.STATE), np.float32)
+    mean[..., network_sizes.PLACE] = 3.0  # in contact
+    mean[1:, 1, 0] = 0.25 * rows / contact_frame.PLACE_UNIT  # a quarter of the finger's length away
+    mean[2, 1, network_sizes.PLACE] = 0.0  # no contact at all lies nowhere else
+    weight = np.tile(np.float32([0.6, 0.4]), (3, 1))
+    posterior = networks.Posterior(weight, mean, np.full_like(mean, 0.1))
+    np.testing.assert_allclose(translate.elsewhere(posterior, posterior.heaviest, frame), [0.0, 0.4, 0.0])
 
 
 def test_weights_for_another_surface_are_refused(monkeypatch):

@@ -63,7 +63,7 @@ def electrode_rows(contacts: int = 240, *, each: bool = True) -> Iterator[Row]:
             yield row(f"{name}_largest_fall", change.min(), "percent", null=0.0, of=f"7 mm ball, {of}")
         found = np.stack([sheet.resistances(sheet.films(moved)) for moved in skin])
         yield from _law_rows(found - rest, gaps, of, each=each)
-        divided = divider.reading(growth(found, rest), sensors.REST_COUNT) - sensors.REST_COUNT
+        divided = divider.reading(growth(found, rest), sensors.REST_COUNTS) - sensors.REST_COUNTS
         yield from _law_rows(divided, gaps, f"{of}, through a divider", each=False)
 
 

@@ -23,7 +23,7 @@ from tactile_core.mechanics.fast.contact import Contact, ContactProblem
 from tactile_core.mechanics.placement import pose_at
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
 from tactile_core.recordings.readers import each_finger
-from tactile_core.sensors import REST_COUNT, divider
+from tactile_core.sensors import REST_COUNTS, divider
 from tactile_core.simulation.pair_sampling import draw_place
 from tactile_core.simulation.scene import load_scene
 from tactile_core.translation.unit_rest import find_rest
@@ -41,12 +41,12 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
     folders = data / "biotac_phac", data / "biotac_recordings"
     if not all(folder.exists() for folder in folders):
         return
-    contacts = _training_contacts(200 if quick else 2000)
+    contacts = _training_contacts(200 if quick else 5000)
     laws = _laws(contacts)
     files = grips.find(folders[0])
     grip, rest = grip_changes(files, grips.hard_to_report(files))
     slide, _ = slide_changes(slide_set.reporting(folders[1]))
-    typical = np.full(slide.shape, float(REST_COUNT))
+    typical = np.broadcast_to(REST_COUNTS, slide.shape)
     of = f"{len(contacts)} simulated contacts; baseline: electrodes shuffled"
     yield from _cosines("grip", grip, rest, laws, (0.92, 0.88), f"{len(grip)} grips, {of}")
     sizes = {name: lambda at_rest, law=law: np.abs(law(at_rest)) for name, law in laws.items() if name != "wrong_sign"}

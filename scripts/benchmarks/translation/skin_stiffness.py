@@ -25,7 +25,7 @@ from tactile_core.mechanics.placement import pose_at
 from tactile_core.mechanics.solve import Step, solve_path
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, depth_at
 from tactile_core.recordings.readers import each_finger
-from tactile_core.sensors import PRESSURE_PER_COUNT, REST_COUNT, divider
+from tactile_core.sensors import PRESSURE_PER_COUNT, REST_COUNTS, divider
 from tactile_core.simulation.pair_sampling import draw_place
 from tactile_core.simulation.scene import load_scene
 
@@ -98,4 +98,4 @@ def _pdc(path: Path) -> list[float]:
 
 def _slides(folder: Path) -> _Real:
     sizes, pdc = slide_changes([path for path in slide_set.find(folder) if path not in slide_set.reporting(folder)])
-    return sizes, np.full(sizes.shape, REST_COUNT), PRESSURE_PER_COUNT * pdc
+    return sizes, np.broadcast_to(REST_COUNTS, sizes.shape), PRESSURE_PER_COUNT * pdc

@@ -14,7 +14,7 @@ from tactile_core.training.step_errors import Bodies, error_columns, joined, par
 from tactile_core.translation.network_sizes import SURFACES
 from tactile_core.translation.translate import Translator
 
-from .contact_rows import answer_rows, posterior_rows
+from .contact_rows import answer_rows, gel_force_rows, posterior_rows, rectified_rows
 from .noise import as_read
 from .slide_metrics import rank_correlation
 
@@ -40,6 +40,8 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
     change = as_read(pairs.signal, SEED)
     columns = translation_figures(translator.nets, pairs, rows, change, bodies)
     found = answer_rows(translator.nets, pairs, change, bodies) + posterior_rows(translator.nets, pairs, change)
+    found += gel_force_rows(translator.nets, pairs, change)
+    found += rectified_rows(translator.nets, pairs, change, bodies)
     found += figure_rows(columns, pairs, rows, "seen indenters", TARGETS)
     for name, mask in slices(pairs, rows):
         for step, body in (("S2MPN", "biotac"), ("M2MPN", "digit"), ("chain", "digit")):

@@ -17,7 +17,7 @@ from ...sensors import divider
 class Wiring:
     """Electronics between the film over an electrode and the number in a file; raises TactileError out of range.
 
-    rest_spread : counts; each electrode rests at ``sensors.REST_COUNT`` and up to this much more or less (assumed)
+    rest_spread : counts; each electrode rests at ``sensors.REST_COUNTS`` and up to this much more or less (assumed)
     gain_error : 1, standard deviation of the logarithm of each electrode's gain (assumed none)
     drift : counts/s; each electrode drifts evenly at up to this rate (88 counts in an hour: docs/sources.md)
     noise : counts, standard deviation in each frame (0.7 to 1.5 in real recordings: docs/sources.md)
@@ -31,7 +31,7 @@ class Wiring:
     tared: bool = False
 
     def __post_init__(self) -> None:
-        room = min(sensors.REST_COUNT, sensors.COUNT_MAX - sensors.REST_COUNT)
+        room = float(min(sensors.REST_COUNTS.min(), sensors.COUNT_MAX - sensors.REST_COUNTS.max()))
         limits = {"rest_spread": room, "gain_error": 1.0, "drift": np.inf, "noise": np.inf}
         for name, largest in limits.items():
             value = getattr(self, name)
@@ -43,14 +43,14 @@ class Wiring:
 def readings(change: np.ndarray, time: np.ndarray, wiring: Wiring, seed: int) -> np.ndarray:
     """Readings of the 12-bit converter, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
 
-    Changes are those of a unit that rests at ``sensors.REST_COUNT``; this one reads them by its own rest, as its
+    Changes are those of a unit that rests at ``sensors.REST_COUNTS``; this one reads them by its own rest, as its
     divider does. Rounded and held within 0..4095, then less the count at rest where ``wiring.tared``. Rest, gain, drift
     and noise are drawn from streams of their own: a recording goes on as it began when it is made longer, and one
     defect changes without the others.
     """
     streams = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
     electrodes = change.shape[1]
-    rest = sensors.REST_COUNT + np.round(streams[0].uniform(-wiring.rest_spread, wiring.rest_spread, electrodes))
+    rest = sensors.REST_COUNTS + np.round(streams[0].uniform(-wiring.rest_spread, wiring.rest_spread, electrodes))
     gain = np.exp(wiring.gain_error * streams[1].standard_normal(electrodes))
     drift = streams[2].uniform(-wiring.drift, wiring.drift, electrodes)
     noise = wiring.noise * streams[3].standard_normal(change.shape)

@@ -32,12 +32,12 @@ def test_ideal_wiring_rounds_and_saturates():
     counts = readings(change, TIME, IDEAL, seed=3)
     assert counts.dtype == np.int16 and counts.shape == (400, 19)
     assert (counts[10] == sensors.COUNT_MAX).all() and (counts[20] == 0).all()
-    assert (counts[30] == sensors.REST_COUNT).all() and (counts[40] == sensors.REST_COUNT + 1).all()
+    assert (counts[30] == sensors.REST_COUNTS).all() and (counts[40] == sensors.REST_COUNTS + 1).all()
 
 
 def test_noise_has_the_size_asked_for():
     counts = readings(STILL, TIME, dataclasses.replace(IDEAL, noise=3.0), seed=1)
-    spread = (counts - sensors.REST_COUNT).std()
+    spread = (counts - sensors.REST_COUNTS).std()
     # 7,600 draws know it to 0.8 % (one deviation); rounding adds 1/12 to the variance
     assert spread == pytest.approx(np.sqrt(9 + 1 / 12), rel=0.03)
 
@@ -46,18 +46,18 @@ def test_drift_is_a_straight_line_within_its_rate():
     counts = readings(STILL, 100 * TIME, dataclasses.replace(IDEAL, drift=0.5), seed=2)
     rate = np.polyfit(100 * TIME, counts.astype(float), 1)[0]
     assert (np.abs(rate) < 0.5).all() and np.abs(rate).max() > 0.3 and rate.min() < 0 < rate.max()
-    line = sensors.REST_COUNT + rate * (100 * TIME)[:, None]
+    line = sensors.REST_COUNTS + rate * (100 * TIME)[:, None]
     assert np.abs(counts - line).max() < 0.75  # half a count of rounding, and the fit's own error
 
 
 def test_gain_scales_changes_but_not_rest():
     wiring = dataclasses.replace(IDEAL, gain_error=0.2)
     change = np.zeros((3, 19))
-    change[1:] = [[200.0], [400.0]]
-    moved = readings(change, TIME[:3], wiring, seed=5) - sensors.REST_COUNT
+    change[1:] = [[-200.0], [-400.0]]
+    moved = readings(change, TIME[:3], wiring, seed=5) - sensors.REST_COUNTS
     np.testing.assert_array_equal(moved[0], 0)
     np.testing.assert_allclose(moved[2], 2 * moved[1], atol=1.5)  # three roundings
-    gain = np.log(moved[2] / 400)
+    gain = np.log(moved[2] / -400)
     assert 0.1 < gain.std() < 0.3  # 19 draws know 0.2 to 16 % (one deviation)
 
 
@@ -68,7 +68,7 @@ def test_tared_counts_are_raw_ones_less_their_rest():
     rest = raw - tared
     assert tared.dtype == np.int16 and abs(tared.mean()) < 0.1
     np.testing.assert_array_equal(rest, rest[:1].repeat(len(TIME), 0))
-    assert rest[0].std() > 40 and np.abs(rest - sensors.REST_COUNT).max() <= 150
+    assert rest[0].std() > 40 and np.abs(rest - sensors.REST_COUNTS).max() <= 150
 
 
 def test_each_defect_has_a_stream_of_its_own():
@@ -80,8 +80,8 @@ def test_each_defect_has_a_stream_of_its_own():
     still = readings(STILL, TIME, dataclasses.replace(wiring, drift=0.0), seed=9)
     np.testing.assert_array_equal(still[0], quiet[0])
     # a stream that two defects shared would tie them: correlations of 19 independent draws stay below 0.7 (p = 0.001)
-    rest, drift = quiet[0] - sensors.REST_COUNT, quiet[-1] - quiet[0]
-    noise = readings(STILL, TIME, dataclasses.replace(IDEAL, noise=50.0), seed=9)[0] - sensors.REST_COUNT
+    rest, drift = quiet[0] - sensors.REST_COUNTS, quiet[-1] - quiet[0]
+    noise = readings(STILL, TIME, dataclasses.replace(IDEAL, noise=50.0), seed=9)[0] - sensors.REST_COUNTS
     assert np.abs(np.corrcoef([rest, drift, noise])[np.triu_indices(3, 1)]).max() < 0.7
 
 
