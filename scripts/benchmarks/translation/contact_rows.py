@@ -100,9 +100,10 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
     peak, true, place, silent = (np.concatenate(values)[still] for values in columns.values())
     of = f"{still.sum()} contacts read without their signs"
     deep, place_mm = float(np.median(peak)), _median(place)
+    truth = float(np.median(true))
     return [
-        row("rectified_peak_um", deep, "um", RECTIFIED_PEAK * float(np.median(true)), of=f"{of}; baseline: the true depth",
-            null=float(np.median(true)), at_least=True),
+        row("rectified_peak_um", deep, "um", RECTIFIED_PEAK * truth, null=truth, of=f"{of}; baseline: the true depth",
+            at_least=True),
         row("rectified_place_mm", place_mm, "mm", RECTIFIED_PLACE, of=of),
         row("rectified_silent", float(silent.mean()), "1", RECTIFIED_SILENT, of=of),
     ]  # fmt: skip
