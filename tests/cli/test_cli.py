@@ -241,7 +241,6 @@ def test_info_may_be_cut_by_its_reader(slide_csv):
         (["pairs", "absent.toml", "--count", "4", "--out", "p.h5", "--seed", "-1"], "--seed"),
         (["simulate", "absent.toml", "--out", "r.h5"], "absent.toml"),
         (["simulate", "absent.toml", "--out", "r.h5", "--error", "50um"], "absent.toml"),
-        (["simulate", "absent.toml", "--out", "r.h5", "--core", "core.obj"], "--core"),
         (["simulate", "absent.toml", "--out", "r.h5", "--seed", "-1"], "--seed"),
         (["train", "absent.h5", "--out", "t", "--seed", "-1"], "--seed"),
         (["train", "absent.h5", "--out", "t", "--effort", "nan"], "--effort"),

@@ -50,8 +50,6 @@ CASES = {
     ("plan", "input"): ["plan {x.csv}", "plan {x.toml}", "plan {scenefolder}", "plan {meshscene}"],
     ("simulate", "scene"): ["simulate {x.toml} --out {out}", "simulate {scenefolder} --out {out}",
                             "simulate {meshscene} --out {out}", "simulate {meshscene} --out {out} --grid x_mm=1,2"],
-    ("simulate", "--isaac-like"): ["simulate {scene} --out {out} --isaac-like {x.tet}"],
-    ("simulate", "--core"): ["simulate {scene} --out {out} --isaac-like {tet} --core {x.obj}"],
     ("simulate", "--cluster"): ["simulate {scene} --out {out} --grid x_mm=-6,-5 --cluster {x.toml}"],
     ("pairs", "scene"): ["pairs {x.toml} --count 2 --out {out}", "pairs {meshscene} --count 2 --out {out}"],
     ("pairs", "--cluster"): ["pairs {scenes/training} --count 2 --out {out} --cluster {x.toml}"],
