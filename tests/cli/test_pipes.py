@@ -155,7 +155,7 @@ def test_a_pipe_is_refused(line, tmp_path, pipes, slide_csv, capsys, request):
     good = {
         "csv": slide_csv, "scene": lambda: root / "scenes/press", "out": lambda: tmp_path / "out",
         "recording": lambda: root / "scenes/press_roll_slide/press_roll_slide.h5",
-        "scenes/training": lambda: root / "scenes/training", "tet": lambda: tet(tmp_path / "good.tet"),
+        "scenes/training": lambda: root / "scenes/training",
     }  # fmt: skip
     words = []
     for word in line.split():
@@ -179,8 +179,3 @@ def test_a_pipe_is_refused(line, tmp_path, pipes, slide_csv, capsys, request):
     assert status == 2 and "Traceback" not in err, err
     if "--start" not in line and "{bag" not in line:
         assert "pipe" in err or "regular file" in err, err
-
-
-def tet(path):
-    path.write_text("v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nt 0 1 2 3\n")
-    return path
