@@ -29,7 +29,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "scen
 FENCED = re.compile(r"^```([\w{}-]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 TORCH = importlib.util.find_spec("torch") is not None
-SECONDS = 300  # for one command; most take one or two
+SECONDS = 900  # for one command; most take one or two
 MEASURES = "evaluate_translation.py"  # exits with 1 where a target is missed, as networks trained for a moment do
 
 # The same command on less: what a page says, what is run here.
