@@ -54,7 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def controls(seconds: float) -> dict[str, float]:
-    """What the gripper is told: N of each finger, m of the lift."""
+    """Return the gripper's commands at a time: N of each finger, m of the lift."""
     squeeze = np.interp(seconds, [0, 0.1, 0.5, 1.0, 1.9, 2.1], [1.0, 1.0, 1.5, 3.0, 3.0, -2.0])
     return {"close_left": squeeze, "close_right": squeeze, "lift": np.interp(seconds, [1.0, 1.6], [0.0, 0.05])}
 

@@ -15,15 +15,13 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..geometry.indenters import Box, Indenter, Ring
-from ..mechanics.electrodes.law import signal_of
 from ..mechanics.first_touch import surface_drop
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, pose_at
 from ..mechanics.solve import Solution, Step, solve, solve_path
 from ..mechanics.thickness import DEPTH_LIMIT, depth_at
-from .pair_sampling import beyond_digit, draw_place
-from .pairs_file import quantise
+from .pair_sampling import draw_place, pair_row
 from .scene import Scene
 
 REGION_X = -14e-3  # m: the region of the pad toward the tip, x below this, that a network may be kept from seeing
@@ -119,7 +117,7 @@ def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray
     lost = ""
     try:
         for slide, biotac, digit in _pairs(press, steps, scene.pairs.friction):
-            rows.append({**named, "slide": slide.astype(np.float32), **_row(biotac, digit)})
+            rows.append({**named, "slide": slide.astype(np.float32), **pair_row(biotac, digit)})
     except TactileError as error:
         lost = str(error)
     record = {"wanted": np.int32(len(steps)), "lost": np.str_(lost), "seconds": np.float64(time.process_time() - began)}
@@ -155,21 +153,3 @@ def _on_biotac(
     except TactileError as error:
         return found, error
     return found, None
-
-
-def _row(biotac: Solution, digit: Solution) -> dict[str, np.ndarray]:
-    return {
-        "displacement_biotac": quantise(biotac.displacement),
-        "displacement_digit": quantise(digit.displacement),
-        "signal": signal_of(biotac).astype(np.float32),
-        "gap": biotac.electrode_gaps.astype(np.float32),
-        "force": biotac.force.astype(np.float32),
-        "force_digit": digit.force.astype(np.float32),
-        "pressure": np.float32(biotac.pressure),
-        "depth_biotac": np.float32(biotac.depth),
-        "depth_digit": np.float32(digit.depth),
-        "contact_center": digit.centre.astype(np.float32),
-        "beyond_digit": beyond_digit(biotac.contact_patch),
-        "contact_patch_biotac": biotac.contact_patch,
-        "contact_patch_digit": digit.contact_patch,
-    }

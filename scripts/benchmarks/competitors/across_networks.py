@@ -84,7 +84,7 @@ class Apply(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[None, None, Tensor]:
-        """Of x alone."""
+        """Return the gradient of x alone: the matrix is constant."""
         return None, None, ctx.turned @ gradient.contiguous()
 
 

@@ -166,7 +166,7 @@ def error_rows(model: Across, pairs: Pairs, scales: list[float]) -> list[Row]:
 def error_columns(
     model: Across, pairs: Pairs, rows: np.ndarray, change: Tensor, skin_scale: float, gel_scale: float
 ) -> dict[str, np.ndarray]:
-    """As `step_errors.translation_figures` has them."""
+    """Compute the columns of `step_errors.translation_figures` for these networks."""
     skin, gel = (true_displacement(pairs, sensor, rows) for sensor in SENSORS)
     with torch.no_grad():
         mesh = model.MVB.posterior(torch.from_numpy(skin / np.float32(skin_scale)))[0]

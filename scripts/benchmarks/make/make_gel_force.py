@@ -1,4 +1,4 @@
-"""Make tactile_core/data/gel_force.npy: the force that a DIGIT's gel carries, linear in its displacement.
+"""Make scripts/benchmarks/translation/gel_force.npy: the force that a DIGIT's gel carries, linear in its displacement.
 
     python scripts/benchmarks/make/make_gel_force.py pairs.h5      of the file that the shipped weights are trained on
 
@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import io
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # `benchmarks` is no package that is installed
+
+from benchmarks.translation.gel_force import TABLE
 from tactile_core import accuracy
 from tactile_core.files import atomic
-from tactile_core.files.shipped import shipped
 from tactile_core.simulation.pairs_file import Pairs, read_pairs, split_presses
-from tactile_core.translation.gel_force import TABLE
 
 EVERY = 7  # of the training contacts: 6,000 of 50,000
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)  # of the mean square of a contact's displacements
@@ -45,7 +47,7 @@ def main(arguments: list[str]) -> int:
     best = min(RIDGES, key=lambda ridge: _error(other @ fits[ridge], true))
     content = io.BytesIO()
     np.save(content, fits[best])
-    atomic.write_bytes(shipped(TABLE), content.getvalue())
+    atomic.write_bytes(TABLE, content.getvalue())
     return 0
 
 

@@ -16,9 +16,10 @@ from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, parts, true_displacement
 from tactile_core.translation.contact_frame import on_skin
 from tactile_core.translation.contact_track import LEAST_FORCE
-from tactile_core.translation.gel_force import carried_force
 from tactile_core.translation.network_sizes import PLACE
 from tactile_core.translation.networks import FORCE_SCALE, Networks, Posterior
+
+from .gel_force import carried_force
 
 # Targets of each frame alone (docs/sources.md, Targets):
 # depths on the BioTac, mm -> largest median (least for the overlap).
@@ -55,7 +56,7 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
 
 
 def gel_force_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row]:
-    """How far the force that a translated gel carries is off the translated force, beside the same of true gels.
+    """Errors of the force that a translated gel carries against the translated force, beside the same of true gels.
 
     The second is the ceiling of the functional (``gel_force``). Over contacts that press without sliding from 0.3 mm.
     """

@@ -152,7 +152,7 @@ def _test(options: argparse.Namespace, photographs: Photographs) -> int:
 
 
 def _pictures(preset: str) -> Callable[[Calibration], BallPictures]:
-    """What draws balls' pictures by a preset; raises TactileError where LLVM is needed and does not work."""
+    """Return the function that draws balls' pictures by a preset; raises TactileError where LLVM is missing."""
     from ...pictures.calibrate.ball_pictures import FastPictures
     from ...pictures.calibrate.fit import finishing_trouble
     from ...pictures.calibrate.mitsuba_pictures import MitsubaPictures

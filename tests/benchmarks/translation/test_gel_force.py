@@ -4,13 +4,13 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from benchmarks.translation.gel_force import carried_force
 
 from tactile_core import accuracy, sensors
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training.step_errors import true_displacement
-from tactile_core.translation.gel_force import carried_force
 
-CONTACTS = Path(__file__).resolve().parents[2] / "scenes" / "training" / "test_contacts.h5"
+CONTACTS = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_contacts.h5"
 
 
 def test_it_is_linear_and_zero_at_rest():

@@ -9,18 +9,17 @@ finite strain is its ceiling (docs/translation.md).
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 
 import numpy as np
 
-from ..files.shipped import shipped
-
-TABLE = "gel_force.npy"
+TABLE = Path(__file__).with_suffix(".npy")
 
 
 @functools.cache
 def functional() -> np.ndarray:
     """Forces (3 M, 3) float32 N by a metre's displacement of each coordinate of the DIGIT's M nodes."""
-    return np.load(shipped(TABLE), allow_pickle=False).astype(np.float32)
+    return np.load(TABLE, allow_pickle=False).astype(np.float32)
 
 
 def carried_force(displacement: np.ndarray) -> np.ndarray:
