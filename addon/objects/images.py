@@ -50,5 +50,6 @@ def pack() -> None:
     """Pack picture and height map, so that a saved file holds them as they are."""
     for name in (PICTURE, HEIGHTS):
         image = bpy.data.images.get(name)
-        if image is not None:
+        # Blender 5.0 empties an image that is packed again without a change.
+        if image is not None and (image.packed_file is None or image.is_dirty):
             image.pack()
