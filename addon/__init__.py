@@ -14,13 +14,14 @@ from .operators import (
     translate_recording,
 )
 from .process import command_line
-from .ui import add_menu, panels, preferences, properties, render_settings
+from .ui import add_menu, asset_library, panels, preferences, properties, render_settings
 
 # In the order of registration: properties before what uses them.
 PARTS = (
     properties,
     render_settings,
     preferences,
+    asset_library,
     import_recording,
     translate_recording,
     set_style,

@@ -9,7 +9,7 @@ from ...tactile_core import sensors
 from ...tactile_core.geometry.lattice import grid_faces
 from ...tactile_core.sensors import biotac
 from ..ui import properties
-from . import axes, surfaces
+from . import axes, styles, surfaces
 
 SKIN_COLOUR = (0.25, 0.55, 0.45, 0.35)  # see-through, so that core and electrodes show
 CORE_COLOUR = (0.08, 0.08, 0.1, 1.0)
@@ -31,6 +31,7 @@ def add_skin(group: bpy.types.Collection, per_metre: float, name: str = "BioTac 
     properties.set_up(skin, "BIOTAC", per_metre)
     group.objects.link(skin)
     surfaces.paint(skin, SKIN_COLOUR)
+    styles.get_ready(skin)
     return skin
 
 

@@ -45,3 +45,13 @@ def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.
     """Write one F-curve a column of ``values`` (T, k)."""
     for index in range(values.shape[1]):
         write_curve(owner, path, frames, values[:, index], index)
+
+
+def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
+    """The keyed values (T,) of one F-curve, none where there is none."""
+    curve = fcurves_of(owner).find(path, index=index)
+    if curve is None:
+        return np.zeros(0)
+    points = np.empty(2 * len(curve.keyframe_points), np.float32)
+    curve.keyframe_points.foreach_get("co", points)
+    return points[1::2]

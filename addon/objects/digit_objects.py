@@ -8,8 +8,8 @@ import numpy as np
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ..ui import properties
-from . import axes, surfaces
-from .styles import DISPLACEMENT
+from . import axes, styles, surfaces
+from .style_nodes import DISPLACEMENT
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
 BESIDE = 7.1e-3 + 23e-3 + 5e-3  # m: half widths of BioTac (docs/sources.md) and of a housing round the LEDs, a gap
@@ -22,6 +22,7 @@ def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Obj
     properties.set_up(gel, "DIGIT", per_metre)
     group.objects.link(gel)
     surfaces.paint(gel, GEL_COLOUR)
+    styles.get_ready(gel)
     if beside is not None:
         gel.location = beside.location
         gel.location.y += BESIDE * per_metre

@@ -7,8 +7,9 @@ import numpy as np
 
 from ...tactile_core import sensors
 from ..ui import properties
-from . import axes, curves, surfaces
+from . import axes, curves, frame_attribute, surfaces
 
+NEAREST, DISTANCE = "electrode", "electrode_distance"  # of the skin's nodes: which, from 0, and how far, m
 _RADIUS = 0.45e-3  # m, of a marker: electrodes themselves are smaller, and hard to see
 _REST = np.array([0.85, 0.85, 0.85])
 _HIGH, _LOW = np.array([0.9, 0.05, 0.02]), np.array([0.02, 0.15, 0.9])  # film thinner, film thicker
@@ -35,6 +36,20 @@ def add_markers(
         curves.write_curves(marker, "color", frames, colours[:, k])
         markers.append(marker)
     return markers
+
+
+def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> None:
+    """Let the skin's nodes know the change (T, 19), counts, of the electrode that is nearest to each."""
+    rest = sensors.biotac_surface().rest
+    # An electrode shows where the skin is nearest to it.
+    over = rest[np.linalg.norm(rest[:, None] - sensors.electrodes(), axis=-1).argmin(0)]
+    distance = np.linalg.norm(rest[:, None] - over, axis=-1)
+    for name, kind, values in ((NEAREST, "INT", distance.argmin(1).astype(np.int32)),
+                               (DISTANCE, "FLOAT", distance.min(1).astype(np.float32))):  # fmt: skip
+        known = skin.data.attributes.get(name) or skin.data.attributes.new(name, kind, "POINT")
+        known.data.foreach_set("value", values)
+    step = frames[1] - frames[0] if len(frames) > 1 else 1.0
+    frame_attribute.add(skin, frame_attribute.COUNTS, change.astype(np.float32), frames[0], step, NEAREST)
 
 
 def colours_of(change: np.ndarray) -> np.ndarray:

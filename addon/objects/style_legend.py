@@ -1,61 +1,83 @@
-"""The legend of a displacement style: a colour bar with its range, and a scale bar."""
+"""The legend of a style: a colour bar with its range, and a scale bar, upright before the sensor."""
 
 from __future__ import annotations
+
+import math
 
 import bpy
 import numpy as np
 
 from ..ui import properties
-from . import styles, surfaces
+from . import style_nodes, styles, surfaces
 
-_BEFORE = 8  # mm in front of the sensor
+_BEFORE = 6.0  # mm in front of the sensor
+_LONG, _HIGH, _LETTERS = 14.0, 1.6, 2.4  # mm
+_TILT = math.radians(50)  # toward a viewer who looks down on the sensor
 _INK = (0.95, 0.95, 0.95, 1.0)
 
 
-def add_legend(thing: bpy.types.Object, largest: float, shown: bool = True) -> None:
-    """A colour bar with its range, and a scale bar of 5 mm, in front of a sensor; one that is there is replaced."""
-    for part in [each for each in thing.children if each.tactile.role == "LEGEND"]:
-        bpy.data.objects.remove(part)
-    if not shown:
-        return
-    per_mm = thing.tactile.per_metre * 1e-3
+def remove_legend(thing: bpy.types.Object) -> None:
+    """Remove a sensor's legend; its arrow stays."""
+    arrow = styles.arrow_of(thing)
+    for part in [each for each in thing.children if each.tactile.role == "LEGEND" and each != arrow]:
+        for piece in (*part.children, part):
+            bpy.data.objects.remove(piece)
+
+
+def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str, str] | None) -> None:
+    """A colour bar, and a scale bar of 5 mm, in front of a sensor; one that is there is replaced.
+
+    title : what the colours say; ends : what stands at the bar's ends, None where there is no bar
+    """
+    remove_legend(thing)
     corners = np.array(thing.bound_box)
-    low, high = corners.min(0), corners.max(0)
-    left, front, top = float(low[0]), float(low[1]) - _BEFORE * per_mm, float(high[2])
-    steps = np.linspace(0, 1, 33)
-    corners = np.array([[left + 12 * per_mm * s, front - w * per_mm, top] for s in steps for w in (0, 1.2)])
-    index = np.arange(32)[:, None] * 2
-    faces = np.concatenate([index + np.array(corner) for corner in ((0, 1, 3), (0, 3, 2))])
-    bar = _legend_part(thing, "Displacement legend", surfaces.new_mesh_object("legend", corners, faces, False).data)
-    styles.make_colour_active(bar.data)
-    places, colours = np.array([p for p, _ in styles.RAMP]), np.array([c for _, c in styles.RAMP])
+    frame = bpy.data.objects.new(f"{thing.name} legend", None)
+    _own(thing, frame, thing)
+    unit = thing.tactile.per_metre * 1e-3
+    frame.location = (corners[:, 0].min(), corners[:, 1].min() - _BEFORE * unit, corners[:, 2].max())
+    frame.rotation_euler, frame.scale, frame.empty_display_size = (_TILT, 0, 0), (unit, unit, unit), 0.01
+    _write(thing, frame, title, (0.0, _HIGH + 0.7))
+    start = 0.0
+    if ends is not None:
+        _bar(thing, frame, style)
+        _write(thing, frame, ends[0], (0.0, -2.6))
+        _write(thing, frame, ends[1], (_LONG, -2.6), "RIGHT")
+        start = _LONG + 3
+    ruler = np.array([[start, 0.0, 0], [start + 5, 0.0, 0], [start + 5, 0.4, 0], [start, 0.4, 0]])
+    _mesh(thing, frame, "Scale bar", ruler, np.array([[0, 1, 2], [0, 2, 3]]), np.tile(_INK, (4, 1)))
+    _write(thing, frame, "5 mm", (start, -2.6))
+
+
+def _bar(thing: bpy.types.Object, frame: bpy.types.Object, style: str) -> None:
+    steps = np.linspace(0, 1, 65)
+    corners = np.array([[_LONG * s, w, 0] for s in steps for w in (0, _HIGH)])
+    index = np.arange(64)[:, None] * 2
+    faces = np.concatenate([index + np.array(corner) for corner in ((0, 3, 1), (0, 2, 3))])
+    places, colours = (np.array(each) for each in zip(*style_nodes.RAMPS[style], strict=True))
     shades = np.column_stack([np.interp(np.repeat(steps, 2), places, colours[:, k]) for k in range(3)])
-    values = np.column_stack([shades, np.ones(len(shades))]).astype(np.float32)
-    bar.data.color_attributes[styles.COLOUR].data.foreach_set("color", values.ravel())
-    bar.data.materials.append(styles.material())
-    for text, along in (("0", 0.0), (f"{largest / per_mm:.2g} mm", 11.0)):
-        _write(thing, text, (left + along * per_mm, front - 3.2 * per_mm, top), per_mm)
-    start = left + 18 * per_mm
-    ruler = np.array(
-        [[start + x * per_mm, front - y * per_mm, top] for x, y in ((0, 0.9), (5, 0.9), (5, 1.2), (0, 1.2))]
-    )
-    _legend_part(
-        thing, "Scale bar", surfaces.new_mesh_object("bar", ruler, np.array([[0, 2, 1], [0, 3, 2]]), False).data
-    )
-    _write(thing, "5 mm", (start, front - 3.2 * per_mm, top), per_mm)
+    _mesh(thing, frame, "Colour bar", corners, faces, np.column_stack([shades, np.ones(len(shades))]))
 
 
-def _legend_part(thing: bpy.types.Object, name: str, data: bpy.types.ID) -> bpy.types.Object:
-    part = bpy.data.objects.new(name, data)
+def _mesh(thing, frame, name: str, corners: np.ndarray, faces: np.ndarray, colours: np.ndarray) -> None:  # noqa: ANN001
+    part = surfaces.new_mesh_object(name, corners, faces, smooth=False)
+    _own(thing, part, frame)
+    styles.make_colour_active(part.data)
+    part.data.color_attributes[style_nodes.COLOUR].data.foreach_set("color", colours.astype(np.float32).ravel())
+    part.data.materials.append(style_nodes.legend_material())
+
+
+def _own(thing: bpy.types.Object, part: bpy.types.Object, parent: bpy.types.Object) -> None:
     properties.set_up(part, "LEGEND", thing.tactile.per_metre)
     thing.users_collection[0].objects.link(part)
-    part.parent, part.hide_select, part.color = thing, True, _INK
-    return part
+    part.parent, part.hide_select, part.color = parent, True, _INK
 
 
-def _write(thing: bpy.types.Object, text: str, place: tuple[float, float, float], per_mm: float) -> None:
+def _write(
+    thing: bpy.types.Object, frame: bpy.types.Object, text: str, place: tuple[float, float], align: str = "LEFT"
+) -> None:
     letters = bpy.data.curves.new("legend", "FONT")
-    letters.body, letters.size = text, 1.8 * per_mm
-    # Moved within its plane: an origin over the sensor's own draws no dashed line across the view.
-    letters.offset_x, letters.offset_y = place[0], place[1]
-    _legend_part(thing, f"Legend {text}", letters).location.z = place[2]
+    letters.body, letters.size, letters.align_x = text, _LETTERS, align
+    letters.materials.append(style_nodes.ink())
+    part = bpy.data.objects.new(f"Legend {text}", letters)
+    _own(thing, part, frame)
+    part.location = (*place, 0.0)

@@ -1,145 +1,87 @@
-"""Styles of a sensor's surface: geometry nodes that colour it by displacement or contact, in Solid views too.
-
-The node groups play without the add-on: the rest is Blender's own attribute ``rest_position``. They leave
-``displacement`` (a vector, in the object's units) and ``Tactile colour`` on the mesh.
-"""
+"""Styles of a sensor's surface: geometry nodes that colour it, in Solid views too; and an arrow for its force."""
 
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
-from . import patch_nodes
+from ..ui import properties
+from . import style_nodes
 
-COLOUR, DISPLACEMENT = "Tactile colour", "displacement"
-MODIFIER = "Tactile style"
-RAMP = ((0.0, (0.50, 0.50, 0.53)), (0.05, (0.10, 0.15, 0.45)), (0.35, (0.0, 0.45, 0.55)),
-         (0.65, (0.35, 0.72, 0.25)), (1.0, (0.98, 0.85, 0.10)))  # fmt: skip
-_TOUCHED, _FREE = (0.95, 0.35, 0.05, 1.0), (0.50, 0.50, 0.53, 1.0)
+MODIFIER, ARROW = "Tactile style", "Force arrow"
 STYLES = (
     ("DISPLACEMENT", "Displacement", "Colour by how far each place has moved"),
     ("CONTACT_PATCH", "Contact Patch", "Colour what is touched; of a DIGIT's gel"),
+    ("ELECTRODES", "Electrodes", "Colour round each electrode by how far its reading has changed; of a BioTac's skin"),
     ("NONE", "Material", "Show the surface's own material"),
 )
+_ONLY = {"CONTACT_PATCH": "DIGIT", "ELECTRODES": "BIOTAC"}  # style -> the one role that has it
+
+
+def can_show(thing: bpy.types.Object, style: str) -> bool:
+    """Return true where a sensor has what a style shows."""
+    return _ONLY.get(style, thing.tactile.role) == thing.tactile.role
+
+
+def get_ready(thing: bpy.types.Object) -> None:
+    """Let a sensor take any style, from the asset library too: its rest is kept, and Solid views have a colour."""
+    thing.add_rest_position_attribute = True
+    make_colour_active(thing.data)
 
 
 def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration: float) -> None:
     """Give a sensor one style in place of another.
 
-    largest : the object's units, at the colours' upper end; exaggeration : how many times the dent is drawn
+    largest : the object's units or counts, at the colours' upper end; exaggeration : how many times the dent is drawn
     """
     old = thing.modifiers.get(MODIFIER)
     if old is not None:
-        group = old.node_group
         thing.modifiers.remove(old)
-        if group is not None and group.users == 0:
-            bpy.data.node_groups.remove(group)
     if style == "NONE":
         return
-    thing.add_rest_position_attribute = True
-    make_colour_active(thing.data)
-    modifier = thing.modifiers.new(MODIFIER, "NODES")
-    modifier.node_group = _group(style, largest, exaggeration)
+    get_ready(thing)
+    _add_nodes(thing, style, {style_nodes.LARGEST: largest, style_nodes.EXAGGERATION: exaggeration})
+
+
+def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
+    """An arrow, child of a sensor, that follows its custom property ``force``; works without the add-on.
+
+    length : of 1 N, in the object's units
+    """
+    get_ready(sensor)
+    arrow = bpy.data.objects.new(f"{sensor.name} force", bpy.data.meshes.new(ARROW))
+    properties.set_up(arrow, "LEGEND", sensor.tactile.per_metre)
+    sensor.users_collection[0].objects.link(arrow)
+    arrow.parent, arrow.hide_select = sensor, True
+    make_colour_active(arrow.data)
+    modifier = _add_nodes(arrow, "FORCE_ARROW", {style_nodes.SENSOR: sensor, style_nodes.LENGTH: length})
+    key = style_nodes.input_of(modifier.node_group, style_nodes.FORCE)
+    for axis in range(3):
+        driver = arrow.driver_add(f'modifiers["{MODIFIER}"]["{key}"]', axis).driver
+        driver.type = "SUM"
+        variable = driver.variables.new()
+        variable.targets[0].id, variable.targets[0].data_path = sensor, f'["force"][{axis}]'
+    return arrow
+
+
+def arrow_of(sensor: bpy.types.Object) -> bpy.types.Object | None:
+    """The arrow of a sensor, if any."""
+    known = (thing for thing in sensor.children if MODIFIER in thing.modifiers and thing.tactile.role == "LEGEND")
+    return next(known, None)
 
 
 def make_colour_active(mesh: bpy.types.Mesh) -> None:
     """Let Solid views colour by the attribute that the nodes write: they show the mesh's active one of that name."""
-    if COLOUR not in mesh.color_attributes:
-        mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "POINT")
-    mesh.color_attributes.active_color = mesh.color_attributes[COLOUR]
+    if style_nodes.COLOUR not in mesh.color_attributes:
+        made = mesh.color_attributes.new(style_nodes.COLOUR, "FLOAT_COLOR", "POINT")
+        grey = np.tile(np.array([*style_nodes.STILL, 1.0], np.float32), len(mesh.vertices))
+        made.data.foreach_set("color", grey)
+    mesh.color_attributes.active_color = mesh.color_attributes[style_nodes.COLOUR]
 
 
-class _Nodes:
-    """A geometry-node group under construction."""
-
-    def __init__(self, name: str) -> None:
-        self.tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
-        self.tree.is_modifier = True
-        for way in ("INPUT", "OUTPUT"):
-            self.tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-
-    def add(self, kind: str, *links: object, **settings: object) -> bpy.types.Node:
-        """A node; links : sockets or values of its enabled inputs, in order, None for those left alone."""
-        node = self.tree.nodes.new(kind)
-        for name, value in settings.items():
-            setattr(node, name, value)
-        for socket, value in zip([s for s in node.inputs if s.enabled], links, strict=False):
-            if isinstance(value, bpy.types.NodeSocket):
-                self.tree.links.new(value, socket)
-            elif value is not None:
-                socket.default_value = value
-        node.location = (190 * (len(self.tree.nodes) % 6), -220 * (len(self.tree.nodes) // 6))
-        return node
-
-    def number(self, name: str, value: float, least: float, most: float, text: str) -> bpy.types.NodeSocket:
-        """An input of the group that users change in the modifier."""
-        item = self.tree.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
-        item.default_value, item.min_value, item.max_value, item.description = value, least, most, text
-        return item
-
-
-def _group(style: str, largest: float, exaggeration: float) -> bpy.types.NodeTree:
-    nodes = _Nodes(f"Tactile {style.replace('_', ' ').title()}")
-    nodes.number("Largest", largest, 1e-6, 1e6, "Displacement at the colours' upper end, in the object's units")
-    nodes.number(
-        "Exaggeration", exaggeration, 0.0, 100.0, "How many times the dent is drawn; pictures keep the true one"
-    )
-    given = nodes.tree.nodes.new("NodeGroupInput")
-    rest = nodes.add("GeometryNodeInputNamedAttribute", "rest_position", data_type="FLOAT_VECTOR")
-    rest = next(s for s in rest.outputs if s.enabled and s.name == "Attribute")
-    moved = nodes.add(
-        "ShaderNodeVectorMath", nodes.add("GeometryNodeInputPosition").outputs[0], rest, operation="SUBTRACT"
-    )
-    kept = nodes.add(
-        "GeometryNodeStoreNamedAttribute", given.outputs["Geometry"], None, DISPLACEMENT, moved.outputs[0],
-        data_type="FLOAT_VECTOR", domain="POINT",
-    )  # fmt: skip
-    again = nodes.add("GeometryNodeInputNamedAttribute", DISPLACEMENT, data_type="FLOAT_VECTOR")
-    again = next(s for s in again.outputs if s.enabled and s.name == "Attribute")
-    if style == "DISPLACEMENT":
-        length = nodes.add("ShaderNodeVectorMath", again, operation="LENGTH").outputs["Value"]
-        share = nodes.add("ShaderNodeMath", length, given.outputs["Largest"], operation="DIVIDE").outputs[0]
-    else:
-        patch = nodes.add("GeometryNodeInputNamedAttribute", patch_nodes.ATTRIBUTE, data_type="FLOAT")
-        share = next(s for s in patch.outputs if s.enabled and s.name == "Attribute")
-    ramp = nodes.add("ShaderNodeValToRGB", share)
-    _colour(ramp.color_ramp, style)
-    shown = nodes.add(
-        "GeometryNodeStoreNamedAttribute", kept.outputs[0], None, COLOUR, ramp.outputs["Color"],
-        data_type="FLOAT_COLOR", domain="POINT",
-    )  # fmt: skip
-    more = nodes.add("ShaderNodeMath", given.outputs["Exaggeration"], 1.0, operation="SUBTRACT").outputs[0]
-    extra = nodes.add("ShaderNodeVectorMath", again, operation="SCALE")
-    nodes.tree.links.new(more, extra.inputs["Scale"])
-    placed = nodes.add("GeometryNodeSetPosition", shown.outputs[0])
-    nodes.tree.links.new(extra.outputs[0], placed.inputs["Offset"])
-    painted = nodes.add("GeometryNodeSetMaterial", placed.outputs[0])
-    painted.inputs["Material"].default_value = material()
-    nodes.tree.links.new(painted.outputs[0], nodes.tree.nodes.new("NodeGroupOutput").inputs[0])
-    return nodes.tree
-
-
-def _colour(ramp: bpy.types.ColorRamp, style: str) -> None:
-    if style == "CONTACT_PATCH":
-        ramp.interpolation = "CONSTANT"
-        ramp.elements[0].color, ramp.elements[1].color, ramp.elements[1].position = _FREE, _TOUCHED, 0.5
-        return
-    for place, colour in RAMP[1:-1]:
-        ramp.elements.new(place).color = (*colour, 1.0)
-    ramp.elements[0].color, ramp.elements[-1].color = (*RAMP[0][1], 1.0), (*RAMP[-1][1], 1.0)
-
-
-def material() -> bpy.types.Material:
-    """A material of the attribute ``Tactile colour``."""
-    found = bpy.data.materials.get(MODIFIER)
-    if found is not None:
-        return found
-    made = bpy.data.materials.new(MODIFIER)
-    if made.node_tree is None:
-        made.use_nodes = True
-    nodes = made.node_tree.nodes
-    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
-    colour = nodes.new("ShaderNodeVertexColor")
-    colour.layer_name = COLOUR
-    made.node_tree.links.new(colour.outputs["Color"], shader.inputs["Base Color"])
-    shader.inputs["Roughness"].default_value = 0.5
-    return made
+def _add_nodes(thing: bpy.types.Object, style: str, values: dict[str, object]) -> bpy.types.NodesModifier:
+    modifier = thing.modifiers.new(MODIFIER, "NODES")
+    modifier.node_group = style_nodes.group(style)
+    for name, value in values.items():
+        modifier[style_nodes.input_of(modifier.node_group, name)] = value
+    return modifier

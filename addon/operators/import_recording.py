@@ -107,6 +107,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         about.polarity = self.polarity
         biotac_objects.add_core(group, skin)
         electrode_markers.add_markers(skin, group, found.signals.change, frames)
+        electrode_markers.add_counts(skin, found.signals.change, frames)
         custom_properties.write(skin, custom_properties.columns(found), frames)
         return skin
 

@@ -1,13 +1,21 @@
-"""Choose how the sensors' surfaces are coloured: by displacement, by contact, or by their own material."""
+"""Choose how the sensors' surfaces are coloured, and whether their force is shown as an arrow."""
 
 import bpy
+import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ..objects import style_legend, styles
+from ..objects import curves, frame_attribute, style_legend, styles
 from ..ui import view
 from ..ui.reports import TactileOperator
 
 _ROLES = ("BIOTAC", "DIGIT")
+
+
+def _sensors(context: bpy.types.Context) -> list[bpy.types.Object]:
+    found = [thing for thing in context.scene.objects if thing.tactile.role in _ROLES]
+    if not found:
+        raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
+    return found
 
 
 class TACTILE_OT_set_style(TactileOperator):
@@ -21,22 +29,64 @@ class TACTILE_OT_set_style(TactileOperator):
         name="Exaggeration", description="How many times the dent is drawn", default=1.0, min=0.0, soft_max=10
     )
     largest: bpy.props.FloatProperty(
-        name="Largest", description="Displacement at the colours' upper end, mm; 0 takes the largest of each sensor",
-        default=0.0, min=0.0,
+        name="Largest", description="At the colours' upper end: mm, or counts of the electrodes; 0 takes the largest of"
+        " each sensor", default=0.0, min=0.0,
     )  # fmt: skip
 
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
-        sensors = [thing for thing in context.scene.objects if thing.tactile.role in _ROLES]
-        if not sensors:
-            raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
+        sensors = _sensors(context)
+        if self.style == "ELECTRODES" and not any(map(_counts, sensors)):
+            raise TactileError("Tactile", "no electrodes' readings", "an imported recording", "Import it (again)")
         for thing in sensors:
-            per_metre = thing.tactile.per_metre
-            largest = (1e-3 * self.largest or thing.tactile.largest or 1e-3) * per_metre
-            patch = self.style == "CONTACT_PATCH" and thing.tactile.role != "DIGIT"
-            styles.set_style(thing, "NONE" if patch else self.style, largest, self.exaggeration)
-            style_legend.add_legend(thing, largest, shown=self.style == "DISPLACEMENT")
+            self._give(thing)
         view.colour_by(context, "OBJECT" if self.style == "NONE" else "VERTEX")
 
+    def _give(self, thing: bpy.types.Object) -> None:
+        style = self.style if styles.can_show(thing, self.style) else "NONE"
+        unit = thing.tactile.per_metre * 1e-3
+        if style == "ELECTRODES":
+            largest = self.largest or _counts(thing) or 1.0
+            legend = ("change, counts", (f"-{largest:.0f}", f"+{largest:.0f}"))
+        else:
+            largest = (self.largest or 1e3 * thing.tactile.largest or 1.0) * unit
+            legend = ("displacement, mm", ("0", f"{largest / unit:.2g}"))
+        styles.set_style(thing, style, largest, self.exaggeration)
+        if style in ("DISPLACEMENT", "ELECTRODES"):
+            style_legend.add_legend(thing, style, *legend)
+        elif style == "CONTACT_PATCH":
+            style_legend.add_legend(thing, style, "orange: in contact", None)
+        else:
+            style_legend.remove_legend(thing)
 
-register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_set_style,))
+
+def _counts(thing: bpy.types.Object) -> float:
+    """Largest change of a recording's electrodes, counts; 0 where there is none, or a file of a former version."""
+    if frame_attribute.modifier_of(thing, frame_attribute.COUNTS) is None:
+        return 0.0
+    return max(float(np.abs(curves.values_of(thing, '["electrodes"]', k)).max(initial=0.0)) for k in range(19))
+
+
+class TACTILE_OT_force_arrow(TactileOperator):
+    """Show the force on each sensor as an arrow whose head stands in the dent; press again to remove it"""
+
+    bl_idname = "tactile.force_arrow"
+    bl_label = "Force Arrow"
+
+    length: bpy.props.FloatProperty(
+        name="Length a Newton", description="Length of an arrow of 1 N, mm", default=8.0, min=0.1, soft_max=50
+    )
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        sensors = [thing for thing in _sensors(context) if "force" in thing]
+        if not sensors:
+            raise TactileError("Tactile", "no force", "a recording or a simulation", "Import, translate or simulate")
+        there = [arrow for arrow in map(styles.arrow_of, sensors) if arrow is not None]
+        for arrow in there:
+            bpy.data.objects.remove(arrow)
+        for thing in sensors if not there else ():
+            styles.add_arrow(thing, self.length * thing.tactile.per_metre * 1e-3)
+
+
+register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_set_style, TACTILE_OT_force_arrow))

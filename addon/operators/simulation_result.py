@@ -11,7 +11,7 @@ import numpy as np
 
 from ...tactile_core import sensors
 from ...tactile_core.translation import contact_patch
-from ..objects import axes, curves, custom_properties, motion, patch_nodes
+from ..objects import axes, curves, custom_properties, frame_attribute, motion
 from ..ui import properties
 from . import pictures
 
@@ -65,7 +65,8 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
         sentences.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
         custom_properties.write(sensor, {"force": force}, frames)
         if role == "DIGIT":
-            patch_nodes.add_patch(sensor, contact_patch.contact_patch(moved[sample], surface), frames[0], 1.0)
+            patch = contact_patch.contact_patch(moved[sample], surface)
+            frame_attribute.add(sensor, frame_attribute.PATCH, patch, frames[0], 1.0)
             pictures.update(sensor, context.evaluated_depsgraph_get())
     if thing.tactile.press_by == "HEIGHT":
         curves.write_curve(thing, "tactile.force", frames, np.linalg.norm(force, axis=1))

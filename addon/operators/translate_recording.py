@@ -4,7 +4,7 @@ import bpy
 
 from ...tactile_core import sensors
 from ...tactile_core.translation import contact_patch
-from ..objects import custom_properties, digit_body, digit_objects, motion, patch_nodes
+from ..objects import custom_properties, digit_body, digit_objects, frame_attribute, motion
 from ..ui import properties, render_settings, timeline, view
 from ..ui.progress import shown
 from ..ui.reports import TactileOperator
@@ -43,7 +43,8 @@ class TACTILE_OT_translate(TactileOperator):
         surface, moved = sensors.digit_surface(), found.translation.displacement_digit
         summary = motion.animate(gel, surface.rest, moved, frames, about.motion)
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0
-        patch_nodes.add_patch(gel, contact_patch.contact_patch(moved, surface), frames[0], step)
+        patch = contact_patch.contact_patch(moved, surface)
+        frame_attribute.add(gel, frame_attribute.PATCH, patch, frames[0], step)
         values = custom_properties.columns(found)
         told_of_gel = {"expected_error_um": 1e6 * found.translation.expected_error_digit}
         told_of_gel |= {name: values[name] for name in ("force", "confidence")}

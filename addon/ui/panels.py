@@ -38,7 +38,9 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
             box.prop(skin.tactile, "tare")
             box.prop(skin.tactile, "polarity")
         layout.operator(TACTILE_OT_translate.bl_idname, icon="MOD_MESHDEFORM")
-        layout.operator_menu_enum("tactile.set_style", "style", icon="COLOR")
+        row = layout.row(align=True)
+        row.operator_menu_enum("tactile.set_style", "style", icon="COLOR")
+        row.operator("tactile.force_arrow", text="", icon="EMPTY_SINGLE_ARROW")
         _numbers(layout, skin)
 
 

@@ -1,0 +1,253 @@
+"""The geometry-node groups of the styles. They play without the add-on, and are what the asset library holds.
+
+Each colours the points of a mesh by the attribute ``Tactile colour``, which its material and Solid views show. They
+read Blender's own attribute ``rest_position`` and those of ``frame_attribute`` and ``electrode_markers``, and leave
+``displacement`` (a vector, in the object's units).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+from . import electrode_markers, frame_attribute
+
+COLOUR, DISPLACEMENT = "Tactile colour", "displacement"
+MATERIAL, LEGEND, INK = "Tactile style", "Tactile legend", "Tactile ink"
+LARGEST, EXAGGERATION, SENSOR, FORCE, LENGTH = "Largest", "Exaggeration", "Sensor", "Force", "Length a Newton"
+STILL = (0.50, 0.50, 0.53)
+RAMPS = {
+    "DISPLACEMENT": ((0.0, STILL), (0.05, (0.10, 0.15, 0.45)), (0.35, (0.0, 0.45, 0.55)), (0.65, (0.35, 0.72, 0.25)),
+                     (1.0, (0.98, 0.85, 0.10))),
+    "CONTACT_PATCH": ((0.0, STILL), (0.5, (0.95, 0.35, 0.05))),
+    "ELECTRODES": ((0.0, (0.02, 0.10, 0.75)), (0.25, (0.25, 0.50, 0.90)), (0.5, (0.85, 0.85, 0.85)),
+                   (0.75, (0.95, 0.45, 0.25)), (1.0, (0.70, 0.02, 0.05))),
+}  # fmt: skip
+ARROW = (0.95, 0.15, 0.55)
+NAMES = {"DISPLACEMENT": "Tactile Displacement", "CONTACT_PATCH": "Tactile Contact Patch",
+         "ELECTRODES": "Tactile Electrodes", "FORCE_ARROW": "Tactile Force Arrow"}  # fmt: skip
+_EDGE = (1.3e-3, 1.7e-3)  # m from an electrode, where its colour begins and ends to fade
+
+
+def group(style: str) -> bpy.types.NodeTree:
+    """The node group of a style, made where the file lacks it."""
+    found = bpy.data.node_groups.get(NAMES[style])
+    return found if found is not None else _BUILD[style](style)
+
+
+def input_of(tree: bpy.types.NodeTree, name: str) -> str:
+    """Key by which a modifier holds the value of a group's input."""
+    return next(item.identifier for item in tree.interface.items_tree if item.name == name and item.in_out == "INPUT")
+
+
+def material() -> bpy.types.Material:
+    """A material of the attribute ``Tactile colour``."""
+    return _material(MATERIAL, "Base Color")
+
+
+def legend_material() -> bpy.types.Material:
+    """The attribute's colours as they are, whatever the light, so that a legend can be compared with them."""
+    return _material(LEGEND, "Emission Color")
+
+
+def ink() -> bpy.types.Material:
+    """White letters, whatever the light."""
+    return _material(INK, None)
+
+
+def _material(name: str, takes: str | None) -> bpy.types.Material:
+    """A material of the file, made where it is missing; takes : which input has the attribute's colour."""
+    found = bpy.data.materials.get(name)
+    if found is not None:
+        return found
+    made = bpy.data.materials.new(name)
+    if made.node_tree is None:
+        made.use_nodes = True
+    nodes = made.node_tree.nodes
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Roughness"].default_value = 0.5
+    if takes is not None:
+        colour = nodes.new("ShaderNodeVertexColor")
+        colour.layer_name = COLOUR
+        made.node_tree.links.new(colour.outputs["Color"], shader.inputs[takes])
+    if takes != "Base Color":
+        shader.inputs["Base Color"].default_value = (0, 0, 0, 1)
+        shader.inputs["Specular IOR Level"].default_value = 0.0
+        shader.inputs["Emission Color"].default_value = (0.9, 0.9, 0.9, 1)
+        shader.inputs["Emission Strength"].default_value = 1.0
+    return made
+
+
+class _Nodes:
+    """A geometry-node group under construction."""
+
+    def __init__(self, style: str) -> None:
+        self.tree = bpy.data.node_groups.new(NAMES[style], "GeometryNodeTree")
+        self.tree.is_modifier = True
+        for way in ("INPUT", "OUTPUT"):
+            self.tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+
+    def add(self, kind: str, *links: object, **settings: object) -> bpy.types.Node:
+        """A node; links : sockets or values of its enabled inputs, in order, None for those left alone."""
+        node = self.tree.nodes.new(kind)
+        for name, value in settings.items():
+            setattr(node, name, value)
+        for socket, value in zip([s for s in node.inputs if s.enabled], links, strict=False):
+            if isinstance(value, bpy.types.NodeSocket):
+                self.tree.links.new(value, socket)
+            elif value is not None:
+                socket.default_value = value
+        node.location = (190 * (len(self.tree.nodes) % 6), -220 * (len(self.tree.nodes) // 6))
+        return node
+
+    def math(self, operation: str, *links: object) -> bpy.types.NodeSocket:
+        """The result of a number's operation."""
+        return self.add("ShaderNodeMath", *links, operation=operation).outputs[0]
+
+    def attribute(self, name: str, kind: str = "FLOAT") -> bpy.types.NodeSocket:
+        """A named attribute of the mesh."""
+        node = self.add("GeometryNodeInputNamedAttribute", name, data_type=kind)
+        return next(s for s in node.outputs if s.enabled and s.name == "Attribute")
+
+    def store(self, geometry: bpy.types.NodeSocket, name: str, value: object, kind: str) -> bpy.types.NodeSocket:
+        """The geometry with a named attribute of its points."""
+        return self.add("GeometryNodeStoreNamedAttribute", geometry, None, name, value, data_type=kind,
+                        domain="POINT").outputs[0]  # fmt: skip
+
+    def input(self, name: str, kind: str, text: str, value: object = None, least: float | None = None) -> None:
+        """An input of the group that users change in the modifier."""
+        item = self.tree.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
+        item.description = text
+        if value is not None:
+            item.default_value = value
+        if least is not None:
+            item.min_value = least
+
+    def end(self, geometry: bpy.types.NodeSocket) -> bpy.types.NodeTree:
+        """Give the geometry its material, and out."""
+        painted = self.add("GeometryNodeSetMaterial", geometry)
+        painted.inputs["Material"].default_value = material()
+        self.tree.links.new(painted.outputs[0], self.tree.nodes.new("NodeGroupOutput").inputs[0])
+        return self.tree
+
+
+def _surface(style: str) -> bpy.types.NodeTree:
+    """Colours of a sensor's own surface, and the dent drawn larger."""
+    nodes = _Nodes(style)
+    told = "Change of the reading, counts," if style == "ELECTRODES" else "Displacement, in the object's units,"
+    nodes.input(LARGEST, "Float", f"{told} at the colours' upper end", 1.0, 1e-6)
+    nodes.input(EXAGGERATION, "Float", "How many times the dent is drawn; pictures keep the true one", 1.0, 0.0)
+    given = nodes.tree.nodes.new("NodeGroupInput")
+    here = nodes.add("GeometryNodeInputPosition").outputs[0]
+    rest = nodes.attribute("rest_position", "FLOAT_VECTOR")
+    moved = nodes.add("ShaderNodeVectorMath", here, rest, operation="SUBTRACT").outputs[0]
+    kept = nodes.store(given.outputs["Geometry"], DISPLACEMENT, moved, "FLOAT_VECTOR")
+    again = nodes.attribute(DISPLACEMENT, "FLOAT_VECTOR")
+    ramp = nodes.add("ShaderNodeValToRGB", _SHARE[style](nodes, given.outputs[LARGEST], again))
+    _fill(ramp.color_ramp, style)
+    colour = ramp.outputs["Color"]
+    if style == "ELECTRODES":
+        colour = _near_electrodes(nodes, colour)
+    shown = nodes.store(kept, COLOUR, colour, "FLOAT_COLOR")
+    more = nodes.math("SUBTRACT", given.outputs[EXAGGERATION], 1.0)
+    extra = nodes.add("ShaderNodeVectorMath", again, operation="SCALE")
+    nodes.tree.links.new(more, extra.inputs["Scale"])
+    placed = nodes.add("GeometryNodeSetPosition", shown)
+    nodes.tree.links.new(extra.outputs[0], placed.inputs["Offset"])
+    return nodes.end(placed.outputs[0])
+
+
+def _moved(nodes: _Nodes, largest: bpy.types.NodeSocket, moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    length = nodes.add("ShaderNodeVectorMath", moved, operation="LENGTH").outputs["Value"]
+    return nodes.math("DIVIDE", length, largest)
+
+
+def _touched(nodes: _Nodes, _largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    return nodes.attribute(frame_attribute.PATCH)
+
+
+def _changed(nodes: _Nodes, largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """0 where the reading falls by the largest change, 1 where it rises by it."""
+    share = nodes.math("DIVIDE", nodes.attribute(frame_attribute.COUNTS), largest)
+    return nodes.math("MULTIPLY_ADD", share, 0.5, 0.5)
+
+
+def _near_electrodes(nodes: _Nodes, colour: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """The colour near an electrode, grey elsewhere; distances are in metres in any file."""
+    near = nodes.add("ShaderNodeMapRange", nodes.attribute(electrode_markers.DISTANCE), *_EDGE, 1.0, 0.0).outputs[0]
+    mixed = nodes.add("ShaderNodeMix", near, (*STILL, 1.0), colour, data_type="RGBA")
+    return next(s for s in mixed.outputs if s.enabled)
+
+
+_SHARE: dict[str, Callable] = {"DISPLACEMENT": _moved, "CONTACT_PATCH": _touched, "ELECTRODES": _changed}
+
+
+def _fill(ramp: bpy.types.ColorRamp, style: str) -> None:
+    stops = RAMPS[style]
+    ramp.interpolation = "CONSTANT" if style == "CONTACT_PATCH" else "LINEAR"
+    for place, _ in stops[2:]:
+        ramp.elements.new(place)
+    for element, (place, colour) in zip(ramp.elements, stops, strict=True):
+        element.position, element.color = place, (*colour, 1.0)
+
+
+def _arrow(style: str) -> bpy.types.NodeTree:
+    """An arrow whose head stands where a sensor's dent is deepest, on an object of its own."""
+    nodes = _Nodes(style)
+    nodes.input(SENSOR, "Object", "A BioTac's skin or a DIGIT's gel")
+    nodes.input(FORCE, "Vector", "Force on the sensor, N, in its axes")
+    nodes.input(LENGTH, "Float", "Length of 1 N, in the object's units", 5.0, 1e-6)
+    given = nodes.tree.nodes.new("NodeGroupInput")
+    seen = nodes.add("GeometryNodeObjectInfo", given.outputs[SENSOR], transform_space="RELATIVE")
+    force = given.outputs[FORCE]
+    newtons = nodes.add("ShaderNodeVectorMath", force, operation="LENGTH").outputs["Value"]
+    length = nodes.math("MULTIPLY", newtons, given.outputs[LENGTH])
+    head, thin = nodes.math("MULTIPLY", length, 0.3), nodes.math("MULTIPLY", length, 0.035)
+    wide = nodes.math("MULTIPLY", length, 0.1)
+    cone = nodes.add("GeometryNodeMeshCone")
+    shaft = nodes.add("GeometryNodeMeshCylinder")
+    long = nodes.math("MULTIPLY", length, 0.7)
+    # Both stand along +Z, tip at the origin.
+    for node, names in ((cone, {"Radius Top": wide, "Depth": head}), (shaft, {"Radius": thin, "Depth": long})):
+        node.inputs["Vertices"].default_value = 24
+        for name, socket in names.items():
+            nodes.tree.links.new(socket, node.inputs[name])
+    cone.inputs["Radius Bottom"].default_value = 0.0
+    up = nodes.add("ShaderNodeCombineXYZ", None, None, nodes.math("MULTIPLY", length, 0.65)).outputs[0]
+    parts = [cone.outputs["Mesh"], nodes.add("GeometryNodeTransform", shaft.outputs["Mesh"]).outputs[0]]
+    nodes.tree.links.new(up, parts[1].node.inputs["Translation"])
+    joined = nodes.tree.nodes.new("GeometryNodeJoinGeometry")
+    for part in parts:
+        nodes.tree.links.new(part, joined.inputs[0])
+    back = nodes.add("ShaderNodeVectorMath", force, operation="SCALE")
+    back.inputs["Scale"].default_value = -1.0
+    turn = nodes.tree.nodes.new("FunctionNodeAlignRotationToVector")
+    turn.axis = "Z"
+    nodes.tree.links.new(back.outputs[0], turn.inputs["Vector"])
+    placed = nodes.add("GeometryNodeTransform", joined.outputs[0])
+    nodes.tree.links.new(_deepest(nodes, seen.outputs["Geometry"]), placed.inputs["Translation"])
+    nodes.tree.links.new(turn.outputs[0], placed.inputs["Rotation"])
+    return nodes.end(nodes.store(placed.outputs[0], COLOUR, (*ARROW, 1.0), "FLOAT_COLOR"))
+
+
+def _deepest(nodes: _Nodes, sensor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """Mean of the nodes' places, weighted by the square of how far each has moved."""
+    here = nodes.add("GeometryNodeInputPosition").outputs[0]
+    rest = nodes.attribute("rest_position", "FLOAT_VECTOR")
+    moved = nodes.add("ShaderNodeVectorMath", here, rest, operation="SUBTRACT").outputs[0]
+    weight = nodes.add("ShaderNodeVectorMath", moved, moved, operation="DOT_PRODUCT").outputs["Value"]
+    weighed = nodes.add("ShaderNodeVectorMath", here, operation="SCALE")
+    nodes.tree.links.new(weight, weighed.inputs["Scale"])
+    sums = []
+    for kind, value in (("FLOAT_VECTOR", weighed.outputs[0]), ("FLOAT", weight)):
+        node = nodes.add("GeometryNodeAttributeStatistic", sensor, None, value, data_type=kind, domain="POINT")
+        sums.append(next(s for s in node.outputs if s.enabled and s.name == "Sum"))
+    # Blender divides by zero to zero: nothing has moved, and there is no arrow.
+    share = nodes.math("DIVIDE", 1.0, sums[1])
+    mean = nodes.add("ShaderNodeVectorMath", sums[0], operation="SCALE")
+    nodes.tree.links.new(share, mean.inputs["Scale"])
+    return mean.outputs[0]
+
+
+_BUILD = {"DISPLACEMENT": _surface, "CONTACT_PATCH": _surface, "ELECTRODES": _surface, "FORCE_ARROW": _arrow}
