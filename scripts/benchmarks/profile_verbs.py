@@ -236,7 +236,8 @@ def write_long(path: Path) -> None:
     """The shipped recording, again and again, LONG frames in all."""
     one = recordings.read(RECORDING)
     rows = np.arange(LONG) % len(one)
-    truth = Truth(*(getattr(one.truth, name)[rows] for name in Truth.__dataclass_fields__))
+    held = {name: getattr(one.truth, name) for name in Truth.__dataclass_fields__}
+    truth = Truth(**{name: None if values is None else values[rows] for name, values in held.items()})
     counts = {name: getattr(one, name)[rows] for name in ("electrodes", "pdc", "tac", "tdc")}
     about = {"scene": "", "seed": 0, "made_by": "profile_verbs", "note": "the shipped recording, repeated"}
     write_simulated(path, time=np.arange(LONG) / 100, **counts, truth=truth, **about)

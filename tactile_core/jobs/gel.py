@@ -23,7 +23,7 @@ from ..mechanics.fast.active_set import UnsolvedError
 from ..mechanics.fast.compliance import Compliance, compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.first_touch import first_touch
-from ..mechanics.node_areas import node_areas
+from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import FRICTION
 from ..mechanics.thickness import DEPTH_LIMIT, thickness_under
@@ -271,13 +271,12 @@ class Gel:
         if found is None:
             return dataclasses.replace(self._untouched(pose), flags=tuple(flags))
         linear, nodes = found.linear, self._compliance.touchable[found.linear.nodes]
-        traction = np.zeros_like(self.surface.rest)
-        traction[nodes] = found.corrected.factor * linear.nodal_force / self.areas[nodes, None]
-        patch = np.zeros(len(traction), bool)
+        pressed = traction(self.sensor, nodes, found.corrected.factor * linear.nodal_force)
+        patch = np.zeros(len(pressed), bool)
         patch[nodes] = True
         slipping = float(linear.slipping.mean()) if len(nodes) and self.friction else 0.0
         return GelContact(
-            found.force, found.corrected.displacement, traction, patch, slipping, found.depth, found.pressure,
+            found.force, found.corrected.displacement, pressed, patch, slipping, found.depth, found.pressure,
             _matrix(linear.pose), tuple(flags),
         )  # fmt: skip
 

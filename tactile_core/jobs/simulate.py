@@ -16,7 +16,7 @@ import msgspec
 from ..files import array_pack, atomic, checksummed
 from ..mechanics.electrodes.law import SHEET
 from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
-from ..simulation.recording import ALL, check_places, recording_of
+from ..simulation.recording import DEFAULT, check_places, recording_of
 from ..simulation.scene import Scene
 from ..simulation.scene_grid import combinations, name_of, with_values
 from ..simulation.scene_text import to_toml
@@ -58,7 +58,7 @@ def plan(
     grid: Sequence[str],
     out: str | os.PathLike,
     seed: int = 0,
-    keep: Sequence[str] = ALL,
+    keep: Sequence[str] = DEFAULT,
     electrodes: str = SHEET,
 ) -> Job:
     """The job: the [recording] of a scene for each combination of the values in ``grid`` (``scene_grid``).

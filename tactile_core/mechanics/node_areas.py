@@ -1,4 +1,4 @@
-"""Share of a sensor's surface that each of its nodes stands for: a nodal force over it is a traction."""
+"""Share of a sensor's surface that each of its nodes stands for; a nodal force over it is a traction."""
 
 from __future__ import annotations
 
@@ -31,6 +31,17 @@ def node_areas(sensor: str) -> np.ndarray:
     areas = areas[mesh.surface]
     areas.flags.writeable = False
     return areas
+
+
+def traction(sensor: str, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Traction (n, 3) Pa on a resting surface whose ``nodes`` (k,) carry forces (k, 3) N; zero at the others.
+
+    Times ``node_areas`` and added up it is the sum of the forces.
+    """
+    areas = node_areas(sensor)
+    found = np.zeros((len(areas), 3))
+    found[nodes] = force / areas[nodes, None]
+    return found
 
 
 def _quadratic(t: float) -> tuple[np.ndarray, np.ndarray]:

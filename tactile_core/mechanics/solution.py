@@ -34,6 +34,7 @@ class OnDemand:
 
     electrode_gaps: Callable[[], np.ndarray]
     films: Callable[[], np.ndarray]
+    traction: Callable[[], np.ndarray]
     errors: Callable[[], tuple[float, float]]
 
 
@@ -81,6 +82,14 @@ class Solution:
     def films(self) -> np.ndarray:
         """Film (k,) m at the nodes of the conducting sheet; (0,) on the DIGIT. The fast tier's is not corrected."""
         return self.on_demand.films()
+
+    @functools.cached_property
+    def traction(self) -> np.ndarray:
+        """Traction (n, 3) Pa of the indenter on the surface; times ``node_areas`` and added up it is the force.
+
+        Raises TactileError in the full and the reference tier, whose forces act on the nodes of their own meshes.
+        """
+        return self.on_demand.traction()
 
     @property
     def shape_error(self) -> float:

@@ -16,6 +16,7 @@ from .fast.contact_state import Contact
 from .fast.press import CorrectedPress
 from .finite_strain.load_path import LoadPath
 from .force_search import UnreachableError, unreachable
+from .node_areas import traction
 from .placement import FRICTION, Placement, on_gel, pose_at
 from .sharpness import sharpest
 from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_pressure
@@ -165,6 +166,7 @@ class _Fast:
             OnDemand(
                 electrode_gaps=lambda: contact.electrode_gaps,
                 films=functools.partial(_films, self.sensor, contact),
+                traction=lambda: traction(self.sensor, touching, found.corrected.factor * contact.nodal_force),
                 errors=functools.partial(
                     _fast_errors, self.sensor, self.thickness, contact, found.depth, problem.indenter, near
                 ),

@@ -62,7 +62,8 @@ def _channels(recording: Recording) -> str:
     if recording.truth is not None:
         moved = ("BioTac", recording.truth.displacement_biotac), ("DIGIT", recording.truth.displacement_digit)
         nodes = [f"{values.shape[1]} {sensor}" for sensor, values in moved if values is not None]
-        held.append(f"truth ({' and '.join(nodes)} nodes)" if nodes else "truth (force)")
+        pressed = " and traction" if recording.truth.tractions else ""
+        held.append(f"truth ({' and '.join(nodes)} nodes{pressed})" if nodes else f"truth (force{pressed})")
     return ", ".join(["electrodes", *held])
 
 

@@ -20,12 +20,22 @@ class Truth:
     displacement_digit : (T, M, 3) float32, m, of the gel surface's nodes
     force : (T, 3) float, N, exerted by the object on the sensor
     contact_center : (T, 2) float, m, (x, z) on the DIGIT after unrolling; NaN without contact
+    traction_biotac : (T, N, 3) float32, Pa, of the object on the resting skin's nodes
+    traction_digit : (T, M, 3) float32, Pa, of the object on the resting gel's nodes
     """
 
     displacement_biotac: np.ndarray | None
     displacement_digit: np.ndarray | None
     force: np.ndarray
     contact_center: np.ndarray | None
+    traction_biotac: np.ndarray | None = None
+    traction_digit: np.ndarray | None = None
+
+    @property
+    def tractions(self) -> dict[str, np.ndarray]:
+        """Tractions that the file was made with, by ``"biotac"`` and ``"digit"``."""
+        held = {"biotac": self.traction_biotac, "digit": self.traction_digit}
+        return {sensor: values for sensor, values in held.items() if values is not None}
 
 
 @dataclass(frozen=True, eq=False)

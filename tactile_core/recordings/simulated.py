@@ -5,8 +5,10 @@ Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sen
 0 if unknown). Datasets, T first: ``time`` (T,) float64 s; ``electrodes``
 (T, 19), ``pdc``, ``tac``, ``tdc`` (T,) int16 raw 12-bit counts; ``truth/displacement_biotac`` (T, N, 3) and
 ``truth/displacement_digit`` (T, M, 3) int16 with attribute ``scale`` (m a unit); ``truth/force`` (T, 3) float32 N;
-``truth/contact_center`` (T, 2) float32 m. The same arrays give the same bytes. `tactile simulate --keep` leaves out the
-rest but ``time`` and ``truth/force``; without ``electrodes`` (and the counts) the file is no recording to translate.
+``truth/contact_center`` (T, 2) float32 m; where asked for ``truth/traction_biotac`` (T, N, 3) and
+``truth/traction_digit`` (T, M, 3) float32 Pa. The same arrays give the same bytes. `tactile simulate --keep` leaves out
+the rest but ``time`` and ``truth/force``; without ``electrodes`` (and the counts) the file is no recording to
+translate.
 """
 
 from __future__ import annotations
@@ -81,7 +83,9 @@ def write_simulated(
         "start_time": float(start_time),
     }
     plain = {"time": np.asarray(time, np.float64)} | counts
-    _write_whole(path, lambda file: _fill(file, attributes, plain, steps, forces))
+    pressed = {f"truth/{name}": getattr(truth, name) for name in ("traction_biotac", "traction_digit")}
+    tractions = {name: _tractions(path, name, value, frames) for name, value in pressed.items() if value is not None}
+    _write_whole(path, lambda file: _fill(file, attributes, plain, steps, forces, tractions))
     return path
 
 
@@ -91,6 +95,7 @@ def _fill(
     plain: dict[str, np.ndarray],
     steps: dict[str, np.ndarray],
     forces: dict[str, np.ndarray],
+    tractions: dict[str, np.ndarray],
 ) -> None:
     """Write the datasets of a file, always in this order, so that the same arrays give the same bytes."""
     for key, value in attributes.items():
@@ -104,6 +109,9 @@ def _fill(
         data.attrs["scale"] = SCALE
     for name, value in forces.items():
         file.create_dataset(name, data=value, **packed)
+    for name, value in tractions.items():
+        chunks = (min(BLOCK, len(value)), *value.shape[1:])
+        file.create_dataset(name, data=value, chunks=chunks, **packed).attrs["unit"] = "Pa"
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
@@ -153,7 +161,15 @@ def _truth(store: Store, frames: int) -> Truth:
         _displacement(store, "truth/displacement_digit", frames),
         store.array("truth/force", (frames, 3)),
         store.optional("truth/contact_center", (frames, 2)),
+        _traction(store, "truth/traction_biotac", frames),
+        _traction(store, "truth/traction_digit", frames),
     )
+
+
+def _traction(store: Store, name: str, frames: int) -> np.ndarray | None:
+    if name not in store.shapes:
+        return None
+    return store.array(name, (frames, *store.shapes[name][0][1:2], 3), np.float32)
 
 
 def _displacement(store: Store, name: str, frames: int) -> np.ndarray | None:
@@ -188,6 +204,12 @@ def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
     if not np.all(np.abs(steps) <= np.iinfo(np.int16).max):
         raise TactileError(f"{path}, truth/{name}", "displacements beyond +-16 mm or not finite", "at most 16 mm")
     return steps.astype(np.int16)
+
+
+def _tractions(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
+    if np.ndim(value) != 3 or np.shape(value)[0] != frames or np.shape(value)[2] != 3:
+        raise TactileError(f"{path}, {name}", f"shape {np.shape(value)}", f"({frames}, nodes, 3)")
+    return np.asarray(value, np.float32)
 
 
 def _write_whole(path: Path, fill: Any) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,19 +27,23 @@ _STILL_COUNT = 2000  # TDC and TAC, not simulated: a constant reading
 OUTPUTS: dict[str, Sensor] = {
     "electrodes": "biotac",
     "displacement_biotac": "biotac",
+    "traction_biotac": "biotac",
     "displacement_digit": "digit",
+    "traction_digit": "digit",
 }
-ALL = tuple(OUTPUTS)
+DEFAULT = ("electrodes", "displacement_biotac", "displacement_digit")
 
 
 class _Frame(NamedTuple):
     """What is kept of a frame.
 
-    moved : by sensor, (n, 3) float32 m; force : (3,) N; pressure : Pa, rise of the fluid's
+    moved, pressed : by sensor, displacement (n, 3) float32 m and traction (n, 3) float32 Pa
+    force : (3,) N; pressure : Pa, rise of the fluid's
     change : (19,) counts of the electrodes; centre : (2,) m, of pressure on the DIGIT
     """
 
     moved: dict[Sensor, np.ndarray]
+    pressed: dict[Sensor, np.ndarray]
     force: np.ndarray
     pressure: float
     change: np.ndarray
@@ -53,7 +57,7 @@ def simulate_recording(
     progress: Callable[[int, int], None] | None = None,
     wiring: Wiring | None = None,
     *,
-    keep: Collection[str] = ALL,
+    keep: Collection[str] = DEFAULT,
     tiers: Mapping[Sensor, Tier] | None = None,
     loaded: tuple[Scene, str] | None = None,
     electrodes: str = SHEET,
@@ -66,12 +70,13 @@ def simulate_recording(
     keep : words of OUTPUTS; a sensor that none of them needs is not solved. tiers : of each sensor, fast by default.
     loaded : a scene and its text in place of the file's, which is then named in messages alone.
     electrodes : the law of their counts, of ``law.LAWS``.
-    Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked, or
-    tared wiring: this kind of file holds raw counts.
+    Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked,
+    tractions of another tier than the fast one, or tared wiring: this kind of file holds raw counts.
     """
     scene, text = loaded or load_scene(scene_path)
     spec = recording_of(scene, scene_path)
     used = sensors_of(keep)
+    _check_tiers(keep, tiers or {})
     wiring = wiring or _wiring(spec)
     if wiring.tared:
         raise TactileError("wiring, tared", "True", "raw counts in a simulated recording", "Tare it when it is read")
@@ -117,6 +122,14 @@ def _tiers_told(tiers: Mapping[Sensor, Tier] | None) -> str:
     return "" if not tiers else ", " + ", ".join(f"{sensor} {tier}" for sensor, tier in sorted(tiers.items()))
 
 
+def _check_tiers(keep: Collection[str], tiers: Mapping[Sensor, Tier]) -> None:
+    """Raise TactileError for tractions that the tier does not give on the surface's own nodes."""
+    for sensor, tier in tiers.items():
+        if f"traction_{sensor}" in keep and tier != "fast":
+            found = f"of the {tier} tier, whose forces act on the nodes of its own mesh"
+            raise TactileError(f"--keep traction_{sensor}", found, "the fast tier", "Give a larger --error, or none")
+
+
 def check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
     """Raise TactileError for a point that presses beside the DIGIT's gel."""
     for number, point in enumerate(spec.points, 1):
@@ -157,17 +170,21 @@ def _solve(
 
 def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str], law: str) -> _Frame:
     """Extract what is kept of a frame's contacts. The force is the BioTac's, or the DIGIT's where that is alone."""
-    moved = {}
-    for sensor in sensors_of(keep):
-        if f"displacement_{sensor}" in keep:
-            rest = sensors.sensor_surface(sensor).rest
-            moved[sensor] = (solved[sensor].displacement if solved else np.zeros_like(rest)).astype(np.float32)
+    moved, pressed = _field(solved, keep, "displacement"), _field(solved, keep, "traction")
     if not solved:
-        return _Frame(moved, np.zeros(3), 0.0, np.zeros(19), np.full(2, np.nan))
+        return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(19), np.full(2, np.nan))
     biotac, digit, first = solved.get("biotac"), solved.get("digit"), next(iter(solved.values()))
     change = signal_of(biotac, law) if "electrodes" in keep else np.zeros(19)
     centre = digit.centre if digit else np.full(2, np.nan)
-    return _Frame(moved, first.force, first.pressure, change, centre)
+    return _Frame(moved, pressed, first.force, first.pressure, change, centre)
+
+
+def _field(solved: Mapping[Sensor, Solution], keep: Collection[str], name: str) -> dict[Sensor, np.ndarray]:
+    """A field (n, 3) float32 of a solution by the sensors of which it is kept; zero where nothing presses."""
+    kept = [sensor for sensor in sensors_of(keep) if f"{name}_{sensor}" in keep]
+    if not solved:
+        return {sensor: np.zeros(sensors.sensor_surface(sensor).rest.shape, np.float32) for sensor in kept}
+    return {sensor: getattr(solved[sensor], name).astype(np.float32) for sensor in kept}
 
 
 def _pressure(frames: list[_Frame]) -> np.ndarray:
@@ -194,10 +211,14 @@ def _wiring(spec: RecordingSpec) -> Wiring:
 
 
 def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
-    """Displacements as far as they are kept, force, and the centre of pressure where the DIGIT is solved."""
+    """Fields as far as they are kept, force, and the centre of pressure where the DIGIT is solved."""
 
-    def moved(sensor: Sensor) -> np.ndarray | None:
-        return np.stack([frame.moved[sensor] for frame in frames]) if sensor in frames[0].moved else None
+    def stacked(fields: Sequence[dict[Sensor, np.ndarray]], sensor: Sensor) -> np.ndarray | None:
+        return np.stack([field[sensor] for field in fields]) if sensor in fields[0] else None
 
+    moved, pressed = [frame.moved for frame in frames], [frame.pressed for frame in frames]
     centre = np.stack([frame.centre for frame in frames]) if "digit" in sensors_of(keep) else None
-    return Truth(moved("biotac"), moved("digit"), np.stack([frame.force for frame in frames]), centre)
+    return Truth(
+        stacked(moved, "biotac"), stacked(moved, "digit"), np.stack([frame.force for frame in frames]), centre,
+        stacked(pressed, "biotac"), stacked(pressed, "digit"),
+    )  # fmt: skip

@@ -9,6 +9,7 @@ from ball_scene import ball_scene
 from tactile_core import recordings, sensors
 from tactile_core.errors import TactileError
 from tactile_core.mechanics.electrodes.wiring import Wiring
+from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.recordings import info
 from tactile_core.recordings.simulated import read_truth
 from tactile_core.sensors import PRESSURE_PER_COUNT
@@ -51,6 +52,23 @@ def test_recording_carries_its_truth(seed_4):
     low, high = re.search(r"Fluid pressure ([\d.]+) to ([\d.]+) kPa", recording.about["note"]).groups()
     assert float(low) == 1.75
     assert float(high) == pytest.approx(pressure.max() / 1e3, abs=0.018)  # half a PDC count and half a printed digit
+
+
+@pytest.mark.parametrize("sensor", ["biotac", "digit"])
+def test_tractions_add_up_to_the_force(sensor, scene, seed_4, tmp_path):
+    simulate_recording(scene, tmp_path / "x.h5", keep=(f"traction_{sensor}",))
+    _, truth = read_truth(tmp_path / "x.h5")
+    traction = truth.tractions.pop(sensor)
+    assert traction.dtype == np.float32 and traction.shape == (61, len(sensors.sensor_surface(sensor).rest), 3)
+    total = np.einsum("tnk,n->tk", traction, node_areas(sensor))
+    np.testing.assert_allclose(total, truth.force, rtol=0, atol=1e-6)  # N: sums of float32
+    assert not traction[:41].any() and traction[50].any()
+    assert read_truth(seed_4)[1].tractions == {}
+
+
+def test_tractions_of_a_finer_tier_are_refused_before_it_begins(scene, tmp_path):
+    with pytest.raises(TactileError, match=r"traction_digit: of the full tier.*larger --error"):
+        simulate_recording(scene, tmp_path / "x.h5", keep=("traction_digit",), tiers={"digit": "full"})
 
 
 def test_same_seed_same_bytes(scene, seed_4, tmp_path):

@@ -13,7 +13,7 @@ from .common import NOTHING, check_seed, electrodes_argument, error_argument, pr
 BRIEF = "simulate a recording"
 TEXT = """\
 Simulate the recording that a scene describes, marked so and with its true meshes. A sensor that nothing of --keep
-needs is not solved: electrodes and displacement_biotac need the BioTac, displacement_digit the DIGIT.
+needs is not solved: electrodes, displacement_biotac and traction_biotac need the BioTac, the others the DIGIT.
 
 --error 50um picks for each sensor the cheapest tier of contact whose measured error (rms of the surface; 95 of 100
 contacts stay below), to the depth that the scene reaches, is at most that, and says which; fast without it. What the
@@ -38,7 +38,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--keep",
         metavar="WORDS",
-        help="what the file holds, out of electrodes,displacement_biotac,displacement_digit (default: all)",
+        help="what the file holds, out of electrodes,displacement_biotac,displacement_digit (default: these three) and"
+        " traction_biotac,traction_digit, or traction for both: Pa on each surface node, by the fast tier alone",
     )
     electrodes_argument(verb)
     error_argument(verb, "um of the surface, such as 50um")
@@ -68,16 +69,26 @@ def run(options: argparse.Namespace) -> int:
             raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
     bound = None if options.error is None else _bound(options.error)
     with bar("simulate", "frame", options.progress) as shown:
-        from ...jobs import results
-        from ...simulation.recording import ALL, simulate_recording
+        from ...simulation.recording import simulate_recording
 
-        keep = results.parse_words(options.keep, ALL)
+        keep = _keep(options.keep)
         tiers = {} if bound is None else _tiers(options, keep, bound)
         simulate_recording(
             options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers, electrodes=options.electrodes
         )
     tell(options.out)
     return 0
+
+
+def _keep(text: str | None) -> tuple[str, ...]:
+    """Words of ``recording.OUTPUTS``; ``traction`` is that of both sensors. Raises TactileError for other words."""
+    from ...jobs import results
+    from ...simulation.recording import DEFAULT, OUTPUTS
+
+    if text is None:
+        return DEFAULT
+    words = results.parse_words(text, (*OUTPUTS, "traction"))
+    return tuple(word for word in OUTPUTS if word in words or ("traction" in words and word.startswith("traction")))
 
 
 def _bound(text: str) -> float:
@@ -110,11 +121,10 @@ def _run_grid(options: argparse.Namespace) -> int:
     engine.check_counts(options, "workers", "restart")
     if options.error:
         raise TactileError("--grid", "given with --error", "one of the two")
-    from ...jobs import results, simulate
+    from ...jobs import simulate
     from ...jobs.engine import result_parts
-    from ...simulation.recording import ALL
 
-    keep = results.parse_words(options.keep, ALL)
+    keep = _keep(options.keep)
     job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep, options.electrodes)
     if options.plan:
         tell(str(result_parts.write(options.out, job)))

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
 from ...sensors import biotac, sensor_surface
 from .. import error_estimate
@@ -120,6 +121,7 @@ class LoadPath:
             OnDemand(
                 electrode_gaps=functools.partial(_electrode_gaps, self.body, touch) if skin else _nothing,
                 films=functools.partial(_films, self.body, touch) if skin else _nothing,
+                traction=functools.partial(_no_traction, self.tier),
                 errors=lambda: stated,
             ),
             touch.steps, (self.body.solid, touch.state),
@@ -152,6 +154,12 @@ def _films(body: Body, touch: ContactState) -> np.ndarray:
 def _inner_skin(body: Body, touch: ContactState) -> np.ndarray:
     """Displacement (n, 3) m of the inner skin's lattice."""
     return body.graded.on_lattice(touch.state.displacement[body.solid.mesh.inner])
+
+
+def _no_traction(tier: str) -> np.ndarray:
+    found = f"asked of the {tier} tier, whose forces act on the nodes of its own mesh"
+    advice = "Solve without --error, or write its surface by `tactile mesh`, with the force on each node"
+    raise TactileError("solve, traction", found, "the fast tier", advice)
 
 
 def _nothing() -> np.ndarray:
