@@ -12,8 +12,9 @@ from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.stopwatch import Stopwatch
 from . import results
-from .frame_pass import FramePass, Tools
+from .frame_pass import FramePass, Solver, Tools
 from .frame_range import frames_text, select
+from .results import SOLVED, TRANSLATED, Gel
 
 if TYPE_CHECKING:
     from ..accuracy import Budget
@@ -46,11 +47,13 @@ def load_tools(
     preset: str = "fast",
     variant: str | None = None,
     answer: Answer | None = None,
+    gel: Gel = TRANSLATED,
 ) -> Tools:
     """The shipped weights, or those in a folder, and the camera and lights of a DIGIT: the shipped unit's, or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
     answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``
+    gel : the networks', or the found contact solved on the DIGIT (``solved_gel``)
     Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
     ``renderer.Renderer`` raises.
     """
@@ -70,7 +73,16 @@ def load_tools(
     posterior = translator.posterior if asked.follows else None
     drawn = translator.plausible if asked.samples else None
     named = translator.card, translator.sha256
-    return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked)
+    return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked, _solver(gel))
+
+
+def _solver(gel: Gel) -> Solver | None:
+    if gel == TRANSLATED:
+        return None
+    from . import solved_gel
+
+    solved_gel.prepare()
+    return solved_gel.solved
 
 
 def choose_preset(tools: Tools, levels: float) -> tuple[Tools, str]:
@@ -173,7 +185,7 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
                     "error": None if options.error is None else str(options.error), "preset": tools.preset,
-                    "answer": dataclasses.asdict(tools.answer)},
+                    "answer": dataclasses.asdict(tools.answer), "gel": TRANSLATED if tools.solve is None else SOLVED},
         "frames_converted": len(made.frames),
         "prepared": made.signals.report,
         "warnings": list(made.warnings()),

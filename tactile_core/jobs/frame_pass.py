@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..translation.networks import Posterior
     from ..translation.translate import Translation
 
+Solver = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
 CHUNK = 64  # frames in memory at a time: about 5 MB of displacements and 20 MB of heights
 SHEET_ARRAYS = (
     "displacement_biotac", "displacement_digit", "force", "confidence", "expected_error_digit", "contact_center"
@@ -40,6 +41,7 @@ REMARKABLE = {
     "beyond_digit": "the contact has no counterpart on the DIGIT's gel",
     "beyond_picture": "the contact lies on the gel beside its picture",
     "undecided_place": "by its own signals the contact may as well lie elsewhere",
+    "gel_not_solved": "no contact was solved on the gel, which is the networks' there",
 }
 
 
@@ -53,6 +55,7 @@ class Tools:
     posterior : Signals -> Posterior, by which contacts are followed through time; None: each frame is translated alone
     plausible : Signals and frames (T,) -> contacts drawn for each, by ``plausible.NAMES``; None: none are
     answer : what the translator was asked for
+    solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
     """
 
     translate: Callable[..., Translation]
@@ -65,6 +68,7 @@ class Tools:
     posterior: Callable[[Signals], Posterior] | None = None
     plausible: Callable[[Signals, np.ndarray], dict[str, np.ndarray]] | None = None
     answer: Answer = dataclasses.field(default_factory=Answer)
+    solve: Solver | None = None
 
     def tracked(self, read: Callable[[int, int], tuple[np.ndarray, Signals]], count: int) -> Tracked | None:
         """States of the contact in a recording of `count` frames, of which `read` gives some, with their times, s."""
@@ -86,7 +90,8 @@ def translated(signals: Signals, tools: Tools, tracked: Tracked | None, frames: 
     if tools.plausible is not None:
         arrays |= tools.plausible(signals, frames)
     arrays |= {"electrodes": signals.electrodes, "pressure_measured": PRESSURE_PER_COUNT * signals.pdc}
-    return arrays | {"flags": arrays["flags"] | signals.flags | _beyond_picture(arrays["contact_center"], tools.camera)}
+    arrays["flags"] = arrays["flags"] | signals.flags | _beyond_picture(arrays["contact_center"], tools.camera)
+    return arrays if tools.solve is None else tools.solve(arrays)
 
 
 def _beyond_picture(center: np.ndarray, camera: Camera | None) -> np.ndarray:

@@ -14,6 +14,7 @@ import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from ..errors import TactileError
 from ..files import atomic
@@ -25,6 +26,9 @@ FRAMES, IMAGES, SHEET, NOTE, TIMINGS = "frames.h5", "images", "contact_sheet.png
 OURS = {FRAMES, IMAGES, SHEET, NOTE, TIMINGS, "exr", "rest.exr"}  # the last two of `tactile render --exr`
 IMAGE_NAME = "{:05d}.png"
 
+Gel = Literal["translated", "solved"]  # the networks' gel, or the found contact solved on the DIGIT (``solved_gel``)
+TRANSLATED: Gel = "translated"
+SOLVED: Gel = "solved"
 KEEPABLE = ("latent", "displacement", "height", "image")
 DEFAULT_KEEP = ("latent", "displacement", "image")
 

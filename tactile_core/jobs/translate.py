@@ -16,6 +16,7 @@ from .frame_pass import Tools
 if TYPE_CHECKING:
     from ..translation.answer import Answer
     from .engine.job import Job
+    from .results import Gel
 
 GROWS = False
 
@@ -29,7 +30,7 @@ def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
     """Translate some frames."""
     recipe = job.recipe
-    unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant, recipe.answer)
+    unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant, recipe.answer, recipe.gel)
     return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit))
 
 
@@ -52,12 +53,13 @@ def _tools(
     preset: str,
     variant: str,
     answer: Answer,
+    gel: Gel,
 ) -> Tools:
     """The networks and the unit, once a process. Raises TactileError where they are not those of the job."""
     from .convert import load_tools
 
     check_unit(calibration, unit_sha256)
-    tools = load_tools(weights, calibration, preset, variant or None, answer)
+    tools = load_tools(weights, calibration, preset, variant or None, answer, gel)
     if tools.sha256 != sha256:
         found, advice = f"sha256 {tools.sha256[:12]}...", "Use the weights that the job was made with"
         raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)

@@ -276,7 +276,7 @@ def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
 
 
 def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None, **options: fake_tools.tools())
     line = ["convert", str(slide_csv()), "--out", str(tmp_path / "out"), "--error"]
     assert main([*line, "5levels"]) == 0
     err = capsys.readouterr().err

@@ -13,6 +13,7 @@ from benchmarks.translation.noise import as_read
 from benchmarks.translation.test_set import SEED
 from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
+from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.error_summary import figure_rows
 from tactile_core.training.step_errors import joined, mesh_columns, parts, true_displacement
@@ -25,6 +26,7 @@ BATCHES = 1, 500  # frames a call
 NAMES = (
     *(f"{kind}_{batch}" for kind in ("numpy", "numpy_confidence", "torch", "across") for batch in BATCHES),
     "numpy_same_pairs_1",
+    "numpy_solved_100",
 )
 QUOTED = {"across": "across", "numpy_same_pairs": "ours"}  # whose errors come from SAME_PAIRS
 # Rows of ours and of ACROSS's networks, trained on the same pairs.
@@ -64,6 +66,18 @@ def _numpy() -> Surfaces:
     def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
         biotac = nets.s2m(nets.encode_signal(change))
         return nets.decode_biotac(biotac), nets.decode_digit(nets.m2m(biotac))
+
+    return surfaces
+
+
+def _numpy_solved() -> Surfaces:
+    """Translate, and solve the found contact on the DIGIT: ``tactile convert --gel solved``."""
+    translator = load_translator()
+
+    def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
+        found = translator(plain_signals(change))
+        arrays = {name: getattr(found, name) for name in ("displacement_digit", "contact_center", "force", "flags")}
+        return found.displacement_biotac, solved_gel.solved(arrays)["displacement_digit"]
 
     return surfaces
 
@@ -108,7 +122,7 @@ def _across() -> Surfaces:
 
 KINDS = {
     "numpy": _numpy, "numpy_same_pairs": _numpy, "numpy_confidence": _numpy_confidence, "torch": _torch,
-    "across": _across,
+    "across": _across, "numpy_solved": _numpy_solved,
 }  # fmt: skip
 
 

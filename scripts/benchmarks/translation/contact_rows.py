@@ -1,16 +1,18 @@
 """The contact that signals are answered with, and the posterior it is taken from, on contacts of known truth.
 
 Medians a blurred answer cannot win: place, force, depth of the deepest node, overlap of the patches. Beside the most
-plausible contact stand the mean of the posterior, and as null the nearest example: what the contact of another press of
-the test set with the most similar signals, each less its size, did, as strong as this signal says.
+plausible contact stand the mean of the posterior, the same contact solved on the DIGIT (``convert --gel solved``), and
+as null the nearest example: what the contact of another press of the test set with the most similar signals, each less
+its size, did, as strong as this signal says.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from tactile_core import accuracy
+from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
+from tactile_core.jobs import solved_gel
 from tactile_core.sensors import COUNT_SIGN
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, parts, true_displacement
@@ -45,13 +47,17 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
     for name, (least, most, targets) in SETS.items():
         inside = still & (pairs.depth_biotac >= least) & (pairs.depth_biotac < most)
         for figure in ("place_mm", "force_size_percent", "peak_percent", "iou"):
-            likely, mean, null = (_median(answers[f"{who}_{figure}"][inside]) for who in ("likely", "mean", "nearest"))
+            likely, mean, solved, null = (
+                _median(answers[f"{who}_{figure}"][inside]) for who in ("likely", "mean", "solved", "nearest")
+            )
             unit, at_least = figure.rsplit("_", 1)[-1].replace("percent", "%").replace("iou", "1"), figure == "iou"
             of = f"{inside.sum()} contacts {name}; baseline: the nearest example"
             found.append(
                 row(f"likely_{figure}", likely, unit, targets.get(figure), null=null, of=of, at_least=at_least)
             )
             found.append(row(f"mean_{figure}", mean, unit, null=null, of=of))
+            if figure != "force_size_percent":  # which solving takes as it is
+                found.append(row(f"solved_{figure}", solved, unit, null=null, of=of))
     return found
 
 
@@ -163,9 +169,20 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
     mean = (posterior.weight[:, :, None] * posterior.mean).sum(1)
     found = {}
     for name, state in (("likely", posterior.heaviest), ("mean", mean)):
-        gel = nets.decode_digit(nets.m2m(nets.given(read, state)))
-        found |= _figures(name, gel, FORCE_SCALE * np.sinh(state[:, PLACE]), pairs, part, bodies)
+        gel, force = nets.decode_digit(nets.m2m(nets.given(read, state))), FORCE_SCALE * np.sinh(state[:, PLACE])
+        found |= _figures(name, gel, force, pairs, part, bodies)
+        if name == "likely":
+            found |= _figures("solved", solved_gels(gel, force), force, pairs, part, bodies)
     return found
+
+
+def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Solve the contacts of gels (B, M, 3) m that networks translated, under forces (B,) N."""
+    arrays = {
+        "displacement_digit": gel, "contact_center": accuracy.dent_center(gel, sensors.digit_surface().rest),
+        "force": force[:, None], "flags": np.zeros(len(gel), np.uint16),
+    }  # fmt: skip
+    return solved_gel.solved(arrays)["displacement_digit"]
 
 
 def _figures(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:

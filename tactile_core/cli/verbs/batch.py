@@ -47,6 +47,7 @@ RECIPE = (  # option, its value where it is not given
     *((name, None) for name in ("kind", "counts_per_unit", "smooth")),
     *(("tare", "auto"), ("no_drift", False), ("polarity", "auto")),
     *(("frames_apart", False), ("answer", "likely"), ("mount_shift", None), ("samples", 0)),
+    ("gel", "translated"),
 )
 
 
@@ -144,13 +145,16 @@ def _recipe(options: argparse.Namespace) -> Translate:
     frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
     if frames > MAX_SHARD_FRAMES:
         raise TactileError("--shard-frames", str(frames), f"1 to {MAX_SHARD_FRAMES}")
+    if options.gel == results.SOLVED:
+        from ...jobs import solved_gel
+
+        solved_gel.check_installed()
     unit = "" if options.calibration is None else unit_hash(Path(options.calibration))
     preset = options.preset or "fast"
     if options.preset is not None and "image" not in keep:
         raise TactileError("--preset", preset, "--keep image", "Keep the pictures that it makes")
-    return Translate(
-        list(keep), sha256, frames, prepare, sensor, unit, preset, variant_for(preset), answer_words(options)
-    )
+    pictures = unit, preset, variant_for(preset)
+    return Translate(list(keep), sha256, frames, prepare, sensor, *pictures, answer_words(options), options.gel)
 
 
 def _status(folder: Path, job: Job) -> int:

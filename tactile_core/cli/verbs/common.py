@@ -93,6 +93,13 @@ def answer_arguments(verb: argparse.ArgumentParser) -> None:
         metavar="N",
         help="draw N contacts for each frame from what its signals say, as sample_center and sample_force in frames.h5",
     )
+    verb.add_argument(
+        "--gel",
+        choices=("translated", "solved"),
+        default="translated",
+        help="the DIGIT's gel as the networks translate it, or by contact mechanics: a ball of the dent's curvature at"
+        " the found place and force, some 10 ms a frame; needs the extra [fem] (default: translated)",
+    )
 
 
 def answer_words(options: argparse.Namespace) -> Answer:

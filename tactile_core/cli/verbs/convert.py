@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
     paths, failed = _fingers(options.recordings), 0
     made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
-    tools = convert.load_tools(options.weights, answer=answer_words(options))
+    tools = convert.load_tools(options.weights, answer=answer_words(options), gel=options.gel)
     if budget is not None and budget.levels is not None:
         tools, why = convert.choose_preset(tools, budget.levels)
         say(why)

@@ -11,6 +11,7 @@ from ... import __version__
 from ...recordings import PrepareOptions
 from ...recordings.electrode_gains import SensorFile
 from ...translation.answer import Answer
+from ..results import TRANSLATED, Gel
 
 SHARD_FRAMES = 1000
 MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
@@ -38,7 +39,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames a shard
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
-    answer : which contact a frame is answered by
+    answer : which contact a frame is answered by; gel : the networks', or the contact solved on the DIGIT
     """
 
     keep: list[str]
@@ -50,6 +51,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     preset: str = "fast"
     variant: str = ""
     answer: Answer = Answer()
+    gel: Gel = TRANSLATED
     version: str = __version__
 
 
