@@ -29,6 +29,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from .files.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from .errors import TactileError as TactileError
     from .geometry import indenters as indenters
@@ -38,8 +40,6 @@ if TYPE_CHECKING:
     from .pictures.renderer import Renderer as Renderer
     from .recordings.readers import read as read
     from .translation.translate_recording import translate as translate
-
-__version__ = "0.1.0"
 
 _HOME = {  # of each public name: its module, and its name there; none for the module itself
     "Gel": (".jobs.gel", "Gel"),

@@ -147,6 +147,21 @@ def test_each_room_imports_only_what_lies_below_it():
     assert offenders == []
 
 
+def test_no_room_looks_up_to_the_public_face():
+    """What all rooms need lies below them, so that the face, which opens into all of them, is their roof."""
+    homes = {path.stem for path in PACKAGE.iterdir()}
+    offenders = [
+        f"{path.relative_to(ROOT)} imports {alias.name} from the face"
+        for path in sources("tactile_core")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module is None
+        and path.relative_to(ROOT).parts[: -node.level] == (PACKAGE.name,)
+        for alias in node.names
+        if alias.name not in homes
+    ]  # fmt: skip
+    assert offenders == []
+
+
 def test_no_room_is_below_itself():
     order = graphlib.TopologicalSorter({room: set(below.split()) for room, below in EDGES.items()})
     assert next(iter(order.static_order())) == "errors"  # raises CycleError, which names the rooms

@@ -11,8 +11,8 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
-from .. import __version__
 from ..files.installed import advice
+from ..files.version import __version__
 from ..pictures.mitsuba.variant import LLVM, OLDEST_LLVM, llvm_trouble
 
 TRY_SECONDS = 60.0  # torch takes five on a slow disk

@@ -9,9 +9,9 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from .. import __version__
 from ..errors import TactileError
 from ..files.installed import advice
+from ..files.version import __version__
 from .stop_signals import Stopped, stopping
 from .terminal import complain, say
 from .verbs import VERBS

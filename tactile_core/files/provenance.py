@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .. import __version__
 from . import outside
+from .version import __version__
 
 
 def sha256(path: str | os.PathLike) -> str:

@@ -8,8 +8,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
 from ..files.hdf5_writer import Disk
+from ..files.version import __version__
 from ..recordings import flags
 
 if TYPE_CHECKING:

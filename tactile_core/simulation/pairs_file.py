@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import __version__, sensors
+from .. import sensors
 from ..errors import TactileError
 from ..files import array_pack, atomic
 from ..files.hdf5_checked import declared, open_checked
 from ..files.hdf5_writer import Disk
+from ..files.version import __version__
 from ..mechanics.electrodes.law import LAWS, SHEET
 from ..recordings.polarity import FALLS
 

@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import __version__, sensors
+from .. import sensors
 from ..errors import TactileError
 from ..files import atomic
+from ..files.version import __version__
 from ..geometry.indenters import Indenter
 from ..mechanics.electrodes.law import SHEET, signal_of
 from ..mechanics.electrodes.wiring import Wiring, readings

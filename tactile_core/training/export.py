@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .. import __version__
+from ..files.version import __version__
 from ..recordings.polarity import FALLS
 from ..translation import reference_signals
 from ..translation.network_sizes import ELECTRODES, ERROR_FEATURES, NETS, PLACE, POSTERIORS, SURFACES

@@ -11,10 +11,10 @@ from typing import Any
 
 import msgspec
 
-from ... import __version__
 from ...errors import TactileError
 from ...files import atomic, provenance
 from ...files.text_file import read_small
+from ...files.version import __version__
 from ...recordings import electrode_gains
 from .. import results
 from .inputs import Input

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from ... import __version__
+from ...files.version import __version__
 from ...recordings import PrepareOptions
 from ...recordings.electrode_gains import SensorFile
 from ...translation.answer import Answer
