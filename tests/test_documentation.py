@@ -93,6 +93,8 @@ def inputs(tmp_path_factory) -> Path:
     for name, frames in (("touch.csv", 80), ("day1/a.csv", 80), ("day2/b.csv", 80), ("touches/1.csv", None)):
         (folder / name).parent.mkdir(exist_ok=True)
         write_touch(folder / name, frames)
+    own = (folder / "touch.csv").read_text(encoding="utf-8").replace("ele", "Taxel ").replace("timestamp", "t")
+    (folder / "own.csv").write_text(own, encoding="utf-8")
     unit = plain_unit()
     write_photographs(folder / "presses", unit)
     shutil.copytree(folder / "presses", folder / "other_presses")

@@ -132,7 +132,7 @@ def convert(
 
     clock = Stopwatch()
     with clock.stage("read"):
-        recording = recordings.read(recording_path)
+        recording = recordings.read(recording_path, None if options.prepare is None else options.prepare.columns)
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
         finger = split(os.fspath(recording_path))[1]

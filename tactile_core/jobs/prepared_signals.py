@@ -105,7 +105,7 @@ def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
     if unit is not None:
         options = dataclasses.replace(options, rest=unit.rest())
     evidence, doubts = "", np.uint16(0)
-    for part in read_parts(path):
+    for part in read_parts(path, options.columns):
         recording = part.recording
         if rest is not None and options.tare not in (None, "none"):  # frames that the user named lie in the first part
             options = dataclasses.replace(options, tare=slice(0, len(recording)))
@@ -131,7 +131,7 @@ def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
 
 def _one_polarity(path: str, options: PrepareOptions) -> tuple[PrepareOptions, str]:
     """Options that name the polarity of the first part that shows it, and the evidence; as they are where none does."""
-    for part in read_parts(path):
+    for part in read_parts(path, options.columns):
         signals = prepare(part.recording, options)
         if not signals.flags[0] & DOUBTS:
             name, evidence = (signals.report[each] for each in ("polarity", "polarity_evidence"))

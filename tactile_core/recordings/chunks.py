@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 from .array_store import Store, open_hdf5
 from .bag import open_bag, read_bag
-from .readers import container_of, layout_of, names, read, reading
+from .column_map import ColumnMap, refuse_other
+from .readers import container_of, layout_of, names, read, reading, table_reader
 from .recording import Recording
 from .table import read_header, read_tables
 
@@ -26,27 +27,30 @@ class Part:
     repeated: int
 
 
-def read_parts(path: str | os.PathLike[str]) -> Iterator[Part]:
+def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> Iterator[Part]:
     """Yield the parts of a recording in order, times counted from the first frame of all. NPZ files are read whole.
+
+    columns : of a CSV file that no layout knows, as of `read`
 
     Raises TactileError like `readers.read`.
     """
     path = os.fspath(path)
     shift, time = 0.0, None
-    for part in _parts(path):
+    for part in _parts(path, columns):
         if part.repeated and time is not None:
             shift = time[-part.repeated]
         time = part.recording.time + shift
         yield replace(part, recording=replace(part.recording, time=time))
 
 
-def _parts(path: str) -> Iterator[Part]:
+def _parts(path: str, columns: ColumnMap | None) -> Iterator[Part]:
     with reading(path):
         container = container_of(path)
+        refuse_other(path, container, columns)
         if container == "csv" and os.path.getsize(path) > TEXT_BYTES:
-            layout = layout_of(path, container, read_header(path))
+            reader = table_reader(path, read_header(path), columns)
             for table, repeated in read_tables(path, TEXT_BYTES, CONTEXT):
-                yield Part(layout.read(table), repeated)
+                yield Part(reader(table), repeated)
         elif container == "hdf5":
             with open_hdf5(path) as store:
                 yield from _of_store(store)
@@ -56,7 +60,7 @@ def _parts(path: str) -> Iterator[Part]:
                 for recording, repeated in read_bag(bag, layout, PART_FRAMES, CONTEXT):
                     yield Part(recording, repeated)
         else:
-            yield Part(read(path), 0)
+            yield Part(read(path, columns), 0)
 
 
 def _of_store(store: Store) -> Iterator[Part]:

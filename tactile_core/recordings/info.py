@@ -20,7 +20,7 @@ def describe(path: str | os.PathLike[str], options: PrepareOptions | None = None
 
     Raises TactileError where the file is no recording.
     """
-    recording = read(path)
+    recording = read(path, None if options is None else options.columns)
     signals = prepare(recording, options)
     lines = [os.fspath(path)]
     lines += [f"  {label:<11}{text}" for label, text in _rows(recording, signals)]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
 
@@ -16,13 +16,15 @@ from ..files.registry import modules_of
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
 from .bag import fingers_of, kind, open_bag, read_bag
+from .column_map import ColumnMap, read_mapped, refuse_other
 from .fingers import named, split
 from .matlab import START, START_OF_HDF5, open_matlab
 from .recording import Recording
-from .table import read_header, read_table
+from .table import Table, read_header, read_table
 from .truncated_cell import shown
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
+MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
 
 
@@ -32,10 +34,11 @@ def layouts() -> tuple[ModuleType, ...]:
     return tuple(modules_of(formats.__name__).values())
 
 
-def read(path: str | os.PathLike[str]) -> Recording:
+def read(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> Recording:
     """Read a BioTac recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
+    columns : which column of a CSV file is what, where no known layout has its names; see ``column_map.read``
 
     Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19) counts, ``pdc``, ``pac``, ``tac``, ``tdc``
     where the file has them, ``warnings`` for what is odd in it. Nothing is resampled, repaired or dropped.
@@ -47,6 +50,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
     path = os.fspath(path)
     with reading(path):
         container = container_of(path)
+        refuse_other(path, container, columns)
         if container == "hdf5":
             with open_hdf5(path) as store:
                 return layout_of(path, container, names(store)).read(store)
@@ -60,8 +64,8 @@ def read(path: str | os.PathLike[str]) -> Recording:
             file, finger = split(path)
             with open_matlab(file) as store:
                 return _read_finger(layout_of(file, container, store.shapes), store, finger)
-        layout = layout_of(path, container, read_header(path))
-        return layout.read(read_table(path))
+        reader = table_reader(path, read_header(path), columns)
+        return reader(read_table(path))
 
 
 def _read_finger(layout: ModuleType, store: Store, finger: int | None) -> Recording:
@@ -142,6 +146,13 @@ def container_of(path: str) -> str:
     return "npz" if start.startswith(ZIP_STARTS) else "csv"
 
 
+def table_reader(path: str, header: Collection[str], columns: ColumnMap | None) -> Callable[[Table], Recording]:
+    """Return what makes a recording of a CSV file's table: the map, or the layout that knows its header."""
+    if columns is None:
+        return layout_of(path, "csv", header).read
+    return partial(read_mapped, columns=columns)
+
+
 def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
     """Return the layout that knows most of the file's columns, arrays or messages. Raises TactileError if none does."""
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
@@ -154,6 +165,6 @@ def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
             path,
             f"no known recording: {word} {shown(held)}",
             known,
-            "Compare the names with the layouts in the documentation",
+            MAP_ADVICE if container == "csv" else "Compare the names with the layouts in the documentation",
         )
     return layout

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..sensors import divider
+from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
 from .polarity import AUTO, FALLS, POLARITIES, Polarity, polarity_of
@@ -58,6 +59,7 @@ class PrepareOptions:
     smooth : frames, odd, centred window over which the changes are averaged; None: 3 of a rectified recording, else 1
     polarity : "falls" or "rises": direction of counts where a film thins; "auto": as the file states, or as detected
     rest : the unit's own, for raw recordings that hold no calm part near it
+    columns : which column of a CSV file is what, for those who read the recording; None: as its layout says
     """
 
     kind: str | None = None
@@ -68,6 +70,7 @@ class PrepareOptions:
     smooth: int | None = None
     polarity: str = AUTO
     rest: Rest | None = None
+    columns: ColumnMap | None = None
 
     def check(self) -> None:
         """Raise TactileError for options that suit no recording; `tare` can only be checked against a recording."""

@@ -47,7 +47,7 @@ def adapt(
     recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames in contact.
     """
     parts, kinds, restless = [], set(), []
-    recordings = [read(path) for path in paths]
+    recordings = [read(path, None if options is None else options.columns) for path in paths]
     rest = _rest(recordings)
     bare = _bare(rest)
     for path, recording in zip(paths, recordings, strict=True):

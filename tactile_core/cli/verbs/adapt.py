@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..terminal import say, tell
-from .common import NOTHING, polarity_argument
+from .common import NOTHING, columns_argument, columns_of, polarity_argument
 
 BRIEF = "rest, gains and offsets of a sensor, from its recordings"
 TEXT = """\
@@ -30,6 +30,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("recordings", nargs="+", metavar="RECORDING", help="of one sensor, in any known layout")
     verb.add_argument("--out", required=True, metavar="FILE", help="new TOML file to write")
     polarity_argument(verb)
+    columns_argument(verb)
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
 
 
@@ -41,7 +42,8 @@ def run(options: argparse.Namespace) -> int:
 
     atomic.claim(options.out)
     typical = reference_signals.read(options.weights or networks.WEIGHTS_FOLDER)
-    sensor, warnings = adapt.adapt_hand(options.recordings, typical, PrepareOptions(polarity=options.polarity))
+    prepare = PrepareOptions(polarity=options.polarity, columns=columns_of(options))
+    sensor, warnings = adapt.adapt_hand(options.recordings, typical, prepare)
     for warning in warnings:
         say(f"warning: {warning}")
     electrode_gains.check(sensor, options.out)

@@ -44,7 +44,7 @@ examples:
 LEAVES = RESUMES
 RECIPE = (  # option, its value where it is not given
     *((name, None) for name in ("keep", "shard_frames", "weights", "sensor", "calibration", "preset")),
-    *((name, None) for name in ("kind", "counts_per_unit", "smooth")),
+    *((name, None) for name in ("kind", "counts_per_unit", "smooth", "columns")),
     *(("tare", "auto"), ("no_drift", False), ("polarity", "auto")),
     *(("frames_apart", False), ("answer", "likely"), ("mount_shift", None), ("samples", 0)),
     ("gel", "translated"),

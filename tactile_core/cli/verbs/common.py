@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import TactileError
 
 if TYPE_CHECKING:
+    from ...recordings.column_map import ColumnMap
     from ...translation.answer import Answer
 
 # What a stopped verb leaves.
@@ -37,6 +38,7 @@ def prepare_arguments(verb: argparse.ArgumentParser) -> None:
         help="what the file holds, where the automatic answer is wrong",
     )
     polarity_argument(verb)
+    columns_argument(verb)
     verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor to counts, for a scaled recording")
     verb.add_argument(
         "--smooth", type=int, metavar="N", help="average over N frames, odd (default: 3 if rectified, else 1)"
@@ -53,6 +55,25 @@ def polarity_argument(verb: argparse.ArgumentParser) -> None:
         help="what counts do where the film over an electrode thins: fall, as raw ones do, or rise, in files that hold"
         " rest minus reading (default: as the file says, or the recording shows)",
     )
+
+
+def columns_argument(verb: argparse.ArgumentParser) -> None:
+    """Add ``--columns``."""
+    verb.add_argument(
+        "--columns",
+        metavar="MAP.toml",
+        help="which column of a CSV file is what, where its names are of no known layout; `tactile info --columns`"
+        " writes such a map",
+    )
+
+
+def columns_of(options: argparse.Namespace) -> ColumnMap | None:
+    """The map that ``--columns`` names; None without."""
+    if options.columns is None:
+        return None
+    from ...recordings import column_map
+
+    return column_map.read(options.columns)
 
 
 def electrodes_argument(verb: argparse.ArgumentParser) -> None:
@@ -137,4 +158,5 @@ def prepare_words(options: argparse.Namespace) -> dict[str, Any]:
         "counts_per_unit": options.counts_per_unit,
         "smooth": options.smooth,
         "polarity": options.polarity,
+        "columns": columns_of(options),
     }

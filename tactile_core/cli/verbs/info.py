@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import os
 
 from ...errors import TactileError
-from ..terminal import complain, tell
-from .common import NOTHING, polarity_argument
+from ..terminal import complain, say, tell
+from .common import NOTHING, columns_of, polarity_argument
 
 BRIEF = "what a recording holds"
-TEXT = "Say what recordings hold: sensor, channels, rate, duration, polarity, tare, gaps, bad samples."
+TEXT = """\
+Say what recordings hold: sensor, channels, rate, duration, polarity, tare, gaps, bad samples.
+
+A CSV file whose column names are of no known layout needs a map: --columns map.toml writes one, guessed from the
+names of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch."""
 EPILOG = """\
-example:
-  tactile info results/*.csv"""
+examples:
+  tactile info results/*.csv
+  tactile info own.csv --columns map.toml"""
 LEAVES = NOTHING
 
 
@@ -20,6 +26,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="+", metavar="FILE")
     polarity_argument(verb)
+    verb.add_argument(
+        "--columns", metavar="MAP.toml", help="which column is what; where there is no such file, it is written"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -27,12 +36,29 @@ def run(options: argparse.Namespace) -> int:
     from ...recordings import PrepareOptions, info
     from ...recordings.readers import each_finger
 
-    failed = 0
+    if options.columns is not None and not os.path.lexists(options.columns):
+        _write_columns(options)
+    prepare, failed = PrepareOptions(polarity=options.polarity, columns=columns_of(options)), 0
     for path in options.recordings:
         try:
             for finger in each_finger(path):
-                tell(info.describe(finger, PrepareOptions(polarity=options.polarity)))
+                tell(info.describe(finger, prepare))
         except TactileError as error:
             complain(str(error))
             failed += 1
     return 2 if failed else 0
+
+
+def _write_columns(options: argparse.Namespace) -> None:
+    """Write the map that the first recording's column names suggest."""
+    from ...recordings import column_map
+    from ...recordings.readers import container_of, reading
+
+    path = options.recordings[0]
+    with reading(path):
+        container = container_of(path)
+        if container != "csv":
+            raise TactileError("--columns", f"given for {path} ({container})", "a CSV recording", "Leave it out")
+        columns, held = column_map.guess(path)
+    column_map.write(options.columns, columns, held)
+    say(f"{options.columns}: written, guessed from the names of the columns; check it")

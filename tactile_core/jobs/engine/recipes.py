@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from ...files.version import __version__
 from ...recordings import PrepareOptions
+from ...recordings.column_map import ColumnMap
 from ...recordings.electrode_gains import SensorFile
 from ...translation.answer import Answer
 from ..results import TRANSLATED, Gel
@@ -27,6 +28,7 @@ class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     counts_per_unit: float | None = None
     smooth: int | None = None
     polarity: str = "auto"
+    columns: ColumnMap | None = None
 
     def options(self) -> PrepareOptions:
         """Return the options for ``recordings.prepare``."""

@@ -1,0 +1,96 @@
+"""A CSV file with names of its own: the map is guessed, read again, and refused in words where it is wrong."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from conftest import SLIDE_HEADER
+
+from tactile_core import recordings
+from tactile_core.cli.main import main
+from tactile_core.errors import TactileError
+from tactile_core.recordings import chunks, column_map
+
+FRAMES = 120
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A file of own names, times in ms, and the same recording in a known layout."""
+    random = np.random.default_rng(1)
+    counts = 3300 + random.integers(-1, 2, (FRAMES, 19))
+    counts[60:90, 7] -= 100
+    time = np.arange(FRAMES)
+    own = tmp_path / "own.csv"
+    names = ["Time (ms)", *(f"Elec {i:02d}" for i in range(19)), "PDC raw"]
+    rows = np.column_stack([10 * time, counts, np.full(FRAMES, 1800)])
+    np.savetxt(own, rows, fmt="%d", delimiter=";", header=";".join(names), comments="")
+    known = np.full((FRAMES, len(SLIDE_HEADER)), 1800.0)
+    known[:, 0], known[:, 26:] = time / 100, counts
+    np.savetxt(tmp_path / "known.csv", known, fmt="%.10g", delimiter=",", header=",".join(SLIDE_HEADER), comments="")
+    return own
+
+
+def test_info_writes_a_map_by_which_the_file_is_the_same_recording(own, tmp_path, capsys):
+    map_file = tmp_path / "map.toml"
+    assert main(["info", str(own)]) == 2
+    assert "tactile info FILE --columns" in capsys.readouterr().err
+    assert main(["info", str(own), "--columns", str(map_file)]) == 0
+    columns = column_map.read(map_file)
+    assert (columns.time, columns.time_unit, columns.pdc, columns.tac) == ("time (ms)", "ms", "pdc raw", "")
+    assert columns.electrodes == tuple(f"elec {i:02d}" for i in range(19))
+    mapped, known = recordings.read(own, columns), recordings.read(tmp_path / "known.csv")
+    for name in ("time", "electrodes", "pdc"):
+        np.testing.assert_allclose(getattr(mapped, name), getattr(known, name), atol=1e-9)
+    parts = list(chunks.read_parts(own, columns))
+    assert len(parts) == 1 and np.array_equal(parts[0].recording.electrodes, known.electrodes)
+
+
+def test_a_map_leads_through_convert_and_batch(own, tmp_path):
+    map_file = tmp_path / "map.toml"
+    assert main(["info", str(own), "--columns", str(map_file)]) == 0
+    words = [str(own), "--columns", str(map_file), "--keep", "latent"]
+    assert main(["convert", *words, "--out", str(tmp_path / "out")]) == 0
+    note = json.loads((tmp_path / "out" / "own" / "note.json").read_text(encoding="utf-8"))
+    assert note["options"]["prepare"]["columns"]["pdc"] == "pdc raw"
+    assert main(["batch", *words, "--out", str(tmp_path / "job")]) == 0
+    assert list((tmp_path / "job" / "shards").rglob("*.h5"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"elec 03"', '"elec 99"', "column 'elec 99'"),
+        ('"elec 03"', '"elec 04"', "18 different"),
+        ('"elec 03", ', "", "18 names"),
+        ('time_unit = "ms"', 'time_unit = "hours"', "time_unit"),
+        ("pdc = ", "presure = ", "presure"),
+        (column_map.FORMAT, "other", "format"),
+    ],
+)
+def test_a_wrong_map_is_refused_in_words(own, tmp_path, old, new, words, capsys):
+    map_file = tmp_path / "map.toml"
+    assert main(["info", str(own), "--columns", str(map_file)]) == 0
+    text = map_file.read_text(encoding="utf-8")
+    assert old in text
+    map_file.write_text(text.replace(old, new), encoding="utf-8")
+    assert main(["info", str(own), "--columns", str(map_file)]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_names_from_a_stranger_stay_in_their_comment(own, tmp_path):
+    text = own.read_text(encoding="utf-8").replace("PDC raw", "x\x1b\u2028=1]")
+    own.write_text(text, encoding="utf-8")
+    map_file = tmp_path / "map.toml"
+    columns, held = column_map.guess(str(own))
+    column_map.write(map_file, columns, held)
+    assert column_map.read(map_file) == columns
+
+
+def test_a_map_is_for_csv_alone(own, tmp_path):
+    columns, _ = column_map.guess(str(own))
+    np.savez(tmp_path / "arrays.npz", electrodes=np.full((50, 19), 3300.0))
+    with pytest.raises(TactileError, match="a CSV recording"):
+        recordings.read(tmp_path / "arrays.npz", columns)
