@@ -117,17 +117,18 @@ def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | No
 
     scene, _ = load_scene(path)
     spec = recording.recording_of(scene, path)
-    time, _, force = recording.motion(spec)
-    frames, contacts = len(time), int((force > 0).sum())
+    time, place, force = recording.motion(spec)
+    frames, pressed = len(time), int((force > 0).sum())
+    contacts = len({(*at, newtons) for at, newtons in zip(place.tolist(), force.tolist(), strict=True) if newtons > 0})
     needed = set(keep) & set(recording.OUTPUTS)
     needed |= {"electrodes"} if "translation" in keep else set()
     needed |= {"displacement_digit"} if "image" in keep else set()
     used = recording.sensors_of(needed)
     choices = tier_choice.choose_for_scene(path, used, budget.um)
-    start, extent = _part("simulate_nothing"), f"{frames} frames, {contacts} in contact; indenter {spec.indenter}"
+    start, extent = _part("simulate_nothing"), f"{frames} frames, {pressed} in contact; indenter {spec.indenter}"
     parts = [Part("start", "simulate", extent, start["start"], start["mb"])]
     for sensor in used:
-        kept = f"displacement_{sensor}" in needed
+        kept = pressed if f"displacement_{sensor}" in needed else 0
         parts += [*_matrices(sensor), _contacts(sensor, choices[sensor], contacts, kept)]
     if "electrodes" in needed:
         disk = _part("simulate_electrodes")["kb"] * frames / 1e3
@@ -182,8 +183,8 @@ def _matrices(sensor: str) -> list[Part]:
     return [Part(what, "simulate", extent, BUILD_S[sensor], disk=MATRICES_MB[sensor], building=BUILD_MB)]
 
 
-def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
-    """The solves of one sensor, in its tier."""
+def _contacts(sensor: str, choice: Any, contacts: int, kept: int) -> Part:
+    """The solves of one sensor, in its tier: of contacts that differ, of which so many frames are kept."""
     part, start = _part(f"simulate_{sensor}"), _part("simulate_nothing")
     ms = part["ms"]
     if choice.tier != "fast":
@@ -191,8 +192,8 @@ def _contacts(sensor: str, choice: Any, contacts: int, kept: bool) -> Part:
         full = costs()["full_ms"][sensor]
         ms += full * tiers[choice.tier][sensor]["ms"] / tiers["full"][sensor]["ms"]
     once = max(part["start"] - start["start"], 0)
-    extent = f"{contacts} contacts; {choice.describe(sensor)}"
-    disk = part["kb"] * contacts / 1e3 if kept else 0.0
+    extent = f"{contacts} different contacts; {choice.describe(sensor)}"
+    disk = part["kb"] * kept / 1e3
     seconds, memory = once + ms * contacts / 1e3, max(part["mb"] - start["mb"], 0) + TIER_MB[choice.tier]
     return Part(f"{NAMES[sensor]} contacts", "simulate", extent, seconds, memory, disk)
 

@@ -71,6 +71,17 @@ def test_tractions_of_a_finer_tier_are_refused_before_it_begins(scene, tmp_path)
         simulate_recording(scene, tmp_path / "x.h5", keep=("traction_digit",), tiers={"digit": "full"})
 
 
+def test_a_press_that_comes_again_is_solved_once(tmp_path, monkeypatch):
+    solve, asked = recording_room.solve, []
+    monkeypatch.setattr(recording_room, "solve", lambda *of, **how: asked.append(how["force"]) or solve(*of, **how))
+    down_and_up = ball_scene((0.0, -8.0, 0.0, 0.0), (0.03, -8.0, 0.0, 0.3), (0.06, -8.0, 0.0, 0.0))
+    (tmp_path / "scene.toml").write_text(down_and_up, encoding="utf-8")
+    simulate_recording(tmp_path, tmp_path / "gel.h5", keep=("displacement_digit",))
+    assert asked == pytest.approx([0.1, 0.2, 0.3])
+    moved = read_truth(tmp_path / "gel.h5")[1].displacement_digit
+    np.testing.assert_array_equal(moved[1], moved[5])
+
+
 def test_same_seed_same_bytes(scene, seed_4, tmp_path):
     again, other = tmp_path / "again.h5", tmp_path / "other.h5"
     simulate_recording(scene, again, seed=4)
