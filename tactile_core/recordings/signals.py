@@ -298,14 +298,14 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
                 "Name frames without contact, or leave the option out",
             )
         return Quiet(np.zeros(len(readings), bool), (), "the file's own zero, as asked for")
-    frames = _frames(options.tare, len(readings))
+    frames = tare_frames(options.tare, len(readings))
     mask = np.zeros(len(readings), bool)
     mask[frames] = True
     return Quiet(mask, ((frames.start, frames.stop),), "given by the user")
 
 
-def _frames(asked: slice | str, count: int) -> slice:
-    """Convert the tare frames to a plain slice. Raises TactileError where they are not inside the recording."""
+def tare_frames(asked: slice | str, count: int) -> slice:
+    """Convert the tare frames to a plain slice. Raises TactileError where they are not inside these `count` frames."""
     if isinstance(asked, slice):
         tare = asked
     else:
@@ -322,7 +322,7 @@ def _frames(asked: slice | str, count: int) -> slice:
         raise TactileError(
             "option tare",
             f"frames {asked if isinstance(asked, str) else f'{tare.start}:{tare.stop}'}",
-            f"A:B inside the {count} frames of the recording, without a step",
+            f"A:B inside {count} frames, without a step",
             "Name frames without contact",
         )
     return slice(first, last)

@@ -11,24 +11,27 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import say, tell
-from .common import NOTHING, polarity_argument
+from .common import NOTHING, columns_argument, columns_of, polarity_argument
 
 if TYPE_CHECKING:
     import numpy as np
 
     from ...recordings import Recording
+    from ...recordings.column_map import ColumnMap
+    from ...recordings.electrode_gains import ElectrodeGains
 
 BRIEF = "live view of a recording that is being written"
 TEXT = """\
 Follow a CSV recording while another program writes it, and show the newest frame's DIGIT picture: in a window, or in
 a PNG file that is replaced with each picture. With --play or --rosbag-play a finished recording is played at its own
-pace, or --speed times as fast. Rest is taken from the first quiet part: begin without contact. The time from frame to
-picture, and how much of it was computing, is printed each second and at the end."""
+pace, or --speed times as fast. Rest is taken from the first quiet part: begin without contact, or name frames by
+--tare, or a unit whose rest is known by --sensor. The time from frame to picture, and how much of it was
+computing, is printed each second and at the end."""
 EPILOG = """\
 examples:
   tactile watch touch.csv
   tactile watch touch.csv --out now.png --idle 10
-  tactile watch touch.csv --play
+  tactile watch touch.csv --play --tare 0:50 --sensor sensor.toml
   tactile watch --rosbag-play touch.bag --speed 2"""
 LEAVES = NOTHING
 POLL = 0.002  # s between two looks at the file
@@ -51,6 +54,14 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--idle", type=float, metavar="S", help="end when no frame came for S seconds (default: never)")
     verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the recording (default: 100)")
     polarity_argument(verb)
+    columns_argument(verb)
+    verb.add_argument(
+        "--tare",
+        default="auto",
+        metavar="auto|none|A:B",
+        help="frames without contact, of the first 10 s, that give the resting reading (default: found automatically)",
+    )
+    verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
 
 
@@ -59,6 +70,7 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     from ...jobs import live
     from ...jobs.convert import load_tools
+    from ...recordings.column_map import refuse_other
     from ...recordings.readers import container_of
 
     _check(options)
@@ -69,8 +81,12 @@ def run(options: argparse.Namespace) -> int:
     if not 1 <= options.rate <= 1e4:
         raise TactileError("--rate", f"{options.rate:g}", "1 to 10,000 Hz")
     playing = options.play or options.rosbag_play
-    source = _played(path, 1.0 if options.speed is None else options.speed) if playing else _followed(options)
-    view = live.View(load_tools(options.weights), options.rate, options.polarity)
+    columns = columns_of(options)
+    refuse_other(path, container, columns)
+    speed = 1.0 if options.speed is None else options.speed
+    source = _played(path, speed, columns) if playing else _followed(options, columns)
+    tare = None if options.tare == "auto" else options.tare
+    view = live.View(load_tools(options.weights), options.rate, options.polarity, tare, _unit(options.sensor, path))
     draw = _window(path) if options.out is None else _file(options.out)
     reported, failed = time.perf_counter(), False
     try:
@@ -108,11 +124,21 @@ def _check(options: argparse.Namespace) -> None:
             raise TactileError(options.rosbag_play, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
 
 
-def _followed(options: argparse.Namespace) -> Iterator[tuple[Recording | None, float]]:
+def _unit(sensor: str | None, path: str) -> ElectrodeGains | None:
+    """The unit of the sensor file that made this recording; None without a file."""
+    if sensor is None:
+        return None
+    from ...recordings import electrode_gains
+    from ...recordings.fingers import split
+
+    return electrode_gains.read(sensor).gains_for(path, split(path)[1], sensor)
+
+
+def _followed(options: argparse.Namespace, columns: ColumnMap | None) -> Iterator[tuple[Recording | None, float]]:
     """New rows of a growing file and when they came; None now and then while there are none."""
     from ...jobs.live import Growing
 
-    growing, last, bad = Growing(options.recording), time.perf_counter(), 0
+    growing, last, bad = Growing(options.recording, columns), time.perf_counter(), 0
     while options.idle is None or time.perf_counter() - last < options.idle:
         came = time.perf_counter()
         rows = growing.poll()
@@ -126,12 +152,12 @@ def _followed(options: argparse.Namespace) -> Iterator[tuple[Recording | None, f
         yield rows, came
 
 
-def _played(path: str, speed: float) -> Iterator[tuple[Recording | None, float]]:
+def _played(path: str, speed: float, columns: ColumnMap | None) -> Iterator[tuple[Recording | None, float]]:
     """The rows of a finished recording when their time has come, a part of it in memory; speed 0: one after another."""
     from ...recordings.chunks import read_parts
 
     began = time.perf_counter()
-    for part in read_parts(path):
+    for part in read_parts(path, columns):
         recording, done = part.recording, part.repeated
         while done < len(recording):
             ahead = recording.time[done] / speed - (time.perf_counter() - began) if speed else 0.0

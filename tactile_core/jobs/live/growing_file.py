@@ -10,7 +10,8 @@ import numpy as np
 from ...errors import TactileError
 from ...files import outside
 from ...recordings.assemble import MAX_BAD_SHARE, BadRows
-from ...recordings.readers import layout_of
+from ...recordings.column_map import ColumnMap
+from ...recordings.readers import table_reader
 from ...recordings.recording import Recording
 from ...recordings.table import Header, read_lines
 
@@ -22,9 +23,9 @@ FEW = 20  # rows, 0.2 s, of which any number may be bad at once: a program that 
 class Growing:
     """A CSV recording that another program is writing, in any of the text layouts."""
 
-    def __init__(self, path: str | os.PathLike) -> None:
-        """Raise TactileError where there is no such file."""
-        self._path = Path(path)
+    def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None) -> None:
+        """Raise TactileError where there is no such file; columns : as of `recordings.read`."""
+        self._path, self._columns = Path(path), columns
         self._place, self._rest, self._lines = 0, b"", 0
         self._header: Header | None = None
         self.rows, self.bad = 0, 0  # that came; of them passed over
@@ -52,7 +53,7 @@ class Growing:
             return None
         self.rows += len(table.lines)
         try:
-            return layout_of(str(self._path), "csv", table.header).read(table)
+            return table_reader(str(self._path), table.header, self._columns)(table)
         except BadRows:
             self.bad += len(table.lines)
             if self.bad > max(FEW, MAX_BAD_SHARE * self.rows):

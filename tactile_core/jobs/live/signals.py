@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...recordings import electrode_gains
+from ...recordings.electrode_gains import ElectrodeGains
 from ...recordings.flags import Flag
 from ...recordings.polarity import AUTO, FALLS, POLARITIES, TOUCHING, Polarity, polarity_of
 from ...recordings.rest_level import find_quiet, level, window_frames
 from ...recordings.signal_kind import detect
-from ...recordings.signals import Signals
-from ...sensors import SAMPLE_RATE
+from ...recordings.signals import Rest, Signals, tare_frames
+from ...sensors import ELECTRODES, SAMPLE_RATE
 
 LONGEST = 10.0  # s that are looked through for rest and polarity; then the calmest so far is taken (assumed)
 AGAIN = 25  # new frames after which the polarity is looked at again
@@ -19,10 +21,22 @@ class LiveSignals:
     """The change against rest, frame by frame. Rest is the first quiet part; drift is not removed.
 
     rate : Hz; polarity : "falls", "rises" or "auto", which is decided by the first contacts, and "falls" until then
+    tare : frames of the first LONGEST s to take rest from, "A:B"; "none" takes the file's own zero
+    unit : gains and offsets to take off, and its rest, which is taken where the first window is not calm near it
+
+    Raises TactileError for a tare of other frames.
     """
 
-    def __init__(self, rate: float = SAMPLE_RATE, polarity: str = AUTO) -> None:
-        self._rate = rate
+    def __init__(
+        self,
+        rate: float = SAMPLE_RATE,
+        polarity: str = AUTO,
+        tare: str | None = None,
+        unit: ElectrodeGains | None = None,
+    ) -> None:
+        self._rate, self._unit = rate, unit
+        self._zero = tare == "none"
+        self._tare = None if tare is None or self._zero else tare_frames(tare, round(LONGEST * rate))
         self._seen, self._pdc, self._looked_at = np.empty((0, 19)), np.empty(0), 0
         self.polarity = _stated_polarity(polarity, "as given")
         self.rest: np.ndarray | None = None
@@ -50,11 +64,21 @@ class LiveSignals:
 
     def _find_rest(self) -> None:
         """Take the first quiet part for rest, or the calmest one when LONGEST has passed."""
-        if len(self._seen) < window_frames(self._rate):
+        if self._tare is not None and len(self._seen) >= self._tare.stop:
+            self.kind, _ = detect(self._seen)
+            first, last = self._tare.start, self._tare.stop
+            self.rest, self.found = level(self._seen[first:last]), f"frames {first}:{last}, as given"
+        if self._tare is not None or len(self._seen) < window_frames(self._rate):
             return
         self.kind, _ = detect(self._seen)
+        if self._zero:
+            self.rest, self.found = np.zeros(ELECTRODES), "the file's own zero, as asked for"
+            return
         quiet = find_quiet(self._seen, None, self._rate, self.kind)
-        if quiet.parts:
+        known = None if self._unit is None or self.kind != "raw" else self._unit.rest()
+        if known is not None and not (quiet.parts and self._agrees(known, *quiet.parts[0])):
+            self.rest, self.found = np.array(known.counts), "the unit's own: the first frames are not calm near it"
+        elif quiet.parts:
             first, last = quiet.parts[0]
             self.rest, self.found = level(self._seen[first:last]), f"frames {first}:{last}"
         elif len(self._seen) >= LONGEST * self._rate:
@@ -62,6 +86,10 @@ class LiveSignals:
             spread = [self._seen[i : i + n].std(axis=0).max() for i in range(0, len(self._seen) - n, n)]
             first = n * int(np.argmin(spread))
             self.rest, self.found = level(self._seen[first : first + n]), f"no quiet part: a guess, {first}:{first + n}"
+
+    def _agrees(self, known: Rest, first: int, last: int) -> bool:
+        """Return true if these calm frames are at the unit's rest."""
+        return known.agrees(level(self._seen[first:last]), float(np.median(self._pdc[first:last])))
 
     def _decide(self) -> None:
         """The polarity, by the frames so far, looked at again now and then; once it is sure it stays."""
@@ -79,12 +107,13 @@ class LiveSignals:
         """Signals of frames (T, 19) counts; call when rest is known."""
         flags = Flag.RECTIFIED if self.kind == "rectified" else 0
         count = len(electrodes)
-        return Signals(
+        signals = Signals(
             change=self.polarity.sign * (electrodes - self.rest), rest=self.rest, drift=np.zeros(19),
             electrodes=electrodes, kind=self.kind,
             quiet=np.zeros(count, bool), flags=np.full(count, flags, np.uint16), pdc=np.full(count, np.nan),
             warnings=(), report={},
         )  # fmt: skip
+        return signals if self._unit is None else electrode_gains.apply(signals, self._unit)
 
 
 def _stated_polarity(polarity: str, who: str) -> Polarity:

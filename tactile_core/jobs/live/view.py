@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...pictures.height_map import folds_counted
+from ...recordings.electrode_gains import ElectrodeGains
 from ...recordings.polarity import AUTO, Polarity
 from ...recordings.recording import Recording
 from ...recordings.signals import Signals
@@ -38,9 +39,16 @@ class Shown:
 class View:
     """Rows in, pictures out: always the newest, older ones that came meanwhile are passed over."""
 
-    def __init__(self, tools: Tools, rate: float, polarity: str = AUTO) -> None:
-        """Take the recording's rate, Hz, and its polarity, as of ``PrepareOptions``."""
-        self._tools, self._signals, self._rate = tools, LiveSignals(rate, polarity), rate
+    def __init__(
+        self,
+        tools: Tools,
+        rate: float,
+        polarity: str = AUTO,
+        tare: str | None = None,
+        unit: ElectrodeGains | None = None,
+    ) -> None:
+        """Take the recording's rate, Hz, and what `LiveSignals` takes."""
+        self._tools, self._signals, self._rate = tools, LiveSignals(rate, polarity, tare, unit), rate
         self._follow = Follower()
         self.frames, self.passed = 0, 0
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)

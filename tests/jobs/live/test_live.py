@@ -15,7 +15,8 @@ from tactile_core.cli.main import main
 from tactile_core.cli.verbs import watch
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert, live
-from tactile_core.recordings import polarity
+from tactile_core.recordings import electrode_gains, polarity
+from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile
 
 
 class Clock:
@@ -134,6 +135,46 @@ def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path,
         grey = np.asarray(Image.open(out))[0, -1, 0]
         assert 50 < grey < 70  # the last frame is pressed by 29 counts times 1 to 3, a grey level a count
         out.unlink()
+
+
+def test_rest_is_from_the_frames_given_or_the_file_s_own_zero():
+    frames = np.where(np.arange(100)[:, None] < 40, 3100.0, 3000.0) * np.ones(19)  # begins in contact
+    signals = live.LiveSignals(tare="50:80")
+    assert not signals.learn(frames[:79]) and signals.learn(frames[79:])
+    np.testing.assert_array_equal(signals.rest, np.full(19, 3000.0))
+    zero = live.LiveSignals(tare="none")
+    assert zero.learn(frames) and not zero.rest.any()
+    with pytest.raises(TactileError, match="tare"):
+        live.LiveSignals(tare="50:2000")
+
+
+def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
+    gain = [2.0] + [1.0] * 18
+    unit = ElectrodeGains("a unit", gain, [0.0] * 19, [3200.0] * 19, [5.0] * 19)
+    noise = np.random.default_rng(3).normal(0, 0.5, (40, 19))
+    held, free = (live.LiveSignals(unit=unit) for _ in range(2))
+    assert held.learn(2900 + noise) and "unit's own" in held.found  # 300 counts away, however calm
+    np.testing.assert_array_equal(held.rest, np.full(19, 3200.0))
+    assert free.learn(3210 + noise) and free.found.startswith("frames")
+    change = free.signals(3110 + noise).change
+    np.testing.assert_allclose(
+        change, np.tile(-100 / np.array(gain), (40, 1)), atol=3.0
+    )  # noise of half a count, twice
+
+
+def test_watch_takes_a_map_a_tare_and_a_sensor(slide_csv, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(watch, "time", Clock())
+    own, columns, sensor = tmp_path / "own.csv", tmp_path / "map.toml", tmp_path / "sensor.toml"
+    own.write_text(slide_csv(frames=90).read_text(encoding="utf-8").replace("ele", "taxel "), encoding="utf-8")
+    assert main(["info", str(own), "--columns", str(columns)]) == 0
+    electrode_gains.write(sensor, SensorFile(electrode_gains.FORMAT, ElectrodeGains("a unit", [1.0] * 19, [0.0] * 19)))
+    words = ["watch", str(own), "--columns", str(columns), "--tare", "0:30", "--sensor", str(sensor)]
+    for more in (["--play"], ["--idle", "0.2"]):
+        capsys.readouterr()
+        assert main([*words, "--out", str(tmp_path / "now.png"), *more]) == 0
+        told = capsys.readouterr()
+        assert told.out.startswith("90 frames: ") and "frames 0:30, as given" in told.err
 
 
 def test_watch_without_a_display_says_what_to_do(slide_csv, monkeypatch, capsys):
