@@ -106,12 +106,14 @@ class Done:
 
     added : what the toolkit added to displacements or heights, in words, where a bound was given
     left : what the translation itself leaves, in words
+    pressed : by how much a kept traction misses the force, in words; empty where it is not kept
     """
 
     folder: Path
     warnings: tuple[str, ...]
     added: str
     left: str
+    pressed: str = ""
 
 
 def convert(
@@ -153,7 +155,7 @@ def convert(
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
         found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
-    return Done(Path(folder), made.warnings(), added, made.describe_expected_error())
+    return Done(Path(folder), made.warnings(), added, made.describe_expected_error(), made.describe_traction())
 
 
 def _added(options: Options, made: FramePass) -> str:

@@ -121,6 +121,7 @@ class FramePass:
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._errors: list[np.ndarray] = []
         self._pressure: list[np.ndarray] = []
+        self._forces: list[np.ndarray] = []  # that the traction adds up to, and the networks'
         self.folded = 0  # height maps of a gel that folds over itself
         self.share = 0.0  # the deepest move of a node so far, over the gel's thickness
         chosen = choose_frames(np.abs(signals.change[frames]).mean(axis=1))
@@ -136,6 +137,7 @@ class FramePass:
             for start in range(0, len(self.frames), CHUNK):
                 frames = self.frames[start : start + CHUNK]
                 arrays = self._translate(frames)
+                arrays |= self._press(arrays)
                 arrays |= self._draw(folder, frames, arrays["displacement_digit"])
                 with self.clock.stage("hdf5"):
                     file.write(start, arrays)
@@ -166,6 +168,25 @@ class FramePass:
             f"the translation itself, beside this: the worst node of its gel is off by {expected:.2f} mm in half of "
             f"such contacts, by less than {bound:.2f} mm in 95 of 100"
         )
+
+    def describe_traction(self) -> str:
+        """Describe by how much the kept traction misses the force; empty where it is not kept."""
+        if not self._forces:
+            return ""
+        from .gel_traction import describe_miss
+
+        return describe_miss(*np.concatenate(self._forces, axis=1))
+
+    def _press(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Tractions of translated frames, where they are kept."""
+        if "traction" not in self.keep:
+            return {}
+        from .gel_traction import gel_traction  # with all of contact mechanics
+
+        with self.clock.stage("traction"):
+            found = gel_traction(arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]))
+        self._forces.append(np.stack([found["traction_force"], arrays["force"]]))
+        return found
 
     def _keep_measures(self, arrays: dict[str, np.ndarray]) -> None:
         touching = np.isfinite(arrays["contact_center"][:, 0])

@@ -97,6 +97,10 @@ def _arrays(
     frames = np.arange(len(time), dtype=np.int32)[rows] + np.int32(start)
     arrays = translated(dataclasses.replace(signals, **part), tools, tracked, frames)
     arrays |= {"frame": frames, "time": time[rows]}
+    if "traction" in keep:
+        from .gel_traction import gel_traction  # with all of contact mechanics
+
+        arrays |= gel_traction(arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]))
     if "height" in keep or "image" in keep:
         arrays["height_map"] = tools.height_map(arrays["displacement_digit"])
     if "image" in keep:

@@ -49,6 +49,10 @@ KEPT = {
     },
     "height": {"height_map": ("m", "(T, 320, 240) of the gel seen by the camera; see pictures.height_map")},
     "image": {},
+    "traction": {
+        "traction_digit": ("Pa", "(T, M, 3) of the object on the resting gel, from the translated displacement"),
+        "traction_force": ("N", "(T, 3) what traction_digit adds up to; force is another estimate"),
+    },
     SAMPLES: {
         "sample_center": ("m", "(T, S, 2) = (x, z) on the DIGIT of contacts that the frame may be as well; NaN: none"),
         "sample_force": ("N", "(T, S) of these contacts; 0 without contact"),
@@ -60,6 +64,7 @@ PICTURES = {"image": ("1", "(T, 320, 240, 3) sRGB pictures of the DIGIT")}  # in
 PACKED = {
     "height_map": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
     "image": {"compression": "gzip", "compression_opts": 4},
+    "traction_digit": {"compression": "gzip", "compression_opts": 1, "shuffle": True},  # zero outside the patch
 }
 LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk of its own
 

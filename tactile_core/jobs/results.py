@@ -29,7 +29,7 @@ IMAGE_NAME = "{:05d}.png"
 Gel = Literal["translated", "solved"]  # the networks' gel, or the found contact solved on the DIGIT (``solved_gel``)
 TRANSLATED: Gel = "translated"
 SOLVED: Gel = "solved"
-KEEPABLE = ("latent", "displacement", "height", "image")
+KEEPABLE = ("latent", "displacement", "height", "image", "traction")
 DEFAULT_KEEP = ("latent", "displacement", "image")
 
 

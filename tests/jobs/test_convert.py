@@ -20,6 +20,7 @@ from tactile_core.errors import TactileError
 from tactile_core.jobs import convert, frame_range, results, sampling_error
 from tactile_core.jobs.frame_pass import CHUNK
 from tactile_core.jobs.frames_file import ALWAYS, KEPT
+from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.pictures import presets, renderer
 from tactile_core.pictures.mitsuba.variant import SCALAR, Choice
 from tactile_core.recordings.flags import Flag
@@ -90,6 +91,17 @@ def test_keep_and_frames_choose_what_is_written(run, slide_csv):
             assert (file[name][:] == whole[name][:][chosen]).all()  # the tare saw the whole recording
     images = run(path, out="images", keep=("image",), frames=slice(-3, None))
     assert [image.name for image in sorted((images / "images").iterdir())] == ["00147.png", "00148.png", "00149.png"]
+
+
+def test_a_kept_traction_is_zero_without_contact_and_adds_up(run, slide_csv):
+    folder = run(slide_csv(frames=80), keep=("traction",), frames=slice(40, 80, 8))
+    with h5py.File(folder / "frames.h5") as file:
+        assert set(file) == {*ALWAYS, *KEPT["traction"]}
+        traction, total = file["traction_digit"][:], file["traction_force"][:]
+        touched = np.isfinite(file["contact_center"][:, 0])
+    assert touched.any() and not touched.all()
+    assert traction.any(axis=(1, 2)).tolist() == touched.tolist() and (total[touched, 1] > 0).all()
+    np.testing.assert_allclose(np.einsum("tnk,n->tk", traction, node_areas("digit")), total, rtol=0, atol=1e-6)
 
 
 def test_the_same_input_gives_the_same_bytes(run, slide_csv):

@@ -145,3 +145,9 @@ def test_the_shipped_table_holds_every_part():
         part = found["parts"][name]
         assert all(part[key] >= 0 for key in PART) and part["mb"] > 0
     assert all(ms > 0 for ms in found["full_ms"].values())
+
+
+def test_a_translated_force_field_asks_for_the_gel(request):
+    recording = request.config.rootpath / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+    assert {"force field", "DIGIT matrices"} <= set(built(plan_for(recording, "traction")))
+    assert "contact mechanics" in plan_for(recording, "latent").left_out

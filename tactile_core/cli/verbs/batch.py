@@ -56,7 +56,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; none: go on with the job in DIR")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder of the job")
     verb.add_argument(
-        "--keep", metavar="WORDS", help="out of latent,displacement,height,image (default: latent,displacement)"
+        "--keep",
+        metavar="WORDS",
+        help="out of latent,displacement,height,image,traction (default: latent,displacement)",
     )
     verb.add_argument("--shard-frames", type=int, metavar="N", help="frames a shard (default: 1000)")
     answer_arguments(verb)
