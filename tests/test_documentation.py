@@ -42,7 +42,25 @@ LESS = [
     ("/shared/job", "shared_job"),
     ("seq 0 7 | parallel -j 8", "seq 0 7 | xargs -P 2 -I{}"),
     ("--workers 8", "--workers 2"),
+    ("scenes/press --keep displacement_digit --error 5um", "brief --keep displacement_digit --error 5um"),
 ]
+# A press of 0.1 s: each frame of the full tier takes a second or more, and scenes/press has 200.
+BRIEF = """\
+format = "tactile-scene-1"
+name = "brief"
+description = "A 7 mm ball presses once."
+[[indenters]]
+kind = "sphere"
+name = "ball"
+radius_mm = 3.5
+[recording]
+indenter = "ball"
+friction = 0.0
+points = [
+    { time_s = 0.0, x_mm = -8.0, z_mm = 0.0, force_n = 0.0 },
+    { time_s = 0.1, x_mm = -8.0, z_mm = 0.0, force_n = 0.6 },
+]
+"""
 # What is run by another test -> its file, and the words it is run by.
 ELSEWHERE = {
     "tactile simulate scenes/press_roll_slide --grid": ("tests/jobs/engine/test_batch_kinds.py", "--grid"),
@@ -95,6 +113,8 @@ def inputs(tmp_path_factory) -> Path:
         write_touch(folder / name, frames)
     own = (folder / "touch.csv").read_text(encoding="utf-8").replace("ele", "Taxel ").replace("timestamp", "t")
     (folder / "own.csv").write_text(own, encoding="utf-8")
+    (folder / "brief").mkdir()
+    (folder / "brief" / "scene.toml").write_text(BRIEF)
     unit = plain_unit()
     write_photographs(folder / "presses", unit)
     shutil.copytree(folder / "presses", folder / "other_presses")
