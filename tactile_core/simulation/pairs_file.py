@@ -21,7 +21,6 @@ from ..mechanics.electrodes.law import LAWS, SHEET
 from ..recordings.polarity import FALLS
 
 FORMAT = "tactile-pairs-2"
-ELECTRODES = 19
 ADVICE = "Make the file again with `tactile pairs`"
 ATTRIBUTES = (
     "biotac_nodes_sha256", "digit_nodes_sha256", "electrodes", "indenters", "polarity", "scene", "seed", "version"
@@ -31,7 +30,7 @@ MIN_PRESSES = 5  # at least three to train on, one to validate, one to test
 DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
     "displacement_biotac": ((None, 3), "i"),
     "displacement_digit": ((None, 3), "i"),
-    "signal": ((ELECTRODES,), "f"),
+    "signal": ((sensors.ELECTRODES,), "f"),
     "force": ((3,), "f"),
     "pressure": ((), "f"),
     "contact_center": ((2,), "f"),

@@ -14,11 +14,11 @@ from ..files import atomic
 from ..files.version import __version__
 from ..geometry.indenters import Indenter
 from ..mechanics.electrodes.law import SHEET, signal_of
-from ..mechanics.electrodes.wiring import Wiring, readings
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement, on_gel
 from ..mechanics.solve import Sensor, Solution, Tier, solve
 from ..recordings import Truth, write_simulated
+from ..sensors.readout import Wiring, readings
 from .scene import RecordingSpec, Scene, load_scene
 
 PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (docs/sources.md, BioTac fluid)

@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ..sensors import ELECTRODES
 from ..simulation.pairs_file import Pairs, Split
 from ..translation.contact_frame import ContactFrame
-from ..translation.network_sizes import ELECTRODES
 from ..translation.networks import DEPTH_SCALE, FORCE_SCALE
 from .mirror_augmentation import across, image_of_electrodes
 from .noise_model import measured

@@ -10,8 +10,9 @@ import torch
 
 from ..files.version import __version__
 from ..recordings.polarity import FALLS
+from ..sensors import ELECTRODES
 from ..translation import reference_signals
-from ..translation.network_sizes import ELECTRODES, ERROR_FEATURES, NETS, PLACE, POSTERIORS, SURFACES
+from ..translation.network_sizes import ERROR_FEATURES, NETS, PLACE, POSTERIORS, SURFACES
 from ..translation.networks import Networks, load
 from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts

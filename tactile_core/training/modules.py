@@ -8,8 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from ..sensors import ELECTRODES
 from ..translation.layers import NORM_EPSILON
-from ..translation.network_sizes import ELECTRODES, PLACE, SIGNAL_HIDDEN, STATE
+from ..translation.network_sizes import PLACE, SIGNAL_HIDDEN, STATE
 from ..translation.networks import COUNT_SCALE, LEAST_SPREAD, SPREAD_LIMITS
 from .surface_codec import SurfaceCodec
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..sensors import COUNT_MAX, COUNT_SIGN, REST_COUNTS
+from ..sensors import COUNT_SIGN, REST_COUNTS
+from ..sensors.readout import converted
 from .options import Options
 
 
@@ -38,6 +39,6 @@ def measured(
     if unit or rectified:
         size = np.linalg.norm(change, axis=1, keepdims=True)
         noise += (real | folded) * options.misfit * size * rng.standard_normal(change.shape)
-    found = np.clip(np.round(rest + gain * change + noise), 0, COUNT_MAX) - rest
+    found = converted(rest + gain * change + noise) - rest
     found = np.where(folded, COUNT_SIGN * np.abs(found), found)
     return np.concatenate([found, folded], -1).astype(np.float32)

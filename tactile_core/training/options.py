@@ -57,7 +57,7 @@ class Options:
     rectified_decay: float = 0.2
     beta: float = 1e-4
     astray: float = 0.2
-    noise: float = 1.5
+    noise: float = 1.5  # sensors.readout.NOISE, which numpy would come with
     gain: float = 0.1
     unit: float = 0.3
     unit_gain: float = 0.3

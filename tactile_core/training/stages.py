@@ -9,7 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..translation.network_sizes import ELECTRODES, ERROR_FEATURES, PLACE, SURFACES
+from ..sensors import ELECTRODES
+from ..translation.network_sizes import ERROR_FEATURES, PLACE, SURFACES
 from ..translation.networks import ERROR_UNIT, FORCE_SCALE, PRESSURE_SCALE
 from .data import Batch, Contacts
 from .modules import ContactPosterior, MeshVae, Residual, compress, initialise, signal_vae

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import TactileError
+from ..sensors import ELECTRODES
 from .layers import plain_shapes, residual_shapes
 from .weights import ADVICE
 
-ELECTRODES = 19
 SIGNAL_HIDDEN = (256, 128, 64)  # the published SVB's (docs/sources.md, Networks)
 PLACE = 2  # numbers of a mesh's latent that are the place of its dent
 STATE = PLACE + 2  # numbers of a contact's state: the place of its dent, and on asinh scales its force and depth

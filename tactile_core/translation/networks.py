@@ -25,9 +25,10 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.shipped import shipped
+from ..sensors import ELECTRODES
 from .contact_frame import ContactFrame
 from .layers import Tensors, plain, residual
-from .network_sizes import ELECTRODES, NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, tensor_shapes
+from .network_sizes import NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, tensor_shapes
 from .weights import ADVICE, CARD_NAME, read_card, read_verified
 
 Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network

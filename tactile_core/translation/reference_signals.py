@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
+from ..sensors import ELECTRODES
+from ..sensors.readout import NOISE
 from . import weights
 from .gain_matching import match
-from .network_sizes import ELECTRODES
 from .networks import compress, expand
 
 FILE = "signals.safetensors"
@@ -24,7 +25,6 @@ FEWEST = 16  # of them: from fewer contacts nothing can be matched (assumed)
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a signal says nothing about gains
 TURNS = 15  # of k-means; more change nothing that matters
 MOST = 10_000  # signals that k-means looks at
-NOISE = 1.5  # counts (docs/sources.md, BioTac read-out)
 TRIES = 2_000  # readings made up to find the match's own bias
 
 

@@ -8,11 +8,11 @@ from ball_scene import ball_scene
 
 from tactile_core import recordings, sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.electrodes.wiring import Wiring
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.recordings import info
 from tactile_core.recordings.simulated import read_truth
 from tactile_core.sensors import PRESSURE_PER_COUNT
+from tactile_core.sensors.readout import Wiring
 from tactile_core.simulation import recording as recording_room
 from tactile_core.simulation.recording import PRESSURE_AT_REST, pdc_counts, sensors_of, simulate_recording
 

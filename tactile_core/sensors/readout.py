@@ -1,6 +1,4 @@
-"""Model of the electronics between the electrodes and the numbers in a file: rest, gains, drift, noise, the
-converter.
-"""
+"""Model the electronics between the electrodes and the numbers in a file: rest, gains, drift, noise, the converter."""
 
 from __future__ import annotations
 
@@ -8,19 +6,20 @@ import dataclasses
 
 import numpy as np
 
-from ... import sensors
-from ...errors import TactileError
-from ...sensors import divider
+from ..errors import TactileError
+from . import COUNT_MAX, REST_COUNTS, divider
+
+NOISE = 1.5  # counts, standard deviation of the noisiest real recordings: translation must bear it (docs/sources.md)
 
 
 @dataclasses.dataclass(frozen=True)
 class Wiring:
     """Electronics between the film over an electrode and the number in a file; raises TactileError out of range.
 
-    rest_spread : counts; each electrode rests at ``sensors.REST_COUNTS`` and up to this much more or less (assumed)
+    rest_spread : counts; each electrode rests at ``REST_COUNTS`` and up to this much more or less (assumed)
     gain_error : 1, standard deviation of the logarithm of each electrode's gain (assumed none)
     drift : counts/s; each electrode drifts evenly at up to this rate (88 counts in an hour: docs/sources.md)
-    noise : counts, standard deviation in each frame (0.7 to 1.5 in real recordings: docs/sources.md)
+    noise : counts, standard deviation in each frame (0.7 to ``NOISE`` in real recordings: docs/sources.md)
     tared : whether the count at rest is taken off, as in files that keep changes alone
     """
 
@@ -31,7 +30,7 @@ class Wiring:
     tared: bool = False
 
     def __post_init__(self) -> None:
-        room = float(min(sensors.REST_COUNTS.min(), sensors.COUNT_MAX - sensors.REST_COUNTS.max()))
+        room = float(min(REST_COUNTS.min(), COUNT_MAX - REST_COUNTS.max()))
         limits = {"rest_spread": room, "gain_error": 1.0, "drift": np.inf, "noise": np.inf}
         for name, largest in limits.items():
             value = getattr(self, name)
@@ -40,20 +39,25 @@ class Wiring:
                 raise TactileError(f"wiring, {name}", repr(value), expected)
 
 
+def converted(counts: np.ndarray) -> np.ndarray:
+    """Round counts to whole ones and hold them within the converter's 12 bits."""
+    return np.clip(np.round(counts), 0, COUNT_MAX)
+
+
 def readings(change: np.ndarray, time: np.ndarray, wiring: Wiring, seed: int) -> np.ndarray:
     """Readings of the 12-bit converter, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
 
-    Changes are those of a unit that rests at ``sensors.REST_COUNTS``; this one reads them by its own rest, as its
+    Changes are those of a unit that rests at ``REST_COUNTS``; this one reads them by its own rest, as its
     divider does. Rounded and held within 0..4095, then less the count at rest where ``wiring.tared``. Rest, gain, drift
     and noise are drawn from streams of their own: a recording goes on as it began when it is made longer, and one
     defect changes without the others.
     """
     streams = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
     electrodes = change.shape[1]
-    rest = sensors.REST_COUNTS + np.round(streams[0].uniform(-wiring.rest_spread, wiring.rest_spread, electrodes))
+    rest = REST_COUNTS + np.round(streams[0].uniform(-wiring.rest_spread, wiring.rest_spread, electrodes))
     gain = np.exp(wiring.gain_error * streams[1].standard_normal(electrodes))
     drift = streams[2].uniform(-wiring.drift, wiring.drift, electrodes)
     noise = wiring.noise * streams[3].standard_normal(change.shape)
     counts = rest + gain * divider.of_unit(change, rest) + drift * (time - time[0])[:, None] + noise
-    counts = np.clip(np.round(counts), 0, sensors.COUNT_MAX)
+    counts = converted(counts)
     return (counts - rest if wiring.tared else counts).astype(np.int16)

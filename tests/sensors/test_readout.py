@@ -7,8 +7,9 @@ import pytest
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.electrodes.wiring import Wiring, readings
 from tactile_core.sensors import divider
+from tactile_core.sensors.readout import NOISE, Wiring, readings
+from tactile_core.training.options import Options
 
 IDEAL = Wiring(rest_spread=0, gain_error=0, drift=0, noise=0)
 TIME = np.arange(400) / sensors.SAMPLE_RATE
@@ -98,3 +99,7 @@ def test_a_longer_recording_begins_as_the_shorter_one():
 def test_impossible_wiring_names_the_field(field, value):
     with pytest.raises(TactileError, match=f"wiring, {field}"):
         Wiring(**{field: value})
+
+
+def test_networks_are_trained_with_the_noise_that_translation_must_bear():
+    assert Options().noise == NOISE
