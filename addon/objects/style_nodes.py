@@ -14,15 +14,15 @@ import bpy
 from . import electrode_markers, frame_attribute
 
 COLOUR, DISPLACEMENT = "Tactile colour", "displacement"
-MATERIAL, LEGEND, INK = "Tactile style", "Tactile legend", "Tactile ink"
+MATERIAL, LEGEND = "Tactile style", "Tactile legend"
 LARGEST, EXAGGERATION, SENSOR, FORCE, LENGTH = "Largest", "Exaggeration", "Sensor", "Force", "Length a Newton"
 STILL = (0.50, 0.50, 0.53)
 RAMPS = {
     "DISPLACEMENT": ((0.0, STILL), (0.05, (0.10, 0.15, 0.45)), (0.35, (0.0, 0.45, 0.55)), (0.65, (0.35, 0.72, 0.25)),
                      (1.0, (0.98, 0.85, 0.10))),
     "CONTACT_PATCH": ((0.0, STILL), (0.5, (0.95, 0.35, 0.05))),
-    "ELECTRODES": ((0.0, (0.02, 0.10, 0.75)), (0.25, (0.25, 0.50, 0.90)), (0.5, (0.85, 0.85, 0.85)),
-                   (0.75, (0.95, 0.45, 0.25)), (1.0, (0.70, 0.02, 0.05))),
+    "ELECTRODES": ((0.0, (0.02, 0.05, 0.60)), (0.35, (0.10, 0.35, 0.95)), (0.5, (0.85, 0.85, 0.85)),
+                   (0.65, (0.98, 0.35, 0.10)), (1.0, (0.60, 0.01, 0.03))),
 }  # fmt: skip
 ARROW = (0.95, 0.15, 0.55)
 NAMES = {"DISPLACEMENT": "Tactile Displacement", "CONTACT_PATCH": "Tactile Contact Patch",
@@ -47,16 +47,15 @@ def material() -> bpy.types.Material:
 
 
 def legend_material() -> bpy.types.Material:
-    """The attribute's colours as they are, whatever the light, so that a legend can be compared with them."""
-    return _material(LEGEND, "Emission Color")
+    """The attribute's colours as they are, whatever the light."""
+    made = _material(LEGEND, "Emission Color")
+    shader = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value, shader.inputs["Emission Strength"].default_value = (0, 0, 0, 1), 1.0
+    shader.inputs["Specular IOR Level"].default_value = 0.0
+    return made
 
 
-def ink() -> bpy.types.Material:
-    """White letters, whatever the light."""
-    return _material(INK, None)
-
-
-def _material(name: str, takes: str | None) -> bpy.types.Material:
+def _material(name: str, takes: str) -> bpy.types.Material:
     """A material of the file, made where it is missing; takes : which input has the attribute's colour."""
     found = bpy.data.materials.get(name)
     if found is not None:
@@ -67,15 +66,9 @@ def _material(name: str, takes: str | None) -> bpy.types.Material:
     nodes = made.node_tree.nodes
     shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Roughness"].default_value = 0.5
-    if takes is not None:
-        colour = nodes.new("ShaderNodeVertexColor")
-        colour.layer_name = COLOUR
-        made.node_tree.links.new(colour.outputs["Color"], shader.inputs[takes])
-    if takes != "Base Color":
-        shader.inputs["Base Color"].default_value = (0, 0, 0, 1)
-        shader.inputs["Specular IOR Level"].default_value = 0.0
-        shader.inputs["Emission Color"].default_value = (0.9, 0.9, 0.9, 1)
-        shader.inputs["Emission Strength"].default_value = 1.0
+    colour = nodes.new("ShaderNodeVertexColor")
+    colour.layer_name = COLOUR
+    made.node_tree.links.new(colour.outputs["Color"], shader.inputs[takes])
     return made
 
 
@@ -193,7 +186,7 @@ def _fill(ramp: bpy.types.ColorRamp, style: str) -> None:
 
 
 def _arrow(style: str) -> bpy.types.NodeTree:
-    """An arrow whose head stands where a sensor's dent is deepest, on an object of its own."""
+    """Scale, turn and move a mesh that stands along +Z, 1 unit high, so that its foot is in a sensor's dent."""
     nodes = _Nodes(style)
     nodes.input(SENSOR, "Object", "A BioTac's skin or a DIGIT's gel")
     nodes.input(FORCE, "Vector", "Force on the sensor, N, in its axes")
@@ -203,31 +196,15 @@ def _arrow(style: str) -> bpy.types.NodeTree:
     force = given.outputs[FORCE]
     newtons = nodes.add("ShaderNodeVectorMath", force, operation="LENGTH").outputs["Value"]
     length = nodes.math("MULTIPLY", newtons, given.outputs[LENGTH])
-    head, thin = nodes.math("MULTIPLY", length, 0.3), nodes.math("MULTIPLY", length, 0.035)
-    wide = nodes.math("MULTIPLY", length, 0.1)
-    cone = nodes.add("GeometryNodeMeshCone")
-    shaft = nodes.add("GeometryNodeMeshCylinder")
-    long = nodes.math("MULTIPLY", length, 0.7)
-    # Both stand along +Z, tip at the origin.
-    for node, names in ((cone, {"Radius Top": wide, "Depth": head}), (shaft, {"Radius": thin, "Depth": long})):
-        node.inputs["Vertices"].default_value = 24
-        for name, socket in names.items():
-            nodes.tree.links.new(socket, node.inputs[name])
-    cone.inputs["Radius Bottom"].default_value = 0.0
-    up = nodes.add("ShaderNodeCombineXYZ", None, None, nodes.math("MULTIPLY", length, 0.65)).outputs[0]
-    parts = [cone.outputs["Mesh"], nodes.add("GeometryNodeTransform", shaft.outputs["Mesh"]).outputs[0]]
-    nodes.tree.links.new(up, parts[1].node.inputs["Translation"])
-    joined = nodes.tree.nodes.new("GeometryNodeJoinGeometry")
-    for part in parts:
-        nodes.tree.links.new(part, joined.inputs[0])
     back = nodes.add("ShaderNodeVectorMath", force, operation="SCALE")
     back.inputs["Scale"].default_value = -1.0
     turn = nodes.tree.nodes.new("FunctionNodeAlignRotationToVector")
     turn.axis = "Z"
     nodes.tree.links.new(back.outputs[0], turn.inputs["Vector"])
-    placed = nodes.add("GeometryNodeTransform", joined.outputs[0])
-    nodes.tree.links.new(_deepest(nodes, seen.outputs["Geometry"]), placed.inputs["Translation"])
-    nodes.tree.links.new(turn.outputs[0], placed.inputs["Rotation"])
+    placed = nodes.add("GeometryNodeTransform", given.outputs["Geometry"])
+    for name, socket in (("Translation", _deepest(nodes, seen.outputs["Geometry"])), ("Rotation", turn.outputs[0]),
+                         ("Scale", length)):  # fmt: skip
+        nodes.tree.links.new(socket, placed.inputs[name])
     return nodes.end(nodes.store(placed.outputs[0], COLOUR, (*ARROW, 1.0), "FLOAT_COLOR"))
 
 

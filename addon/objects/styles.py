@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 
 from ..ui import properties
-from . import style_nodes
+from . import style_nodes, surfaces
 
-MODIFIER, ARROW = "Tactile style", "Force arrow"
+MODIFIER = "Tactile style"
 STYLES = (
     ("DISPLACEMENT", "Displacement", "Colour by how far each place has moved"),
     ("CONTACT_PATCH", "Contact Patch", "Colour what is touched; of a DIGIT's gel"),
@@ -49,7 +49,7 @@ def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
     length : of 1 N, in the object's units
     """
     get_ready(sensor)
-    arrow = bpy.data.objects.new(f"{sensor.name} force", bpy.data.meshes.new(ARROW))
+    arrow = surfaces.new_mesh_object(f"{sensor.name} force", *_upright(), smooth=False)
     properties.set_up(arrow, "LEGEND", sensor.tactile.per_metre)
     sensor.users_collection[0].objects.link(arrow)
     arrow.parent, arrow.hide_select = sensor, True
@@ -85,3 +85,15 @@ def _add_nodes(thing: bpy.types.Object, style: str, values: dict[str, object]) -
     for name, value in values.items():
         modifier[style_nodes.input_of(modifier.node_group, name)] = value
     return modifier
+
+
+def _upright() -> tuple[np.ndarray, np.ndarray]:
+    """An arrow 1 high that stands on its tip: nodes (n, 3), triangles (m, 3)."""
+    around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    rings = [(0.0, 0.0), (0.12, 0.3), (0.05, 0.3), (0.05, 1.0), (0.0, 1.0)]  # radius and height
+    nodes = np.concatenate([np.stack([r * np.cos(around), r * np.sin(around), 0 * around + h], -1) for r, h in rings])
+    index, count = np.arange(24), 24
+    after = np.roll(index, -1)
+    faces = [np.stack([a + k * count, b + k * count, c + k * count], -1) for k in range(len(rings) - 1)
+             for a, b, c in ((index, after + count, after), (index, index + count, after + count))]  # fmt: skip
+    return nodes, np.concatenate(faces)

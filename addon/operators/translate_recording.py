@@ -50,8 +50,8 @@ class TACTILE_OT_translate(TactileOperator):
         told_of_gel |= {name: values[name] for name in ("force", "confidence")}
         custom_properties.write(gel, told_of_gel, frames)
         low = timeline.mark_low_confidence(context.scene, found.translation.confidence, frames)
-        view.show(context, [skin, gel])
         view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))
+        view.show(context, [skin, gel])
         self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
 

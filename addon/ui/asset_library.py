@@ -20,7 +20,7 @@ TOLD = {
     "DISPLACEMENT": "Colours a BioTac's skin or a DIGIT's gel by how far each place has moved",
     "CONTACT_PATCH": "Colours what is touched of a DIGIT's gel",
     "ELECTRODES": "Colours a BioTac's skin round its electrodes by the change of each reading",
-    "FORCE_ARROW": "For an empty mesh beside a sensor: an arrow whose head stands in the dent",
+    "FORCE_ARROW": "For a mesh 1 unit high on its tip: follows a force, with its tip in a sensor's dent",
 }
 
 

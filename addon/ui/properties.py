@@ -19,7 +19,7 @@ ROLES = (
     ("LED", "LED", "A lamp of the DIGIT"),
     ("BODY", "DIGIT body", "A part of the DIGIT that is there to be seen"),
     ("TWIN", "Simulated indenter", "Where the simulation had the indenter"),
-    ("LEGEND", "Legend", "A colour bar or a scale bar"),
+    ("LEGEND", "Legend", "A colour bar, an arrow, or a light to look by"),
 )
 PRESS_BY = (
     ("HEIGHT", "Height", "It presses as deep as it is moved into the DIGIT's gel"),

@@ -6,6 +6,7 @@ import contextlib
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 # Of a new file of Blender's (File > New > General): name, type and place.
 _UNTOUCHED = (
@@ -17,11 +18,23 @@ _SHARE = 0.68  # of a 3D view that it keeps beside the picture
 
 
 def hide_untouched(scene: bpy.types.Scene) -> None:
-    """Hide the cube, light and camera that a new file begins with, unless somebody has moved or renamed them."""
+    """Hide the cube, light and camera that a new file begins with, unless somebody has moved or renamed them.
+
+    A sun takes the light's place, so that a rendered view is not dark: no sun reaches the DIGIT's picture.
+    """
     for name, kind, place in _UNTOUCHED:
         thing = scene.objects.get(name)
         if thing is not None and thing.type == kind and np.allclose(thing.location, place, atol=1e-3):
+            if kind == "LIGHT" and not thing.hide_render:
+                _add_sun(thing)
             thing.hide_render, thing.hide_viewport = True, True
+
+
+def _add_sun(light: bpy.types.Object) -> None:
+    sun = bpy.data.objects.new("Tactile sun", bpy.data.lights.new("Tactile sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 3.0, (0.6, 0.35, 0.0)  # W/m2; from above, the base and one side
+    sun.tactile.role = "LEGEND"
+    light.users_collection[0].objects.link(sun)
 
 
 def is_new(scene: bpy.types.Scene) -> bool:
@@ -72,6 +85,20 @@ def show(context: bpy.types.Context, things: list[bpy.types.Object]) -> None:
         if region is not None:
             with context.temp_override(window=window, area=area, region=region):
                 bpy.ops.view3d.view_selected()
+            _clear_sidebar(area, region)
+
+
+def _clear_sidebar(area: bpy.types.Area, region: bpy.types.Region) -> None:
+    """Move what is looked at into the part of a view that its sidebar, drawn over it, leaves free."""
+    sidebar = next((each for each in area.regions if each.type == "UI"), None)
+    if sidebar is None or not 1 < sidebar.width < region.width:
+        return
+    seen, free = area.spaces.active.region_3d, 1 - sidebar.width / region.width
+    right = seen.view_rotation @ Vector((1.0, 0.0, 0.0))
+    seen.view_distance /= free
+    # Width that the view shows at what it looks at: Blender's lens is for a sensor of 72 mm along the longer side.
+    wide = seen.view_distance * 72 / area.spaces.active.lens * region.width / max(region.width, region.height)
+    seen.view_location += right * wide * (1 - free) / 2
 
 
 def colour_by(context: bpy.types.Context, kind: str) -> None:
