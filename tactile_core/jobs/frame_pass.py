@@ -41,6 +41,7 @@ REMARKABLE = {
     "beyond_digit": "the contact has no counterpart on the DIGIT's gel",
     "beyond_picture": "the contact lies on the gel beside its picture",
     "undecided_place": "by its own signals the contact may as well lie elsewhere",
+    "two_contacts": "the signals look like two contacts at once; the translation shows one",
     "gel_not_solved": "no contact was solved on the gel, which is the networks' there",
 }
 

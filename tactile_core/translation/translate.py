@@ -22,6 +22,7 @@ from .contact_track import LEAST_FORCE, track
 from .error_bounds import KINDS
 from .network_sizes import PLACE, SURFACES
 from .networks import Networks, Posterior
+from .two_contacts import two_contacts
 from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
@@ -48,7 +49,7 @@ class Translation:
     expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
         below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
-        BEYOND_DIGIT and UNDECIDED_PLACE
+        BEYOND_DIGIT, TWO_CONTACTS and UNDECIDED_PLACE
     """
 
     latent_signal: np.ndarray
@@ -154,6 +155,7 @@ class Translator:
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
+        flags[two_contacts(change, rectified)] |= np.uint16(Flag.TWO_CONTACTS)
         undecided = touched & (elsewhere(posterior, state, nets.frames["MVB"]) > UNDECIDED)
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(

@@ -18,7 +18,16 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.translation import fluid_pressure, followed_rows, grips, prints, recordings, slide_set, test_set
+from benchmarks.translation import (
+    fluid_pressure,
+    followed_rows,
+    grips,
+    prints,
+    recordings,
+    slide_set,
+    test_set,
+    two_contact_rows,
+)
 from benchmarks.translation.model_card import write_model_card
 from tactile_core.accuracy import HEADER, Row, failed, line
 from tactile_core.errors import TactileError
@@ -96,7 +105,7 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
     if options.quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
     found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network)]
-    found += test_set.speed_rows(network, pairs)
+    found += [*two_contact_rows.rows(pairs), *test_set.speed_rows(network, pairs)]
     apart = [translate.load_translator(folder) for folder in options.kept_apart]
     for unaware in apart:
         found += test_set.unseen_rows(unaware, pairs, bodies)
