@@ -1,13 +1,16 @@
 """Measure speed against error of every way to draw a DIGIT's picture: ours, stock Mitsuba, a table, simple nulls.
 
-    python scripts/benchmarks/compare_pictures.py PRESSES [--deeper DIR] [--json FILE] [--quick]
+    python scripts/benchmarks/compare_pictures.py PRESSES [--deeper DIR] [--finish] [--json FILE] [--quick]
 
 On photographs: three fits without a third of PRESSES each, tried on that third; three numbers a press are fitted
 (right, down, depth), by the fast picture; with --deeper, on further photographs of the same unit and ball, too, whose
-drift of the light is taken off. Nulls: the background alone, and the nearest fitted photograph shifted to the place.
-`through` allows light through the coating where the ball touches it, three more numbers a photograph.
-Times are CPU ms a picture on one core, the least of a few. Stock Mitsuba draws the file of `render --scene-out`; its
-error is its noise, against the mean of 1,024 samples. Needs the extra [render]; LLVM's rows only where LLVM works.
+drift of the light is taken off. Fits end on the fast picture, with --finish on Mitsuba's; they start from round
+numbers that know nothing of the unit. Nulls: the background alone, and the nearest fitted photograph shifted to the
+place. `through` allows light through the coating where the ball touches it, three more numbers a photograph.
+Times are CPU ms a picture on one core, the least of a few. The presets' own, and their levels from the full model, are
+those of data/optics_presets.json (measure_presets.py). Stock Mitsuba draws the file of `render --scene-out`; its error
+is its noise, of the difference of two renders. Prints rows, then one table. Needs the extra [render]; LLVM's rows only
+where LLVM works.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -35,14 +39,17 @@ from tactile_core.pictures.calibrate.photo_metrics import figures
 from tactile_core.pictures.calibrate.photographs import Photographs, Press, chosen, press_of, read_photographs
 from tactile_core.pictures.calibrate.press_fit import MODEL_ERROR, Ball, Sight, fit_ball
 from tactile_core.pictures.mitsuba.scene_file import write_scene
-from tactile_core.pictures.mitsuba.variant import LLVM, activate
+from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR, activate
+from tactile_core.pictures.presets import NAMES, measured
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
 
+START = Path(__file__).resolve().parents[2] / "scenes/calibrations/start.toml"
 BALL = 3e-3  # m, radius
-SIZES = ((240, 320), (480, 640))
-SAMPLES, MANY = (32, 64, 256), 1024  # of stock Mitsuba, a pixel
+SIZES = {(240, 320): (32, 64, 256), (480, 640): (32,)}  # of pictures: samples a pixel of stock Mitsuba, whose time
+# grows as the pixels do
+TABLE, STOCK = "taxim_like", "stock_mitsuba"
 TYPICAL = (1e-3, 0.5e-3, 1e-3, BALL)  # right, down, depth, radius, m, of the press whose time is taken
 FLANK = 0.5, 1.0  # of the contact's radius: where the print is steep
 
@@ -54,31 +61,32 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("presses", metavar="PRESSES")
     parser.add_argument("--deeper", metavar="DIR", help="further photographs, of another day")
+    parser.add_argument("--finish", action="store_true", help="finish each fit on Mitsuba's pictures")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")
-    parser.add_argument("--quick", action="store_true", help="one fit of the fast picture alone, the small size")
+    parser.add_argument("--quick", action="store_true", help="one third of the photographs, 240 x 320 at 32 samples")
     options = parser.parse_args(arguments)
     rows = []
     print(HEADER)
-    for found in measure(read_photographs(options.presses), options.deeper, options.quick):
+    for found in measure(read_photographs(options.presses), options.deeper, options.finish, options.quick):
         rows.append(found)
         print(line(found), flush=True)
     if options.json:
         atomic.write_json(Path(options.json), rows)
+    print(table(rows))
     return 0
 
 
-def measure(photographs: Photographs, deeper: str | None, quick: bool) -> Iterator[Row]:
-    """Yield all rows: on photographs, then times, then stock Mitsuba's noise."""
+def measure(photographs: Photographs, deeper: str | None, finish: bool, quick: bool) -> Iterator[Row]:
+    """Yield all rows: on photographs, then the table's times, then stock Mitsuba's."""
     variants = working_variants()
     one_thread(variants[0])
     further = [] if deeper is None else _further(Path(deeper), photographs)
-    yield from on_photographs(photographs, further, variants, quick)
-    unit = load_calibration()
-    for size in SIZES[: 1 if quick else None]:
-        yield from times(unit.at_size(*size), variants)
-    if variants[0] == LLVM:
-        for size in SIZES[: 1 if quick else None]:
-            yield from stock_mitsuba(unit.at_size(*size), SAMPLES[: 1 if quick else None])
+    yield from on_photographs(photographs, further, variants, finish, 1 if quick else FOLDS)
+    for size, samples in [*SIZES.items()][: 1 if quick else None]:
+        unit = load_calibration().at_size(*size)
+        yield table_time(unit, photographs)
+        if variants[0] == LLVM:
+            yield from stock_mitsuba(unit, samples[: 1 if quick else None])
 
 
 def _further(folder: Path, photographs: Photographs) -> list[Press]:
@@ -89,14 +97,16 @@ def _further(folder: Path, photographs: Photographs) -> list[Press]:
     return [press for press in found if press is not None]
 
 
-def on_photographs(photographs: Photographs, further: list[Press], variants: list[str], quick: bool) -> Iterator[Row]:
+def on_photographs(
+    photographs: Photographs, further: list[Press], variants: list[str], finish: bool, folds: int
+) -> Iterator[Row]:
     """Rows of every method on photographs that it was not fitted on, and on further ones."""
     names = [press.name for press in photographs.presses]
     found: dict[tuple[str, str], list[dict[str, float]]] = {}
-    for fold in range(1 if quick else FOLDS):
+    for fold in range(folds):
         apart = names[fold::FOLDS]
         fitted = chosen(photographs, [name for name in names if name not in apart])
-        unit = calibrate(fitted, 2 * BALL, load_calibration(), unit="fold", quick=quick).calibration
+        unit = calibrate(fitted, 2 * BALL, load_calibration(START), unit="fold", quick=not finish).calibration
         for where, presses in (("apart", chosen(photographs, apart).presses), ("deeper", further)):
             for name, figures_of in one_fit(unit, fitted, presses, variants):
                 found.setdefault((where, name), []).append(figures_of)
@@ -129,16 +139,16 @@ def one_fit(
 
 def methods(unit: Calibration, fitted: Photographs, fast: FastPictures, variants: list[str]) -> dict[str, Change]:
     """Ways to draw the change by a press, by name."""
-    table = TableBench(fast, fit_table(unit, fitted, BALL))
+    bench = TableBench(fast, fit_table(unit, fitted, BALL))
     found: dict[str, Change] = {
         "null_background": lambda ball: np.zeros((*unit.camera.shape, 3)),
-        "taxim_like": lambda ball: table.change(ball.numbers),
+        TABLE: lambda ball: bench.change(ball.numbers),
         "fast": lambda ball: fast.change(ball.numbers),
     }
     for variant in variants[:1]:  # the other one's pictures are half a level apart: ``measure_presets``
         for preset in ("standard", "quality"):
             renderer = Renderer(unit, preset, variant, rest=fast.rest)
-            found[f"{preset}_{variant.split('_')[0]}"] = lambda ball, renderer=renderer: renderer.in_levels(
+            found[preset] = lambda ball, renderer=renderer: renderer.in_levels(
                 renderer.radiance(fast.heights(ball.numbers)) - renderer.rest_radiance
             )
     return found
@@ -194,39 +204,80 @@ def flank_colour(error: np.ndarray, fast: FastPictures, ball: Ball) -> float:
     return float(np.mean(errors))
 
 
-def times(unit: Calibration, variants: list[str]) -> Iterator[Row]:
-    """CPU ms of a picture by each preset and variant."""
-    fast = FastPictures(unit)
-    height, size = fast.heights(TYPICAL), f"{unit.camera.width}x{unit.camera.height}"
-    names = [("fast", None), *((preset, variant) for variant in variants for preset in ("standard", "quality"))]
-    for preset, variant in names:
-        renderer = Renderer(unit, preset, variant, rest=fast.rest)
-        renderer(height)
-        label = preset if variant is None else f"{preset}_{variant.split('_')[0]}"
-        yield row(f"{label}_{size}_ms", best_ms(renderer, height, 3), "ms", of="one core, CPU")
+def table_time(unit: Calibration, photographs: Photographs) -> Row:
+    """CPU ms of a picture by the table that the photographs the unit was fitted on give."""
+    fitted = chosen(photographs, list(unit.fit.photographs))
+    coarse = unit.at_size(photographs.shape[1], photographs.shape[0])
+    bench = TableBench(FastPictures(unit), fit_table(coarse, fitted, BALL))
+    return row(f"{TABLE}_{_size(unit)}_ms", best_ms(bench.change, TYPICAL, 3), "ms", of="one core, CPU")
 
 
 def stock_mitsuba(unit: Calibration, samples: tuple[int, ...]) -> Iterator[Row]:
     """CPU ms and noise, levels rms, of Mitsuba's own renders of the scene's file."""
     mi = activate(LLVM)
-    fast = FastPictures(unit)
     matrix = np.asarray(unit.response.centre, np.float32).T
-    size = f"{unit.camera.width}x{unit.camera.height}"
     with tempfile.TemporaryDirectory() as folder:
-        write_scene(Path(folder) / "scene.xml", unit, fast.heights(TYPICAL))
+        write_scene(Path(folder) / "scene.xml", unit, FastPictures(unit).heights(TYPICAL))
         scene = mi.load_file(str(Path(folder) / "scene.xml"))
-
-        def drawn(count: int, seed: int) -> np.ndarray:
-            return np.array(mi.render(scene, spp=count, seed=seed)) @ matrix
-
-        truth = np.mean([drawn(256, seed) for seed in range(100, 100 + MANY // 256)], axis=0)
+        np.array(mi.render(scene, spp=1, seed=0))  # compiles
         for count in samples:
-            drawn(count, 0)
-            ms = best_ms(lambda seed, count=count: drawn(count, seed), 1, 2)
-            squares = np.mean(np.square(drawn(count, 2) - truth))
-            noise = float(np.sqrt(squares / (1 + count / MANY)))  # the truth's own noise is in it
-            yield row(f"stock_mitsuba_{count}_{size}_ms", ms, "ms", of="one core, CPU, path integrator")
-            yield row(f"stock_mitsuba_{count}_{size}_noise", noise, "levels", of="rms")
+            began = time.process_time()
+            one, other = (np.array(mi.render(scene, spp=count, seed=seed)) @ matrix for seed in (1, 2))
+            ms = 1e3 * (time.process_time() - began) / 2
+            of = "one core, CPU, path integrator"
+            yield row(f"{STOCK}_{count}_{_size(unit)}_ms", ms, "ms", of=of)
+            noise = float(np.sqrt(np.mean(np.square(one - other)) / 2))
+            yield row(f"{STOCK}_{count}_{_size(unit)}_noise", noise, "levels", of="rms")
+
+
+def _size(unit: Calibration) -> str:
+    return f"{unit.camera.width}x{unit.camera.height}"
+
+
+def table(rows: list[Row]) -> str:
+    """The rows and the presets' file as one table of speed against error, Markdown."""
+    value = {found["name"]: found["value"] for found in rows}
+    presets = measured()["presets"]
+    small, large = (f"{width}x{height}" for width, height in SIZES)
+    lines = [
+        f"| | ms {small}: LLVM, without | ms {large} | levels from the full model | not fitted: dB, levels "
+        "| flanks' colour | deeper: dB, levels |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    ways = [("null_background", "background alone"), ("null_shifted", "nearest fitted photograph, shifted")]
+    for name, label in (*ways, (TABLE, "table after Taxim"), *((preset, f"`{preset}`") for preset in NAMES)):
+        found = presets.get(name)
+        if found:
+            times = [_times(found["ms"]), _times(found["ms_480x640"]), _number(found["error"])]
+        else:
+            times = [_number(value.get(f"{name}_{size}_ms")) for size in (small, large)] + [""]
+        seen = [
+            _numbers(value, f"{where}_{name}", figures_)
+            for where, figures_ in (
+                ("apart", ("roi_psnr", "roi_l1")),
+                ("apart", ("flank_colour",)),
+                ("deeper", ("roi_psnr", "roi_l1")),
+            )
+        ]
+        lines.append("| " + " | ".join([label, *times, *seen]) + " |")
+    for count in next(iter(SIZES.values())):
+        times = [_number(value.get(f"{STOCK}_{count}_{size}_ms")) for size in (small, large)]
+        noise = _number(value.get(f"{STOCK}_{count}_{small}_noise"))
+        lines.append(f"| stock Mitsuba, {count} samples | " + " | ".join([*times, f"{noise} (noise)", "", "", ""]) + " |")
+    return "\n".join(lines)
+
+
+def _times(ms: dict[str, float]) -> str:
+    """Times of a preset by LLVM and without; one number where it needs no Mitsuba."""
+    return _number(ms["numpy"]) if "numpy" in ms else ", ".join(_number(ms.get(variant)) for variant in (LLVM, SCALAR))
+
+
+def _numbers(value: dict[str, float], name: str, figures_: Sequence[str]) -> str:
+    return ", ".join(_number(value.get(f"{name}_{figure}")) for figure in figures_)
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
-"""Measure each preset of `tactile render`: its error beside its time, on ten random contact fields.
+"""Measure each preset of `tactile render`: its error beside its time, on random contact fields.
 
     python scripts/benchmarks/measure_presets.py                       everything; writes data/optics_presets.json
+    python scripts/benchmarks/measure_presets.py --fields 4            on fewer fields, which the file says; 10 else
     python scripts/benchmarks/measure_presets.py --quick --json FILE   two fields, 240 x 320; writes FILE alone
+    python scripts/benchmarks/measure_presets.py --coatings            quality against paths, by coating, alone
 
 Errors are grey levels rms over the picture, its channels and the fields, before rounding: `_direct` from converged
 direct light, the others from the full model of a matte coating: 64 pictures from 512 points an LED, four bounces
@@ -63,19 +65,22 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure, print, write; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two fields, the small size")
+    parser.add_argument("--fields", type=int, default=FIELDS, metavar="N", help="contacts to draw")
+    parser.add_argument("--coatings", action="store_true", help="only quality against paths, by coating")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")
     parser.add_argument("--calibration", metavar="FILE", help="another than the shipped one")
     options = parser.parse_args(arguments)
     unit = load_calibration(options.calibration)
     rows = []
     print(HEADER)
-    for found in measure(unit, 2 if options.quick else FIELDS, options.quick):
+    count = 2 if options.quick else options.fields
+    for found in against_paths(unit) if options.coatings else measure(unit, count, options.quick):
         rows.append(found)
         print(line(found), flush=True)
     if options.json:
         atomic.write_json(Path(options.json), rows)
-    if not options.quick and not options.calibration:
-        atomic.write_json(TABLE, table(rows))
+    if not (options.quick or options.calibration or options.coatings):
+        atomic.write_json(TABLE, table(rows, count))
     for missed in failed(rows):
         print(f"MISSED: {missed['name']} = {missed['value']}, target {missed['target']}", file=sys.stderr)
     return int(bool(failed(rows)))
@@ -89,8 +94,6 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
     yield from errors(unit, heights, best, dataclasses.replace(REFERENCE, passes=QUICK_PASSES) if quick else REFERENCE)
     if len(variants) == 2:
         yield from agreement(unit, heights[0])
-    if best == LLVM and not quick:
-        yield from against_paths(unit)
     for variant in variants:
         for name in NAMES:
             slow = name == REFERENCE.name and (quick or variant != best)
@@ -99,8 +102,9 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
     if not quick:
         large = unit.at_size(*LARGE)
         large_heights = fields(large, 2)
-        for name in NAMES[:-1]:
-            yield speed(large, name, best, large_heights, quick)
+        for variant in variants:
+            for name in NAMES[:-1] if variant == best else NAMES[1:-1]:
+                yield speed(large, name, variant, large_heights, quick)
 
 
 def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
@@ -252,13 +256,13 @@ def one_thread(variant: str) -> None:
         drjit.set_thread_count(1)
 
 
-def table(rows: list[Row]) -> dict:
-    """The data file of the presets: what was measured, by preset."""
+def table(rows: list[Row], count: int) -> dict:
+    """The data file of the presets: what was measured on so many fields, by preset."""
     value = {found["name"]: found["value"] for found in rows}
     presets = {}
     for name in NAMES:
         times = {label: value.get(f"{name}_{label}_240x320_ms") for label in ("numpy", LLVM, SCALAR)}
-        large = {label: value.get(f"{name}_{label}_480x640_ms") for label in ("numpy", LLVM)}
+        large = {label: value.get(f"{name}_{label}_480x640_ms") for label in times}
         presets[name] = {
             "error": value[f"{name}_error"],
             "error_direct": value.get(f"{name}_error_direct"),
@@ -270,8 +274,8 @@ def table(rows: list[Row]) -> dict:
     import mitsuba
 
     versions = provenance.versions() | {"mitsuba": mitsuba.__version__, "drjit": drjit.__version__}
-    how = "scripts/benchmarks/measure_presets.py: grey levels rms on ten random contact fields; CPU ms a frame, "
-    how += "one core"
+    how = f"scripts/benchmarks/measure_presets.py --fields {count}: grey levels rms on {count} random contact fields; "
+    how += "CPU ms a frame, one core"
     return {"how": how, "machine": provenance.machine(), "presets": presets, "versions": versions}
 
 

@@ -216,5 +216,5 @@ def test_a_bound_on_pictures_picks_the_preset(ready, part):
         scene.tactile_render.error = bound
         assert settings.preset_of(scene) == preset
     scene.tactile_render.error = "1e-9levels"
-    with pytest.raises(part("tactile_core.errors").TactileError, match="quality has"):
+    with pytest.raises(part("tactile_core.errors").TactileError, match="or more, which"):
         settings.preset_of(scene)

@@ -296,6 +296,6 @@ def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_
     assert "pictures: fast" in err and "the translation itself" in err and "0.01 mm" in err
     note = json.loads((tmp_path / "out" / "touch" / "note.json").read_text(encoding="utf-8"))
     assert note["options"]["error"] == "5levels" and note["options"]["preset"] == "fast"
-    for bound, words in (("1e-6levels", "quality has"), ("1e-9um", "or more"), ("much", "5um,0.6levels")):
+    for bound, words in (("1e-6levels", "or more, which"), ("1e-9um", "or more"), ("much", "5um,0.6levels")):
         assert main([*line, bound, "--overwrite"]) == 2
         assert words in capsys.readouterr().err

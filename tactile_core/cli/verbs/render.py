@@ -26,7 +26,8 @@ DIR is a new folder, which appears whole or not at all:
   images/%05d.png  8-bit pictures: response x radiance + ambient light
   exr/%05d.exr     with --exr, float32: linear radiance of the coating, R, G, B = light of the red, green, blue LED
   rest.exr         the same of the undeformed gel;  camera.exr  response and ambient light
-  FILE.xml         with --scene-out: the first frame's LEDs, coating and gel for `mitsuba FILE.xml`, FILE.ply beside it
+  FILE.xml         with --scene-out: the first frame's LEDs, coating and gel for `mitsuba FILE.xml`, FILE.ply beside it;
+                   without the light that the coating spreads: its first comment names the Gaussian to lay over
   note.json        input, calibration, preset, versions;  timings.json  ms a frame
 
 Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (`tactile doctor` says how).

@@ -28,6 +28,8 @@ PATHS_A_PASS = 64  # a pixel: a square, as the sampler's strata want it
 class GelLight:
     """Radiance by one preset; scenes are made once, only the gel's vertices change.
 
+    Without the light that the coating spreads, which ``Renderer`` lays over (``coating_spread``).
+
     surroundings : lamps and bodies beside the unit's own; seed : of the reference's random numbers
     """
 

@@ -4,6 +4,8 @@ NAME.xml        LEDs, coating, housing, camera, Mitsuba's path integrator; `mits
 NAME.ply        the gel, mm
 NAME.camera.exr response and ambient light, by which radiance becomes 8-bit levels, as of ``jobs.render``
 
+The light that the coating spreads is left out, as Mitsuba's materials spread none: the XML's first comment and the
+EXR's `coating_spread_px` say the Gaussian, standard deviation in pixels, to lay over the radiance.
 The file's camera has square pixels, as wide as the unit's, and is a pinhole where the unit's appears: Mitsuba's camera
 cannot look through the window and keep the unit's even grid. Gel 1 mm up lies up to a third of a pixel off by that.
 """
@@ -53,7 +55,9 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
     atomic.write_bytes(path.with_suffix(".ply"), _ply(mesh, np.asarray(height_map, np.float32)))
     view = dataclasses.replace(unit, camera=square)
     ambient = by_led(view, np.zeros((*square.shape, 3))).sum(-1)
-    write_exr(path.with_suffix(".camera.exr"), camera_planes(view, ambient), {"calibration": unit.unit})
+    spread = f"{unit.coating.spread / square.pixel_size[0]:.6g}"
+    about = {"calibration": unit.unit, "coating_spread_px": spread}
+    write_exr(path.with_suffix(".camera.exr"), camera_planes(view, ambient), about)
     content = {
         "integrator": {"type": "path", "max_depth": DEPTH, "hide_emitters": True},
         "eye": _eye(square),
@@ -62,6 +66,7 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
         **lamps(unit), **walls(unit, mesh),
     }  # fmt: skip
     root = ElementTree.Element("scene", version=VERSION)
+    root.append(ElementTree.Comment(f" the coating spreads light: a Gaussian of {spread} px over the radiance, left out "))
     for name, value in content.items():
         _add(root, name, value)
     ElementTree.indent(root)

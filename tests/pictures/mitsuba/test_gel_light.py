@@ -9,6 +9,7 @@ import pytest
 from gel_pictures import Press, levels, works
 
 from tactile_core.errors import TactileError
+from tactile_core.files.exr import read_exr
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.gel_light import GelLight
 from tactile_core.pictures.mitsuba.scene_file import square_pixels, write_scene
@@ -160,3 +161,10 @@ def test_pixels_of_a_scene_file_are_square(small):
     assert square.pixel_size[0] == square.pixel_size[1] and square.height == 89
     with pytest.raises(TactileError, match="ends in"):
         write_scene("gel.json", small, rest_height_map(small.camera))
+
+
+def test_a_scene_file_says_the_spread_that_it_leaves_out(small, tmp_path):
+    write_scene(tmp_path / "gel.xml", small, rest_height_map(small.camera))
+    pixels = f"{small.coating.spread / small.camera.pixel_size[0]:.6g}"
+    assert f"a Gaussian of {pixels} px" in (tmp_path / "gel.xml").read_text(encoding="utf-8")
+    assert read_exr(tmp_path / "gel.camera.exr")[1]["coating_spread_px"] == pixels
