@@ -31,6 +31,7 @@ class Options:
     prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
     sensor : the unit's rest, and gains and offsets to take off, as `tactile adapt` finds them
     error : what the toolkit may add
+    calibration : file of the DIGIT that is drawn, for the note; None for the one that ships
     """
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
@@ -39,6 +40,7 @@ class Options:
     overwrite: bool = False
     sensor: SensorFile | None = None
     error: Budget | None = None
+    calibration: str | os.PathLike | None = None
 
 
 def load_tools(
@@ -63,17 +65,19 @@ def load_tools(
 
     translator, unit = translate.load_translator(weights, answer), load_calibration(calibration)
     mapper = height_map.digit_mapper(unit.camera)
-    if preset == "fast":
+    dots = None
+    if preset == "fast" and unit.markers is None:
         shade = shading.Shader(unit)
     else:
         from ..pictures.renderer import Renderer
 
         shade = Renderer(unit, preset, variant)
+        dots = shade.dots
     asked = translator.answer
     posterior = translator.posterior if asked.follows else None
     drawn = translator.plausible if asked.samples else None
     named = translator.card, translator.sha256
-    return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked, _solver(gel))
+    return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked, _solver(gel), dots)
 
 
 def _solver(gel: Gel) -> Solver | None:
@@ -85,8 +89,10 @@ def _solver(gel: Gel) -> Solver | None:
     return solved_gel.solved
 
 
-def choose_preset(tools: Tools, levels: float) -> tuple[Tools, str]:
+def choose_preset(tools: Tools, levels: float, calibration: str | os.PathLike | None = None) -> tuple[Tools, str]:
     """Tools whose pictures are within a bound, grey levels, and in words what was chosen, and why.
+
+    calibration : the file that the tools were loaded with
 
     Raises TactileError where none are.
     """
@@ -96,7 +102,7 @@ def choose_preset(tools: Tools, levels: float) -> tuple[Tools, str]:
     if chosen != presets.FAST:
         from ..pictures.renderer import Renderer
 
-        tools = dataclasses.replace(tools, shade=Renderer(preset=chosen), preset=chosen)
+        tools = dataclasses.replace(tools, shade=Renderer(calibration, chosen), preset=chosen)
     return tools, presets.describe_choice(chosen, levels)
 
 
@@ -193,8 +199,16 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
         "warnings": list(made.warnings()),
         "flagged_frames": made.flagged,
         "weights": weights_entry(tools),
+        **_unit_entry(options.calibration),
         "versions": provenance.versions("PIL", "matplotlib"),
     }  # fmt: skip
+
+
+def _unit_entry(calibration: str | os.PathLike | None) -> dict[str, dict[str, str]]:
+    """Return the calibration that pictures are drawn by, where one was given."""
+    if calibration is None:
+        return {}
+    return {"calibration": {"file": os.path.basename(calibration), "sha256": provenance.sha256(calibration)}}
 
 
 def weights_entry(tools: Tools) -> dict:

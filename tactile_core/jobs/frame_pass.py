@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import TactileError
 from ..files.png import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import folds_counted
@@ -25,6 +26,7 @@ from .frames_file import FramesFile, kept
 from .sampling_error import depth_share
 
 if TYPE_CHECKING:
+    from ..pictures.marker_field import MarkerField
     from ..recordings import Recording, Signals
     from ..translation.networks import Posterior
     from ..translation.translate import Translation
@@ -57,6 +59,7 @@ class Tools:
     plausible : Signals and frames (T,) -> contacts drawn for each, by ``plausible.NAMES``; None: none are
     answer : what the translator was asked for
     solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
+    dots : on the gel that is drawn; None: it has none
     """
 
     translate: Callable[..., Translation]
@@ -70,6 +73,23 @@ class Tools:
     plausible: Callable[[Signals, np.ndarray], dict[str, np.ndarray]] | None = None
     answer: Answer = dataclasses.field(default_factory=Answer)
     solve: Solver | None = None
+    dots: MarkerField | None = None
+
+    def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+        """Picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
+        return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
+
+    def marker_motion(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
+        """Array of frames.h5 of gels displaced by (T, M, 3) m. Raises TactileError for a unit without dots."""
+        return {"marker_motion": self.needed_dots().motion(displacement)}
+
+    def needed_dots(self) -> MarkerField:
+        """The unit's dots; raises TactileError where it has none."""
+        if self.dots is None:
+            found = "asked of a unit without dots"
+            advice = "Give a --calibration with a [markers] table (docs/calibration.md)"
+            raise TactileError("--keep marker_motion", found, "a gel with dots printed on it", advice)
+        return self.dots
 
     def tracked(self, read: Callable[[int, int], tuple[np.ndarray, Signals]], count: int) -> Tracked | None:
         """States of the contact in a recording of `count` frames, of which `read` gives some, with their times, s."""
@@ -116,6 +136,8 @@ class FramePass:
         clock: Stopwatch,
     ) -> None:
         """Take frames : (T,) indices into the recording, in order; keep : words of results.KEEPABLE."""
+        if "marker_motion" in keep:
+            tools.needed_dots()
         self.recording, self.signals, self.frames, self.keep = recording, signals, frames, keep
         self.tools, self.clock = tools, clock
         self._tracked = tools.tracked(self._read, len(recording))
@@ -139,6 +161,8 @@ class FramePass:
                 frames = self.frames[start : start + CHUNK]
                 arrays = self._translate(frames)
                 arrays |= self._press(arrays)
+                if "marker_motion" in self.keep:
+                    arrays |= self.tools.marker_motion(arrays["displacement_digit"])
                 arrays |= self._draw(folder, frames, arrays["displacement_digit"])
                 with self.clock.stage("hdf5"):
                     file.write(start, arrays)
@@ -148,6 +172,8 @@ class FramePass:
                 progress(start + len(frames), len(self.frames))
             file.annotate("time", start_time=self.recording.start_time)
             file.annotate("electrodes", rest=self.signals.rest, kind=self.signals.kind)
+            if "marker_motion" in self.keep:
+                file.annotate("marker_motion", rest=self.tools.needed_dots().rest)
 
     def warnings(self) -> tuple[str, ...]:
         """Warnings for the user: of the recording, and of its translated frames."""
@@ -217,11 +243,11 @@ class FramePass:
         with self.clock.stage("height_map"), folds_counted() as folds:
             heights = self.tools.height_map(displacement[seen])
         self.folded += len(folds)
-        for frame, height in zip(frames[seen], heights, strict=True):
+        for frame, height, moved in zip(frames[seen], heights, displacement[seen], strict=True):
             shown = self.shown.get(int(frame))
             if "image" in self.keep or shown is not None:
                 with self.clock.stage("shade"):
-                    picture = self.tools.shade(height)
+                    picture = self.tools.draw(height, moved)
                 if shown is not None:
                     shown["pictures"] = picture
                 if "image" in self.keep:

@@ -58,6 +58,8 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
                 out.write(first, _arrays(signals, time, rows, start, keep, tools, tracked))
             out.annotate("time", start_time=about["start_time"])
             out.annotate("electrodes", rest=signals.rest, kind=signals.kind)
+            if "marker_motion" in keep:
+                out.annotate("marker_motion", rest=tools.needed_dots().rest)
         checksummed.write_checksum(partial)
     return True
 
@@ -101,8 +103,11 @@ def _arrays(
         from .gel_traction import gel_traction  # with all of contact mechanics
 
         arrays |= gel_traction(arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]))
+    if "marker_motion" in keep:
+        arrays |= tools.marker_motion(arrays["displacement_digit"])
     if "height" in keep or "image" in keep:
         arrays["height_map"] = tools.height_map(arrays["displacement_digit"])
     if "image" in keep:
-        arrays["image"] = np.stack([tools.shade(height) for height in arrays["height_map"]])
+        heights, moved = arrays["height_map"], arrays["displacement_digit"]
+        arrays["image"] = np.stack([tools.draw(*each) for each in zip(heights, moved, strict=True)])
     return arrays

@@ -53,6 +53,9 @@ KEPT = {
         "traction_digit": ("Pa", "(T, M, 3) of the object on the resting gel, from the translated displacement"),
         "traction_force": ("N", "(T, 3) what traction_digit adds up to; force is another estimate"),
     },
+    "marker_motion": {
+        "marker_motion": ("px", "(T, n, 2) right and down, of the gel's dots, row by row; attribute rest: (n, 2) px"),
+    },
     SAMPLES: {
         "sample_center": ("m", "(T, S, 2) = (x, z) on the DIGIT of contacts that the frame may be as well; NaN: none"),
         "sample_force": ("N", "(T, S) of these contacts; 0 without contact"),

@@ -177,7 +177,7 @@ class Gel:
 
         Raises TactileError for the BioTac, which has no camera.
         """
-        return self._renderer(self.height_map())
+        return self._renderer(self.height_map(), self._renderer.marks(self._contact.displacement))
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
         """The pose (4, 4) in which the indenter, its own z out of the sensor, stands ``depth`` m past first touch.

@@ -214,7 +214,7 @@ class Pictures:
             radiance = self.renderer.radiance(height)
         with self.clock.stage("picture"):
             noise = np.random.default_rng(number) if self.noise else None
-            picture = self.renderer.picture(radiance, noise)
+            picture = self.renderer.picture(radiance, noise, None if self.heights else self.renderer.marks(values))
         with self.clock.stage("png"):
             write_png(folder / results.IMAGES / results.IMAGE_NAME.format(number), picture)
         if self.exr:

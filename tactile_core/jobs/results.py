@@ -29,7 +29,7 @@ IMAGE_NAME = "{:05d}.png"
 Gel = Literal["translated", "solved"]  # the networks' gel, or the found contact solved on the DIGIT (``solved_gel``)
 TRANSLATED: Gel = "translated"
 SOLVED: Gel = "solved"
-KEEPABLE = ("latent", "displacement", "height", "image", "traction")
+KEEPABLE = ("latent", "displacement", "height", "image", "traction", "marker_motion")
 DEFAULT_KEEP = ("latent", "displacement", "image")
 
 

@@ -103,6 +103,24 @@ class HeightMapper:
             maps[k] = self._one(frame)
         return maps
 
+    def covers(self, x: np.ndarray, z: np.ndarray) -> bool:
+        """Return true if all places x, z m lie on the even part of the resting surface."""
+        ends = ((spline.nodes[0], spline.nodes[-1]) for spline in (self._along, self._across))
+        return all(low <= place.min() and place.max() <= high for place, (low, high) in zip((x, z), ends, strict=True))
+
+    def follow(
+        self, displacement: np.ndarray, x: np.ndarray, z: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where gel points that rest at places x, z (n,) m come to: x, z and height (n,) m.
+
+        displacement : (n_nodes, 3) m
+        """
+        move = self.surface.grid(displacement)[self.surface.window].astype(float)
+        tables = np.stack([move[..., 0], move[..., 2], self._rest_y + move[..., 1]])
+        coefficients = self._along.to_coefficients @ tables @ self._across.to_coefficients.T
+        along_x, along_z, height = self._look_up(coefficients, x, z).astype(float).T
+        return x + along_x, z + along_z, height
+
     def _one(self, displacement: np.ndarray) -> np.ndarray:
         move = self.surface.grid(displacement)[self.surface.window].astype(float)
         if not move.any():

@@ -16,6 +16,7 @@ from .camera_noise import camera_noise
 from .coating_spread import CoatingSpread
 from .height_map import digit_mapper, of_unit, rest_height_map
 from .level_loops import in_picture
+from .marker_field import MarkerField
 from .mitsuba.direct_light import Hits, direct_light
 from .mitsuba.gel_light import ASIDE, GelLight
 from .mitsuba.gel_mesh import GelMesh
@@ -92,12 +93,16 @@ class Renderer:
             found = f"{len(surroundings.lamps)} more lamps and {len(surroundings.occluders)} bodies in the light's way"
             raise TactileError(f"preset {preset}", found, "a unit's own LEDs", "Choose standard, with LLVM (doctor)")
         self.rest_radiance = self._spread_radiance(resting)
+        self.dots = None if calibration.markers is None else MarkerField(calibration)
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")
 
-    def __call__(self, height_map: np.ndarray) -> np.ndarray:
-        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
-        return self.picture(self.radiance(height_map))
+    def __call__(self, height_map: np.ndarray, marks: np.ndarray | None = None) -> np.ndarray:
+        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.
+
+        marks : (H, W) share of light that dots leave, of ``dots.marks``; of a unit with dots they must be given
+        """
+        return self.picture(self.radiance(height_map), marks=marks)
 
     def render(self, displacement: np.ndarray) -> np.ndarray:
         """Pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
@@ -105,13 +110,16 @@ class Renderer:
         displacement : of the DIGIT surface's 2,867 nodes, as ``translate`` and ``solve`` return it
         Raises TactileError for another shape or values that are not finite.
         """
-        mapper = digit_mapper(self.camera)
         if np.ndim(displacement) != 3:
-            return self(mapper(displacement))
+            return self(digit_mapper(self.camera)(displacement), self.marks(displacement))
         pictures = np.empty((len(displacement), *self.camera.shape, 3), np.uint8)
         for k, frame in enumerate(displacement):
-            pictures[k] = self(mapper(frame))
+            pictures[k] = self.render(frame)
         return pictures
+
+    def marks(self, displacement: np.ndarray) -> np.ndarray | None:
+        """Share (H, W) of light that the dots of a gel displaced by (n_nodes, 3) m leave; None without dots."""
+        return None if self.dots is None else self.dots.marks(displacement)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3) float32, levels of its band, that each LED gives to what pixels see."""
@@ -121,16 +129,26 @@ class Renderer:
         found = self._light.radiance(heights)
         return np.moveaxis(self._spread(np.moveaxis(found, -1, 0)), 0, -1)
 
-    def picture(self, radiance: np.ndarray, noise: np.random.Generator | None = None) -> np.ndarray:
-        """Picture (H, W, 3) uint8: background + response (radiance - radiance at rest).
+    def picture(
+        self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times the dots' share.
 
         noise : makes the camera's noise, as measured on the unit; None for none
+        marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them.
         """
-        if noise is None and available() and radiance.dtype == self.rest_radiance.dtype == np.float32:
+        if self.dots is not None and marks is None:
+            found = "a picture of heights alone, which do not say where the dots have moved"
+            raise TactileError(
+                "markers", found, "the gel's displacement", "Call Renderer.render, or leave [markers] out"
+            )
+        if noise is None and marks is None and available() and radiance.dtype == self.rest_radiance.dtype == np.float32:
             now, at_rest = np.moveaxis(radiance, -1, 0), np.moveaxis(self.rest_radiance, -1, 0)
             return in_picture(now, at_rest, self._response, self.background, np.float32(LARGEST_LEVEL))
         levels = self.in_levels(radiance - self.rest_radiance)
         levels += self.background
+        if marks is not None:
+            levels *= marks[..., None]
         if noise is not None:
             levels += camera_noise(self.calibration, noise)
         np.rint(levels, out=levels)

@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import TactileError
 from .camera import COLOURS, Camera, Led
 from .coating import Coating
+from .markers import Markers
 
 AMBIENT_DEGREE = 5
 AMBIENT_TERMS = (AMBIENT_DEGREE + 1) * (AMBIENT_DEGREE + 2) // 2
@@ -95,6 +96,7 @@ class Calibration:
     gel_index : refractive index of gel and acrylic, taken as equal
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
     photograph : path of a photograph of the untouched gel, which then is the picture at rest; "" for none
+    markers : dots printed on the gel; None for none
     photographed : LEDs and albedo when it was taken, which a file's are; None for a calibration's that never changed
     noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for
     """
@@ -111,6 +113,7 @@ class Calibration:
     noise: tuple[float, float, float]
     fit: Fit
     photographed: tuple[tuple[Led, Led, Led], tuple[float, float, float]] | None = None
+    markers: Markers | None = None
 
     def __post_init__(self) -> None:
         if tuple(led.colour for led in self.leds) != COLOURS:
@@ -124,6 +127,9 @@ class Calibration:
         table = np.asarray(self.ambient, float)
         if table.shape != (3, AMBIENT_TERMS) or not np.isfinite(table).all():
             raise TactileError("ambient", f"shape {table.shape}", f"3 rows of {AMBIENT_TERMS} finite numbers")
+        if self.markers is not None and self.photograph:
+            found = f"beside the photograph {self.photograph}, whose own dots would stay"
+            raise TactileError("markers", found, "a picture at rest that the lights make", "Leave the photograph out")
         if len(self.noise) != 3:
             raise TactileError("noise, levels", repr(self.noise), "three numbers")
         for level in self.noise:

@@ -19,6 +19,7 @@ from ..files.text_file import read_toml_text
 from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
 from .camera import COLOURS, Camera, Led
 from .coating import Coating
+from .markers import Markers
 
 FORMAT, FORMER = "tactile-calibration-3", "tactile-calibration-1"
 WITHOUT_SPREAD = "tactile-calibration-2"  # whose coatings do not spread light
@@ -26,6 +27,7 @@ SHIPPED = shipped("calibrations/default.toml")
 LARGEST = 1e8  # of a unit's numbers, as the radiance of a spot of 0.05 mm; a fit's errors may be larger
 ADVICE = "Make it again with `tactile calibrate`"
 
+OPTIONAL = ("markers",)  # tables that may be left out
 _TABLES = {
     "": ("format", "unit", "camera", "leds", "response", "ambient", "coating", "gel", "background", "noise", "fit"),
     "camera": ("width_px", "height_px", "px_per_mm_x", "px_per_mm_y", "centre_x_mm", "centre_z_mm",
@@ -37,6 +39,7 @@ _TABLES = {
     "gel": ("dome_scale", "index"),
     "background": ("photograph",),
     "noise": ("levels",),
+    "markers": ("rows", "columns", "pitch_mm", "diameter_mm", "albedo"),
     "fit": ("note", "photographs", "ball_diameter_mm", "errors", "standard_errors", "not_identified"),
 }  # fmt: skip
 
@@ -91,7 +94,11 @@ class _Reader:
         if content.get("format") == WITHOUT_SPREAD and isinstance(content.get("coating"), dict):
             self._content = content | {"format": FORMAT, "coating": {"spread_mm": 0.0} | content["coating"]}
         for table, names in _TABLES.items():
-            self._check_names(table or "top level", self._content if not table else self._table(table), names)
+            if not table:
+                optional = (name for name in OPTIONAL if name in self._content)
+                self._check_names("top level", self._content, (*names, *optional))
+            elif table in self._content:
+                self._check_names(table, self._table(table), names)
 
     def _table(self, name: str) -> dict[str, Any]:
         table = self._content[name]
@@ -124,6 +131,17 @@ class _Reader:
             noise=_three("noise, levels", self._content["noise"]["levels"]),
             fit=self._fit(),
             photographed=(leds, coating.albedo) if photograph else None,
+            markers=self._markers() if "markers" in self._content else None,
+        )
+
+    def _markers(self) -> Markers:
+        table = self._content["markers"]
+        return Markers(
+            _whole("markers, rows", table["rows"]),
+            _whole("markers, columns", table["columns"]),
+            1e-3 * _number("markers, pitch_mm", table["pitch_mm"]),
+            1e-3 * _number("markers, diameter_mm", table["diameter_mm"]),
+            _number("markers, albedo", table["albedo"]),
         )
 
     def _camera(self) -> Camera:
@@ -289,6 +307,17 @@ def _as_text(calibration: Calibration) -> str:
         "[background]  # a photograph of the untouched gel, beside this file, is then the picture at rest",
         f"photograph = {_quoted(Path(calibration.photograph).name)}",
     ]
+    if calibration.markers is not None:
+        markers = calibration.markers
+        lines += [
+            "",
+            "[markers]  # dots printed on the gel, a square grid in the picture's middle; may be left out",
+            f"rows = {markers.rows}  # down the picture",
+            f"columns = {markers.columns}",
+            f"pitch_mm = {_digits(1e3 * markers.pitch)}",
+            f"diameter_mm = {_digits(1e3 * markers.diameter)}",
+            f"albedo = {_digits(markers.albedo)}  # share of the coating's light: 0 black",
+        ]
     lines += [
         "",
         "[noise]  # standard deviation, grey levels, red, green, blue; used when asked for",

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture
 def tactile(monkeypatch, capsys):
     """Run a command line in this process, without networks; returns (status, stdout, stderr)."""
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
 
     def run(*arguments):
         status = main([str(argument) for argument in arguments])

@@ -72,5 +72,5 @@ if __name__ == "__main__":
     from tactile_core.cli.main import main
     from tactile_core.jobs import convert
 
-    convert.load_tools = lambda weights=None, **options: tools()
+    convert.load_tools = lambda *files, **options: tools()
     sys.exit(main())

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -13,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from PIL import Image
+from plain_unit import plain_unit
 
 from tactile_core.accuracy import Budget
 from tactile_core.cli.main import main
@@ -22,8 +24,10 @@ from tactile_core.jobs.frame_pass import CHUNK
 from tactile_core.jobs.frames_file import ALWAYS, KEPT
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.pictures import presets, renderer
+from tactile_core.pictures.marker_field import MarkerField
 from tactile_core.pictures.mitsuba.variant import SCALAR, Choice
 from tactile_core.recordings.flags import Flag
+from tactile_core.sensors.markers import Markers
 
 FRAMES = 150  # of slide_csv: more than two chunks
 
@@ -102,6 +106,20 @@ def test_a_kept_traction_is_zero_without_contact_and_adds_up(run, slide_csv):
     assert touched.any() and not touched.all()
     assert traction.any(axis=(1, 2)).tolist() == touched.tolist() and (total[touched, 1] > 0).all()
     np.testing.assert_allclose(np.einsum("tnk,n->tk", traction, node_areas("digit")), total, rtol=0, atol=1e-6)
+
+
+def test_marker_motion_needs_a_unit_with_dots_and_has_their_rest(slide_csv, tmp_path, tools):
+    unit = dataclasses.replace(plain_unit(), markers=Markers(3, 2, 2e-3, 0.6e-3, 0.1))
+    dotted = dataclasses.replace(tools, dots=MarkerField(unit), shade=lambda height, marks: fake_tools.shade(height))
+    options, path = convert.Options(slice(60, 80, 10), ("marker_motion", "image")), slide_csv(frames=80)
+    with pytest.raises(TactileError, match=r"unit without dots.*--calibration"):
+        convert.convert(path, tmp_path / "none", options, tools)
+    assert not (tmp_path / "none").exists()
+    folder = convert.convert(path, tmp_path / "out", options, dotted).folder
+    with h5py.File(folder / "frames.h5") as file:
+        assert set(file) == {*ALWAYS, "marker_motion"}
+        assert file["marker_motion"].shape == (2, 6, 2) and file["marker_motion"].attrs["rest"].shape == (6, 2)
+        assert np.abs(file["marker_motion"][:]).max() > 0.01  # a dent off the camera's axis: perspective alone
 
 
 def test_the_same_input_gives_the_same_bytes(run, slide_csv):
@@ -278,7 +296,7 @@ def test_a_conversion_is_as_deep_as_its_deepest_node(sampled, run, slide_csv, tm
 
 def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
     drawn = []
-    monkeypatch.setattr(renderer, "Renderer", lambda preset: drawn.append(preset) or str)
+    monkeypatch.setattr(renderer, "Renderer", lambda calibration, preset: drawn.append(preset) or str)
     monkeypatch.setattr(presets, "choose_variant", lambda wanted: Choice(SCALAR, ""))
     tools, told = convert.choose_preset(fake_tools.tools(), 5)
     assert (tools.preset, drawn) == ("fast", []) and "fast" in told
@@ -288,7 +306,7 @@ def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
 
 
 def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, **options: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     line = ["convert", str(slide_csv()), "--out", str(tmp_path / "out"), "--error"]
     assert main([*line, "5levels"]) == 0
     err = capsys.readouterr().err

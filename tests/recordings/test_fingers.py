@@ -52,7 +52,7 @@ def test_a_file_of_one_finger_keeps_its_name(hand):
 def test_convert_and_batch_give_a_result_a_finger(hand, tmp_path, monkeypatch, capsys):
     import fake_tools
 
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     path, out = hand(), tmp_path / "out"
     assert main(["convert", path, "--out", str(out), "--keep", "latent"]) == 0
     assert {folder.name for folder in out.iterdir()} == {"hand_finger0", "hand_finger1"}

@@ -58,7 +58,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--keep",
         metavar="WORDS",
-        help="out of latent,displacement,height,image,traction (default: latent,displacement)",
+        help="out of latent,displacement,height,image,traction,marker_motion (default: latent,displacement)",
     )
     verb.add_argument("--shard-frames", type=int, metavar="N", help="frames a shard (default: 1000)")
     answer_arguments(verb)
@@ -155,6 +155,11 @@ def _recipe(options: argparse.Namespace) -> Translate:
     preset = options.preset or "fast"
     if options.preset is not None and "image" not in keep:
         raise TactileError("--preset", preset, "--keep image", "Keep the pictures that it makes")
+    if "marker_motion" in keep:
+        from ...pictures.marker_field import MarkerField
+        from ...sensors.calibration_file import load_calibration
+
+        MarkerField(load_calibration(options.calibration))  # refused here where the unit has no dots
     pictures = unit, preset, variant_for(preset)
     return Translate(list(keep), sha256, frames, prepare, sensor, *pictures, answer_words(options), options.gel)
 

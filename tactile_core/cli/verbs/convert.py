@@ -43,6 +43,7 @@ examples:
   tactile convert day1/*.csv --out results --keep latent --overwrite
   tactile convert touch.csv --out results --frames 200:300:5 --tare 0:50
 
+--keep marker_motion adds the motion, px, of dots printed on the gel, for a --calibration with [markers].
 --keep traction adds the force field on the gel, Pa on each node of its surface, from its translated displacement by the
 gel's own compliance (built once, 18 s and 145 MB), and prints by how much it misses the networks' force.
 
@@ -68,12 +69,15 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         default="latent,displacement,image",
         metavar="WORDS",
         help="what to write beside the numbers that are always there, out of"
-        " latent,displacement,height,image,traction (default: %(default)s)",
+        " latent,displacement,height,image,traction,marker_motion (default: %(default)s)",
     )
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
     prepare_arguments(verb)
     verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+    verb.add_argument(
+        "--calibration", metavar="FILE", help="DIGIT that is drawn, by `tactile calibrate`, instead of the shipped one"
+    )
     answer_arguments(verb)
     error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
     progress_argument(verb)
@@ -90,13 +94,13 @@ def run(options: argparse.Namespace) -> int:
     keep, frames = results.parse_keep(options.keep), frame_range.parse_frames(options.frames)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     budget = None if options.error is None else accuracy.parse_budget(options.error)
-    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget)
+    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     paths, failed = _fingers(options.recordings), 0
     made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
-    tools = convert.load_tools(options.weights, answer=answer_words(options), gel=options.gel)
+    tools = convert.load_tools(options.weights, options.calibration, answer=answer_words(options), gel=options.gel)
     if budget is not None and budget.levels is not None:
-        tools, why = convert.choose_preset(tools, budget.levels)
+        tools, why = convert.choose_preset(tools, budget.levels, options.calibration)
         say(why)
     for path, folder in zip(paths, folders, strict=True):
         try:
