@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .operators import (
     calibration_objects,
+    check_llvm,
     import_recording,
     preview,
     render_engine,
@@ -11,6 +12,7 @@ from .operators import (
     scene_files,
     set_style,
     simulate,
+    snap_to_gel,
     translate_recording,
 )
 from .process import command_line
@@ -22,6 +24,7 @@ PARTS = (
     render_settings,
     preferences,
     asset_library,
+    check_llvm,
     import_recording,
     translate_recording,
     set_style,
@@ -30,6 +33,7 @@ PARTS = (
     render_setup,
     calibration_objects,
     add_menu,
+    snap_to_gel,
     simulate,
     scene_files,
     panels,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from typing import Any
 
 import bpy
@@ -72,9 +73,16 @@ def authored(context: bpy.types.Context) -> Authored:
     pressing = specs[0].name
     order = {name: k for k, name in enumerate(document.pop("order", []))}
     specs.sort(key=lambda spec: order.get(spec.name, len(order)))
-    recording = {"noise_counts": 1.0, "drift_counts": 3.0, "tilt_deg": 0.0} | kept
+    recording = {"noise_counts": 1.0, "drift_counts": 3.0} | kept | _press(thing)
     recording |= {"indenter": pressing, "points": points}
     return Authored(_scene(Scene, document, specs, recording), meshes, values["apex"] if by_height else None)
+
+
+def _press(thing: bpy.types.Object) -> dict[str, float]:
+    """Friction and tilt, rounded from Blender's float32; of a former file's indenter, which lacks them, nothing."""
+    about = thing.tactile
+    values = {"friction": round(about.friction, 5), "tilt_deg": round(math.degrees(about.tilt), 4)}
+    return values if about.format >= 2 else {}
 
 
 def _scene(kind: type, document: dict, specs: list, recording: dict) -> Any:

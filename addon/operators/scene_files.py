@@ -1,6 +1,7 @@
 """Import Scene and Export Scene: ``scene.toml`` to objects and back."""
 
 import json
+import math
 from pathlib import Path
 
 import bpy
@@ -68,6 +69,7 @@ def _set_motion(scene: bpy.types.Scene, found, things: list[bpy.types.Object]) -
     chosen.tactile.document = json.dumps(document)
     if spec is None:
         return chosen
+    chosen.tactile.friction, chosen.tactile.tilt = spec.friction, math.radians(spec.tilt_deg)
     points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
     rate = sensors.SAMPLE_RATE
     # A motion may begin later than 0 s: frame 0 stays time 0.

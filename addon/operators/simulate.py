@@ -107,7 +107,7 @@ class TACTILE_OT_simulate(TactileOperator):
                 over = self._job.poll()
                 share = round(100 * self._job.share)
                 context.window_manager.progress_update(share)
-                context.workspace.status_text_set(f"Simulating: {share} %   (Esc stops)")
+                context.workspace.status_text_set(f"{self._job.stage}: {share} %   (Esc stops)")
                 if over:
                     self._bake(context)
         except Refused:

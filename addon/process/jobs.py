@@ -21,11 +21,13 @@ _PATIENCE = 5.0  # s that a cancelled job has to end by itself
 
 
 class Job:
-    """A worker and its folder. ``done`` of ``total`` is its reported progress; ``finished`` : whether it ended well."""
+    """A worker and its folder. ``done`` of ``total`` is its reported progress, in the ``stage`` of that name;
+    ``finished`` : whether it ended well.
+    """
 
     def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:
         """Start it. folder : where its input lies and its output goes; listening : whether it waits for ``tell``."""
-        self.folder, self.done, self.total, self.finished = folder, 0, 1, False
+        self.folder, self.done, self.total, self.finished, self.stage = folder, 0, 1, False, ""
         (folder / "job.json").write_text(json.dumps({"kind": kind} | options), encoding="utf-8")
         self._lines: queue.Queue[str] = queue.Queue()
         with open(folder / "stderr.txt", "wb") as errors:
@@ -43,7 +45,7 @@ class Job:
 
     @property
     def share(self) -> float:
-        """Share of the job that is done, 0..1."""
+        """Share of the stage that is done, 0..1."""
         return self.done / self.total
 
     def tell(self, message: dict) -> None:
@@ -57,6 +59,7 @@ class Job:
         error = None
         for message in self._messages(wait):
             error = message.get("error", error)
+            self.stage = message.get("stage", self.stage)
             if message.get("total"):
                 self.done, self.total = message["done"], message["total"]
             self.finished = self.finished or bool(message.get("finished"))

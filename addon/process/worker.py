@@ -1,7 +1,8 @@
 """The other process: long jobs run here, so that Blender lives on when they stall, are stopped or abort.
 
 Started by ``jobs.Job`` as `python worker.py FOLDER` with ``tactile_core`` on its path. FOLDER/job.json says what to do;
-each line on stdout is a JSON object: {"done": 3, "total": 10}, {"error": "..."} or {"finished": true}. No bpy here.
+each line on stdout is a JSON object: {"stage": "..."}, {"done": 3, "total": 10}, {"error": "..."} or
+{"finished": true}. No bpy here.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import dataclasses
 import json
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -52,18 +53,40 @@ def simulate(folder: Path, job: dict, progress: Progress) -> None:
     With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
     """
     from tactile_core.errors import TactileError
+    from tactile_core.mechanics.fast.compliance import compliance_of
     from tactile_core.simulation.recording import sensors_of, simulate_recording
     from tactile_core.simulation.tier_choice import choose_for_scene
 
-    depths = _forces_from_heights(folder, job, progress) if (folder / "heights.npz").exists() else None
-    choices = {} if job["um"] is None else choose_for_scene(folder, sensors_of(job["keep"]), job["um"])
+    by_height, used = (folder / "heights.npz").exists(), sensors_of(job["keep"])
+    stages = _stages(used, by_height, job["um"])
+    for sensor in used if job["um"] is None else ():
+        next(stages)
+        compliance_of(sensor)
+    if by_height:
+        next(stages)
+    depths = _forces_from_heights(folder, job, progress) if by_height else None
+    if job["um"] is not None:
+        next(stages)
+    choices = {} if job["um"] is None else choose_for_scene(folder, used, job["um"])
     tiers = {sensor: choice.tier for sensor, choice in choices.items()}
     scene, out = folder / "scene.toml", folder / "recording.h5"
+    next(stages)
     try:
         simulate_recording(scene, out, job["seed"], progress, keep=job["keep"], tiers=tiers)
     except TactileError as error:
         raise _in_scene(error, folder, job, depths) from error
     _result(folder, [choice.describe(sensor) for sensor, choice in choices.items()])
+
+
+def _stages(used: tuple[str, ...], by_height: bool, um: float | None) -> Iterator[None]:
+    """Name each stage of a simulation at each step, with its number: "Solving the contacts, 3 of 3"."""
+    surface = {"biotac": "the skin's", "digit": "the gel's"}
+    names = [f"Preparing {surface[sensor]} compliance (computed once, then kept)" for sensor in used if um is None]
+    names += ["Finding the forces of the heights"] * by_height + ["Choosing the tiers"] * (um is not None)
+    names.append("Solving the contacts")
+    for k, name in enumerate(names):
+        say(stage=f"{name}, {k + 1} of {len(names)}", done=0, total=1)
+        yield
 
 
 def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[float]:
@@ -95,7 +118,7 @@ def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[fl
             force = max(solution.axial_force, 0.0)
         points.append(msgspec.structs.replace(point, force_n=force))
         depths.append(depth)
-        progress(k + 1, 2 * len(apexes))
+        progress(k + 1, len(apexes))
     # The rest of the scene as it was written: load_scene has made its file names absolute.
     text = msgspec.toml.decode((folder / "scene.toml").read_bytes(), type=type(scene))
     recording = msgspec.structs.replace(text.recording, points=points)
@@ -190,6 +213,18 @@ def _renderer(folder: Path, preset: str) -> Any:
     return Renderer(load_calibration(folder / "unit.toml"), preset, surroundings=around)
 
 
+def variant(folder: Path, job: dict, progress: Progress) -> None:
+    """FOLDER/variant.txt: which variant of Mitsuba this machine runs, and why, in a sentence."""
+    from tactile_core.pictures.mitsuba.variant import LLVM, OLDEST_LLVM, choose_variant
+
+    choice = choose_variant()
+    works = choice.name == LLVM
+    text = f"Mitsuba runs by LLVM: {choice.why}" if works else (
+        f"Mitsuba traces one ray at a time, because {choice.why}; several times faster with LLVM {OLDEST_LLVM} or newer"
+    )  # fmt: skip
+    (folder / "variant.txt").write_text(text, encoding="utf-8")
+
+
 def read(folder: Path, job: dict, progress: Progress) -> None:
     """The recording at job["path"] -> arrays.npz and about.json, which ``recording_reader`` puts together again."""
     from tactile_core import recordings
@@ -207,7 +242,7 @@ def read(folder: Path, job: dict, progress: Progress) -> None:
 
 
 STEPS = 8  # of sinking by the free distance; each leaves a small part of it, far below a pixel after eight
-JOBS = {"simulate": simulate, "render": render, "read": read}
+JOBS = {"simulate": simulate, "render": render, "read": read, "variant": variant}
 
 if __name__ == "__main__":
     sys.exit(main(Path(sys.argv[1])))

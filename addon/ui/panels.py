@@ -4,7 +4,7 @@ import json
 
 import bpy
 
-from ..operators import preview
+from ..operators import preview, snap_to_gel
 from ..operators.import_recording import TACTILE_OT_import_recording
 from ..operators.preview import TACTILE_OT_live_picture
 from ..operators.render_setup import draw_settings
@@ -13,6 +13,7 @@ from ..operators.simulate import TACTILE_OT_simulate
 from ..operators.translate_recording import TACTILE_OT_translate
 from . import properties, timeline
 from .add_menu import TACTILE_MT_add
+from .reports import missing
 
 
 class _Panel:
@@ -99,16 +100,30 @@ class TACTILE_PT_author(_Panel, bpy.types.Panel):
             column.label(text=thing.name, icon="MESH_ICOSPHERE")
             column.prop(thing.tactile, "press_by")
             if thing.tactile.press_by == "FORCE":
-                column.prop(thing.tactile, "force")
+                column.prop(thing.tactile, "force", text="Force (N)")
+            column.prop(thing.tactile, "friction")
+            column.prop(thing.tactile, "tilt")
+            _depth(column, context, thing)
             if thing.tactile.spec:
                 row = column.row(align=True)
                 row.label(text=_shape(thing.tactile.spec))
                 row.operator("tactile.use_as_indenter", text="Press with Mesh")
-        layout.prop(context.scene.tactile_render, "error")
+        layout.prop(context.scene.tactile_render, "error", text="Largest Error", placeholder="50um,0.6levels")
         layout.operator(TACTILE_OT_simulate.bl_idname, icon="PHYSICS")
         row = layout.row(align=True)
         row.operator(TACTILE_OT_import_scene.bl_idname, text="Import Scene", icon="IMPORT")
         row.operator(TACTILE_OT_export_scene.bl_idname, text="Export Scene", icon="EXPORT")
+
+
+def _depth(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object) -> None:
+    """How deep an indenter stands in the resting gel on this frame, and the button that puts it there."""
+    sensor = properties.of_role(context.scene, "DIGIT") or properties.of_role(context.scene, "BIOTAC")
+    row = column.row(align=True)
+    if sensor is not None and not missing("msgspec"):
+        depth = snap_to_gel.depth_of(thing, sensor, context.evaluated_depsgraph_get())
+        if depth is not None:
+            row.label(text=f"{1e3 * abs(depth):.2f} mm {'above' if depth < 0 else 'below'} the resting gel")
+    row.operator("tactile.snap_to_gel")
 
 
 CLASSES = (TACTILE_PT_recording, TACTILE_PT_picture, TACTILE_PT_author)

@@ -1,14 +1,73 @@
-"""Preferences > Add-ons > Tactile: what is there, what is missing and what to do."""
+"""Preferences > Add-ons > Tactile: what is there, what is missing and what to do; cache, LLVM, default calibration."""
+
+import os
+import shutil
+from pathlib import Path
 
 import bpy
 
-from .reports import ADVICE, MODULES, missing
+from ...tactile_core.files import cache
+from .reports import ADVICE, MODULES, TactileOperator, missing
+
+ID = __package__.rsplit(".", 2)[0]  # the extension, not this package in it
+LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"  # by which Mitsuba finds the library
+
+
+def of(context: bpy.types.Context) -> bpy.types.AddonPreferences:
+    """The extension's preferences."""
+    return context.preferences.addons[ID].preferences
+
+
+class TACTILE_OT_clear_cache(TactileOperator):
+    """Remove what was computed once for all simulations and is computed again, in minutes, where it is missing"""
+
+    bl_idname = "tactile.clear_cache"
+    bl_label = "Clear Cache"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (no part of the file)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask first."""
+        return context.window_manager.invoke_confirm(self, event)
+
+    def work(self, _context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        known = cache.entries()
+        size = sum(map(size_of, known))
+        for folder in known:
+            shutil.rmtree(folder)
+        self.report({"INFO"}, f"{len(known)} folders removed, {1e-6 * size:.0f} MB")
+
+
+def size_of(folder: Path) -> int:
+    """Bytes of the files in a folder."""
+    return sum(file.stat().st_size for file in folder.iterdir() if file.is_file())
+
+
+def _llvm_changed(preferences: bpy.types.AddonPreferences, _context: bpy.types.Context) -> None:
+    preferences.verdict = ""
+    _set_llvm(preferences.llvm)
+
+
+def _set_llvm(path: str) -> None:
+    """Name LLVM's library to the processes that draw; an empty path leaves the environment as it is."""
+    if path:
+        os.environ[LLVM_VARIABLE] = bpy.path.abspath(path)
 
 
 class TactilePreferences(bpy.types.AddonPreferences):
     """Shown under the add-on's name."""
 
-    bl_idname = __package__.rsplit(".", 2)[0]  # the extension, not this package in it
+    bl_idname = ID
+
+    calibration: bpy.props.StringProperty(
+        name="Default Calibration", description="File of one DIGIT unit (tactile calibrate) for scenes that name none;"
+        " empty: the one that ships", subtype="FILE_PATH",
+    )  # fmt: skip
+    llvm: bpy.props.StringProperty(
+        name="LLVM Library", description="libLLVM.so, LLVM-C.dll or libLLVM.dylib, version 18 or newer, which makes"
+        " Mitsuba's presets several times faster; empty: the system's", subtype="FILE_PATH", update=_llvm_changed,
+    )  # fmt: skip
+    verdict: bpy.props.StringProperty(name="Verdict", description="What the last check of LLVM has found")
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Called by Blender."""
@@ -21,6 +80,35 @@ class TactilePreferences(bpy.types.AddonPreferences):
             column.label(text=text, icon="CHECKMARK" if there else "ERROR")
         if lacking:
             column.label(text=ADVICE + ".", icon="INFO")
+        column = self.layout.column()
+        column.use_property_split = True
+        column.prop(self, "calibration")
+        column.prop(self, "llvm")
+        row = column.row()
+        row.label(text=self.verdict or "LLVM: not checked yet", icon="INFO")
+        row.operator("tactile.check_llvm", icon="FILE_REFRESH")
+        row = column.row()
+        size = sum(map(size_of, cache.entries()))
+        row.label(text=f"Cache: {1e-6 * size:.0f} MB in {cache.cache_folder()}", icon="DISK_DRIVE")
+        row.operator(TACTILE_OT_clear_cache.bl_idname, icon="TRASH")
+        row = column.row()
+        row.label(text="Styles in the asset library “Tactile”", icon="ASSET_MANAGER")
+        row.operator("tactile.install_styles", icon="FILE_REFRESH")
 
 
-register, unregister = bpy.utils.register_classes_factory((TactilePreferences,))
+CLASSES = (TACTILE_OT_clear_cache, TactilePreferences)
+
+
+def register() -> None:
+    """Called by the package."""
+    for kind in CLASSES:
+        bpy.utils.register_class(kind)
+    stored = bpy.context.preferences.addons.get(ID)
+    if stored is not None and stored.preferences is not None:
+        _set_llvm(stored.preferences.llvm)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    for kind in reversed(CLASSES):
+        bpy.utils.unregister_class(kind)

@@ -1,10 +1,13 @@
 """Properties that the add-on stores in a .blend: the role of each object, and the path of its recording."""
 
+import math
+
 import bpy
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.mechanics.placement import FRICTION
 
-FORMAT = 1  # of these properties; raised when an older file needs to be read differently
+FORMAT = 2  # of these properties; raised when an older file needs to be read differently. 2: friction and tilt
 
 # Blender 4.5 asks for this word before it lets a path begin with "//"; older ones do not know it.
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
@@ -66,6 +69,14 @@ class TactileObject(bpy.types.PropertyGroup):
     force: bpy.props.FloatProperty(
         name="Force", description="Force of the press, in newtons; keyframe it like a location", min=0.0, soft_max=2.0,
         default=0.0, precision=3, options={"ANIMATABLE"},
+    )  # fmt: skip
+    friction: bpy.props.FloatProperty(
+        name="Friction", description="Coefficient of friction between the indenter and the gel", default=FRICTION,
+        min=0.0, max=5.0, options=set(),
+    )  # fmt: skip
+    tilt: bpy.props.FloatProperty(
+        name="Tilt", description="Of the press against the normal of the surface", subtype="ANGLE",
+        default=0.0, min=0.0, max=math.radians(45), options=set(),
     )  # fmt: skip
     largest: bpy.props.FloatProperty(
         name="Largest", description="Largest displacement of the animation, metres", default=0.0, min=0.0

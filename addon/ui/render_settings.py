@@ -9,6 +9,7 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.calibration import Calibration
 from ..objects import digit_body
+from . import preferences
 
 _FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
 _MITSUBA = (
@@ -27,7 +28,7 @@ class TactileRender(bpy.types.PropertyGroup):
 
     preset: bpy.props.EnumProperty(name="Preset", description="How exactly the picture is made", items=PRESETS)
     calibration: bpy.props.StringProperty(
-        name="Calibration", description="File of one DIGIT unit (tactile calibrate); empty: the one that ships",
+        name="Calibration", description="File of one DIGIT unit (tactile calibrate); empty: the one of the preferences",
         subtype="FILE_PATH", options=_RELATIVE, update=lambda settings, context: _take_calibration(settings, context),
     )  # fmt: skip
     error: bpy.props.StringProperty(
@@ -55,8 +56,11 @@ def preset_of(scene: bpy.types.Scene) -> str:
 
 
 def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) -> Calibration:
-    """The unit whose file a scene names, its picture (width, height) pixels large. Raises TactileError."""
-    path = scene.tactile_render.calibration
+    """The unit whose file a scene names, else the preferences', its picture (width, height) pixels large.
+
+    Raises TactileError.
+    """
+    path = scene.tactile_render.calibration or preferences.of(bpy.context).calibration
     unit = calibration_file.load_calibration(bpy.path.abspath(path) if path else None)
     return unit if size is None else unit.at_size(*size)
 

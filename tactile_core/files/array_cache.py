@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import TactileError
 from . import atomic, outside
+from .cache import HASHES  # written last: without it an entry is not whole
 
-HASHES = "sha256.json"  # written last: without it an entry is not whole
 _MOST = 2**16  # bytes of that file; a few names and hashes
 
 

@@ -14,8 +14,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
-import msgspec
-
 from ..errors import TactileError
 from ..files import atomic
 from ..files.text_file import read_toml_text
@@ -53,6 +51,8 @@ class ColumnMap:
 
 def read(path: str | os.PathLike) -> ColumnMap:
     """Read a map; raises TactileError naming file and field for what is unreadable, unknown or missing."""
+    import msgspec  # not by every reader: Blender without wheels has none
+
     file = Path(path)
     try:
         found = tomllib.loads(read_toml_text(file))

@@ -326,3 +326,44 @@ def _press(scene):
     scene.render.fps, scene.frame_start, scene.frame_end = 100, 1, 3
     for frame, force in ((1, 0.0), (3, 0.1)):
         _key(ball, frame, force=force)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "box"])
+def test_an_indenter_snaps_to_the_gel_and_its_depth_is_read(sensors, part, shape):
+    bpy.ops.tactile.add_indenter(shape=shape)
+    thing, gel = bpy.context.object, sensors.objects["DIGIT gel"]
+    depth = part("addon.operators.snap_to_gel").depth_of
+    assert depth(thing, gel, bpy.context.evaluated_depsgraph_get()) < 0
+    for wanted in (0.0, 0.4):
+        assert bpy.ops.tactile.snap_to_gel(depth=wanted) == {"FINISHED"}
+        # A micrometre: float32 locations of some tens of millimetres.
+        assert 1e3 * depth(thing, gel, bpy.context.evaluated_depsgraph_get()) == pytest.approx(wanted, abs=1e-3)
+
+
+def test_friction_and_tilt_reach_the_scene_file(sensors, part, tmp_path):
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    thing = bpy.context.object
+    thing.tactile.press_by, thing.tactile.friction, thing.tactile.tilt = "FORCE", 0.35, np.radians(12)
+    _key(thing, 1, x=-8.0, y=0.0, force=0.0)
+    _key(thing, 20, x=-8.0, y=0.0, force=0.5)
+    sensors.frame_end = 20
+    spec = part("tactile_core.simulation.scene").load_scene(_export(tmp_path))[0].recording
+    assert (spec.friction, spec.tilt_deg) == (0.35, 12.0)
+
+
+def test_a_simulation_names_its_stages(sensors, part, monkeypatch):
+    pytest.importorskip("h5py")
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    bpy.ops.tactile.snap_to_gel(depth=0.1)
+    sensors.frame_end = 2
+    job, seen = part("addon.process.jobs").Job, []
+    poll = job.poll
+
+    def look(self, wait=0.0):
+        over = poll(self, wait)
+        seen.append(self.stage)
+        return over
+
+    monkeypatch.setattr(job, "poll", look)
+    assert bpy.ops.tactile.simulate() == {"FINISHED"}
+    assert seen[-1] == "Solving the contacts, 4 of 4"

@@ -1,0 +1,36 @@
+"""Say in the preferences whether LLVM works for Mitsuba, as `tactile doctor` does on the command line."""
+
+import bpy
+
+from ..process.jobs import Job, JobFolder
+from ..process.tracer import close_all
+from ..ui import preferences
+from ..ui.reports import TactileOperator, require
+
+_LOOK = 0.1  # s between two looks at the worker
+
+
+class TACTILE_OT_check_llvm(TactileOperator):
+    """Try LLVM in another process: it needs some seconds, and a bad library ends that process alone"""
+
+    bl_idname = "tactile.check_llvm"
+    bl_label = "Check"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (no part of the file)
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        require("mitsuba")
+        close_all()  # workers that draw keep the library they began with
+        with JobFolder() as folder:
+            job = Job("variant", folder)
+            try:
+                while not job.poll(_LOOK):
+                    pass
+            finally:
+                job.cancel()
+            verdict = (folder / "variant.txt").read_text(encoding="utf-8")
+        preferences.of(context).verdict = verdict
+        self.report({"INFO"}, verdict)
+
+
+register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_check_llvm,))

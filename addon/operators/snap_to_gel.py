@@ -1,0 +1,104 @@
+"""How deep an indenter is in the resting gel, and the button that puts it there."""
+
+from __future__ import annotations
+
+import functools
+import json
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...tactile_core.mechanics.placement import Placement, pose_at
+from ..objects import axes, indenter_objects
+from ..process.jobs import JobFolder
+from ..ui import properties
+from ..ui.reports import TactileOperator, require
+from .scene_bridge import indenter_of, sensor_of
+
+
+def depth_of(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float | None:
+    """How far an indenter has been moved below the point of first touch, m; negative above it.
+
+    None for a mesh of the user's, whose distances take too long for a panel.
+    """
+    if not thing.tactile.spec:
+        return None
+    place = _place(thing, sensor, depsgraph)
+    apex, direction = _touch(_name(sensor), thing.tactile.spec, *np.round(place[[0, 2]], 7), thing.tactile.tilt)
+    return float((place - apex) @ direction)
+
+
+def _name(sensor: bpy.types.Object) -> str:
+    return "digit" if sensor.tactile.role == "DIGIT" else "biotac"
+
+
+def _place(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    relative = indenter_objects.world_axes(thing, sensor)
+    return indenter_objects.place_of(thing, sensor, indenter_objects.foot_of(thing, relative, depsgraph))
+
+
+@functools.lru_cache(maxsize=64)  # a panel asks at each redraw
+def _touch(sensor: str, spec: str, x: float, z: float, tilt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Point of first touch (3,) m and direction of the press (3,) of a body of a spec."""
+    import msgspec
+
+    from ...tactile_core.simulation.indenter_specs import IndenterSpec
+
+    pose = _pose(sensor, msgspec.convert(json.loads(spec), IndenterSpec).build(), x, z, tilt)
+    return pose.apex, pose.direction
+
+
+def _pose(sensor: str, indenter: Any, x: float, z: float, tilt: float) -> Any:
+    return pose_at(sensor, indenter, Placement(x, z, tilt))
+
+
+class TACTILE_OT_snap_to_gel(TactileOperator):
+    """Move the indenter along the press until it touches the resting gel, or is as deep as asked"""
+
+    bl_idname = "tactile.snap_to_gel"
+    bl_label = "Snap to Gel"
+
+    depth: bpy.props.FloatProperty(
+        name="Depth", description="Below the point of first touch, mm; negative: above it", default=0.0, soft_min=-5.0,
+        soft_max=2.0, precision=3,
+    )  # fmt: skip
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return true where an indenter has a gel to touch."""
+        scene = context.scene
+        if properties.of_role(scene, "INDENTER", context.object) is None:
+            cls.poll_message_set("Add an indenter first")
+            return False
+        return any(properties.of_role(scene, role) for role in ("DIGIT", "BIOTAC"))
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        require("msgspec")
+        thing, sensor = indenter_of(context), sensor_of(context)
+        depsgraph = context.evaluated_depsgraph_get()
+        place = _place(thing, sensor, depsgraph)
+        pose = _pose(_name(sensor), self._built(thing, sensor, depsgraph), place[0], place[2], thing.tactile.tilt)
+        moved = pose.apex + 1e-3 * self.depth * pose.direction - place
+        world = sensor.matrix_world.to_3x3() @ Vector(axes.to_blender(moved, sensor.tactile.per_metre))
+        matrix = thing.matrix_world.copy()
+        matrix.translation += world
+        thing.matrix_world = matrix
+
+    def _built(self, thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Any:
+        """The indenter as it is simulated."""
+        import msgspec
+
+        spec, mesh = indenter_objects.spec_of(thing, indenter_objects.world_axes(thing, sensor), depsgraph)
+        if mesh is None:
+            return spec.build()
+        require("trimesh", "rtree", "scipy")
+        with JobFolder() as folder:
+            path = folder / spec.file
+            path.write_bytes(mesh)
+            return msgspec.structs.replace(spec, file=str(path)).build()
+
+
+register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_snap_to_gel,))

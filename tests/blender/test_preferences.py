@@ -1,0 +1,45 @@
+"""Preferences: the cache's size and its clearing, LLVM's verdict, the default calibration."""
+
+from __future__ import annotations
+
+import bpy
+import pytest
+
+PACKAGE = "bl_ext.user_default.tactile"
+
+
+@pytest.fixture
+def preferences(extension):
+    found = bpy.context.preferences.addons[PACKAGE].preferences
+    yield found
+    found.calibration = found.llvm = ""
+
+
+def test_clearing_the_cache_removes_our_arrays_alone(monkeypatch, tmp_path, part):
+    monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))
+    for name in ("compliance-digit-1", "mine"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "array.npy").write_bytes(b"1234")
+    (tmp_path / "compliance-digit-1" / "sha256.json").write_text("{}")
+    assert [part("addon.ui.preferences").size_of(each) for each in part("tactile_core.files.cache").entries()] == [6]
+    assert bpy.ops.tactile.clear_cache() == {"FINISHED"}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
+
+
+def test_a_scene_without_calibration_takes_the_preferences(preferences, scene, part, tmp_path):
+    settings = part("addon.ui.render_settings")
+    own = tmp_path / "unit.toml"
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    bpy.data.lights["LED red"].energy *= 2
+    bpy.ops.tactile.save_as_calibration(filepath=str(own))
+    shipped = settings.calibration_of(scene)
+    preferences.calibration = str(own)
+    assert settings.calibration_of(scene).leds[0].radiance == pytest.approx(2 * shipped.leds[0].radiance, rel=1e-5)
+
+
+def test_the_verdict_on_llvm_names_a_library_that_is_not_there(preferences, monkeypatch):
+    pytest.importorskip("mitsuba")
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "")
+    preferences.llvm = "/nowhere/libLLVM.so"
+    assert bpy.ops.tactile.check_llvm() == {"FINISHED"}
+    assert "one ray at a time" in preferences.verdict and "/nowhere/libLLVM.so" in preferences.verdict
