@@ -48,9 +48,9 @@ def check_electrodes(path: str, count: int, source: str) -> None:
     if count == 24:
         raise TactileError(
             f"{path}, {source}",
-            "24 electrodes: a BioTac SP, not supported yet",
+            "24 electrodes: a BioTac SP, for which no weights ship",
             "the 19 electrodes of a BioTac",
-            "Use a recording of a BioTac with 19 electrodes",
+            "Use a recording of one; `tactile info` tells what a CSV file of a BioTac SP holds",
         )
     raise TactileError(
         f"{path}, {source}",

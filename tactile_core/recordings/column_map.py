@@ -18,7 +18,8 @@ from ..errors import TactileError
 from ..files import atomic
 from ..files.text_file import read_toml_text
 from ..sensors import ELECTRODES
-from .assemble import assemble
+from ..sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
+from .assemble import assemble, check_electrodes
 from .recording import Recording
 from .table import Table, read_header
 
@@ -128,6 +129,7 @@ def read_mapped(table: Table, columns: ColumnMap) -> Recording:
     Raises TactileError for a column that is missing, and the errors of ``assemble``.
     """
     electrodes = [name.lower() for name in columns.electrodes]
+    _check_series(table, electrodes)
     time = columns.time.lower()
     channels = {name: table.column(column) for name in CHANNELS if (column := getattr(columns, name).lower())}
     return assemble(
@@ -142,6 +144,16 @@ def read_mapped(table: Table, columns: ColumnMap) -> Recording:
         names=electrodes,
         **channels,
     )
+
+
+def _check_series(table: Table, electrodes: list[str]) -> None:
+    """Raise TactileError where the electrodes are 19 of the 24 columns of a BioTac SP."""
+    parts = [NUMBERED.match(name) for name in table.header]
+    stems = [(found[1], found[3]) for found in parts if found]
+    for name in electrodes:
+        found = NUMBERED.match(name)
+        if found and stems.count((found[1], found[3])) == SP_ELECTRODES:
+            check_electrodes(table.path, SP_ELECTRODES, f"line 1, columns {found[1]}..{found[3]}")
 
 
 def refuse_other(path: str, container: str, columns: ColumnMap | None) -> None:

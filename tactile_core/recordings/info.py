@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ..sensors import ELECTRODES
+from . import biotac_sp
 from .flags import Flag, names
 from .readers import read
 from .recording import Recording
@@ -18,9 +19,12 @@ def describe(path: str | os.PathLike[str], options: PrepareOptions | None = None
     """Describe sensor, channels, rate, duration, tare state, gaps and suspicious samples with their lines, as a short
     table.
 
-    Raises TactileError where the file is no recording.
+    A BioTac SP's, which cannot be translated, is described too. Raises TactileError where the file is no recording.
     """
-    recording = read(path, None if options is None else options.columns)
+    columns = None if options is None else options.columns
+    if biotac_sp.recognised(path, columns):
+        return biotac_sp.describe_sp(path)
+    recording = read(path, columns)
     signals = prepare(recording, options)
     lines = [os.fspath(path)]
     lines += [f"  {label:<11}{text}" for label, text in _rows(recording, signals)]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+ELECTRODES = 24  # beside four that excite (``locations.csv`` of github.com/bsadr/biotac)
 C10, C01 = 0.120342857e6, 0.0304571429e6  # Pa, two-term Mooney-Rivlin, Shore 35A (config)
 BULK = 1.5e9  # Pa (model)
 INITIAL_PRESSURE = 1750.0  # Pa, of the fluid before anything touches (model)

@@ -11,7 +11,8 @@ from .common import NOTHING, columns_of, polarity_argument
 
 BRIEF = "what a recording holds"
 TEXT = """\
-Say what recordings hold: sensor, channels, rate, duration, polarity, tare, gaps, bad samples.
+Say what recordings hold: sensor, channels, rate, duration, polarity, tare, gaps, bad samples. Of a BioTac SP's CSV,
+which no weights translate: fingers, lines, labels and the counts of its 24 electrodes.
 
 A CSV file whose column names are of no known layout needs a map: --columns map.toml writes one, guessed from the
 names of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch."""

@@ -1,4 +1,4 @@
-"""CSV of a BioTac SP, ff_e1..24 or ff_biotac_1..24 (also mf, th): recognised, and refused for now."""
+"""CSV of a BioTac SP, ff_e1..24 or ff_biotac_1..24 (also mf, th): no recording to translate; see ``biotac_sp``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..recording import Recording
 from ..table import Table
 
 CONTAINER = "csv"
-NAME = "CSV with ff_e1..24 of a BioTac SP (recognised, not supported yet)"
+NAME = "CSV with ff_e1..24 or ff_biotac_1..24 of a BioTac SP"
 COLUMN = re.compile(r"(ff|mf|rf|lf|th)_(e|biotac_)\d+$")
 
 
