@@ -18,7 +18,7 @@ from ..files.text_file import read_toml_text
 from ..sensors import COUNT_MAX, ELECTRODES, divider
 from .fingers import FINGERS
 from .recording import Recording
-from .signals import PrepareOptions, Rest, Signals, prepare
+from .signals import PrepareOptions, Rest, Signals, doubt_law, prepare
 
 FORMAT = "tactile-sensor-2"
 OLD_FORMAT = "tactile-sensor-1"  # its offsets were of counts that rise where a film thins
@@ -100,7 +100,7 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
     change = (signals.typical - offset) / np.array(sensor.gain)
     if signals.kind == "raw":
         change = divider.of_unit(change, signals.rest)
-    return dataclasses.replace(signals, change=change, report={**signals.report, "sensor": applied})
+    return doubt_law(dataclasses.replace(signals, change=change, report={**signals.report, "sensor": applied}))
 
 
 def read(path: str | os.PathLike) -> SensorFile:

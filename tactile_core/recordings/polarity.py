@@ -106,15 +106,16 @@ def _apart(less: float, more: float) -> bool:
 
 def likeness(changes: np.ndarray) -> float:
     """Mean over changes (n, 19) counts of the cosine to the nearest simulated contact, in the networks' scale."""
-    return float((_unit(changes) @ patterns().T).max(axis=1).mean())
+    return float((unit(changes) @ patterns().T).max(axis=1).mean())
 
 
 @functools.cache
 def patterns() -> np.ndarray:
     """Unit vectors (P, 19) of simulated contacts, in the networks' scale."""
-    return _unit(np.load(shipped(PATTERNS), allow_pickle=False).astype(np.float64))
+    return unit(np.load(shipped(PATTERNS), allow_pickle=False).astype(np.float64))
 
 
-def _unit(changes: np.ndarray) -> np.ndarray:
+def unit(changes: np.ndarray) -> np.ndarray:
+    """Unit vectors (n, 19) of changes (n, 19) counts, in the networks' scale."""
     compressed = np.arcsinh(changes / SCALE)
     return compressed / np.maximum(np.linalg.norm(compressed, axis=1, keepdims=True), 1e-9)

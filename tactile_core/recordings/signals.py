@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import TactileError
 from ..sensors import divider
+from . import contact_law
 from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
@@ -154,18 +155,26 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     flags |= np.uint16(_doubts(polarity, warnings))
     report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope) | {"smoothed_frames": frames}
     report |= {"polarity": polarity.name, "polarity_evidence": polarity.evidence}
-    return Signals(
-        change=polarity.sign * change,
-        rest=rest[0].copy(),
-        drift=slope,
-        electrodes=readings,
-        kind=kind,
-        quiet=quiet.mask,
-        flags=flags,
-        pdc=_pressure_change(recording, kind, quiet, unit_rest),
-        warnings=tuple(warnings),
-        report=report,
-    )
+    signals = Signals(
+        change=polarity.sign * change, rest=rest[0].copy(), drift=slope, electrodes=readings, kind=kind,
+        quiet=quiet.mask, flags=flags, pdc=_pressure_change(recording, kind, quiet, unit_rest),
+        warnings=tuple(warnings), report=report,
+    )  # fmt: skip
+    return doubt_law(signals)
+
+
+def doubt_law(signals: Signals) -> Signals:
+    """Flag the frames in contact, and warn, where together they resemble no simulated ones; undoes an older doubt."""
+    if signals.kind not in ("raw", "tared"):
+        return signals
+    typical = signals.typical
+    contact = contact_law.touching(typical) & ~signals.quiet
+    words = contact_law.doubt(typical[contact])
+    flags = signals.flags & ~np.uint16(Flag.LAW_DOUBTED)
+    if words:
+        flags[contact] |= np.uint16(Flag.LAW_DOUBTED)
+    others = tuple(text for text in signals.warnings if not text.startswith(contact_law.BEGINNING))
+    return replace(signals, flags=flags, warnings=(*others, *filter(None, [words])))
 
 
 def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -> tuple[str, str]:

@@ -197,7 +197,7 @@ class Translator:
         """
         usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))
         confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
-        untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL)
+        untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL | Flag.LAW_DOUBTED)
         confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
         return confidence.astype(np.float32)
 

@@ -1,0 +1,66 @@
+"""Doubt a recording whose contacts, taken together, resemble no simulated ones.
+
+A wrong polarity, gains, order of channels or rest turns each contact into a signal that a contact may well have: one
+frame hardly shows it. What a few neighbouring simulated contacts leave unexplained, averaged over different contacts of
+a recording, does (``scripts/benchmarks/translation/wrong_laws.py``; docs/accuracy.md has the table).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .polarity import TOUCHING, patterns, unit
+
+MOST = 2000  # frames looked at, evenly spread
+NEIGHBOURS = 8  # simulated contacts that a change is put together from
+RIDGE = 0.1  # of their unit vectors' products: neighbours are alike, and their differences must not grow without bound
+BEGINNING = "signals unlike simulated contacts"  # of the warning
+FEWEST = (
+    10  # different contacts; of fewer, gains that are twice as large mostly pass (and one press, made up, has up to 9)
+)
+# Share of a change left over, LEFT + MORE / sqrt(different contacts), that 99 of 100 recordings of units with the right
+# law stay below: simulated contacts of even presses, gains 10 % apart, noise of 1.5 counts (`wrong_laws.py --fit`).
+LEFT, MORE = 0.1766, 0.2246
+
+
+def touching(change: np.ndarray) -> np.ndarray:
+    """Mark (T,) bool the changes (T, 19) counts that are contacts."""
+    return np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
+
+
+def left_over(change: np.ndarray) -> tuple[float, int]:
+    """Share of changes in contact (n, 19) counts, of a typical unit, that simulated contacts leave, the mean over
+    different contacts; and the number of these. (0, 0) of none.
+    """
+    if not len(change):
+        return 0.0, 0
+    change = change[np.linspace(0, len(change) - 1, min(len(change), MOST)).astype(int)]
+    chosen = unit(change)
+    known = patterns()
+    like = chosen @ known.T
+    near = known[np.argpartition(-like, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]]
+    products = near @ near.transpose(0, 2, 1) + RIDGE * np.eye(NEIGHBOURS)
+    weights = np.linalg.solve(products, (near @ chosen[:, :, None]))
+    left = np.sqrt(np.square(chosen - (near * weights).sum(axis=1)).sum(axis=1))
+    _, which, counts = np.unique(like.argmax(axis=1), return_inverse=True, return_counts=True)
+    # Where rest is far off, all contacts look like one, but for what they change by.
+    steps = change - np.median(change, axis=0)
+    others = np.unique((unit(steps[touching(steps)]) @ known.T).argmax(axis=1))
+    return float((np.bincount(which, left) / counts).mean()), max(len(counts), len(others))
+
+
+def limit(contacts: int) -> float:
+    """The share left over beyond which a recording of so many different contacts is doubted."""
+    return LEFT + MORE / float(np.sqrt(contacts))
+
+
+def doubt(change: np.ndarray) -> str:
+    """Say why changes in contact (n, 19) counts, of a typical unit, are doubted; empty where they are not."""
+    left, contacts = left_over(change)
+    if contacts < FEWEST or left <= limit(contacts):
+        return ""
+    return (
+        f"{BEGINNING}: {left:.0%} of them is left over by their neighbours among these, as a mean"
+        f" of {contacts} contacts, at most {limit(contacts):.0%} of a unit as simulated. Polarity, gains, order of the"
+        " electrodes or rest may be wrong: see tactile info, --polarity, --tare, and tactile adapt for gains"
+    )
