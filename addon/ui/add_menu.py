@@ -3,6 +3,7 @@
 import bpy
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.geometry.indenters.scene_form import forms
 from ..objects import axes, biotac_objects, digit_body, digit_objects, indenter_objects
 from ..operators.scene_bridge import sensor_of
 from . import properties, render_settings, view
@@ -12,14 +13,8 @@ SENSORS = (
     ("BIOTAC", "BioTac", "A BioTac's skin with its core"),
     ("DIGIT", "DIGIT", "A DIGIT's gel"),
 )
-SHAPES = (
-    ("sphere", "Sphere", "A ball"),
-    ("cylinder", "Cylinder", "The flat end of an upright cylinder"),
-    ("lying_cylinder", "Lying Cylinder", "The side of a cylinder along the finger"),
-    ("box", "Box", "A flat face"),
-    ("ring", "Ring", "A ring of round wire that lies flat"),
-    ("edge", "Edge", "The rounded ridge of a wedge along the finger"),
-)
+# Each shape's own file says how the menu shows it, and which of the sizes below sets which of its fields.
+FORMS = {kind: form for kind, form in forms().items() if form.label}
 _ABOVE = 10e-3  # m over the sensors' frame: 1.7 mm above the pads, in the middle of both (docs/sources.md, Frame)
 _MIDDLE = -8e-3  # m, x of the middle of the pads
 
@@ -63,7 +58,12 @@ class TACTILE_OT_add_indenter(TactileOperator):
     bl_idname = "tactile.add_indenter"
     bl_label = "Add Indenter"
 
-    shape: bpy.props.EnumProperty(name="Shape", description="What presses", items=SHAPES)
+    shape: bpy.props.EnumProperty(
+        name="Shape",
+        description="What presses",
+        items=[(kind, form.label, form.says) for kind, form in FORMS.items()],
+        default="sphere",
+    )
     radius: bpy.props.FloatProperty(
         name="Radius", description="Of the body or of the ring's middle, mm", default=3.0, min=0.5, max=20
     )
@@ -81,8 +81,9 @@ class TACTILE_OT_add_indenter(TactileOperator):
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw only the sizes that the shape has."""
         self.layout.prop(self, "shape")
-        for name in SIZES[self.shape].values():
-            self.layout.prop(self, name)
+        for size in FORMS[self.shape].sizes.values():
+            if size.slider:
+                self.layout.prop(self, size.slider)
 
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
@@ -92,12 +93,13 @@ class TACTILE_OT_add_indenter(TactileOperator):
         from ...tactile_core.simulation.indenter_specs import IndenterSpec
 
         sensor = sensor_of(context)
-        sizes = {field: getattr(self, name) for field, name in SIZES[self.shape].items()}
-        if self.shape == "box":
-            sizes["sizes_mm"] = [sizes["sizes_mm"]] * 3
+        sizes = {}
+        for size in FORMS[self.shape].sizes.values():
+            if size.slider:
+                value = _as_typed(getattr(self, size.slider))
+                sizes[size.field] = value if size.count == 1 else [value] * size.count
         names = {thing.name for thing in context.scene.objects}
         name = next(n for n in (self.shape, *(f"{self.shape}_{k}" for k in range(2, 1000))) if n not in names)
-        sizes = {field: _tidy(value) for field, value in sizes.items()}
         spec = msgspec.convert({"kind": self.shape, "name": name} | sizes, IndenterSpec)
         thing = indenter_objects.add_indenter(context.collection, spec, sensor.tactile.per_metre)
         thing.parent = sensor
@@ -105,20 +107,9 @@ class TACTILE_OT_add_indenter(TactileOperator):
         view.show(context, [thing])
 
 
-def _tidy(value: float | list[float]) -> float | list[float]:
-    """Sizes as they were typed: Blender's float32 makes 0.4 to 0.4000000059604645."""
-    return [_tidy(item) for item in value] if isinstance(value, list) else round(value, 5)
-
-
-# shape -> field of its spec: property of the operator
-SIZES = {
-    "sphere": {"radius_mm": "radius"},
-    "cylinder": {"radius_mm": "radius", "edge_mm": "edge", "length_mm": "length"},
-    "lying_cylinder": {"radius_mm": "radius", "edge_mm": "edge", "length_mm": "length"},
-    "box": {"sizes_mm": "length", "edge_mm": "edge"},
-    "ring": {"radius_mm": "radius", "tube_mm": "tube"},
-    "edge": {"angle_deg": "angle", "radius_mm": "edge", "length_mm": "length"},
-}
+def _as_typed(value: float) -> float:
+    """Return a size as it was typed: Blender's float32 makes 0.4 to 0.4000000059604645."""
+    return round(value, 5)
 
 
 class TACTILE_OT_use_as_indenter(TactileOperator):
@@ -155,15 +146,9 @@ class TACTILE_MT_add(bpy.types.Menu):
         for name, label, _ in SENSORS:
             self.layout.operator(TACTILE_OT_add_sensor.bl_idname, text=label, icon="OUTLINER_OB_META").sensor = name
         self.layout.separator()
-        for name, label, _ in SHAPES:
-            self.layout.operator(TACTILE_OT_add_indenter.bl_idname, text=label, icon=ICONS[name]).shape = name
+        for kind, form in FORMS.items():
+            self.layout.operator(TACTILE_OT_add_indenter.bl_idname, text=form.label, icon=form.icon).shape = kind
         self.layout.operator(TACTILE_OT_use_as_indenter.bl_idname, icon="MESH_MONKEY")
-
-
-ICONS = {
-    "sphere": "MESH_UVSPHERE", "cylinder": "MESH_CYLINDER", "lying_cylinder": "MESH_CAPSULE", "box": "MESH_CUBE",
-    "ring": "MESH_TORUS", "edge": "MESH_CONE",
-}  # fmt: skip
 
 
 def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -263,7 +263,9 @@ def table(rows: list[Row]) -> str:
     for count in next(iter(SIZES.values())):
         times = [_number(value.get(f"{STOCK}_{count}_{size}_ms")) for size in (small, large)]
         noise = _number(value.get(f"{STOCK}_{count}_{small}_noise"))
-        lines.append(f"| stock Mitsuba, {count} samples | " + " | ".join([*times, f"{noise} (noise)", "", "", ""]) + " |")
+        lines.append(
+            f"| stock Mitsuba, {count} samples | " + " | ".join([*times, f"{noise} (noise)", "", "", ""]) + " |"
+        )
     return "\n".join(lines)
 
 

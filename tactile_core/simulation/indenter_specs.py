@@ -1,127 +1,52 @@
-"""The indenters that a scene can name: one struct a kind, millimetres in, metres out."""
+"""The indenters that a scene can name: one struct a kind, millimetres in, metres out.
+
+Structs of shapes that their sizes describe come from the shapes' own files; meshes and groups stand here.
+"""
 
 from __future__ import annotations
 
+import functools
+import operator
 import os
 import pathlib
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 import numpy as np
 from msgspec import Meta
 
 from ..errors import TactileError
-from ..geometry.indenters import (
-    Box,
-    BumpyCube,
-    Cylinder,
-    Edge,
-    Indenter,
-    LyingCylinder,
-    MeshIndenter,
-    Pose,
-    Ring,
-    Several,
-    Sphere,
-)
+from ..geometry.indenters import Indenter, MeshIndenter, Pose, Several
+from ..geometry.indenters.scene_form import SceneForm, Size, forms
 
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
 
 
-class SphereSpec(msgspec.Struct, tag="sphere", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """A ball."""
+class SizedSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A shape that its sizes describe: the struct of each ``SceneForm`` has the form's kind and fields."""
 
     name: str
-    radius_mm: Positive
 
     def build(self) -> Indenter:
         """The indenter, in metres."""
-        return Sphere(self.radius_mm * 1e-3)
+        return forms()[self.__struct_config__.tag].build(msgspec.structs.asdict(self))
 
 
-class CylinderSpec(msgspec.Struct, tag="cylinder", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """An upright cylinder that touches with its flat, rounded end."""
-
-    name: str
-    radius_mm: Positive
-    edge_mm: Positive = 0.5
-    length_mm: Positive = 10.0
-
-    def build(self) -> Indenter:
-        """The indenter, in metres."""
-        return Cylinder(self.radius_mm * 1e-3, self.edge_mm * 1e-3, self.length_mm * 1e-3)
-
-
-class LyingCylinderSpec(
-    msgspec.Struct, tag="lying_cylinder", tag_field="kind", forbid_unknown_fields=True, frozen=True
-):
-    """A cylinder that touches with its side; an edge as large as the radius makes its ends half balls."""
-
-    name: str
-    radius_mm: Positive
-    edge_mm: Positive = 0.5
-    length_mm: Positive = 20.0
-
-    def build(self) -> Indenter:
-        """The indenter, in metres."""
-        return LyingCylinder(self.radius_mm * 1e-3, self.edge_mm * 1e-3, self.length_mm * 1e-3)
+def _spec_of(form: SceneForm) -> type[SizedSpec]:
+    """Define the struct of a form."""
+    fields = [
+        (size.field, Positive if size.count == 1 else tuple[(Positive,) * size.count], *_default(size))
+        for size in form.sizes.values()
+    ]
+    return msgspec.defstruct(
+        f"{form.shape.__name__}Spec", fields, bases=(SizedSpec,), namespace={"__doc__": f"{form.says}."},
+        module=__name__, tag=form.kind, tag_field="kind", forbid_unknown_fields=True, frozen=True,
+    )  # fmt: skip
 
 
-class BoxSpec(msgspec.Struct, tag="box", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """A box or cube that touches with a flat face."""
-
-    name: str
-    sizes_mm: tuple[Positive, Positive, Positive]
-    edge_mm: Positive = 0.5
-
-    def build(self) -> Indenter:
-        """The indenter, in metres."""
-        x, y, z = self.sizes_mm
-        return Box((x * 1e-3, y * 1e-3, z * 1e-3), self.edge_mm * 1e-3)
-
-
-class RingSpec(msgspec.Struct, tag="ring", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """A ring of round wire that lies flat; its outer diameter is 2 (radius_mm + tube_mm)."""
-
-    name: str
-    radius_mm: Positive
-    tube_mm: Positive
-
-    def build(self) -> Indenter:
-        """The indenter, in metres."""
-        return Ring(self.radius_mm * 1e-3, self.tube_mm * 1e-3)
-
-
-class EdgeSpec(msgspec.Struct, tag="edge", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """A wedge that touches with its rounded ridge."""
-
-    name: str
-    angle_deg: Positive
-    radius_mm: Positive = 0.5
-    length_mm: Positive = 20.0
-    height_mm: Positive = 10.0
-
-    def build(self) -> Indenter:
-        """The indenter, in metres."""
-        lengths = (self.radius_mm, self.length_mm, self.height_mm)
-        return Edge(float(np.deg2rad(self.angle_deg)), *(value * 1e-3 for value in lengths))
-
-
-class BumpyCubeSpec(msgspec.Struct, tag="bumpy_cube", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """A cube with five bumps on its lower face, placed like the dots of a die."""
-
-    name: str
-    size_mm: Positive
-    bump_radius_mm: Positive
-    bump_height_mm: Positive
-    spacing_mm: Positive
-    edge_mm: Positive = 0.5
-
-    def build(self) -> Indenter:
-        """The indenter, in metres."""
-        lengths = (self.size_mm, self.edge_mm, self.bump_radius_mm, self.bump_height_mm, self.spacing_mm)
-        return BumpyCube(*(value * 1e-3 for value in lengths))
+def _default(size: Size) -> tuple[float, ...]:
+    return () if size.default is None else (size.default,)
 
 
 class MeshSpec(msgspec.Struct, tag="mesh", tag_field="kind", forbid_unknown_fields=True, frozen=True):
@@ -142,7 +67,10 @@ class MeshSpec(msgspec.Struct, tag="mesh", tag_field="kind", forbid_unknown_fiel
         return MeshIndenter.from_file(self.file, self.unit_mm * 1e-3, self.up, self.spacing_mm * 1e-3)
 
 
-Single = SphereSpec | CylinderSpec | LyingCylinderSpec | BoxSpec | RingSpec | EdgeSpec | BumpyCubeSpec | MeshSpec
+if TYPE_CHECKING:
+    Single = SizedSpec | MeshSpec
+else:
+    Single = functools.reduce(operator.or_, map(_spec_of, forms().values()), MeshSpec)
 
 
 class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import TactileError
 from .indenter import NEAREST, Indenter, check_length, lengths, sign_of
+from .scene_form import SceneForm, Size
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,3 +65,13 @@ class Box(Indenter):
     def _inner(self) -> np.ndarray:
         """Half-sizes (3,) m of the smaller box."""
         return np.array(self.sizes) / 2 - self.edge
+
+
+SCENE = SceneForm(
+    "box",
+    Box,
+    "The flat face of a box",
+    {"sizes": Size("sizes_mm", slider="length", count=3), "edge": Size("edge_mm", 0.5, slider="edge")},
+    "Box",
+    "MESH_CUBE",
+)

@@ -12,6 +12,8 @@ from .box import Box
 from .circle import circle_curvature, circle_distance
 from .indenter import NEAREST, Indenter, check_length
 from .pose import Pose
+from .preview import Hull, Surface, joined
+from .scene_form import SceneForm, Size
 from .several import Several
 from .sphere import Sphere
 
@@ -70,6 +72,10 @@ class BumpyCube(Indenter):
         """See ``Indenter.support``."""
         return Several(self._parts).support(direction)
 
+    def preview(self, hull: Hull) -> Surface:
+        """See ``Indenter.preview``."""
+        return joined(self._parts, hull)
+
     @property
     def _foot(self) -> float:
         """Radius of the circle in which a bump meets the face, m."""
@@ -127,3 +133,17 @@ class BumpyCube(Indenter):
         beside = of_shaft > below
         branch = np.where(beside, _SHAFT, np.where(capped, _BALL, _RIM))
         return branch, np.where(beside, of_shaft, below), np.where(beside[:, None], from_shaft, toward)
+
+
+SCENE = SceneForm(
+    "bumpy_cube",
+    BumpyCube,
+    "A cube with five bumps on its lower face, placed like the dots of a die",
+    {
+        "size": Size("size_mm"),
+        "bump_radius": Size("bump_radius_mm"),
+        "bump_height": Size("bump_height_mm"),
+        "spacing": Size("spacing_mm"),
+        "edge": Size("edge_mm", 0.5),
+    },
+)

@@ -9,6 +9,7 @@ import numpy as np
 from ...errors import TactileError
 from . import extrusion
 from .indenter import SQUARE, Indenter, check_length, sign_of
+from .scene_form import SceneForm, Size
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,3 +45,17 @@ class Cylinder(Indenter):
     def _prism(self, points: np.ndarray) -> tuple[extrusion.Outline, np.ndarray, float]:
         outline = extrusion.disc(points[:, :2], self.radius - self.edge)
         return outline, points[:, 2] - self.length / 2, self.length / 2 - self.edge
+
+
+SCENE = SceneForm(
+    "cylinder",
+    Cylinder,
+    "The flat, rounded end of an upright cylinder",
+    {
+        "radius": Size("radius_mm", slider="radius"),
+        "edge": Size("edge_mm", 0.5, slider="edge"),
+        "length": Size("length_mm", 10.0, slider="length"),
+    },
+    "Cylinder",
+    "MESH_CYLINDER",
+)

@@ -9,6 +9,7 @@ import numpy as np
 from ...errors import TactileError
 from . import extrusion
 from .indenter import NEAREST, SQUARE, Indenter, check_length, sign_of
+from .scene_form import SceneForm, Size
 
 _ACROSS, _OWN = [1, 2], [2, 0, 1]  # extrusions answer in the order y, z, x
 _ANGLES = np.deg2rad([10, 170])  # a sharper wedge is a blade, a blunter one a plane
@@ -79,3 +80,18 @@ def _polygon(across: np.ndarray, corners: np.ndarray) -> extrusion.Outline:
     at_corner = ~inside & ((foot <= 0) | (foot >= 1)) & (reach > NEAREST)
     slope = np.where(at_corner[:, None], arm / np.maximum(reach, NEAREST)[:, None], normals[nearest])
     return extrusion.Outline(np.where(at_corner, reach, value), slope, np.where(at_corner, reach, np.inf))
+
+
+SCENE = SceneForm(
+    "edge",
+    Edge,
+    "The rounded ridge of a wedge along the finger",
+    {
+        "angle": Size("angle_deg", slider="angle"),
+        "radius": Size("radius_mm", 0.5, slider="edge"),
+        "length": Size("length_mm", 20.0, slider="length"),
+        "height": Size("height_mm", 10.0),
+    },
+    "Edge",
+    "MESH_CONE",
+)

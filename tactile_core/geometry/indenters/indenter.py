@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from ...errors import TactileError
+from .preview import Hull, Surface
 
 # Where a direction meets a flat or a line of the body squarely, rounding must not choose an end of it.
 SQUARE = 1e-9
@@ -38,6 +39,10 @@ class Indenter(Protocol):
         lower = [self.support(-axis)[k] for k, axis in enumerate(np.eye(3))]
         upper = [self.support(axis)[k] for k, axis in enumerate(np.eye(3))]
         return np.array(lower), np.array(upper)
+
+    def preview(self, hull: Hull) -> Surface:
+        """Nodes (n, 3) m in the own frame and triangles (m, 3) that show the body; a convex one is its hull."""
+        return hull(self.support)
 
     @functools.cached_property
     def least_side(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from ...errors import TactileError
 from . import extrusion
 from .indenter import Indenter, check_length, sign_of
+from .scene_form import SceneForm, Size
 
 _OWN = np.array([2, 0, 1])  # extrusions answer in the order y, z, x
 
@@ -53,3 +54,17 @@ class LyingCylinder(Indenter):
         across[:, 1] -= self.radius
         outline = extrusion.disc(across, self.radius - self.edge)
         return outline, points[:, 0], self.length / 2 - self.edge
+
+
+SCENE = SceneForm(
+    "lying_cylinder",
+    LyingCylinder,
+    "The side of a cylinder along the finger",
+    {
+        "radius": Size("radius_mm", slider="radius"),
+        "edge": Size("edge_mm", 0.5, slider="edge"),
+        "length": Size("length_mm", 20.0, slider="length"),
+    },
+    "Lying Cylinder",
+    "MESH_CAPSULE",
+)

@@ -9,6 +9,7 @@ import numpy as np
 from ...errors import TactileError
 from .indenter import SQUARE, Indenter
 from .pose import Pose
+from .preview import Hull, Surface, joined
 
 _TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
 
@@ -54,6 +55,10 @@ class Several(Indenter):
         places = np.array([pose.support(indenter, direction) for indenter, pose in self.parts])
         reach = places @ direction
         return places[reach > reach.max() - SQUARE].mean(axis=0)
+
+    def preview(self, hull: Hull) -> Surface:
+        """See ``Indenter.preview``."""
+        return joined(self.parts, hull)
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Distance (n,) m and gradient (n, 3) of the nearest part, and that part's index (n,)."""

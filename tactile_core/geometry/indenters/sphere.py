@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from .indenter import NEAREST, Indenter, check_length, lengths
+from .scene_form import SceneForm, Size
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,3 +42,6 @@ class Sphere(Indenter):
             arm[length < NEAREST] = [0.0, 0.0, -NEAREST]
             length = np.maximum(length, NEAREST)
         return length, arm / length[:, None]
+
+
+SCENE = SceneForm("sphere", Sphere, "A ball", {"radius": Size("radius_mm", slider="radius")}, "Sphere", "MESH_UVSPHERE")

@@ -66,7 +66,9 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
         **lamps(unit), **walls(unit, mesh),
     }  # fmt: skip
     root = ElementTree.Element("scene", version=VERSION)
-    root.append(ElementTree.Comment(f" the coating spreads light: a Gaussian of {spread} px over the radiance, left out "))
+    root.append(
+        ElementTree.Comment(f" the coating spreads light: a Gaussian of {spread} px over the radiance, left out ")
+    )
     for name, value in content.items():
         _add(root, name, value)
     ElementTree.indent(root)

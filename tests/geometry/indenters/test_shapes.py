@@ -1,5 +1,7 @@
 """Every shape: exact distance, unit gradient, exact curvature, support, bounds, touching pose; and what is refused."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from tactile_core.geometry.indenters import (
     Sphere,
     pose_on,
 )
+from tactile_core.geometry.indenters.scene_form import forms
 
 LEANING = np.array([[np.cos(0.4), 0, np.sin(0.4)], [0, 1, 0], [-np.sin(0.4), 0, np.cos(0.4)]])
 CONVEX = {
@@ -262,3 +265,26 @@ def test_distance_behind_a_bump_is_that_of_its_surface():
 def test_impossible_indenters_are_refused(make, said):
     with pytest.raises(TactileError, match=said):
         make()
+
+
+def points_of(support):
+    """In place of a hull: the body's farthest points, and no triangles."""
+    return np.array([support(direction) for direction in directions()]), np.empty((0, 3), int)
+
+
+@every_shape
+def test_a_preview_lies_on_the_body_and_touches_the_plane(indenter):
+    nodes, faces = indenter.preview(points_of)
+    assert indenter.distance(nodes)[0].max() < 1e-9
+    assert nodes[:, 2].min() > -1e-12
+    assert not len(faces) or (faces.min() == 0 and faces.max() == len(nodes) - 1)
+
+
+def test_every_form_is_found_in_its_shapes_file_and_names_its_sizes():
+    found = forms()
+    assert set(found) == {"box", "bumpy_cube", "cylinder", "edge", "lying_cylinder", "ring", "sphere"}
+    for form in found.values():
+        arguments = {field.name for field in dataclasses.fields(form.shape)}
+        assert set(form.sizes) == arguments, form.kind
+        given = [size.default is None for size in form.sizes.values()]
+        assert given == sorted(given, reverse=True), f"{form.kind}: those without a default come first"
