@@ -24,6 +24,7 @@ from benchmarks.translation import (
     grips,
     prints,
     recordings,
+    sequence_rows,
     slide_set,
     test_set,
     two_contact_rows,
@@ -104,7 +105,7 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
     pairs, bodies = read_pairs(options.test_set), our_bodies()
     if options.quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
-    found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network)]
+    found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network), *sequence_rows.rows(network)]
     found += [*two_contact_rows.rows(pairs), *test_set.speed_rows(network, pairs)]
     apart = [translate.load_translator(folder) for folder in options.kept_apart]
     for unaware in apart:
