@@ -212,7 +212,7 @@ def _unit_entry(calibration: str | os.PathLike | None) -> dict[str, dict[str, st
 
 
 def weights_entry(tools: Tools) -> dict:
-    """Return the weights' hash, which stands for their card, and their error and null, um, as the card has them."""
+    """Return the weights' hash, which stands for their card, and their error and baseline, um, as the card has them."""
     from ..translation.card_errors import chain_error
 
     found = chain_error(tools.card)

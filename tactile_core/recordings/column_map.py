@@ -27,7 +27,7 @@ FORMAT = "tactile-columns-1"
 LAYOUT = "CSV with columns mapped by --columns"
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 CHANNELS = "pdc", "tac", "tdc"
-ADVICE = "Write it anew: tactile info RECORDING --columns NEW.toml"
+ADVICE = "Write it again: tactile info RECORDING --columns NEW.toml"
 NUMBERED = re.compile(r"(.*?)(\d+)(\D*)$", re.DOTALL)
 TIME = re.compile(r"time|stamp|^t$|^t\W|sec")
 UNIT = re.compile(r"(?:^|[^a-z])(ns|us|ms|s)(?:[^a-z]|$)")
@@ -82,11 +82,11 @@ def read(path: str | os.PathLike) -> ColumnMap:
 def write(path: str | os.PathLike, columns: ColumnMap, held: tuple[str, ...]) -> None:
     """Write a map to a new file, whole or not at all; held : the recording's columns, named in a comment."""
     named = ", ".join(held[:MOST_NAMED]) + (f" and {len(held) - MOST_NAMED} more" if len(held) > MOST_NAMED else "")
-    told = json.dumps(named)[1:-1]  # escaped, so that no name ends the comment
+    quoted = json.dumps(named)[1:-1]  # escaped, so that no name ends the comment
     lines = [
         "# Which column of a recording is what; guessed from their names: check it. Leave empty what is not there.",
         "# Used by: tactile convert RECORDING --columns THIS_FILE",
-        f"# Columns of the recording: {told}",
+        f"# Columns of the recording: {quoted}",
         f'format = "{FORMAT}"',
         f"time = {json.dumps(columns.time)}",
         f'time_unit = "{columns.time_unit}"  # s, ms, us or ns',

@@ -17,7 +17,7 @@ class Options:
     components : Gaussians of S2MPN's posterior over contacts (five: docs/sources.md, Networks)
     epochs : stage -> passes over the training contacts; `effort` multiplies all of them. More make
         simulated contacts better, not real recordings (docs/train.md)
-    beta : weight of the KL divergence against a loss whose null answer is 1 (1e-4: docs/sources.md, Networks)
+    beta : weight of the KL divergence against a loss that is 1 for no displacement (1e-4: docs/sources.md, Networks)
     astray : weight of a translated place's distance on the DIGIT from the true one, in cells, against the same loss
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (docs/sources.md)
     unit : share of training samples that keep their sign and are read as a real unit is known, its rest found from

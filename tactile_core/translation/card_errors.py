@@ -1,4 +1,4 @@
-"""Error of a set of weights on presses kept apart from their training, as their card states it, beside the null."""
+"""Read the error of a set of weights on presses kept apart from their training, and the baseline, from their card."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 ROW, SET = "chain_rms_um", "test presses"  # BioTac signals to the gel's displacement, rms over its nodes
-WORSE = 0.8  # of the null, the error of no displacement at all: above it weights hardly translate (assumed)
+WORSE = 0.8  # of the baseline, the error of no displacement at all: above it weights hardly translate (assumed)
 
 
 def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Return error and null, um, of the translation on presses kept apart; None where the card has no such row."""
+    """Return error and baseline, um, of the translation on presses kept apart; None where the card has no such row."""
     rows = card.get("errors")
     for row in rows if isinstance(rows, list) else []:
         if isinstance(row, dict) and (row.get("name"), row.get("set")) == (ROW, SET):

@@ -92,7 +92,7 @@ def vae_loss(vae: MeshVae | SignalVae, x: Tensor, target: Tensor) -> Tensor:
 
 
 def run_epoch(loss: Callable, optimiser: torch.optim.Optimizer, batches: Batches, parts: Iterator[np.ndarray]) -> None:
-    """One pass over the data."""
+    """Train for one pass over the data."""
     for part in parts:
         optimiser.zero_grad()
         loss(*batches(part)).backward()
@@ -112,7 +112,7 @@ def compressed(pairs: Pairs, rows: np.ndarray, random: np.random.Generator) -> T
 
 
 def train_signal(vae: SignalVae, pairs: Pairs, rows: np.ndarray, seed: int) -> None:
-    """SVB; noise and gains are drawn anew in each pass."""
+    """Train SVB; each pass draws noise and gains of its own."""
     random, optimiser = np.random.default_rng([seed, 1]), torch.optim.Adam(vae.parameters(), SIGNAL_RATE)
 
     def both(some: np.ndarray) -> tuple[Tensor, Tensor]:

@@ -1,4 +1,4 @@
-"""Share of two contacts at once that are told, on sums of two test contacts' signals, and of single ones mistaken.
+"""Measure how many of two contacts at once are recognised, on sums of two signals, and how many single ones mistaken.
 
 A sum stands for both at once: contacts far apart bend the skin each for itself, but for the fluid that both press.
 """

@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _say_error(card: dict) -> None:
-    """Print the error of the weights on presses kept apart, and a warning where it is hardly below the null."""
+    """Print the error of the weights on presses kept apart, and a warning where it is hardly below the baseline."""
     from ...translation.card_errors import chain_error, doubt
 
     found = chain_error(card)

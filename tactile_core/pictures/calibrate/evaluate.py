@@ -88,7 +88,7 @@ def _try_press(
     whole: BallPictures, working: BallPictures, press: Press, background: np.ndarray, radius: float, search_radius: bool
 ) -> Evaluation:
     sight = Sight(press)
-    untouched = background + press.drift  # the null knows how the light drifted as well
+    untouched = background + press.drift  # the baseline knows how the light drifted as well
 
     def compared(change: np.ndarray | float) -> tuple[np.ndarray, dict[str, float]]:
         picture = np.rint(untouched + change).clip(0, LARGEST_LEVEL).astype(np.uint8)

@@ -15,7 +15,7 @@ from .photographs import Photographs, Press, chosen, turned
 from .press_fit import Sight, fit_ball
 
 FOLDS = 3
-WORTH = 0.8  # of the null's L1: a calibration that leaves more of a press is worth nothing (assumed)
+WORTH = 0.8  # of the background's L1: a calibration that leaves more of a press is worth nothing (assumed)
 # What a picture that keeps its shape may be turned by: rows, columns reversed.
 WAYS = {
     (True, True): "turned by 180 degrees",
