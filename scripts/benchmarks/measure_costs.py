@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tactile_core.files.shipped import shipped
 
@@ -62,7 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
         if not options.quick:
             parts["simulate_nothing"] = simulate(folder, SETS["digit"], force=0.0)
             parts |= conversions(folder)
-        full = {} if options.quick else full_tier(folder)
+        full = {} if options.quick else full_tier()
     rows = as_rows(parts, full)
     print("\n".join([HEADER, *map(line, rows)]))
     if options.json:
@@ -71,7 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
         how = "scripts/benchmarks/measure_costs.py: CPU s of one thread, MB resident, kB a frame on disk"
         named = {name: part._asdict() for name, part in parts.items()}
         about = {"how": how, "machine": provenance.machine(), "versions": provenance.versions()}
-        atomic.write_json(TABLE, about | {"parts": named, "full": full})
+        atomic.write_json(TABLE, about | {"parts": named, "full_ms": full})
     return 0
 
 
@@ -116,19 +116,12 @@ def conversions(folder: Path) -> dict[str, Part]:
     return found
 
 
-def full_tier(folder: Path) -> dict[str, dict[str, Any]]:
-    """Measure the full tier by sensor.
-
-    ms : a contact at a force, without friction and with the default one, the mean of FORCES; mb : of memory more than
-    the fast tier's
-    """
-    found = {}
-    for sensor in ("biotac", "digit"):
-        press = f"mesh {sensor} --press sphere --diameter 7 --force-n {FORCES[-1]} --out {folder / 'press.ply'}"
-        peaks = [run(Case("press", f"{press} --tier {tier}"), folder).peak for tier in ("fast", "full")]
-        means = {name: contact_ms(sensor, friction) for name, friction in (("smooth", 0.0), ("rough", FRICTION))}
-        found[sensor] = {"ms": means, "mb": peaks[1] - peaks[0]}
-    return found
+def full_tier() -> dict[str, dict[str, float]]:
+    """Time of a contact of the full tier at a force, ms, by sensor, without friction and with the default one."""
+    ways = {"smooth": 0.0, "rough": FRICTION}
+    return {
+        sensor: {way: contact_ms(sensor, friction) for way, friction in ways.items()} for sensor in ("biotac", "digit")
+    }
 
 
 def contact_ms(sensor: Sensor, friction: float) -> float:
@@ -139,16 +132,15 @@ def contact_ms(sensor: Sensor, friction: float) -> float:
     return 1e3 * (time.process_time() - began) / len(FORCES)
 
 
-def as_rows(parts: dict[str, Part], full: dict[str, dict[str, Any]]) -> list[Row]:
+def as_rows(parts: dict[str, Part], full: dict[str, dict[str, float]]) -> list[Row]:
     """Make three rows a part."""
     rows = []
     for name, part in parts.items():
         rows.append(row(f"cost_{name}", part.ms, "ms", of=f"a frame; {part.start:.2f} s before the first"))
         rows.append(row(f"memory_{name}", part.mb, "MB", of=f"peak resident; {part.kb:.1f} kB a frame on disk"))
     for sensor, cost in full.items():
-        for name, ms in cost["ms"].items():
+        for name, ms in cost.items():
             rows.append(row(f"cost_full_{sensor}_{name}", ms, "ms", of="a contact at a force"))
-        rows.append(row(f"memory_full_{sensor}", cost["mb"], "MB", of="more than the fast tier"))
     return rows
 
 

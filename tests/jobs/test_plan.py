@@ -29,7 +29,8 @@ NAMES = (
 def tables(monkeypatch):
     """Round numbers: 10 ms a frame of everything, 30 on the BioTac; contacts are not solved."""
     parts = {name: dict(PART) for name in NAMES} | {"simulate_biotac": PART | {"ms": 30.0, "mb": 150.0}}
-    monkeypatch.setattr(plan, "costs", lambda: {"parts": parts, "full_ms": {"biotac": 2000.0, "digit": 1000.0}})
+    full = {"biotac": {"smooth": 2000.0, "rough": 8000.0}, "digit": {"smooth": 1000.0, "rough": 4000.0}}
+    monkeypatch.setattr(plan, "costs", lambda: {"parts": parts, "full_ms": full})
 
     def choose(path, used, bound):
         tier = "fast" if bound is None or bound > 20 else "full"
@@ -139,12 +140,20 @@ def test_the_command_prints_a_table_or_json(capsys):
     assert "[recording]" in capsys.readouterr().err
 
 
+def test_friction_costs_the_full_tier_what_was_measured_with_it(tmp_path):
+    text = (PRESS / "scene.toml").read_text(encoding="utf-8")
+    assert "friction = 0.0" in text
+    (tmp_path / "scene.toml").write_text(text.replace("friction = 0.0", "friction = 0.5"), encoding="utf-8")
+    smooth, rough = (plan_for(path, "displacement_digit", Budget(um=5.0)) for path in (PRESS, tmp_path))
+    assert rough.seconds > 3 * smooth.seconds
+
+
 def test_the_shipped_table_holds_every_part():
     found = json.loads(plan.COSTS.read_text(encoding="utf-8"))
     for name in NAMES:
         part = found["parts"][name]
         assert all(part[key] >= 0 for key in PART) and part["mb"] > 0
-    assert all(ms > 0 for ms in found["full_ms"].values())
+    assert all(each["rough"] > each["smooth"] > 0 for each in found["full_ms"].values())
 
 
 def test_a_translated_force_field_asks_for_the_gel(request):
