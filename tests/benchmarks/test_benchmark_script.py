@@ -34,7 +34,7 @@ def test_a_stage_runs_and_its_rows_can_be_read(script, tmp_path, capsys):
 
 
 def test_the_front_holds_what_nothing_beats_in_both(script):
-    from benchmarks.table.report import pareto, steps
+    from benchmarks.table.benchmark_page import pareto, steps
 
     front = pareto([(3, 1.0), (1, 4.0), (2, 5.0), (2.5, 2.0), (9, 1.0)])
     assert front == [(1, 4.0), (2.5, 2.0), (3, 1.0)]
@@ -73,8 +73,8 @@ def test_the_page_of_accuracy_gets_the_table(script, tmp_path):
 
 
 def test_the_report_that_ships_can_be_read_and_draws(script):
+    from benchmarks.table.benchmark_page import plot
     from benchmarks.table.method import Method
-    from benchmarks.table.report import plot
 
     told = json.loads((SCRIPTS.parent / "docs" / "benchmark.json").read_text())
     names = [row["name"] for row in told["rows"]]

@@ -17,8 +17,8 @@ import numpy as np
 
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Indenter, Pose, mesh_file
-from tactile_core.mechanics.finite_strain.contact_state import ContactState
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
+from tactile_core.mechanics.finite_strain.solved_contact import ContactState
 from tactile_core.mechanics.pose_path import between
 from tactile_core.sensors import Material, biotac, digit
 

@@ -10,8 +10,8 @@ import numpy as np
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, order, row
 from tactile_core.geometry.indenters import Sphere, pose_on
-from tactile_core.mechanics.finite_strain.contact_state import ContactState
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
+from tactile_core.mechanics.finite_strain.solved_contact import ContactState
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.sensors import Material
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_core.geometry.indenters import Indenter, pose_on
-from tactile_core.mechanics.finite_strain.contact_state import ContactState
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
+from tactile_core.mechanics.finite_strain.solved_contact import ContactState
 from tactile_core.mechanics.finite_strain.tolerance import Tolerance
 from tactile_core.mechanics.solids.neo_hookean import NeoHookean
 from tactile_core.sensors import Material

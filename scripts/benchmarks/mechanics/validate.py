@@ -24,17 +24,17 @@ from benchmarks.mechanics import (
     golden,
     hertz,
     incompressible,
-    layers,
     manufactured,
     many,
     oracle,
     patch,
     public_mesh,
     symmetry,
+    thin_layers,
     tiers,
     work,
 )
-from benchmarks.mechanics.report import write
+from benchmarks.mechanics.mechanics_page import write
 from benchmarks.translation import rest_impedance, simulated_patterns, skin_stiffness
 from tactile_core.accuracy import HEADER, Row, failed, line
 from tactile_core.accuracy import row as make_row
@@ -51,7 +51,10 @@ CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
     "oracle": (oracle.rows, "scikit-fem as oracle: the same equations assembled by another library"),
     "golden": (golden.rows, "Golden forces: a ball of 3.5 mm on a bonded layer of 3 mm, to 60 % of its thickness"),
     "hertz": (hertz.rows, "Hertz: a small contact on a deep block"),
-    "layers": (layers.rows, "Bonded layers: Dimitriadis's formula, the exact solution, the thin incompressible limit"),
+    "layers": (
+        thin_layers.rows,
+        "Bonded layers: Dimitriadis's formula, the exact solution, the thin incompressible limit",
+    ),
     "work": (work.rows, "The indenter's work is the stored energy, and comes back"),
     "symmetry": (symmetry.rows, "Turned and mirrored sensors give the turned and mirrored answer"),
     "fluid": (fluid.rows, "The fluid keeps its volume"),

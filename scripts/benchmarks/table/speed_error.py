@@ -26,7 +26,7 @@ for _threads in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ[_threads] = "1"  # of this process and of those it starts: times are of one core
 
 from benchmarks.table.method import Method  # noqa: E402
-from benchmarks.table.run import STAGES, measured  # noqa: E402
+from benchmarks.table.stage_processes import STAGES, measured  # noqa: E402
 from tactile_core.accuracy import HEADER, failed, line  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
@@ -63,7 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.json:
         atomic.write_json(options.json, rows)
     if not options.quick and not options.only:
-        from benchmarks.table.report import write_report
+        from benchmarks.table.benchmark_page import write_report
         from benchmarks.table.summary import write_summary
 
         write_report(ROOT / "docs", methods, rows, missing, text)

@@ -68,22 +68,22 @@ def run(options: argparse.Namespace) -> int:
     """Write the mesh."""
     _check(options)
     from ...files import atomic
-    from ...mechanics import export
+    from ...mechanics import sensor_meshes
 
-    export.check_suffix(options.out)
+    sensor_meshes.check_suffix(options.out)
     atomic.claim(options.out)
     if options.frames:
         from ...jobs.gel_frames import frame_displacement
 
         moved = frame_displacement(options.frames, options.sensor, options.frame)
-        export.write_surface(options.out, options.sensor, moved, {})
+        sensor_meshes.write_surface(options.out, options.sensor, moved, {})
     elif options.press:
         solution = _pressed(options, _indenter(options))
         if not solution.converged:
             say("warning: the contact did not converge; the file holds the last state")
-        export.write_solution(options.out, options.sensor, solution)
+        sensor_meshes.write_solution(options.out, options.sensor, solution)
     else:
-        export.write_rest(options.out, options.sensor)
+        sensor_meshes.write_rest(options.out, options.sensor)
     tell(options.out)
     return 0
 

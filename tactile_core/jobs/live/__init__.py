@@ -1,7 +1,7 @@
 """A recording while it is made: its newest frame as a picture, as soon as it is there."""
 
 from .growing_file import Growing
-from .signals import LiveSignals
-from .view import Shown, View
+from .live_signals import LiveSignals
+from .live_view import Shown, View
 
 __all__ = ["Growing", "LiveSignals", "Shown", "View"]

@@ -20,8 +20,8 @@ from ..solids.hex_mesh import inner_faces, outer_faces
 from ..solids.neo_hookean import NeoHookean
 from ..solids.split_bulk_modulus import SplitBulkModulus
 from ..solution import Sensor
-from .contact_state import ContactState
 from .newton import FiniteStrainContact
+from .solved_contact import ContactState
 from .tolerance import EXACT, Tolerance
 
 # m of a load step: without friction one is enough from rest, unless it fails and is halved; friction follows a path.

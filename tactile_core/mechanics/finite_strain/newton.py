@@ -22,9 +22,9 @@ from ..solids.finite_strain import FiniteStrainSolid, State
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.sparse_cholesky import NotPositiveDefiniteError, PatternFactor
 from .contact_set import ContactSet
-from .contact_state import ContactState, guarded
 from .obstacle import Obstacle, PlacedIndenter
 from .penalty_points import LET_THROUGH, NO_PUSH, PenaltyPoints, Push
+from .solved_contact import ContactState, guarded
 from .tolerance import EXACT, Tolerance
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly

@@ -11,8 +11,8 @@ from ...sensors import biotac_sp
 from ..solids.finite_strain import FiniteStrainSolid
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.mooney_rivlin import MooneyRivlin
-from .contact_state import ContactState
 from .newton import FiniteStrainContact
+from .solved_contact import ContactState
 from .sp_mesh import half_ellipsoid_mesh
 
 INTERVALS = (24, 16, 8)  # nodes every 0.6 mm across the pad, 0.9 mm along it

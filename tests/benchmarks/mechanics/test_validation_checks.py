@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from benchmarks.mechanics import fluid, hertz, incompressible, layers, manufactured, oracle, patch, symmetry, work
+from benchmarks.mechanics import fluid, hertz, incompressible, manufactured, oracle, patch, symmetry, thin_layers, work
 from benchmarks.mechanics.golden import disc
 
 from tactile_core.accuracy import failed, order
@@ -44,14 +44,14 @@ def test_hertz_on_a_coarse_mesh(monkeypatch):
 
 
 def test_exact_layer_is_met():
-    depth, _, found = layers.layer_force(0.4999, 0.5)
-    ball = layers._BALL * layers.THICKNESS
-    exact = layers.exact_layer(depth, ball, layers.THICKNESS, layers.YOUNGS, 0.4999)[2]
+    depth, _, found = thin_layers.layer_force(0.4999, 0.5)
+    ball = thin_layers._BALL * thin_layers.THICKNESS
+    exact = thin_layers.exact_layer(depth, ball, thin_layers.THICKNESS, thin_layers.YOUNGS, 0.4999)[2]
     assert found == pytest.approx(exact, rel=1e-3)  # 5e-5 found; small strain is left out at 4e-4
 
 
 def test_thin_incompressible_limit_is_approached():
-    far, near = (layers.thin_limit(ratio) - 1 for ratio in (20, 40))
+    far, near = (thin_layers.thin_limit(ratio) - 1 for ratio in (20, 40))
     assert 0 < near < 0.03 and near < far / 2
 
 

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from benchmarks.mechanics import report, validate
+from benchmarks.mechanics import mechanics_page, validate
 from benchmarks.mechanics.golden import GOLDEN_FORCE
 
 from tactile_core.accuracy import failed, order, row
@@ -40,10 +40,10 @@ def test_report_holds_every_row_and_small_plots(tmp_path):
         for name in ("force_error", "shape_rms") for depth in ("0.6", "1.4") for spacing in (0.4, 0.2, 0.1)
     ]  # fmt: skip
     speed = [row("digit_fast_0.2mm_shape_rms", 3.0, "um", 2.0), row("digit_fast_0.2mm_time", 2.0, "ms")]
-    report.write(tmp_path / "mechanics.md", {"Golden": forces, "Refined": refined, "Speed": speed})
+    mechanics_page.write(tmp_path / "mechanics.md", {"Golden": forces, "Refined": refined, "Speed": speed})
     text = (tmp_path / "mechanics.md").read_text(encoding="utf-8")
     for found in forces + refined + speed:
-        assert report.line(found) in text
+        assert mechanics_page.line(found) in text
     assert text.count("MISSED") == 1
     plots = sorted(tmp_path.glob("*.png"))
     assert [plot.name for plot in plots] == ["mechanics_force.png", "mechanics_spacing.png", "mechanics_speed.png"]
@@ -57,7 +57,7 @@ def test_script_writes_its_rows_and_says_what_missed(script, monkeypatch, tmp_pa
     assert json.loads((tmp_path / "rows.json").read_text()) == [good, slow]
     assert script.main(["--quick"]) == 1
     said = capsys.readouterr()
-    assert "MISSED: b = 2.0 1, target 1.0" in said.err and report.line(bad) in said.out
+    assert "MISSED: b = 2.0 1, target 1.0" in said.err and mechanics_page.line(bad) in said.out
 
 
 def test_a_check_that_breaks_off_is_a_miss_and_the_others_go_on(script, monkeypatch, tmp_path, capsys):

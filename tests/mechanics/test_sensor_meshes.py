@@ -8,8 +8,8 @@ import trimesh
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
-from tactile_core.mechanics import export
-from tactile_core.mechanics.export import outer_surface, write_rest, write_solution, write_surface
+from tactile_core.mechanics import sensor_meshes
+from tactile_core.mechanics.sensor_meshes import outer_surface, write_rest, write_solution, write_surface
 from tactile_core.mechanics.solids import stress
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.mechanics.solids.hex_mesh import gel_mesh, skin_mesh
@@ -78,4 +78,4 @@ def test_another_ending_is_refused(tmp_path, solution):
         with pytest.raises(TactileError, match=r"'\.obj'; expected \.ply or \.stl or \.vtu"):
             write(tmp_path / "a.obj")
     with pytest.raises(TactileError, match="''"):
-        export.check_suffix("contact")
+        sensor_meshes.check_suffix("contact")

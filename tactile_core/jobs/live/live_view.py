@@ -17,7 +17,7 @@ from ...translation.contact_track import Follower
 from ...translation.translate import Translation
 from ..frame_pass import Tools
 from .growing_file import newest
-from .signals import LiveSignals
+from .live_signals import LiveSignals
 
 REMEMBERED = 1000  # latencies that figures are taken over
 
