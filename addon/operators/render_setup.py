@@ -22,6 +22,7 @@ class TACTILE_OT_set_up_render(TactileOperator):
         gel = properties.of_role(scene, "DIGIT", context.object)
         if gel is None:
             raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
+        properties.check_own(gel)
         unit = render_settings.calibration_of(scene)
         digit_body.add_body(gel, unit)
         camera = unit.camera

@@ -5,7 +5,7 @@ import numpy as np
 
 from ...tactile_core.errors import TactileError
 from ..objects import curves, frame_attribute, style_legend, styles
-from ..ui import view
+from ..ui import properties, view
 from ..ui.reports import TactileOperator
 
 _ROLES = ("BIOTAC", "DIGIT")
@@ -15,6 +15,7 @@ def _sensors(context: bpy.types.Context) -> list[bpy.types.Object]:
     found = [thing for thing in context.scene.objects if thing.tactile.role in _ROLES]
     if not found:
         raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
+    properties.check_own(*found)
     return found
 
 

@@ -38,6 +38,8 @@ class TACTILE_OT_simulate(TactileOperator):
         require("h5py", "msgspec", "scipy")
         from ...tactile_core.simulation.scene_text import write_scene
 
+        roles = ("BIOTAC", "DIGIT")
+        properties.check_own(*(properties.of_role(context.scene, role) for role in roles))
         found = scene_bridge.authored(context)
         if found.meshes:
             require("trimesh", "rtree")

@@ -78,6 +78,7 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
         """See ``TactileOperator``."""
         require("msgspec")
         thing, sensor = indenter_of(context), sensor_of(context)
+        properties.check_own(thing)
         depsgraph = context.evaluated_depsgraph_get()
         place = _place(thing, sensor, depsgraph)
         pose = _pose(_name(sensor), self._built(thing, sensor, depsgraph), place[0], place[2], thing.tactile.tilt)

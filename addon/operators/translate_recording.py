@@ -30,6 +30,7 @@ class TACTILE_OT_translate(TactileOperator):
         """See ``TactileOperator``."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
+        properties.check_own(skin)
         about = skin.tactile
         with shown(context) as progress:
             path = bpy.path.abspath(about.recording)

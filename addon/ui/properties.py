@@ -110,6 +110,16 @@ def check_format(thing: bpy.types.Object) -> None:
         )  # fmt: skip
 
 
+def check_own(*things: bpy.types.Object | None) -> None:
+    """Raise TactileError for an object that a library holds, which Blender lets nobody change here."""
+    for thing in things:
+        if thing is not None and thing.library is not None:
+            raise TactileError(
+                thing.name, f"linked from {thing.library.name}", "an object of this file, which can be changed",
+                "Object > Library Override > Make, or append it in place of linking",
+            )  # fmt: skip
+
+
 CLASSES = (TactileObject,)
 
 

@@ -1,0 +1,107 @@
+"""Files and scenes that are not as the extension makes them: each works, or says what to do."""
+
+from __future__ import annotations
+
+import bpy
+import pytest
+
+
+@pytest.fixture
+def translated(imported):
+    imported(frames="70:90")
+    bpy.ops.tactile.translate()
+    return bpy.context.scene.objects["DIGIT gel"]
+
+
+def test_renamed_parts_are_known_by_their_roles(translated, part):
+    for thing in (*translated.children_recursive, translated):
+        thing.name = f"my {thing.name}"
+    assert part("addon.objects.digit_body").leds_of(translated).keys() == {"red", "green", "blue"}
+    assert bpy.ops.tactile.set_style(style="DISPLACEMENT") == {"FINISHED"}
+    assert bpy.ops.tactile.set_up_render() == {"FINISHED"}
+    assert bpy.ops.tactile.translate() == {"FINISHED"}
+    assert sum(thing.tactile.role == "DIGIT" for thing in bpy.context.scene.objects) == 1
+
+
+def test_a_deleted_gel_comes_back_with_its_body(translated):
+    skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
+    for thing in (*translated.children_recursive, translated):
+        bpy.data.objects.remove(thing)
+    bpy.context.view_layer.objects.active = skin
+    with pytest.raises(RuntimeError, match="no DIGIT"):
+        bpy.ops.tactile.set_up_render()
+    assert bpy.ops.tactile.translate() == {"FINISHED"}
+    assert sum(thing.tactile.role == "LED" for thing in bpy.context.scene.objects) == 3
+
+
+def test_a_deleted_skin_is_asked_for(translated):
+    bpy.data.objects.remove(next(t for t in bpy.context.scene.objects if t.tactile.role == "BIOTAC"))
+    assert not bpy.ops.tactile.translate.poll()
+    assert bpy.ops.tactile.set_style(style="CONTACT_PATCH") == {"FINISHED"}
+
+
+def test_two_gels_are_drawn_each_by_its_own_parts(translated, part):
+    copy = translated.copy()
+    copy.location.y += 80
+    bpy.context.scene.collection.objects.link(copy)
+    draw, leds = part("addon.operators.pictures").draw, part("addon.objects.digit_body").leds_of
+
+    def drawn():
+        bpy.context.view_layer.update()
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        return [draw(gel, depsgraph, "fast")[0].astype(int) for gel in (translated, copy)]
+
+    before = drawn()
+    leds(translated)["red"].data.energy = 0.0
+    after = drawn()
+    assert (before[0] - after[0]).max() > 50  # levels: the red LED is off
+    assert (before[1] == after[1]).all()  # a copy without LEDs has the calibration's
+
+
+def test_a_recording_that_has_moved_is_named(translated):
+    skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
+    skin.tactile.recording = "//gone.h5"
+    bpy.context.view_layer.objects.active = skin
+    with pytest.raises(RuntimeError, match=r"gone\.h5"):
+        bpy.ops.tactile.translate()
+
+
+def test_a_text_as_calibration_is_named(translated, tmp_path):
+    (tmp_path / "notes.txt").write_text("dear diary")
+    bpy.context.scene.tactile_render.calibration = str(tmp_path / "notes.txt")
+    with pytest.raises(RuntimeError, match=r"notes\.txt"):
+        bpy.ops.tactile.set_up_render()
+
+
+@pytest.mark.parametrize("scale", [(1, 1, -1), (-1, 1, 1), (0, 1, 1)])
+def test_a_mirrored_indenter_is_refused_in_words(scene, scale):
+    pytest.importorskip("msgspec")
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    thing = bpy.context.object
+    thing.scale = scale
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="scale"):
+        bpy.ops.tactile.snap_to_gel()
+
+
+def test_a_linked_sensor_is_left_alone_in_words(translated, tmp_path):
+    """A library's objects are read-only."""
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(str(path), link=True) as (held, taken):
+        taken.objects = list(held.objects)
+    for thing in taken.objects:
+        bpy.context.scene.collection.objects.link(thing)
+    with pytest.raises(RuntimeError, match="library"):
+        bpy.ops.tactile.set_style(style="DISPLACEMENT")
+
+
+def test_a_file_of_the_former_version_gets_what_it_lacks(translated):
+    """Format 1 had no colour on its meshes and no friction of a press."""
+    attributes = translated.data.color_attributes
+    attributes.remove(attributes["Tactile colour"])
+    translated.tactile.format, translated.add_rest_position_attribute = 1, False
+    assert bpy.ops.tactile.set_style(style="DISPLACEMENT") == {"FINISHED"}
+    assert translated.data.color_attributes.active_color.name == "Tactile colour"
