@@ -29,7 +29,7 @@ one_thread()  # before numpy is imported: the times are those of one core
 import numpy as np  # noqa: E402
 
 from benchmarks.mechanics.random_contacts import random_contacts  # noqa: E402
-from tactile_core.accuracy import HEADER, line, row  # noqa: E402
+from tactile_core.accuracy import HEADER, Row, line, row  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.files import atomic, compiled  # noqa: E402
 from tactile_core.mechanics.error_estimate import measured  # noqa: E402
@@ -62,13 +62,9 @@ def main(arguments: list[str] | None = None) -> int:
     ]  # fmt: skip
     for name, times, error in all_measured(options.count):
         for how in HOW:
-            cpu, wall = np.array(times[how]).T
-            middle = [np.median(cpu), np.quantile(cpu, 0.95), np.median(wall), np.quantile(wall, 0.95)]
+            middle = figures(times[how])
             table.append(f"| {name} | {how} | {' | '.join(f'{each:.3g}' for each in middle)} | {error[how]} |")
-            key = f"loop_{name.replace(', ', '_').replace(' ', '_')}_{how}"
-            of = f"{len(cpu)} contacts, one core; error {error[how]}"
-            for label, value in zip(("cpu", "cpu_95", "wall", "wall_95"), middle, strict=True):
-                rows.append(row(f"{key}_{label}", float(value), "ms", of=of))
+        rows += as_rows(name, times, error)
     print("\n".join([HEADER, *map(line, rows)]))
     print("\n".join(table))
     if options.json:
@@ -78,17 +74,39 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
+def figures(times: Times) -> list[float]:
+    """Median and 95 % of CPU, then of wall ms."""
+    return [float(np.quantile(each, level)) for each in np.array(times).T for level in (0.5, 0.95)]
+
+
+def as_rows(name: str, times: dict[str, Times], error: dict[str, str]) -> list[Row]:
+    """Four rows a way of computing."""
+    rows = []
+    for how in HOW:
+        key = f"loop_{name.replace(', ', '_').replace(' ', '_')}_{how}"
+        of = f"{len(times[how])} contacts, one core; error {error[how]}"
+        for label, value in zip(("cpu", "cpu_95", "wall", "wall_95"), figures(times[how]), strict=True):
+            rows.append(row(f"{key}_{label}", value, "ms", of=of))
+    return rows
+
+
 def all_measured(count: int):  # noqa: ANN201
     """Yield a name, times by way, and the error by way in words."""
     for sensor in ("digit", "biotac"):
-        tier = measured()["tiers"]["fast"][sensor]["bins"][1]
-        stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
-        for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
-            times, apart, last = measure(sensor, steps, contacts)
-            error = {"numpy": stated, "compiled": f"{np.quantile(apart, 0.99):.2g} um from numpy in 99 of 100"}
-            yield f"{sensor}, {name}", times, error
-            if sensor == "digit" and steps > 1:
+        for name, times, error, last in of_sensor(sensor, count):
+            yield name, times, error
+            if sensor == "digit" and name.endswith("path"):
                 yield from pictures(last)
+
+
+def of_sensor(sensor: str, count: int):  # noqa: ANN201
+    """Yield the same of a sensor's contacts alone and on paths, and the contacts at the paths' ends."""
+    tier = measured()["tiers"]["fast"][sensor]["bins"][1]
+    stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
+    for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
+        times, apart, last = measure(sensor, steps, contacts)
+        error = {"numpy": stated, "compiled": f"{np.quantile(apart, 0.99):.2g} um from numpy in 99 of 100"}
+        yield f"{sensor}, {name}", times, error, last
 
 
 def measure(sensor: str, steps: int, count: int) -> tuple[dict[str, Times], list[float], list[FastContact]]:

@@ -8,6 +8,7 @@ from benchmarks.mechanics.contact_tiers import fast_misses, miss, solved
 from benchmarks.mechanics.tier_truth import read_truth
 from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
+from tactile_core.files import compiled
 from tactile_core.mechanics.error_estimate import REFERENCE_SHARE, measured
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.simulation.scene import load_scene
@@ -18,11 +19,15 @@ NAMES = tuple(f"{sensor}_{tier}" for sensor in ("digit", "biotac") for tier in (
 TRUTH = TRAINING / "reference_contacts.npz"
 QUICK = 2  # contacts that the full tier solves in a quick run
 EVERY = 7  # of as many test presses one, in a quick run
+IN_LOOP, IN_LOOP_QUICK = 500, 18  # contacts a sensor, alone and on paths
 REPEATS = {"fast": 3, "full": 1}
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure one tier on one sensor: median time and error of the contacts."""
+    """Measure one tier on one sensor: median time and error of the contacts.
+
+    The fast tier's time is that of random contacts alone, compiled, where the extra [fast] is installed.
+    """
     sensor, tier = name.split("_")
     if tier == "reference":
         return _reference(sensor, quick)
@@ -39,8 +44,13 @@ def measure(name: str, quick: bool) -> Method:
     shape, force, null = (np.median([getattr(each, of) for each in misses]) for of in ("shape", "force", "null"))
     of = f"{len(misses)} random contacts, without friction, against the reference tier"
     more = [row(f"mechanics_{name}_force_error", 100 * force, "percent", null=100, of=of)]
-    more += _on_test_contacts(sensor, quick) if tier == "fast" else []
-    return Method("mechanics", name, float(np.median(ms)), mb, 1e6 * shape, "um", 1e6 * null, of, tuple(more))
+    took = float(np.median(ms))
+    if tier == "fast":
+        more += _on_test_contacts(sensor, quick)
+        loop = _in_the_loop(sensor, quick)
+        took = next((each["value"] for each in loop if each["name"].endswith("alone_compiled_cpu")), took)
+        more += loop
+    return Method("mechanics", name, took, mb, 1e6 * shape, "um", 1e6 * null, of, tuple(more))
 
 
 def _solved(sensor, contact, tier):  # noqa: ANN001, ANN202 (as `solved`)
@@ -63,6 +73,19 @@ def _reference(sensor: str, quick: bool) -> Method:
     of = f"{len(truths)} random contacts, by measure_tiers.py: a third of the full tier's error (assumed)"
     mb = None if quick else peak_mb()
     return Method("mechanics", f"{sensor}_reference", float(ms), mb, error, "um", full["null_um"], of)
+
+
+def _in_the_loop(sensor: str, quick: bool) -> list[Row]:
+    """Times of random contacts with friction, alone and on paths, by numpy and compiled; none without the extra
+    [fast].
+    """
+    from benchmarks import measure_loop
+
+    if not compiled.available():
+        return []
+    count = IN_LOOP_QUICK if quick else IN_LOOP
+    found = list(measure_loop.of_sensor(sensor, count))
+    return [each for name, times, error, _ in found for each in measure_loop.as_rows(name, times, error)]
 
 
 def _on_test_contacts(sensor: str, quick: bool) -> list[Row]:
