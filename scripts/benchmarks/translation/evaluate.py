@@ -40,7 +40,7 @@ from tactile_core.training.step_errors import our_bodies
 from tactile_core.translation import translate
 
 QUICK = 6  # recordings
-QUICK_PRESSES = 7  # of as many one is looked at; prime to how box, ring and others take turns
+QUICK_PRESSES = 7  # of as many one is looked at, or a sequence; prime to how box, ring and others take turns
 TEST_SET = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_contacts.h5"
 
 
@@ -105,7 +105,8 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
     pairs, bodies = read_pairs(options.test_set), our_bodies()
     if options.quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
-    found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network), *sequence_rows.rows(network)]
+    found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network)]
+    found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
     found += [*two_contact_rows.rows(pairs), *test_set.speed_rows(network, pairs)]
     apart = [translate.load_translator(folder) for folder in options.kept_apart]
     for unaware in apart:

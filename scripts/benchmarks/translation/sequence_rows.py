@@ -31,9 +31,12 @@ Truth = dict[str, np.ndarray]
 Errors = dict[str, np.ndarray]  # by UNITS, a number a judged frame
 
 
-def rows(network: Translator, file: Path = FILE) -> list[Row]:
-    """Medians over frames from 0.1 N on, of all sequences and of those of each motion; places 90 % stay below."""
-    truth = read(file)
+def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
+    """Medians over frames from 0.1 N on, of all sequences and of those of each motion; places 90 % stay below.
+
+    every : of as many sequences one is judged
+    """
+    truth = {name: values[::every] for name, values in read(file).items()}
     time = np.arange(truth["force"].shape[1]) / SAMPLE_RATE
     followed, alone, motion = [], [], []
     for number, signal in enumerate(truth["signal"]):
@@ -49,7 +52,7 @@ def rows(network: Translator, file: Path = FILE) -> list[Row]:
         found.append(_row(f"sequence_{figure}", figure, both, slice(None), of, unit, TARGETS[figure]))
         for number, name in enumerate(MOTIONS):
             found.append(_row(f"sequence_{figure}", figure, both, kind == number, name, unit))
-    value, null = (float(np.percentile(each["place"], 90)) for each in both)
+    value, null = (_quantile(each["place"], 90) for each in both)
     return [*found, row("sequence_place_90", value, "mm", null=null, of=f"{len(kind)} frames")]
 
 
@@ -90,5 +93,11 @@ def _row(
     name: str, figure: str, both: tuple[Errors, Errors], some: np.ndarray | slice, of: str, unit: str,
     target: float | None = None,
 ) -> Row:  # fmt: skip
-    value, null = (float(np.nanmedian(each[figure][some])) for each in both)
+    value, null = (_quantile(each[figure][some], 50) for each in both)
     return row(name, value, unit, target, null=null, of=of, at_least=figure == "iou")
+
+
+def _quantile(values: np.ndarray, level: int) -> float | None:
+    """The value that so many per cent stay below; None where that is a lost contact."""
+    found = float(np.nanpercentile(values, level, method="higher"))
+    return found if np.isfinite(found) else None
