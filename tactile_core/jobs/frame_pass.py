@@ -53,7 +53,8 @@ class Tools:
     """Tools of a conversion; the same for every recording.
 
     translate : Signals -> Translation; card, sha256 : of its weights
-    height_map : (T, M, 3) m -> (T, H, W) m; shade : (H, W) m -> (H, W, 3) uint8, by a preset of ``pictures.presets``
+    height_map : (T, M, 3) m -> (T, H, W) m
+    shade : (H, W) m, and the ``marks`` of dots if there are any -> (H, W, 3) uint8, by a preset of ``pictures.presets``
     camera : of the DIGIT that is drawn, by which contacts beside its picture are flagged; None: none are
     posterior : Signals -> Posterior, by which contacts are followed through time; None: each frame is translated alone
     plausible : Signals and frames (T,) -> contacts drawn for each, by ``plausible.NAMES``; None: none are
@@ -66,7 +67,7 @@ class Tools:
     card: dict[str, Any]
     sha256: str
     height_map: Callable[[np.ndarray], np.ndarray]
-    shade: Callable[[np.ndarray], np.ndarray]
+    shade: Callable[..., np.ndarray]
     preset: str = "fast"
     camera: Camera | None = None
     posterior: Callable[[Signals], Posterior] | None = None

@@ -22,6 +22,7 @@ class MarkerField:
             raise TactileError("calibration, markers", "missing", "a [markers] table", "See docs/calibration.md")
         self.unit, self._mapper = unit, digit_mapper(unit.camera)
         markers, camera = unit.markers, unit.camera
+        self._dark = 1 - markers.albedo  # share of light that ink takes
         down, right = (markers.pitch * (np.arange(n) - (n - 1) / 2) for n in (markers.rows, markers.columns))
         x, z = np.meshgrid(
             camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right, indexing="ij"
@@ -50,9 +51,8 @@ class MarkerField:
         middle, *rim = self._seen(displacement)
         # Columns: half of the dot's image along x and along z, px.
         axes = np.stack([(rim[0] - rim[1]) / 2, (rim[2] - rim[3]) / 2], -1)
-        dark = 1 - self.unit.markers.albedo
         for place, axis in zip(middle, axes, strict=True):
-            self._darken(share, place, axis, dark)
+            self._darken(share, place, axis)
         return share
 
     def _seen(self, displacement: np.ndarray) -> np.ndarray:
@@ -62,10 +62,10 @@ class MarkerField:
         row, column = camera.to_pixel(x, z, height - (1 - self.unit.dome_scale) * self._dome)
         return np.stack([column, row], -1).reshape(*self._x.shape, 2)
 
-    def _darken(self, share: np.ndarray, place: np.ndarray, axes: np.ndarray, dark: float) -> None:
+    def _darken(self, share: np.ndarray, place: np.ndarray, axes: np.ndarray) -> None:
         """Darken the pixels (H, W) of one dot's ellipse by the part of each that it covers.
 
-        place : (2,) px, its middle; axes : (2, 2), from a unit disc to px; dark : share of light that ink takes
+        place : (2,) px, its middle; axes : (2, 2), from a unit disc to px
         """
         area = abs(np.linalg.det(axes))
         if area < LEAST_AREA:
@@ -79,4 +79,4 @@ class MarkerField:
         at = np.stack(np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])), -1) - place
         out = np.linalg.norm(at @ np.linalg.inv(axes).T, axis=-1) - 1
         covered = np.clip(0.5 - out * np.sqrt(area), 0, 1)  # a rim is straight across a pixel
-        share[low[1] : high[1], low[0] : high[0]] *= (1 - dark * covered).astype(np.float32)
+        share[low[1] : high[1], low[0] : high[0]] *= (1 - self._dark * covered).astype(np.float32)
