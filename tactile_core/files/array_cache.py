@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import TactileError
 from . import atomic, outside
-from .cache import HASHES  # written last: without it an entry is not whole
+from .cache import HASHES as HASHES  # written last: without it an entry is not whole
 
 _MOST = 2**16  # bytes of that file; a few names and hashes
 

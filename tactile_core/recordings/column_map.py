@@ -12,7 +12,7 @@ import re
 import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from ..errors import TactileError
 from ..files import atomic
@@ -131,7 +131,9 @@ def read_mapped(table: Table, columns: ColumnMap) -> Recording:
     electrodes = [name.lower() for name in columns.electrodes]
     _check_series(table, electrodes)
     time = columns.time.lower()
-    channels = {name: table.column(column) for name in CHANNELS if (column := getattr(columns, name).lower())}
+    channels: dict[str, Any] = {
+        name: table.column(column) for name in CHANNELS if (column := getattr(columns, name).lower())
+    }
     return assemble(
         table.path,
         LAYOUT,
