@@ -15,6 +15,7 @@ from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.recordings import electrode_gains, prepare, read
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile
+from tactile_core.recordings.flags import Flag
 from tactile_core.sensors import REST_COUNTS, electrodes
 from tactile_core.translation import adapt, reference_signals, weights
 
@@ -200,7 +201,9 @@ def test_signals_are_corrected_and_say_so(tmp_path):
         np.testing.assert_allclose(found.typical, (signals.typical - offset) / 2, atol=1e-6)
         assert found.report["sensor"]["gain"] == [2.0] * 19 and "sensor" not in signals.report
         assert found.report["sensor"]["offset_counts"] == [offset] * 19
-        assert (found.electrodes == signals.electrodes).all() and (found.flags == signals.flags).all()
+        assert (found.electrodes == signals.electrodes).all()
+        doubt = Flag.LAW_DOUBTED  # which the unit's gains may take back, or give
+        assert (found.flags | doubt == signals.flags | doubt).all()
 
 
 def test_a_sensor_file_comes_back(tmp_path):
