@@ -189,7 +189,7 @@ def note(recording: Recording, made: FramePass, options: Options, tools: Tools) 
         "recording": {
             "file": os.path.basename(recording.path), "sha256": provenance.sha256(recording.path),
             "layout": recording.layout, "frames": len(recording), "simulated": recording.simulated,
-            "about": recording.about,
+            "about": {name: value for name, value in recording.about.items() if name != "scene"},  # the file holds it
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
                     "error": None if options.error is None else str(options.error), "preset": tools.preset,

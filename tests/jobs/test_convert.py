@@ -145,6 +145,11 @@ def test_the_note_tells_what_is_reproducible_and_no_path(run, slide_csv, tmp_pat
     assert set(timings["ms_a_frame"]) == set(timings["cpu_ms_a_frame"]) == stages
 
 
+def test_the_note_of_the_shipped_recording_takes_4_kb(run):
+    folder = run(Path(__file__).parents[2] / "scenes" / "press_roll_slide" / "press_roll_slide.h5", keep=())
+    assert (folder / "note.json").stat().st_size <= 4096
+
+
 def test_flags_of_recording_and_translation_meet_and_are_told(run, slide_csv):
     path = slide_csv(frames=FRAMES)
     lines = path.read_text().splitlines()
