@@ -263,19 +263,22 @@ def table(rows: list[Row]) -> str:
     for count in next(iter(SIZES.values())):
         times = [_number(value.get(f"{STOCK}_{count}_{size}_ms")) for size in (small, large)]
         noise = _number(value.get(f"{STOCK}_{count}_{small}_noise"))
-        lines.append(
-            f"| stock Mitsuba, {count} samples | " + " | ".join([*times, f"{noise} (noise)", "", "", ""]) + " |"
-        )
+        cells = [f"stock Mitsuba, {count} samples", *times, f"{noise} (noise)", "", "", ""]
+        lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def _times(ms: dict[str, float]) -> str:
     """Times of a preset by LLVM and without; one number where it needs no Mitsuba."""
-    return _number(ms["numpy"]) if "numpy" in ms else ", ".join(_number(ms.get(variant)) for variant in (LLVM, SCALAR))
+    return _number(ms["numpy"]) if "numpy" in ms else _joined([ms.get(variant) for variant in (LLVM, SCALAR)])
 
 
 def _numbers(value: dict[str, float], name: str, figures_: Sequence[str]) -> str:
-    return ", ".join(_number(value.get(f"{name}_{figure}")) for figure in figures_)
+    return _joined([value.get(f"{name}_{figure}") for figure in figures_])
+
+
+def _joined(values: Sequence[float | None]) -> str:
+    return ", ".join(_number(each) for each in values if each is not None)
 
 
 def _number(value: float | None) -> str:

@@ -66,9 +66,8 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
         **lamps(unit), **walls(unit, mesh),
     }  # fmt: skip
     root = ElementTree.Element("scene", version=VERSION)
-    root.append(
-        ElementTree.Comment(f" the coating spreads light: a Gaussian of {spread} px over the radiance, left out ")
-    )
+    left_out = f" left out: the coating spreads light, a Gaussian of {spread} px over the radiance "
+    root.append(ElementTree.Comment(left_out))
     for name, value in content.items():
         _add(root, name, value)
     ElementTree.indent(root)
