@@ -22,7 +22,12 @@ from .unit_rest import UnitRest, find_rest
 
 FEWEST_FRAMES = 50  # in contact, half a second: less holds no contact worth the name (assumed)
 MOST_FRAMES = 3_000  # looked at, evenly spread; neighbours at 100 Hz say the same
+FEWEST_CONTACTS = 5  # different ones: fewer tell no gain from the contact itself (assumed)
 FEW_CONTACTS = 20  # different ones; with fewer, gains of 30 % are found to 20 % only (simulated contacts at one place)
+# Error of gains over the scatter of those found, LEAST_LEFT + LEFT / sqrt(different contacts): measured, made-up units
+# of 15 and 30 % scatter, 15 to 320 different contacts, with noise (tests/translation/test_adapt.py). What is found is
+# shrunk towards 1, the more so the fewer contacts there are; matching by wrong gains leaves the rest.
+LEAST_LEFT, LEFT = 0.17, 6.3
 TOUCHED = 2.0  # contacts that tell an electrode's gain; below, it is not fitted (assumed)
 MOVED = 5.0  # counts that the 99 % level of an electrode must reach, three times the noise: else it was never touched
 SHOWN = 3  # names spelled out
@@ -31,11 +36,16 @@ LARGEST_OFFSET = 30.0  # counts; more is no tare error but a match gone wrong (a
 
 @dataclass(frozen=True)
 class Adapted:
-    """Fitted sensor with warnings for the user. fitted : (19,) bool, the electrodes with a gain."""
+    """Fitted sensor with warnings for the user.
+
+    fitted : (19,) bool, the electrodes with a gain; uncertainty : relative error of a gain to be expected, rms over
+        electrodes, beside a factor common to all; NaN where none has a gain
+    """
 
     sensor: ElectrodeGains
     fitted: np.ndarray
     warnings: tuple[str, ...]
+    uncertainty: float
 
 
 def adapt(
@@ -66,7 +76,7 @@ def adapt(
     if not restless:
         return fitted
     warning = f"no quiet part in {_listed(restless)}: where the tare is off, so are the gains and offsets"
-    return Adapted(fitted.sensor, fitted.fitted, (warning, *fitted.warnings))
+    return dataclasses.replace(fitted, warnings=(warning, *fitted.warnings))
 
 
 def adapt_hand(
@@ -120,7 +130,7 @@ def _fitted(
     try:
         found = fit(change, rectified, typical, f"{note}; {bare.note}")
     except TactileError as error:
-        return Adapted(bare, np.zeros(change.shape[1], bool), (f"no gains: {error}",))
+        return Adapted(bare, np.zeros(change.shape[1], bool), (f"no gains: {error}",), np.nan)
     fields = {name: getattr(bare, name) for name in ("rest_counts", "rest_spread_counts", "rest_pdc")}
     return dataclasses.replace(found, sensor=msgspec.structs.replace(found.sensor, **fields))
 
@@ -137,13 +147,19 @@ def _contacts(signals: Signals) -> np.ndarray:
 
 
 def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: str) -> Adapted:
-    """Fit gains and offsets to frames in contact (n, 19) counts; raises TactileError for fewer than half a second."""
+    """Fit gains and offsets to frames in contact (n, 19) counts.
+
+    Raises TactileError for fewer than half a second of them, or of different contacts than FEWEST_CONTACTS.
+    """
     frames = len(change)
     if frames < FEWEST_FRAMES:
         advice = "Use recordings with more contact"
         raise TactileError("adapt", f"{frames} frames in contact", f"at least {FEWEST_FRAMES}", advice)
     change = change[np.linspace(0, frames - 1, min(frames, MOST_FRAMES)).round().astype(int)]
     found = match(change, typical.typical, rectified)
+    if found.alike < FEWEST_CONTACTS:
+        advice = "Touch more places, softly and hard"
+        raise TactileError("adapt", f"{found.alike} different contacts", f"at least {FEWEST_CONTACTS}", advice)
     log_gain = found.log_gain - typical.bias(rectified) * found.contacts / (found.contacts + PRIOR)
     touched = (found.contacts >= TOUCHED) & (np.quantile(np.abs(change), 0.99, axis=0) >= MOVED)
     gain, fitted, warnings = _believable(np.exp(log_gain), touched, found)
@@ -152,8 +168,11 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
         warnings.append(f"{_names(np.abs(found.offset) > LARGEST_OFFSET)}: no believable offset; taken as 0")
     signs = "rectified, so no offsets" if rectified else "signed"
     note = f"{note}; {frames} frames in contact ({signs}), {found.alike} different contacts"
+    uncertainty = _uncertainty(gain[fitted], found.alike)
+    if fitted.any():
+        note += f"; gains to about {uncertainty:.0%}"
     sensor = ElectrodeGains(note, [round(g, 4) for g in gain.tolist()], [round(o, 4) for o in offset.tolist()])
-    return Adapted(sensor, fitted, tuple(warnings))
+    return Adapted(sensor, fitted, tuple(warnings), uncertainty)
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
@@ -175,6 +194,13 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
         warnings.append("the fit did not settle: gains are uncertain")
     fitted = touched & ~wild
     return np.where(fitted, gain, 1.0), fitted, warnings
+
+
+def _uncertainty(gain: np.ndarray, contacts: int) -> float:
+    """Error to be expected of fitted gains (n,) from so many different contacts; NaN of none."""
+    if not len(gain):
+        return np.nan
+    return float(np.log(gain).std()) * (LEAST_LEFT + LEFT / np.sqrt(contacts))
 
 
 def _names(which: np.ndarray) -> str:

@@ -76,6 +76,27 @@ def test_gains_are_found_to_half_their_scatter(typical, rectified, sigma):
         assert found.fitted.all() and found.warnings == ()
 
 
+@pytest.mark.parametrize("count", [40, 600])
+def test_the_gains_uncertainty_is_stated_to_half(typical, count):
+    """Over units; of one unit alone it may be off by more."""
+    errors, stated = [], []
+    for unit in range(4):
+        gain = np.exp(0.25 * np.random.default_rng(20 + unit).standard_normal(19))
+        read = readings(touched(contacts(count, seed=30 + unit)), gain, np.zeros(19), False, seed=unit)
+        read = np.tile(read[reference_signals.touching(read)], (2, 1))
+        found = adapt.fit(read, False, typical, "test")
+        errors.append(error(found, gain))
+        stated.append(found.uncertainty)
+        assert f"gains to about {found.uncertainty:.0%}" in found.sensor.note
+    assert 0.5 < rms(np.array(stated)) / rms(np.array(errors)) < 2
+
+
+def test_too_few_different_contacts_give_no_gains(typical):
+    one = contacts(1, seed=5, places=np.array([[-8e-3, 0.0]]))
+    with pytest.raises(TactileError, match="different contacts"):
+        adapt.fit(readings(np.tile(one, (100, 1)), np.ones(19), np.zeros(19), False, 0), False, typical, "test")
+
+
 @pytest.mark.parametrize("rectified", [False, True])
 def test_a_sensor_like_the_simulated_one_is_left_alone(typical, rectified):
     """0.1: as much as a gain error of 10 %, which the networks are trained to bear."""

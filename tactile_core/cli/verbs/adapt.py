@@ -12,7 +12,8 @@ TEXT = """\
 Fit a gain and an offset to each electrode of a BioTac, so that its readings in contact look like the simulated ones
 that the networks were trained on. Recordings of one sensor are taken together; what touched it need not be known. The
 more places were touched, softly and hard, the better. An electrode that the recordings do not tell enough of keeps
-gain 1, and a warning says so. Rectified recordings give no offsets.
+gain 1, and a warning says so. Rectified recordings give no offsets. How uncertain gains are is printed; fewer than
+five different contacts give none.
 
 Three raw recordings or more also give the unit's rest, from those of the lowest fluid pressure (of the least squeezed
 electrodes where there is no PDC), with how far each electrode may be off: `tactile convert --sensor` takes it for
@@ -46,6 +47,8 @@ def run(options: argparse.Namespace) -> int:
     sensor, warnings = adapt.adapt_hand(options.recordings, typical, prepare)
     for warning in warnings:
         say(f"warning: {warning}")
+    for name, section in sensor.sections().items():
+        say(f"{name}: {section.note}")
     electrode_gains.check(sensor, options.out)
     electrode_gains.write(options.out, sensor)
     tell(options.out)
