@@ -1,0 +1,34 @@
+"""The example of docs/blender.md, as it stands there: an author's whole way, from an empty file to a picture."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "blender.md"
+
+
+def test_the_example_goes_from_an_empty_file_to_a_picture(scene, part, monkeypatch, tmp_path):
+    for name in ("h5py", "msgspec", "scipy"):
+        pytest.importorskip(name)
+    monkeypatch.chdir(tmp_path)
+    code = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL).group(1)
+    bpy.context.scene.frame_set(1)
+    exec(compile(code, str(PAGE), "exec"), {})  # noqa: S102 (the page's own text)
+    found = part("tactile_core.simulation.scene").load_scene(tmp_path / "author" / "press")[0]
+    forces = [point.force_n for point in found.recording.points]
+    assert forces[0] == 0 and max(forces) > 0.5
+    picture = bpy.data.images.load(str(tmp_path / "author" / "press.png"))
+    assert tuple(picture.size) == (240, 320) and np.ptp(np.array(picture.pixels)) > 0.3
+    gel = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "DIGIT")
+    assert gel["expected_error_um"] > 0  # translated, no longer the simulated one
+
+
+def test_every_operator_is_documented(extension):
+    page = PAGE.read_text(encoding="utf-8")
+    registered = {name for name in dir(bpy.ops.tactile) if not name.startswith("_")}
+    assert {name for name in registered if f"`{name}`" not in page} == set()
