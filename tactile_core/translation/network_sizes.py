@@ -38,7 +38,8 @@ def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]
         shapes |= residual_shapes("decoder", latent + PLACE, wide + near, width, blocks)
         shapes |= {"wide": (wide, 3 * sizes["nodes"]), "near": (near, 3 * window)}
         return shapes | {"scale": (wide + near,), "turn": (sizes["nodes"],)}
-    return residual_shapes("map", sizes["inputs"], sizes["outputs"], width, blocks)
+    shapes = residual_shapes("map", sizes["inputs"], sizes["outputs"], width, blocks)
+    return shapes | {"rectified": (1,)} if net == "pressure" else shapes
 
 
 _MESH = ("blocks", "columns", "half", "latent", "near", "nodes", "rows", "wide", "width")
@@ -82,7 +83,7 @@ def check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
         ("error", "outputs", len(SURFACES)),
         ("force", "inputs", sizes["MVB"]["latent"]),
         ("force", "outputs", 3),
-        ("pressure", "inputs", ELECTRODES + 1),
+        ("pressure", "inputs", ELECTRODES),
         ("pressure", "outputs", 1),
     ]
     for net, size, expected in links:

@@ -200,7 +200,11 @@ class Networks:
         return estimate * (size / np.where(length > 0, length, 1))[:, None]
 
     def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one."""
+        """Rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one.
+
+        Rectified ones' is proportional to the sum of their changes: where the gains are not known and a real finger
+        shares its changes out among the electrodes otherwise than a simulated one, their pattern misleads.
+        """
         return self._blocks(self._pressure, *_signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
@@ -236,9 +240,11 @@ class Networks:
         return np.float32(FORCE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
     def _pressure(self, signal: np.ndarray) -> np.ndarray:
-        seen = np.concatenate([compress(signal[:, :ELECTRODES]), signal[:, ELECTRODES:]], -1)
-        head = residual(seen, self.tensors["pressure"], "map", self.sizes["pressure"]["blocks"])
-        return np.float32(PRESSURE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
+        change, tensors = signal[:, :ELECTRODES], self.tensors["pressure"]
+        head = residual(compress(change), tensors, "map", self.sizes["pressure"]["blocks"])
+        signed = np.float32(PRESSURE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
+        rectified = tensors["rectified"] * np.abs(change).sum(-1, keepdims=True)
+        return np.where(signal[:, ELECTRODES:] > 0, rectified, signed)
 
     def _either(self, part: str, seen: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
         """Apply a part of S2MPN, or of R2MPN to rectified frames."""

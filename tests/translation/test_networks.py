@@ -23,7 +23,7 @@ SIZES = {
     "D2BPN": {"inputs": 9, "outputs": 6, **MLP},
     "B2SPN": {"inputs": 8, "outputs": 8, **MLP},
     "force": {"inputs": 6, "outputs": 3, "width": 8, "blocks": 1},
-    "pressure": {"inputs": 20, "outputs": 1, "width": 8, "blocks": 1},
+    "pressure": {"inputs": 19, "outputs": 1, "width": 8, "blocks": 1},
     "error": {"inputs": 11, "outputs": 2, "width": 8, "blocks": 1},
 }
 
@@ -99,6 +99,14 @@ def test_shapes_and_dtype(nets, count):
         assert np.isfinite(result).all(), name
     distance = nets.signal_distance(calls(nets, count)["encode_signal"][1])
     assert distance.mahalanobis.shape == distance.residual.shape == distance.largest.shape == (count,)
+
+
+def test_pressure_of_rectified_changes_grows_with_their_sum_whatever_their_pattern(nets):
+    change = np.abs(calls(nets, 3)["encode_signal"][1])
+    expected = nets.tensors["pressure"]["rectified"] * change.sum(-1)
+    np.testing.assert_allclose(nets.pressure(change[:, ::-1], True), expected, rtol=1e-5)
+    np.testing.assert_allclose(nets.pressure(2 * change, True), 2 * expected, rtol=1e-5)
+    assert not np.allclose(nets.pressure(change), expected)
 
 
 def test_a_frame_does_not_depend_on_its_neighbours(nets):
