@@ -48,7 +48,7 @@ def signals_of(change):
 
 def test_the_doubt_flags_contacts_alone_and_a_unit_s_gains_take_it_back():
     change = wrong_laws.signals(odd=True)
-    gain = np.where(np.arange(19) % 4 == 0, 2.0, 1.0)
+    gain = np.where(np.arange(19) % 4 == 0, 2.5, 1.0)
     doubted = signals_of(change * gain)
     contact = contact_law.touching(change * gain)
     assert not (doubted.flags[:40] & Flag.LAW_DOUBTED).any()
