@@ -151,9 +151,9 @@ class Translator:
         # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
         center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m") if alone else STILL)
         silent = np.isnan(center[:, 0])
-        confidence = self._confidence(change, signals.flags, rectified)
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
+        confidence = self._confidence(change, flags, rectified)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
         flags[two_contacts(change, rectified)] |= np.uint16(Flag.TWO_CONTACTS)
         undecided = touched & (elsewhere(posterior, state, nets.frames["MVB"]) > UNDECIDED)
@@ -193,11 +193,14 @@ class Translator:
         """Confidence (T,): 1 for signals like those of the training, 0 far from them.
 
         Each distance to the training signals counts against its quantiles in validation: it is 1 up to the 95 %
-        quantile, 0 at the outermost. Not a calibrated probability: that is what bounds are for.
+        quantile, 0 at the outermost, and at most UNTRAINED_CONFIDENCE for frames that a flag says training did not know.
+        Not a calibrated probability: that is what bounds are for.
         """
         usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))
         confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
-        untrained = flags & np.uint16(Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL | Flag.LAW_DOUBTED)
+        untrained = flags & np.uint16(
+            Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL | Flag.LAW_DOUBTED | Flag.OUT_OF_RANGE
+        )
         confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
         return confidence.astype(np.float32)
 

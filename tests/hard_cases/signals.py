@@ -174,7 +174,7 @@ def drift() -> Found:
 
 
 @case("signals_out_of_range", "out-of-range latents", TRANSLATION,
-      "forty times as large: all frames in contact carry OUT_OF_RANGE and no confidence; all is finite")  # fmt: skip
+      "forty times as large: all frames in contact carry OUT_OF_RANGE and little confidence; all is finite")  # fmt: skip
 def out_of_range() -> Found:
     """Changes forty times those of the shipped recording, up to what 12 bits hold: training knows fifteen times."""
     _, signals = prepared()
@@ -185,7 +185,7 @@ def out_of_range() -> Found:
     flagged = (found.flags & int(Flag.OUT_OF_RANGE)) > 0
     broken = (
         *_finite(found),
-        *(() if found.confidence.max() <= 0.05 else (f"confidence {found.confidence.max():.2f}",)),
+        *(() if found.confidence.max() <= UNTRAINED_CONFIDENCE else (f"confidence {found.confidence.max():.2f}",)),
     )
     words = f"nodes move up to {np.abs(found.displacement_digit).max() * 1e3:.2f} mm"
     return Found(100 * float(flagged.mean()), "percent", 100.0, at_least=True, words=words, broken=broken)
