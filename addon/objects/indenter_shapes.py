@@ -9,7 +9,7 @@ import bmesh
 import numpy as np
 
 from ...tactile_core.geometry.indenters import mesh_file
-from ...tactile_core.geometry.indenters.preview import Surface
+from ...tactile_core.geometry.indenters.indenter import Surface
 from ...tactile_core.simulation.indenter_specs import MeshSpec
 
 _DIRECTIONS = 4000  # hull points of a body: edges of 0.5 mm round then look round

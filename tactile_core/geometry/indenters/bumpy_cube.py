@@ -10,9 +10,9 @@ import numpy as np
 from ...errors import TactileError
 from .box import Box
 from .circle import circle_curvature, circle_distance
-from .indenter import NEAREST, Indenter, check_length
+from .indenter import NEAREST, Hull, Indenter, Surface, check_length
 from .pose import Pose
-from .preview import Hull, Surface, joined
+from .preview import joined
 from .scene_form import SceneForm, Size
 from .several import Several
 from .sphere import Sphere

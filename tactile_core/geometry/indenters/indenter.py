@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from ...errors import TactileError
-from .preview import Hull, Surface
 
 # Where a direction meets a flat or a line of the body squarely, rounding must not choose an end of it.
 SQUARE = 1e-9
 # m; nearer than this to a centre of curvature (deep inside a body) normals and curvatures are those at this distance.
 NEAREST = 1e-9
+
+Surface = tuple[np.ndarray, np.ndarray]  # nodes (n, 3) m in the body's frame, triangles (m, 3)
+Hull = Callable[[Callable[[np.ndarray], np.ndarray]], Surface]  # surface of a convex body, by its ``support``
 
 
 class Indenter(Protocol):

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .indenter import Indenter
-    from .pose import Pose
-
-Surface = tuple[np.ndarray, np.ndarray]  # nodes (n, 3) m in the body's frame, triangles (m, 3)
-Hull = Callable[[Callable[[np.ndarray], np.ndarray]], Surface]  # surface of a convex body, by its ``support``
+from .indenter import Hull, Indenter, Surface
+from .pose import Pose
 
 
 def joined(parts: Iterable[tuple[Indenter, Pose]], hull: Hull) -> Surface:

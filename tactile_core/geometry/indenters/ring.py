@@ -8,8 +8,7 @@ import numpy as np
 
 from ...errors import TactileError
 from .circle import circle_curvature, circle_distance
-from .indenter import SQUARE, Indenter, check_length
-from .preview import Hull, Surface
+from .indenter import SQUARE, Hull, Indenter, Surface, check_length
 from .scene_form import SceneForm, Size
 
 _ACROSS, _AROUND = 24, 64  # of the preview: nodes across and along the wire

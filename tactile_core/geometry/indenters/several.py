@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 
 from ...errors import TactileError
-from .indenter import SQUARE, Indenter
+from .indenter import SQUARE, Hull, Indenter, Surface
 from .pose import Pose
-from .preview import Hull, Surface, joined
+from .preview import joined
 
 _TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
 
