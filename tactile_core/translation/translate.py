@@ -193,7 +193,7 @@ class Translator:
         """Confidence (T,): 1 for signals like those of the training, 0 far from them.
 
         Each distance to the training signals counts against its quantiles in validation: it is 1 up to the 95 %
-        quantile, 0 at the outermost, and at most UNTRAINED_CONFIDENCE for frames that a flag says training did not know.
+        quantile, 0 at the outermost, and at most UNTRAINED_CONFIDENCE where a flag says that training did not know it.
         Not a calibrated probability: that is what bounds are for.
         """
         usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))

@@ -174,7 +174,7 @@ def drift() -> Found:
 
 
 @case("signals_out_of_range", "out-of-range latents", TRANSLATION,
-      "forty times as large: all frames in contact carry OUT_OF_RANGE and little confidence; all is finite")  # fmt: skip
+      "forty times as large: frames in contact carry OUT_OF_RANGE and little confidence; all is finite")  # fmt: skip
 def out_of_range() -> Found:
     """Changes forty times those of the shipped recording, up to what 12 bits hold: training knows fifteen times."""
     _, signals = prepared()
