@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ...recordings import electrode_gains
-from ...recordings.electrode_gains import ElectrodeGains
 from ...recordings.flags import Flag
 from ...recordings.polarity import AUTO, FALLS, POLARITIES, TOUCHING, Polarity, polarity_of
 from ...recordings.rest_level import find_quiet, level, window_frames
 from ...recordings.signal_kind import detect
 from ...recordings.signals import Rest, Signals, tare_frames
 from ...sensors import ELECTRODES, SAMPLE_RATE
+
+if TYPE_CHECKING:
+    from ...recordings.electrode_gains import ElectrodeGains
 
 LONGEST = 10.0  # s that are looked through for rest and polarity; then the calmest so far is taken (assumed)
 AGAIN = 25  # new frames after which the polarity is looked at again
@@ -113,7 +116,11 @@ class LiveSignals:
             quiet=np.zeros(count, bool), flags=np.full(count, flags, np.uint16), pdc=np.full(count, np.nan),
             warnings=(), report={},
         )  # fmt: skip
-        return signals if self._unit is None else electrode_gains.apply(signals, self._unit)
+        if self._unit is None:
+            return signals
+        from ...recordings import electrode_gains
+
+        return electrode_gains.apply(signals, self._unit)
 
 
 def _stated_polarity(polarity: str, who: str) -> Polarity:
