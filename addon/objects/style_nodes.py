@@ -41,6 +41,21 @@ def input_of(tree: bpy.types.NodeTree, name: str) -> str:
     return next(item.identifier for item in tree.interface.items_tree if item.name == name and item.in_out == "INPUT")
 
 
+def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> None:
+    """Set the value of a group's input in a modifier. Blender 5.2 holds inputs as properties, not by their keys."""
+    key = input_of(modifier.node_group, name)
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, key).value = value
+    else:
+        modifier[key] = value
+
+
+def input_path(modifier: bpy.types.NodesModifier, name: str) -> str:
+    """Return the data path of a group's input, from its modifier on."""
+    key = input_of(modifier.node_group, name)
+    return f".properties.inputs.{key}.value" if hasattr(modifier, "properties") else f'["{key}"]'
+
+
 def material() -> bpy.types.Material:
     """A material of the attribute ``Tactile colour``."""
     return _material(MATERIAL, "Base Color")

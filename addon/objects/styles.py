@@ -55,9 +55,9 @@ def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
     arrow.parent, arrow.hide_select = sensor, True
     make_colour_active(arrow.data)
     modifier = _add_nodes(arrow, "FORCE_ARROW", {style_nodes.SENSOR: sensor, style_nodes.LENGTH: length})
-    key = style_nodes.input_of(modifier.node_group, style_nodes.FORCE)
+    path = style_nodes.input_path(modifier, style_nodes.FORCE)
     for axis in range(3):
-        driver = arrow.driver_add(f'modifiers["{MODIFIER}"]["{key}"]', axis).driver
+        driver = arrow.driver_add(f'modifiers["{MODIFIER}"]{path}', axis).driver
         driver.type = "SUM"
         variable = driver.variables.new()
         variable.targets[0].id, variable.targets[0].data_path = sensor, f'["force"][{axis}]'
@@ -83,7 +83,7 @@ def _add_nodes(thing: bpy.types.Object, style: str, values: dict[str, object]) -
     modifier = thing.modifiers.new(MODIFIER, "NODES")
     modifier.node_group = style_nodes.group(style)
     for name, value in values.items():
-        modifier[style_nodes.input_of(modifier.node_group, name)] = value
+        style_nodes.set_input(modifier, name, value)
     return modifier
 
 

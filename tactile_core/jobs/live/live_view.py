@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections import deque
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...pictures.height_map import folds_counted
-from ...recordings.electrode_gains import ElectrodeGains
 from ...recordings.polarity import AUTO, Polarity
 from ...recordings.recording import Recording
 from ...recordings.signals import Signals
@@ -18,6 +18,9 @@ from ...translation.translate import Translation
 from ..frame_pass import Tools
 from .growing_file import newest
 from .live_signals import LiveSignals
+
+if TYPE_CHECKING:
+    from ...recordings.electrode_gains import ElectrodeGains
 
 REMEMBERED = 1000  # latencies that figures are taken over
 
