@@ -143,8 +143,8 @@ class _Nodes:
 def _surface(style: str) -> bpy.types.NodeTree:
     """Colours of a sensor's own surface, and the dent drawn larger."""
     nodes = _Nodes(style)
-    told = "Change of the reading, counts," if style == "ELECTRODES" else "Displacement, in the object's units,"
-    nodes.input(LARGEST, "Float", f"{told} at the colours' upper end", 1.0, 1e-6)
+    quantity = "Change of the reading, counts," if style == "ELECTRODES" else "Displacement, in the object's units,"
+    nodes.input(LARGEST, "Float", f"{quantity} at the colours' upper end", 1.0, 1e-6)
     nodes.input(EXAGGERATION, "Float", "How many times the dent is drawn; pictures keep the true one", 1.0, 0.0)
     given = nodes.tree.nodes.new("NodeGroupInput")
     here = nodes.add("GeometryNodeInputPosition").outputs[0]

@@ -19,7 +19,7 @@ from .scene_bridge import indenter_of, sensor_of
 
 
 def depth_of(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float | None:
-    """How far an indenter has been moved below the point of first touch, m; negative above it.
+    """Compute how far an indenter stands below its point of first touch, m; negative above it.
 
     None for a mesh of the user's, whose distances take too long for a panel.
     """

@@ -116,7 +116,7 @@ class TACTILE_PT_author(_Panel, bpy.types.Panel):
 
 
 def _depth(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object) -> None:
-    """How deep an indenter stands in the resting gel on this frame, and the button that puts it there."""
+    """Draw how deep an indenter stands in the resting gel on this frame, and the button that puts it there."""
     sensor = properties.of_role(context.scene, "DIGIT") or properties.of_role(context.scene, "BIOTAC")
     row = column.row(align=True)
     if sensor is not None and not missing("msgspec"):

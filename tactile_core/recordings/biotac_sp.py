@@ -40,7 +40,7 @@ class SpRecording:
 
     @property
     def labelled(self) -> bool:
-        """Whether lines carry labels, as snapshots of grasps do; without, they follow each other in time."""
+        """Return true where lines carry labels, as snapshots of grasps do; without, they follow each other in time."""
         return bool(self.others)
 
 

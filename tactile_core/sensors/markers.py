@@ -42,5 +42,5 @@ class Markers:
 
     @property
     def count(self) -> int:
-        """How many dots there are."""
+        """Count the dots."""
         return self.rows * self.columns

@@ -135,7 +135,7 @@ def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
     """Compute the fluid's pressure, (1,) Pa, for each count of the electrodes' summed changes read without their sign.
 
     It is the median over training contacts above PRESSURE_FROM. On sample 7 of the slides (docs/sources.md) a law of
-    one number is steadier than a network, whose scale changed by a third with its seed (docs/train.md).
+    one number does better than networks, large and small (docs/train.md).
     """
     rows = contacts.split.train
     rows = rows[contacts.pairs.pressure[rows] > PRESSURE_FROM]
