@@ -183,10 +183,10 @@ def out_of_range() -> Found:
     change = np.clip(40 * signals.change[touched], -4095, 4095)
     found = translator()(dataclasses.replace(signals, change=change, **part))
     flagged = (found.flags & int(Flag.OUT_OF_RANGE)) > 0
-    broken = (
-        *_finite(found),
-        *(() if found.confidence.max() <= UNTRAINED_CONFIDENCE else (f"confidence {found.confidence.max():.2f}",)),
-    )
+    sure = float(found.confidence.max())
+    # Confidences are float32, which rounds the limit up: numpy before 2 compares the two as float64.
+    limit = float(np.float32(UNTRAINED_CONFIDENCE))
+    broken = (*_finite(found), *(() if sure <= limit else (f"confidence {sure:.2f}",)))
     words = f"nodes move up to {np.abs(found.displacement_digit).max() * 1e3:.2f} mm"
     return Found(100 * float(flagged.mean()), "percent", 100.0, at_least=True, words=words, broken=broken)
 
