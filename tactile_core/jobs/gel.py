@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -28,7 +29,7 @@ from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import FRICTION
 from ..mechanics.thickness import DEPTH_LIMIT, thickness_under
 from ..pictures.height_map import digit_mapper, folds_counted
-from ..pictures.presets import FAST
+from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import load_calibration
@@ -37,14 +38,16 @@ PUSH = np.array([0.0, 1.0, 0.0])  # into the gel: along +y of the sensors' frame
 FLAGS = {
     "unsolved": "no equilibrium was found; the values are those of the contact before",
     "too deep": "the pose lies deeper than 60 % of the thickness; the values are those at that depth",
-    "force not reached": "no depth bears the force; the values are those at the greatest depth that was solved",
+    "force not reached": "no depth bears the force; the values are those of the nearest contact that was solved",
     "began inside": "the first pose lies in the gel; the indenter was taken to come straight in along +y",
     "jumped": "the step is too long to follow; friction was forgotten, and the indenter taken to come in along +y",
 }
 # Farther, or turned by more, in one step a contact is another one, assumed: at 100 Hz that is 0.3 m/s and 2 turns a s.
 _LONGEST_STEP, _LARGEST_TURN = 3e-3, 0.13  # m, rad
-_LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less is lost in rounding
+_LEAST_FORCE = 1e-5  # N, the weight of 1 mg: less is lost in rounding
+_LARGEST_DROP = 1e3  # of the force, in one search: larger ones go by way of a force between (assumed)
 _SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the greatest depth, at which to stand where a force is not reached
+_ENDED: Any = object()  # stands for poses or forces that are used up
 _BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (assumed: 20 mm/s at 100 Hz)
 
 
@@ -100,10 +103,11 @@ class Gel:
     ) -> None:
         if sensor not in ("digit", "biotac"):
             raise TactileError("Gel, sensor", repr(sensor), "digit or biotac")
-        if not (np.isfinite(friction) and friction >= 0):
-            raise TactileError("Gel, friction", repr(friction), "a coefficient of zero or more")
-        self.sensor, self.friction, self.preset = sensor, float(friction), preset
-        self.indenter: Indenter = indenter if hasattr(indenter, "curvature") else MeshIndenter.from_trimesh(indenter)
+        if preset not in NAMES:
+            raise TactileError("Gel, preset", repr(preset), f"one of {', '.join(NAMES)}")
+        self.sensor, self.preset = sensor, preset
+        self.friction = _not_negative(friction, "Gel, friction", "a coefficient of zero or more")
+        self.indenter: Indenter = indenter if _presses(indenter) else MeshIndenter.from_trimesh(indenter)
         self.surface = sensors.sensor_surface(sensor)
         self._calibration = calibration
         self.reset()
@@ -122,8 +126,8 @@ class Gel:
         Raises TactileError for what is no pose or force; the contact before then stays. Whatever else happens is
         said in ``flags``.
         """
-        if force is not None and not (np.isfinite(force) and force >= 0):
-            raise TactileError("Gel, force", f"{force!r} N", "zero or more, and finite")
+        if force is not None:
+            force = _not_negative(force, "Gel, force", "newtons, zero or more, and finite")
         here = Pose(*rigid_pose(pose), PUSH)
         flags: list[str] = []
         jumps = self._press is not None and self._touches and self._too_far(here)
@@ -144,13 +148,19 @@ class Gel:
         return self._contact
 
     def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
-        """The contact at each of many poses, one after the other; forces : N, as in ``press``, one a pose."""
+        """The contact at each of many poses, one after the other; forces : N, as in ``press``, one a pose.
+
+        Raises TactileError as ``press`` does, and where poses or forces end before the others.
+        """
         if forces is None:
             for pose in poses:
                 yield self.press(pose)
-        else:
-            for pose, force in zip(poses, forces, strict=True):
-                yield self.press(pose, force)
+            return
+        for pose, force in itertools.zip_longest(poses, forces, fillvalue=_ENDED):
+            if pose is _ENDED or force is _ENDED:
+                found = f"{'poses' if pose is _ENDED else 'forces'} end before the others"
+                raise TactileError("Gel, follow", found, "a force for each pose, or None", "Give as many of both")
+            yield self.press(pose, force)
 
     @property
     def contact(self) -> GelContact:
@@ -253,11 +263,16 @@ class Gel:
     def _at_force(
         self, press: CorrectedPress, touch: Pose, force: float, limit: float, flags: list[str]
     ) -> FastContact:
-        """The contact at a force, or where it is not reached as deep as one is found."""
+        """The contact at a force, or where it is not reached the nearest to it that is found."""
+        bears, above = float(self._contact.force[1]), None
+        if bears > _LARGEST_DROP * force:
+            above = press.at_force(float(np.sqrt(bears * force)), touch)
         found = press.at_force(force, touch)
         if found is not None:
             return found
         flags.append("force not reached")
+        if above is not None:
+            return above
         for share in _SHALLOWER:
             try:
                 return self._at_depth(press, touch, share * limit)
@@ -284,6 +299,22 @@ class Gel:
         none = np.zeros_like(self.surface.rest)
         patch = np.zeros(len(none), bool)
         return GelContact(np.zeros(3), none, none.copy(), patch, 0.0, 0.0, 0.0, _matrix(pose))
+
+
+def _presses(indenter: Any) -> bool:
+    """Return true for one of ``geometry.indenters``; a class of them is none."""
+    return hasattr(indenter, "curvature") and not isinstance(indenter, type)
+
+
+def _not_negative(value: Any, where: str, expected: str) -> float:
+    """Return a number; raises TactileError for what is none, negative, or not finite."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not (np.isfinite(number) and number >= 0):
+        raise TactileError(where, repr(value), expected)
+    return number
 
 
 def _matrix(pose: Pose) -> np.ndarray:

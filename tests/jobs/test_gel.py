@@ -188,11 +188,47 @@ def test_what_is_no_pose_is_refused_and_the_loop_goes_on(pose, words):
     assert gel.press(gel.touching(-8e-3, 0.0, 0.04e-3)).flags == ()
 
 
-@pytest.mark.parametrize("force", [np.nan, -1.0, np.inf])
+@pytest.mark.parametrize("force", [np.nan, -1.0, np.inf, "much", np.ones(2)], ids=str)
 def test_what_is_no_force_is_refused(force):
     gel = Gel("digit", BALL)
     with pytest.raises(TactileError, match="force"):
         gel.press(gel.touching(-8e-3, 0.0), force=force)
+
+
+def test_poses_and_forces_of_other_numbers_are_refused_after_those_that_go_together():
+    gel = Gel("digit", BALL)
+    pose = gel.touching(-8e-3, 0.0)
+    for poses, forces, words in (([pose, pose], [0.1], "forces end"), ([pose], [0.1, None], "poses end")):
+        steps = gel.follow(poses, forces)
+        assert next(steps).flags == ()
+        with pytest.raises(TactileError, match=words):
+            next(steps)
+
+
+@pytest.mark.parametrize("sensor", ["digit", "biotac"])
+@pytest.mark.parametrize("friction", [0.78, 0.0])
+def test_drawn_out_in_one_step_the_contact_is_that_of_many(sensor, friction):
+    """Drawn out farther than nodes are followed, the indenter left a dented surface behind and touched nothing."""
+    gel = Gel(sensor, BALL, friction=friction)
+    start = gel.touching(-8e-3, 0.0)
+    deep, shallow = shifted(start, y=1.7e-3), shifted(start, y=0.3e-3)
+    at_once = list(gel.follow([deep, shallow]))[-1]
+    gel.reset()
+    slowly = list(gel.follow([deep, *(shifted(start, y=y) for y in np.arange(1.5e-3, 0.4e-3, -0.2e-3)), shallow]))[-1]
+    assert slowly.force[1] > 0.2
+    assert at_once.flags == slowly.flags == ()
+    np.testing.assert_allclose(at_once.displacement, slowly.displacement, atol=1e-6)  # m, what may pass through a node
+
+
+@pytest.mark.parametrize("sensor", ["digit", "biotac"])
+def test_a_force_that_falls_to_next_to_nothing_is_found(sensor):
+    gel = Gel(sensor, BALL)
+    pose = gel.touching(-8e-3, 0.0)
+    gel.press(pose, force=5.0)
+    faint = gel.press(pose, force=2e-5)  # N
+    assert faint.flags == () and faint.force[1] == pytest.approx(2e-5, rel=2e-3)
+    gel.press(pose, force=5.0)
+    assert not gel.press(pose, force=1e-6).patch.any()
 
 
 def test_flags_tell_what_is_wrong_and_the_loop_goes_on():
@@ -225,5 +261,10 @@ def test_meshes_and_sensors_that_cannot_be_are_refused():
         Gel("digit", trimesh.creation.icosphere(2, 3.0))  # in millimetres
     with pytest.raises(TactileError, match="digit or biotac"):
         Gel("gelsight", BALL)
-    with pytest.raises(TactileError, match="coefficient"):
-        Gel("digit", BALL, friction=-1.0)
+    for friction in (-1.0, "rough"):
+        with pytest.raises(TactileError, match="coefficient"):
+            Gel("digit", BALL, friction=friction)
+    with pytest.raises(TactileError, match="one of fast"):
+        Gel("digit", BALL, preset="best")
+    with pytest.raises(TactileError, match="trimesh"):
+        Gel("digit", Sphere)  # the class, not one of it

@@ -148,7 +148,8 @@ class ContactProblem:
         touched &= gap < _REACH
         take = (gap < _way_in(before, axial_force)) | touched
         if not take.any():
-            return self._nothing(pose, converged=axial_force is None)
+            lost = len(before.nodes) > 0 and self._overlaps_at_rest(pose)  # left behind, and yet not out of reach
+            return self._nothing(pose, converged=axial_force is None and not lost)
         active = touched[take] | (gap[take] < min(_LIKELY * gap.min(), 0))
         far = 0.1e-3 + float(np.linalg.norm(pose.apex - before.pose.apex))
         landed, inside = moved[take], gap[take] < -_CLOSED
@@ -158,6 +159,11 @@ class ContactProblem:
             self.near[take], landed, np.zeros_like(landed), active, before.core_nodes, np.zeros(len(active), int)
         )
         return self._rounds(pose, axial_force, before, moved, candidates)
+
+    def _overlaps_at_rest(self, pose: Pose) -> bool:
+        """Return true where an undeformed surface would touch the indenter."""
+        gap, _ = self._distance(pose, self.near, np.zeros((len(self.near), 3)))
+        return bool((gap < 0).any())
 
     def _distance(self, pose: Pose, nodes: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps (k,) m and normals (k, 3) of the indenter at nodes (k,) displaced by (k, 3) m."""
