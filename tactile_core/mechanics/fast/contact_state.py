@@ -49,6 +49,13 @@ class Contact:
             self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
         )
 
+    def at_depth(self, depth: float) -> Contact:
+        """The same contact, whose depth, m, is counted from elsewhere."""
+        moved = dataclasses.replace(self, depth=depth)
+        if "displacement" in vars(self):  # is known already, and does not depend on it
+            vars(moved)["displacement"] = self.displacement
+        return moved
+
     @property
     def deformed(self) -> np.ndarray:
         """Deformed positions (n, 3) m of the surface's nodes."""

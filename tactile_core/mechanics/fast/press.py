@@ -58,17 +58,22 @@ class CorrectedPress:
         self.last: Contact | None = None
         self._last_power = 1.0
 
-    def at_depth(self, depth: float, pose: Pose | None = None) -> FastContact:
+    def at_depth(self, depth: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact:
         """The contact at a depth, m, of the press's pose or of another one; it may not have converged.
 
+        touches : whether ``pose`` is known to be at first touch, which is looked for otherwise
         Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
         """
-        return self._guarded_if_needed(lambda: self._at_depth(depth, pose or self.pose))
+        there = pose or self.pose
+        fall = self._surface_drop(there, touches=touches)
+        return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
 
-    def at_force(self, force: float, pose: Pose | None = None) -> FastContact | None:
+    def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
         """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found."""
+        there = pose or self.pose
+        fall = self._surface_drop(there, touches=touches)
         try:
-            return self._guarded_if_needed(lambda: self._at_force(force, pose or self.pose))
+            return self._guarded_if_needed(lambda: self._at_force(force, there, fall))
         except UnsolvedError:
             return None
 
@@ -96,20 +101,20 @@ class CorrectedPress:
         rest = self.compliance.surface.rest[self.compliance.touchable[self.problem.nodes_near]]
         return sharpest(self.problem.indenter, self.pose, rest) >= BENDS
 
-    def _at_depth(self, depth: float, pose: Pose) -> FastContact:
+    def _at_depth(self, depth: float, pose: Pose, fall: float) -> FastContact:
         contact = self.problem.at_pose(pose.moved(depth), self.last)
         if contact.converged:
             self.last = contact
-        return self._with_correction(contact, self._surface_drop(pose))
+        return self._with_correction(contact, fall)
 
-    def _at_force(self, force: float, pose: Pose) -> FastContact | None:
+    def _at_force(self, force: float, pose: Pose, fall: float) -> FastContact | None:
         """A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
 
         None beyond the limit; raises UnsolvedError where none is found.
         """
         if isinstance(self.problem, EdgeContactProblem):
-            return self._by_depths(force, pose)
-        contact, fall = self.last or self._find_first_contact(pose), self._surface_drop(pose)
+            return self._by_depths(force, pose, fall)
+        contact = self.last or self._find_first_contact(pose)
         if contact is not None and not same_line(contact.pose, pose):
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, contact.axial_force)
         before: tuple[float, float] | None = None  # linear and corrected force, N
@@ -131,12 +136,11 @@ class CorrectedPress:
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, goal)
         raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
 
-    def _by_depths(self, force: float, pose: Pose) -> FastContact | None:
+    def _by_depths(self, force: float, pose: Pose, fall: float) -> FastContact | None:
         """The same among contacts at depths: where all points feel the turn of their normals those are found quicker.
 
         Raises PenetrationError and UnsolvedError.
         """
-        fall = self._surface_drop(pose)
 
         def move(depth: float, before: FastContact) -> FastContact:
             contact = self.problem.at_pose(pose.moved(depth + fall), before.linear)
@@ -173,13 +177,16 @@ class CorrectedPress:
             depth *= 1.5
         return None
 
-    def _surface_drop(self, pose: Pose) -> float:
+    def _surface_drop(self, pose: Pose, *, touches: bool) -> float:
+        """Additional distance, m, to first touch at a pose, against the press's own."""
+        if touches:
+            return float((pose.apex - self.pose.apex) @ pose.direction)
         return surface_drop(self.compliance.surface, self.problem.indenter, self.pose, pose)
 
     def _with_correction(self, contact: Contact, fall: float) -> FastContact:
-        made = correct(self.compliance, _from_touch(contact, fall))
         if contact.converged:
             self.problem.check_follows(contact)
+        made = correct(self.compliance, _from_touch(contact, fall))
         pressure = made.factor * contact.fluid_pressure
         force, axial = made.factor * contact.force, made.factor * contact.axial_force
         return FastContact(contact, made, force, axial, pressure, contact.depth - fall)
@@ -188,4 +195,4 @@ class CorrectedPress:
 def _from_touch(contact: Contact, fall: float) -> Contact:
     """A contact with its depth measured from first touch where the indenter has slid to, as the correction knows it."""
     depth = max(contact.depth - fall, _LEAST_DEPTH)
-    return contact if depth == contact.depth else dataclasses.replace(contact, depth=depth)
+    return contact if depth == contact.depth else contact.at_depth(depth)
