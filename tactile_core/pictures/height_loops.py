@@ -1,4 +1,4 @@
-"""A compiled loop of ``HeightMapper``."""
+"""Compiled loops of ``HeightMapper``."""
 
 from __future__ import annotations
 
@@ -32,3 +32,51 @@ def look_up(coefficients, row, t, column, s):  # noqa: ANN001, ANN201
                 total += u[i] * along
             found[n, k] = total
     return found
+
+
+@Loop
+def heights_above(  # noqa: ANN201
+    coefficients, x, z, to_x, to_z, miss, start, step, tolerance, most_steps,  # noqa: ANN001
+):  # fmt: skip
+    """Heights (n,) float32 m of the gel points that have moved to places x, z (n,) m, and how many were not found.
+
+    The search of ``HeightMapper._source`` place by place, and ``look_up`` of the height where it ends.
+    coefficients : (3, rows, columns), of the splines of sideways motion along x, along z and of the height
+    to_x, to_z, miss : (2, n), rows of the inverse Jacobian and by how much each place is missed at first
+    start, step : (2,) m, of the coefficients' grid
+    """
+    intervals = coefficients.shape[1] - 3, coefficients.shape[2] - 3
+    heights, lost = np.empty(len(x), np.float32), 0
+    u, v, found = np.empty(4), np.empty(4), np.empty(3, np.float32)
+    for n in range(len(x)):
+        source_x, source_z, miss_x, miss_z = x[n], z[n], miss[0, n], miss[1, n]
+        for number in range(most_steps + 1):
+            arrived = number == most_steps
+            if arrived:
+                lost += 1
+            else:
+                source_x -= to_x[0, n] * miss_x + to_x[1, n] * miss_z
+                source_z -= to_z[0, n] * miss_x + to_z[1, n] * miss_z
+                arrived = max(abs(miss_x), abs(miss_z)) <= tolerance
+            row_place = min(max((source_x - start[0]) / step[0], 0.0), float(intervals[0]))
+            column_place = min(max((source_z - start[1]) / step[1], 0.0), float(intervals[1]))
+            row, column = min(int(row_place), intervals[0] - 1), min(int(column_place), intervals[1] - 1)
+            for place, weights in ((row_place - row, u), (column_place - column, v)):
+                back = 1 - place
+                weights[0] = back * back * back / 6
+                weights[1] = 2 / 3 - place * place * (1 - place / 2)
+                weights[2] = 2 / 3 - back * back * (1 - back / 2)
+                weights[3] = place * place * place / 6
+            for k in range(2 if arrived else 0, 3 if arrived else 2):
+                total = 0.0
+                for i in range(4):
+                    along = 0.0
+                    for j in range(4):
+                        along += coefficients[k, row + i, column + j] * v[j]
+                    total += u[i] * along
+                found[k] = total
+            if arrived:
+                heights[n] = found[2]
+                break
+            miss_x, miss_z = source_x - x[n] + found[0], source_z - z[n] + found[1]
+    return heights, lost

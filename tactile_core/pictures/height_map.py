@@ -25,7 +25,7 @@ from ..geometry.lattice import Lattice
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import HEIGHT_ZERO_Y, Camera
-from .height_loops import look_up
+from .height_loops import heights_above, look_up
 
 _log = logging.getLogger(__name__)
 _folded: contextvars.ContextVar[list[int] | None] = contextvars.ContextVar("folded", default=None)
@@ -78,6 +78,7 @@ class HeightMapper:
         self._to_pixels = [
             _short(self._fine_along.matrix(camera.gel_x)), _short(self._fine_across.matrix(camera.gel_z)).T.copy()
         ]  # fmt: skip
+        self._fine_places = np.stack(np.meshgrid(*fine, indexing="ij")).reshape(2, -1)
         self._rest_y = rest[..., 1] - HEIGHT_ZERO_Y
         down, right = self._along.matrix(camera.gel_x), self._across.matrix(camera.gel_z)
         self.rest = (down @ self._rest_y @ right.T).astype(np.float32)
@@ -135,39 +136,53 @@ class HeightMapper:
             return down @ move[..., 1] @ right.T
         tables = np.stack([move[..., 0], move[..., 2], self._rest_y + move[..., 1]])
         coefficients = self._along.to_coefficients @ tables @ self._across.to_coefficients.T
-        x, z = self._source(tables[:2], coefficients[:2])
-        height = self._look_up(coefficients[2:], x, z)[:, 0].reshape(len(down), len(right))
-        return height - down @ self._rest_y @ right.T
+        height, lost = self._moved_heights(tables[:2], coefficients)
+        if lost:
+            _say_folded(lost, len(height))
+        return height.reshape(len(down), len(right)) - down @ self._rest_y @ right.T
 
-    def _source(self, move: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rest places (n,) x, z m of the gel points that have moved to the nodes of the refined grid.
+    def _moved_heights(self, move: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, int]:
+        """Heights (n,) m of the gel points that have moved to the nodes of the refined grid, and how many of these
+        were not found.
 
-        Newton's method for X + u(X) = x from X = x, with the Jacobian kept: u changes little over a displacement.
-        move : (2, rows, columns) sideways displacement x, z at the window's nodes; coefficients : of its splines
+        move : (2, rows, columns) sideways displacement x, z at the window's nodes
+        coefficients : (3, rows + 2, columns + 2), of its splines and the height's
         """
         (down, right), (down_slope, right_slope) = self._to_fine
         to_x, to_z = _inverse(down_slope @ move @ right.T, down @ move @ right_slope.T)
-        x, z = np.meshgrid(self._fine_along.nodes, self._fine_across.nodes, indexing="ij")
-        x, z = x.ravel(), z.ravel()
-        source_x, source_z = x.copy(), z.copy()
         miss = (down @ move @ right.T).reshape(2, -1)
+        if not available():
+            x, z, lost = self._source(coefficients[:2], to_x, to_z, miss)
+            return self._look_up(coefficients[2:], x, z)[:, 0], lost
+        axes = self._along, self._across
+        return heights_above(
+            coefficients, *self._fine_places, to_x, to_z, miss, np.array([axis.start for axis in axes]),
+            np.array([axis.step for axis in axes]), MOVE_TOLERANCE, MOVE_ITERATIONS,
+        )  # fmt: skip
+
+    def _source(
+        self, coefficients: np.ndarray, to_x: np.ndarray, to_z: np.ndarray, miss: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, int]:
+        """Rest places (n,) x, z m of the gel points that have moved to the nodes of the refined grid, and how many of
+        these were not found.
+
+        Newton's method for X + u(X) = x from X = x, with the Jacobian kept: u changes little over a displacement.
+        coefficients : (2, rows + 2, columns + 2), of the splines of u; to_x, to_z : (2, n), rows of the Jacobian's
+        inverse; miss : (2, n) m, u at the start
+        """
+        x, z = self._fine_places
+        source_x, source_z = x.copy(), z.copy()
         active = np.arange(len(x))
         for _ in range(MOVE_ITERATIONS):
             source_x[active] -= (to_x[:, active] * miss).sum(0)
             source_z[active] -= (to_z[:, active] * miss).sum(0)
             active = active[np.abs(miss).max(0) > MOVE_TOLERANCE]
             if not len(active):
-                return source_x, source_z
+                break
             at_x, at_z = source_x[active], source_z[active]
             moved = self._look_up(coefficients, at_x, at_z).T
             miss = np.stack([at_x - x[active], at_z - z[active]]) + moved
-        folded = _folded.get()
-        if folded is None:
-            found = len(active), len(x)
-            _log.warning("gel surface folds over itself at %d of %d places: height there is a guess", *found)
-        else:
-            folded.append(len(active))
-        return source_x, source_z
+        return source_x, source_z, len(active)
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Splines with coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, good to 0.1 nm a mm."""
@@ -180,6 +195,15 @@ class HeightMapper:
         patches = patches.take(row * windows.shape[1] + column, axis=0)
         weights = (weights_x[:, None] * weights_z).reshape(16, -1).T
         return np.einsum("nkp,np->nk", patches, weights)
+
+
+def _say_folded(count: int, places: int) -> None:
+    """Count, or log, a map that folds over itself at ``count`` of its places."""
+    folded = _folded.get()
+    if folded is None:
+        _log.warning("gel surface folds over itself at %d of %d places: height there is a guess", count, places)
+    else:
+        folded.append(count)
 
 
 def _short(matrix: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from ..errors import TactileError
 from ..files.compiled import available
 from ..sensors.camera import Camera
 from .lamp_loops import interpolate
+from .perspective_loops import seen_heights, slope_maps, weigh_slopes
 
 SETTLING_STEPS = 3  # of the view of the resting gel; each makes the error 1,000 times smaller over a dome
 HIGHEST_GEL = 0.9  # share of the camera's height
@@ -50,9 +51,14 @@ class Perspective:
         if height.max() >= HIGHEST_GEL * self.camera.apparent_height:
             found = f"{height.max() * 1e3:.1f} mm high"
             raise TactileError("height map", found, f"below the camera at {self.camera.apparent_height * 1e3:.1f} mm")
-        steepness = self._steepness(height)
-        if float(steepness.min()) < STEEPEST - 1:
+        steepness, least = self._steepness(height)
+        if least < STEEPEST - 1:
             return self._from_above(height)
+        if available():
+            return seen_heights(
+                height, steepness, self._start, self._start_near, self._start_nearest, self._rows[:, 0],
+                self._columns[0], self._inverse,
+            )  # fmt: skip
         # Newton's method: the tangent plane at q near is h = at + turn (seen - h). One step on the nearest pixels of
         # the map, one between them.
         turn = steepness.take(self._start_nearest)
@@ -64,13 +70,17 @@ class Perspective:
         turn /= near
         return (bilinear(height, row, column) + turn * seen) / (1 + turn)
 
-    def _steepness(self, height: np.ndarray) -> np.ndarray:
-        """Slope along the position p from the picture's middle, times |p| / apparent height, (H, W)."""
+    def _steepness(self, height: np.ndarray) -> tuple[np.ndarray, float]:
+        """Slope along the position p from the picture's middle, times |p| / apparent height, (H, W), and its least."""
         slope_right, slope_down = slopes(height, self.camera)
-        slope_right *= self.right * self._inverse
-        slope_down *= self.down * self._inverse
+        right, down = self.right * self._inverse, self.down * self._inverse
+        if available():
+            least = weigh_slopes(slope_right, slope_down, right[0], down[:, 0])
+            return slope_right, float(least)
+        slope_right *= right
+        slope_down *= down
         slope_right += slope_down
-        return slope_right
+        return slope_right, float(slope_right.min())
 
     def _places(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Fractional rows and columns of the map at the pixels' positions times near, within the map."""
@@ -113,6 +123,8 @@ def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
 def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Slopes of heights (H, W) m along the picture's right and down, second order, at its edges too."""
     right, down = camera.pixel_size
+    if available() and height.dtype == np.float32:
+        return slope_maps(np.ascontiguousarray(height), np.float32(0.5 / right), np.float32(0.5 / down))
     return _differences(height.T, right).T, _differences(height, down)
 
 

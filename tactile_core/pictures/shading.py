@@ -19,6 +19,7 @@ from .coating_spread import CoatingSpread
 from .height_map import of_unit, rest_height_map
 from .lamp_loops import lamp_light
 from .perspective import Perspective, slopes
+from .perspective_loops import seen_surface
 
 # A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
 # differences that slopes are made of.
@@ -102,6 +103,11 @@ class SeenSurface:
         inverse = np.float32(1 / camera.apparent_height)
         self.height = seen
         self.slope_right, self.slope_down = slopes(seen, camera)
+        if available():
+            self.near, self.tilt, self.own, self.normal, self.square, self.mapped = seen_surface(
+                seen, self.slope_right, self.slope_down, view.right[0], view.down[:, 0], inverse
+            )
+            return
         self.near = 1 - seen * inverse
         outward = view.right * self.slope_right
         outward += view.down * self.slope_down  # q . dh/dq

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tactile_core import sensors
-from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.height_map import digit_mapper, folds_counted
 from tactile_core.pictures.renderer import Renderer
 
 
@@ -29,3 +29,17 @@ def test_heights_and_pictures_are_numpys(compiled_loops):
     for height, picture in zip(*found[False], strict=True):
         np.testing.assert_array_equal(renderer(height), picture)  # light, shadows and levels, to the bit
     assert np.ptp(found[True][1][0].astype(int) - found[True][1][1]) > 20  # grey levels: something is seen
+
+
+def test_a_gel_that_folds_over_itself_is_counted_as_numpy_counts_it(compiled_loops):
+    rest, folding = sensors.digit_surface().rest, np.zeros((1, *sensors.digit_surface().rest.shape))
+    folding[0, :, 0] = 1e-3 * np.sin(
+        rest[:, 0] / 0.4e-3
+    )  # m, pushed along the finger farther than its places lie apart
+    found = {}
+    for on in (False, True):
+        compiled_loops(on)
+        with folds_counted() as folds:
+            found[on] = digit_mapper()(folding), folds
+    assert found[True][1] == found[False][1] and found[True][1][0] > 100
+    assert np.isfinite(found[True][0]).all()
