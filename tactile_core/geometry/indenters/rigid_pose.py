@@ -11,6 +11,7 @@ from ...errors import TactileError
 
 # Single precision and a quaternion of four decimals stay below this; what is farther off is scaled or sheared.
 _RIGID = 1e-3
+_LAST_ROW, _ROUNDING = np.array([0.0, 0.0, 0.0, 1.0]), 1e-6  # of single precision
 _FARTHEST = 1.0  # m from the sensor's origin; farther off a pose is in millimetres or in another frame (assumed)
 
 
@@ -25,7 +26,7 @@ def rigid_pose(pose: Any) -> tuple[np.ndarray, np.ndarray]:
         axes = _from_quaternion(turn)
     else:
         matrix = _array(pose, (4, 4), "matrix")
-        if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
+        if np.abs(matrix[3] - _LAST_ROW).max() > _ROUNDING:
             raise TactileError("pose, last row", f"{matrix[3].tolist()}", "0, 0, 0, 1", "Transpose the matrix")
         origin, axes = matrix[:3, 3].copy(), _orthonormal(matrix[:3, :3])
     if np.abs(origin).max() > _FARTHEST:

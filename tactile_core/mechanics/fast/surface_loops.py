@@ -81,33 +81,3 @@ def add_field(displacement, plane, frames, centre, radius, reach, lines, field, 
             for i in range(3):
                 moved[node, i] += scale * frames[i, j, node] * local
     return moved
-
-
-@Loop
-def patch_shape(places, frames, force, direction):  # noqa: ANN001, ANN201
-    """Moments of the loads on a contact's nodes (k,).
-
-    Returns the total load N, centre (2,) m, mean square distance m2 from it, spread (3,) m2 (xx, zz, xz), mean
-    force (3,) N and direction (3,) in the nodes' frames, sum of squared shares, largest share.
-    """
-    k, total = len(force), 0.0
-    load = np.empty(k)
-    for a in range(k):
-        load[a] = np.sqrt(force[a, 0] ** 2 + force[a, 1] ** 2 + force[a, 2] ** 2)
-        total += load[a]
-    centre, spread, local, towards, even, most = np.zeros(2), np.zeros(3), np.zeros(3), np.zeros(3), 0.0, 0.0
-    for a in range(k):
-        share = load[a] / total
-        even, most = even + share**2, max(most, share)
-        centre[0] += share * places[a, 0]
-        centre[1] += share * places[a, 1]
-        for i in range(3):
-            for j in range(3):
-                local[i] += frames[a, j, i] * force[a, j]
-                towards[i] += share * frames[a, j, i] * direction[j]
-    for a in range(k):
-        share, x, z = load[a] / total, places[a, 0] - centre[0], places[a, 1] - centre[1]
-        spread[0] += share * x * x
-        spread[1] += share * z * z
-        spread[2] += share * x * z
-    return total, centre, spread[0] + spread[1], spread, local, towards, even, most
