@@ -44,7 +44,7 @@ LOG = "tactile-install.log"
 SIZES_MB = {
     "": "50",
     "plain": "430",
-    "dev": "530",
+    "dev": "590",
     "check": "40",
     "docs": "30",
     "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)",

@@ -65,6 +65,7 @@ points = [
 ELSEWHERE = {
     "tactile simulate scenes/press_roll_slide --grid": ("tests/jobs/engine/test_batch_kinds.py", "--grid"),
     "tactile watch --rosbag-play": ("tests/jobs/live/test_live.py", "--rosbag-play"),
+    "tactile watch touch.csv --serve": ("tests/jobs/live/test_frame_server.py", "--serve"),
     "tactile render frames.h5": ("tests/jobs/engine/test_batch_kinds.py", "--workers"),
     "python3 scripts/dev.py demo": (".ci/run", "dev.py demo"),
     "python3 scripts/dev.py test-blender": (".ci/run", "dev.py test-blender"),

@@ -54,6 +54,8 @@ LIBRARIES = (
     Library("rosbags", "rosbags", "ros", "ROS bags and MCAP"),
     Library("distributed", "distributed", "batch", "batches on many machines (tactile batch --cluster)"),
     Library("pyarrow", "pyarrow", "batch", "LeRobot data sets (tactile export)"),
+    Library("zmq", "pyzmq", "live", "frames for other programs (tactile watch --serve)"),
+    Library("cv2", "opencv-python-headless", "camera", "a real DIGIT's camera (tactile watch --camera)"),
     Library("torch", "torch", "train", "training (tactile train)"),
 )
 
@@ -67,7 +69,7 @@ def report() -> Iterator[str]:
     for library, (version, trouble) in zip(LIBRARIES, tried, strict=True):
         found[library.module] = not trouble
         state = "missing" if trouble.startswith("missing") else "broken" if trouble else version or "works"
-        yield f"  {library.package:<11} {state:<12} {library.use}" + (f": {trouble}" if trouble else "")
+        yield f"  {library.package:<22} {state:<12} {library.use}" + (f": {trouble}" if trouble else "")
     yield from _mitsuba(found["mitsuba"])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import time
 from collections.abc import Callable, Iterator
@@ -16,22 +17,28 @@ from .common import NOTHING, columns_argument, columns_of, polarity_argument
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...jobs.live import DigitCamera, Shown, View
     from ...recordings import Recording
     from ...recordings.column_map import ColumnMap
     from ...recordings.electrode_gains import ElectrodeGains
 
+    Rows = Iterator[tuple[Recording | None, float]]  # new rows and when they came; None now and then without any
+    Output = Callable[[Shown, dict[str, np.ndarray]], bool]  # takes a frame and its pictures; false: it has ended
+
 BRIEF = "live view of a recording that is being written"
 TEXT = """\
 Follow a CSV recording while another program writes it, and show the newest frame's DIGIT picture: in a window, or in
-a PNG file that is replaced with each picture. With --play or --rosbag-play a finished recording is played at its own
-pace, or --speed times as fast. Rest is taken from the first quiet part: begin without contact, or name frames by
---tare, or a unit whose rest is known by --sensor. The time from frame to picture, and how much of it was
-computing, is printed each second and at the end."""
+a PNG file that is replaced with each picture. --serve publishes the frames for other programs of this machine
+(docs/read_frames.py reads them), and --camera shows the camera of a real DIGIT beside the simulated picture.
+With --play or --rosbag-play a finished recording is played at its own pace, or --speed times as fast. Rest is taken
+from the first quiet part: begin without contact, or name frames by --tare, or a unit whose rest is known by --sensor.
+The time from frame to picture, and how much of it was computing, is printed each second and at the end."""
 EPILOG = """\
 examples:
   tactile watch touch.csv
   tactile watch touch.csv --out now.png --idle 10
   tactile watch touch.csv --play --tare 0:50 --sensor sensor.toml
+  tactile watch touch.csv --serve 7311 --camera 0
   tactile watch --rosbag-play touch.bag --speed 2"""
 LEAVES = NOTHING
 POLL = 0.002  # s between two looks at the file
@@ -51,6 +58,17 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         help="of playing: times the recording's own pace; 0: every frame, as fast as pictures come (default: 1)",
     )
     verb.add_argument("--out", metavar="FILE", help="write each picture to this PNG file instead of a window")
+    verb.add_argument(
+        "--serve",
+        type=int,
+        metavar="PORT",
+        help="publish each frame at this port of this machine alone, by ZeroMQ (0: any free port), instead of a window",
+    )
+    verb.add_argument(
+        "--camera",
+        metavar="N|FILE",
+        help="show a real DIGIT's camera, by number (0: /dev/video0) or from a video file, beside the simulated one",
+    )
     verb.add_argument("--idle", type=float, metavar="S", help="end when no frame came for S seconds (default: never)")
     verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the recording (default: 100)")
     polarity_argument(verb)
@@ -87,13 +105,29 @@ def run(options: argparse.Namespace) -> int:
     source = _played(path, speed, columns) if playing else _followed(options, columns)
     tare = None if options.tare == "auto" else options.tare
     view = live.View(load_tools(options.weights), options.rate, options.polarity, tare, _unit(options.sensor, path))
-    draw = _window(path) if options.out is None else _file(options.out)
-    reported, failed = time.perf_counter(), False
+    with contextlib.ExitStack() as opened:
+        camera = None
+        if options.camera is not None:
+            camera = opened.enter_context(contextlib.closing(live.DigitCamera(options.camera)))
+        _follow(source, view, camera, _outputs(options, path, opened))
+    return 0
+
+
+def _follow(source: Rows, view: View, camera: DigitCamera | None, outputs: list[Output]) -> None:
+    """Show, and report, until the rows end or an output does."""
+    reported, failed, lost = time.perf_counter(), False, False
     try:
         for rows, came in source:
             shown = None if rows is None else view.show(rows, came)
-            if shown is not None and not draw(shown.picture):
-                break
+            if shown is not None:
+                seen = {"picture": shown.picture}
+                if camera is not None:
+                    seen["camera"] = camera.picture(shown.picture.shape)
+                if not all(output(shown, seen) for output in outputs):
+                    break
+            if camera is not None and camera.lost and not lost:
+                lost = True
+                say("the camera gives no more pictures; watching goes on without it")
             if time.perf_counter() - reported >= TOLD:
                 reported = time.perf_counter()
                 say(view.describe_latency() + (f"; force {shown.force:.2f} N" if shown else ""))
@@ -105,13 +139,14 @@ def run(options: argparse.Namespace) -> int:
             say(f"rest from {view.rest_found}" if view.rest_found else "rest was not found")
             say(f"counts that {view.polarity.name[:-1]}: {view.polarity.evidence}")
             tell(f"{view.frames} frames: {view.describe_latency()}")
-    return 0
 
 
 def _check(options: argparse.Namespace) -> None:
     """Raise TactileError for words that do not go together."""
     if (options.recording is None) == (options.rosbag_play is None):
         raise TactileError("tactile watch", "no recording, or two", "PATH or --rosbag-play FILE")
+    if options.serve is not None and not 0 <= options.serve < 2**16:
+        raise TactileError("--serve, port", f"{options.serve}", "0 to 65535")
     if options.speed is not None:
         if not (options.play or options.rosbag_play):
             raise TactileError("--speed", f"{options.speed:g}", "--play or --rosbag-play beside it")
@@ -134,7 +169,7 @@ def _unit(sensor: str | None, path: str) -> ElectrodeGains | None:
     return electrode_gains.read(sensor).gains_for(path, split(path)[1], sensor)
 
 
-def _followed(options: argparse.Namespace, columns: ColumnMap | None) -> Iterator[tuple[Recording | None, float]]:
+def _followed(options: argparse.Namespace, columns: ColumnMap | None) -> Rows:
     """New rows of a growing file and when they came; None now and then while there are none."""
     from ...jobs.live import Growing
 
@@ -152,7 +187,7 @@ def _followed(options: argparse.Namespace, columns: ColumnMap | None) -> Iterato
         yield rows, came
 
 
-def _played(path: str, speed: float, columns: ColumnMap | None) -> Iterator[tuple[Recording | None, float]]:
+def _played(path: str, speed: float, columns: ColumnMap | None) -> Rows:
     """The rows of a finished recording when their time has come, a part of it in memory; speed 0: one after another."""
     from ...recordings.chunks import read_parts
 
@@ -177,6 +212,32 @@ def _played(path: str, speed: float, columns: ColumnMap | None) -> Iterator[tupl
 def _due(recording: Recording, passed: float) -> int:
     """Frames whose time is within `passed` s of the first."""
     return int(recording.time.searchsorted(passed, side="right"))
+
+
+def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStack) -> list[Output]:
+    """Where frames go: the file, the port, or without either a window. ``opened`` closes the port."""
+    outputs: list[Output] = []
+    if options.serve is not None:
+        from ...jobs.live import FrameServer
+
+        server = opened.enter_context(contextlib.closing(FrameServer(options.serve)))
+        say(f"serving frames at {server.address}, to programs of this machine alone")
+
+        def publish(shown: Shown, seen: dict[str, np.ndarray]) -> bool:
+            server.send(shown, seen)
+            return True
+
+        outputs.append(publish)
+    if options.out is not None:
+        outputs.append(_drawn(_file(options.out)))
+    return outputs or [_drawn(_window(path))]
+
+
+def _drawn(draw: Callable[[np.ndarray], bool]) -> Output:
+    """Draws a frame's pictures, one beside the other."""
+    import numpy as np
+
+    return lambda shown, seen: draw(np.concatenate(list(seen.values()), axis=1))
 
 
 def _file(path: str) -> Callable[[np.ndarray], bool]:

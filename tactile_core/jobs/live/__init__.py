@@ -1,7 +1,9 @@
 """A recording while it is made: its newest frame as a picture, as soon as it is there."""
 
+from .digit_camera import DigitCamera
+from .frame_server import FrameServer
 from .growing_file import Growing
 from .live_signals import LiveSignals
 from .live_view import Shown, View
 
-__all__ = ["Growing", "LiveSignals", "Shown", "View"]
+__all__ = ["DigitCamera", "FrameServer", "Growing", "LiveSignals", "Shown", "View"]

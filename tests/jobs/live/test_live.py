@@ -212,6 +212,7 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
         (["a.csv", "--speed", "2"], "--play or --rosbag-play beside it"),
         (["a.csv", "--play", "--speed", "-1"], "0 to 1000"),
         (["a.csv", "--play", "--speed", "nan"], "0 to 1000"),
+        (["a.csv", "--serve", "70000"], "0 to 65535"),
         (["--rosbag-play", "none.bag"], "there is no such file"),
         (["--rosbag-play", __file__], "no bag"),
     ],
