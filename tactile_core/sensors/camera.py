@@ -13,10 +13,10 @@ import math
 import numpy as np
 
 from ..errors import TactileError
+from .descriptor import Gel, of_kind
 
-# Plane of height zero, shared frame: the lowest point of the public gel mesh at rest (docs/sources.md, Frame). Heights
-# grow with y, toward the camera, so that an indentation raises them.
-HEIGHT_ZERO_Y = -8.301e-3
+# Plane of height zero, shared frame. Heights grow with y, toward the camera, so that an indentation raises them.
+HEIGHT_ZERO_Y = of_kind("digit", Gel).camera.height_zero_y
 MOST_PIXELS = 10_000_000  # 2.5 GB for a fast picture; the camera has 76,800 (assumed enough)
 FINEST = 1000.0  # pixels a millimetre; the shipped unit's camera has 20 (assumed enough)
 LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a camera that is higher

@@ -1,15 +1,55 @@
-"""The two profile tables that ship with the package: shapes of the public sensor meshes, sampled."""
+"""Read the profile tables of sensors' descriptors: shapes of resting surfaces, sampled."""
 
 from __future__ import annotations
 
+import io
+from pathlib import Path
+
 import numpy as np
 
-from ..files.shipped import shipped
+from ..errors import TactileError
+from ..files.text_file import read_small
+
+_RADII = "x_mm,theta_deg,r_outer_mm,r_inner_mm,r_core_mm"
+_HEIGHTS = "x_mm,z_mm,top_height_mm,bottom_height_mm"
+_AROUND = 72  # angles of a station, every 5 degrees
 
 
-def load_profile(name: str) -> np.ndarray:
-    """Read rows of ``data/<name>`` as floats, millimetres and degrees as the table's header says, nan where a ray
-    missed.
+def read_radii(path: Path) -> np.ndarray:
+    """Read a skin's stations (n, 72, 5): x, angle and radii of outer skin, inner skin and core, mm and degrees.
+
+    Radii are nan where a ray missed. Raises TactileError for a table whose stations do not go round the axis in even
+    steps, or whose outer skin is missing where it goes round elsewhere: an open profile.
     """
-    with shipped(name).open("r", encoding="ascii") as lines:
-        return np.loadtxt(lines, delimiter=",", skiprows=1)
+    rows = _table(path, _RADII)
+    angles = -180 + 360 / _AROUND * np.arange(_AROUND)
+    if len(rows) % _AROUND or not (rows[:, 1].reshape(-1, _AROUND) == angles).all():
+        raise TactileError(path, "stations that do not close round the axis", "each from -180 to 175 degrees, every 5")
+    stations = rows.reshape(-1, _AROUND, 5)
+    there = np.isfinite(stations[..., 2])
+    whole = np.flatnonzero(there.all(axis=1))
+    if len(whole) < 2:
+        raise TactileError(path, "an open profile: no two stations with the outer skin all round", "a closed skin")
+    between = slice(whole[0], whole[-1] + 1)
+    if not there[between].all():
+        station, column = (int(each[0]) for each in np.nonzero(~there[between]))
+        where = f"{path}, x_mm {stations[whole[0] + station, 0, 0]:g}, theta_deg {angles[column]:g}"
+        raise TactileError(
+            where, "an open profile: no outer radius", "a closed skin between its first and last whole station"
+        )
+    return stations
+
+
+def read_heights(path: Path) -> np.ndarray:
+    """Read a gel's heights (n, 4): x, z, top and bottom, mm; nan off the gel."""
+    return _table(path, _HEIGHTS)
+
+
+def _table(path: Path, header: str) -> np.ndarray:
+    first, _, rest = read_small(path).partition("\n")
+    if first.strip() != header:
+        raise TactileError(f"{path}, row 1", first, header)
+    try:
+        return np.loadtxt(io.StringIO(rest), delimiter=",", ndmin=2)
+    except ValueError as error:
+        raise TactileError(path, str(error), f"numbers under {header}") from error

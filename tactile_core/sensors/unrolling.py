@@ -10,9 +10,8 @@ from ..geometry.catmull_rom import on_grid
 from ..geometry.lattice import Lattice
 from . import biotac
 
-PAD_RADIUS = 7.065e-3  # m, cross-section of the pad about biotac.AXIS_Y, rms 4 um (docs/sources.md, BioTac skin)
+PAD_RADIUS, ROLL_ORIGIN_X = biotac.DESCRIPTOR.unrolling.radius, biotac.DESCRIPTOR.unrolling.origin_x
 _STENCIL = 1e-3 * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])  # of (row, column), for differences
-ROLL_ORIGIN_X = -8.0e-3  # m, the place in the middle of the pad where both share x (docs/sources.md, Two sensors)
 
 
 def node_normals(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -24,20 +24,8 @@ from ..solids.hex_mesh import skin_mesh
 from .gap_law import FILM_FLOOR
 from .thin_sheet import ThinSheet, resistances
 
-# Both fitted to the impedances at rest of two real units (``benchmarks.translation.rest_impedance``, soft objects'
-# trials 01 to 03): 0.74 and 0.64 S/m, 530 and 610 ohm. A dilute salt solution, and what metal and salt water resist
-# each other, in series with every electrode; it takes part in no contact.
-CONDUCTIVITY = 0.69  # S/m
-INTERFACE = 570.0  # ohm
-# m: assumed (docs/sources.md, BioTac electrodes). With 0.3 mm the unit not fitted is missed by 21 %, with this by 20 %.
-ELECTRODE_RADIUS = 0.6e-3
-
-# Excitation electrodes X1..X4, mm, SynTouch's frame as in ``sensors``. From the drawing in the visualiser of Shadow
-# Robot and SynTouch (sr_gui_biotac, biotac.py, "physical electrode locations on the sensor", 2013), where the sensing
-# electrodes stand at 8.58 mm - x along the finger and, across, at 0.942 times their arc from the pad's lowest line.
-_EXCITATION_SYNTOUCH_MM = np.array(
-    [[-3.9, -4.956, -1.116], [-15.9, -3.588, -3.595], [-15.9, 3.588, -3.595], [-3.9, 4.956, -1.116]]
-)
+_FILM, ELECTRODE_RADIUS = biotac.DESCRIPTOR.fluid, biotac.DESCRIPTOR.electrodes.radius
+CONDUCTIVITY, INTERFACE = _FILM.conductivity, _FILM.interface
 _FINE = 2  # times the triangles are halved to find what the grid leaves unresolved near an electrode: 0.12 mm
 
 
@@ -81,12 +69,6 @@ def growth(resistance: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
     return (resistance + INTERFACE) / (at_rest + INTERFACE)
 
 
-def excitation_electrodes() -> np.ndarray:
-    """Positions (4, 3) m of the excitation electrodes X1..X4 in the shared frame, read from a drawing (see above)."""
-    x, y, z = _EXCITATION_SYNTOUCH_MM.T
-    return np.column_stack([-x - 13.97, z, y]) * 1e-3
-
-
 @functools.cache
 def biotac_sheet(*, core_of_mesh: bool = False) -> BiotacSheet:
     """The sheet of the resting BioTac; a solve takes 10 ms.
@@ -100,7 +82,7 @@ def biotac_sheet(*, core_of_mesh: bool = False) -> BiotacSheet:
     free = ~skin_mesh().clamped[skin_mesh().inner]
     faces = _mirrored_faces(inner)
     faces = faces[free[faces].all(1)]
-    positions = np.concatenate([sensors.electrodes(), excitation_electrodes()])
+    positions = np.concatenate([sensors.electrodes(), sensors.excitation_electrodes()])
     face, weights, feet = closest_on_triangles(Lattice(inner.rest.copy(), faces, inner.shape), positions)
     corners = faces[face]
     if not core_of_mesh:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from ... import sensors
+from ...sensors import biotac
 from ..fast.sensing_points import electrode_feet
 
-FILM_FLOOR = 20e-6  # m, thinnest film the law knows (docs/sources.md, BioTac electrodes)
+FILM_FLOOR = biotac.DESCRIPTOR.fluid.thinnest  # m, thinnest film the law knows
 # counts m: assumed. No gap law is published (docs/sources.md); this one puts the 95th percentile of the largest change
 # a press makes near 150 counts, as of the networks' prototype. One constant for all electrodes: against the thin
 # sheet it leaves 9 counts rms of 20 over 240 contacts, a constant for each electrode 7 (``electrode_law``).

@@ -119,7 +119,7 @@ def graded_skin(footprint: Footprint) -> GradedMesh:
 
 
 # Lines of the skin's grid that a mesh must keep: where the glued part begins and ends, and where the lines' spacing
-# changes (``biotac.angles``, TIP_ROWS, TRUNK_ROWS).
+# changes (``biotac.angles``, ``tip_rows``, ``trunk_rows``).
 _SKIN_ROW_MARKS = (10, 18, 45, 52)
 _SKIN_COLUMN_MARKS = (9, 12, 52, 55)
 

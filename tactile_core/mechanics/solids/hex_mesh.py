@@ -120,12 +120,9 @@ def glued_skin() -> np.ndarray:
     return _on_core(inner.reshape(-1, 3)).reshape(inner.shape[:2])
 
 
-_ATTACHED = 0.02e-3  # m, nodes this close to the core are glued to it: 532 nodes of the public mesh
-_BASE_CAP_X = 4.9e-3  # m, the inner base cap rests on the core (public mesh: 0.024 mm inside it)
-
-
 def _on_core(inner: np.ndarray) -> np.ndarray:
+    held = biotac.DESCRIPTOR.core
     x, y, z = inner.T
     radius = np.hypot(y - biotac.AXIS_Y, z)
     core = biotac.core_radius(x, np.arctan2(z, biotac.AXIS_Y - y))
-    return (np.nan_to_num(core, nan=-1.0) >= radius - _ATTACHED) | (x > _BASE_CAP_X)
+    return (np.nan_to_num(core, nan=-1.0) >= radius - held.attached) | (x > held.base_cap_x)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, excitation_electrodes, growth
+from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, growth
 from tactile_core.mechanics.electrodes.gap_law import FILM_FLOOR
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.sensors import biotac
@@ -79,7 +79,7 @@ def test_a_skin_on_its_core_leaves_the_floor():
 
 
 def test_excitation_stands_on_both_sides_of_the_core():
-    places = excitation_electrodes()
+    places = sensors.excitation_electrodes()
     np.testing.assert_allclose(places[:2] * [1, 1, -1], places[[3, 2]])
     apart = np.linalg.norm(places[:, None] - sensors.electrodes(), axis=2)
     assert apart.min() > 1.2e-3  # two electrodes of 0.6 mm radius: none overlap

@@ -6,27 +6,24 @@ import functools
 
 import numpy as np
 
-from ..geometry.catmull_rom import catmull_rom
-from ..geometry.lattice import Lattice, cap_faces, grid_faces
-from .profiles import load_profile
+from ...errors import TactileError
+from ...geometry.catmull_rom import catmull_rom
+from ...geometry.lattice import Lattice, cap_faces, grid_faces
+from ..descriptor import Fluid, of_kind
+from ..profiles import read_radii
 
-AXIS_Y = -1.237e-3  # the table's axis: (y, z) = (AXIS_Y, 0), also the pad's centre of curvature (docs/sources.md)
-TIP_X, BASE_X = -14.0e-3, 1.2e-3  # between them outer and inner skin are cylinders, paired at the same x
-
-# Where the meridians meet the axis, tip and base, and the rounding of the cap (public mesh).
-_POLES = {"outer": (-21.30e-3, 6.65e-3), "inner": (-19.725e-3, 5.08e-3)}
-
-TIP_ROWS, TRUNK_ROWS, BASE_ROWS = 18, 28, 12  # node intervals along a meridian, poles included
-PAD_ANGLE = np.pi / 2
-SKIN_THICKNESS = 1.58e-3  # uniform (docs/sources.md, BioTac skin)
-PAD_INTERVALS, BACK_INTERVALS = 40, 24  # round the axis: 4.5 degrees (0.56 mm) on the pad, 7.5 on the back
+DESCRIPTOR = of_kind("biotac", Fluid)
+_SKIN, _LATTICE = DESCRIPTOR.skin, DESCRIPTOR.lattice
+AXIS_Y = _SKIN.axis_y
+PAD_ANGLE, SKIN_THICKNESS = _SKIN.pad_half_angle, _SKIN.thickness
+_POLES = {"outer": _SKIN.outer_poles, "inner": _SKIN.inner_poles}
 
 
 @functools.cache
 def angles() -> np.ndarray:
     """Angles (columns,) rad about the axis, 0 at the pad's lowest line, growing toward +z, from -pi up."""
-    pad = np.linspace(-PAD_ANGLE, PAD_ANGLE, PAD_INTERVALS + 1)
-    back = np.linspace(PAD_ANGLE, 2 * np.pi - PAD_ANGLE, BACK_INTERVALS + 1)[1:-1]
+    pad = np.linspace(-PAD_ANGLE, PAD_ANGLE, _LATTICE.pad_intervals + 1)
+    back = np.linspace(PAD_ANGLE, 2 * np.pi - PAD_ANGLE, _LATTICE.back_intervals + 1)[1:-1]
     back = np.where(back > np.pi - 1e-9, back - 2 * np.pi, back)
     return np.sort(np.concatenate([pad, back]))
 
@@ -39,7 +36,7 @@ def _mean_of_known(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 @functools.cache
 def _table() -> dict[str, np.ndarray]:
     """Read x (60,) m, theta (72,) rad and radii (60, 72) m of outer skin, inner skin and core, made even in theta."""
-    rows = load_profile("biotac_profile.csv").reshape(60, 72, 5)
+    rows = read_radii(DESCRIPTOR.folder / _SKIN.profile)
     mirror = (-np.arange(72)) % 72  # the table starts at -180 degrees in 5 degree steps
     radii = _mean_of_known(rows[..., 2:], rows[:, mirror, 2:]) * 1e-3
     return {
@@ -71,9 +68,9 @@ def _meridian(layer: str, column: int) -> np.ndarray:
     if layer == "inner":  # the table ends before the inner cap's corner: rounded as the outer one is
         x, r = np.insert(x, -1, base - 5e-6), np.insert(r, -1, r[-2] - 0.5e-3)
     pieces = [
-        _piece(x, r, x[0], TIP_X, np.linspace(0, 1, TIP_ROWS + 1)),
-        _piece(x, r, TIP_X, BASE_X, np.linspace(0, 1, TRUNK_ROWS + 1))[1:],
-        _piece(x, r, BASE_X, base, np.linspace(0, 1, BASE_ROWS + 1))[1:],
+        _piece(x, r, x[0], _SKIN.tip_x, np.linspace(0, 1, _LATTICE.tip_rows + 1)),
+        _piece(x, r, _SKIN.tip_x, _SKIN.base_x, np.linspace(0, 1, _LATTICE.trunk_rows + 1))[1:],
+        _piece(x, r, _SKIN.base_x, base, np.linspace(0, 1, _LATTICE.base_rows + 1))[1:],
     ]
     return np.concatenate(pieces)
 
@@ -115,12 +112,27 @@ def _meridians(layer: str) -> np.ndarray:
 
 def core_radius(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Radius of the rigid core, m, about the axis at stations x (n,) m and angles theta (n,) rad; nan off the core."""
+    return _radius("core", x, theta)
+
+
+def _radius(layer: str, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
     table = _table()
-    row = np.clip(np.searchsorted(table["x"], x) - 1, 0, 58)
+    row = np.clip(np.searchsorted(table["x"], x) - 1, 0, len(table["x"]) - 2)
     t = (x - table["x"][row]) / (table["x"][row + 1] - table["x"][row])
     columns, weights = _columns(theta)
-    lower, upper = ((weights * table["core"][at, columns]).sum(axis=0) for at in (row, row + 1))
+    lower, upper = ((weights * table[layer][at, columns]).sum(axis=0) for at in (row, row + 1))
     return lower * (1 - t) + upper * t
+
+
+def check_inside(points: np.ndarray) -> None:
+    """Raise TactileError where one of the electrodes at points (n, 3) m does not lie inside the inner skin."""
+    x, y, z = points.T
+    inside = np.hypot(y - AXIS_Y, z) < _radius("inner", x, np.arctan2(z, AXIS_Y - y))
+    if not inside.all():
+        at = points[int(np.argmin(inside))]
+        found = f"an electrode at x, y, z = {', '.join(f'{1e3 * each:.3g}' for each in at)} mm, outside the body"
+        where = DESCRIPTOR.folder / DESCRIPTOR.electrodes.places
+        raise TactileError(where, found, "places inside the inner skin, mm in the maker's frame of [frame]")
 
 
 @functools.cache

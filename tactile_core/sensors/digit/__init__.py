@@ -6,32 +6,26 @@ import functools
 
 import numpy as np
 
-from ..geometry.lattice import Lattice, grid_faces
-from .profiles import load_profile
+from ...geometry.lattice import Lattice, grid_faces
+from ..descriptor import Gel, of_kind
+from ..profiles import read_heights
 
-# Outline and back of the public gel mesh (across_framework, MIT): measured on its nodes.
-HALF_WIDTH = 9.17e-3
-X_TIP, X_BASE = -20.06e-3, 4.94e-3
-BACK_Y = -4.2365e-3
-THICKNESS = 4.06e-3  # at the apex
+DESCRIPTOR = of_kind("digit", Gel)
+_OUTLINE, _DOME, _LATTICE = DESCRIPTOR.outline, DESCRIPTOR.dome, DESCRIPTOR.lattice
+HALF_WIDTH, X_TIP, X_BASE = _OUTLINE.half_width, _OUTLINE.tip_x, _OUTLINE.base_x
+CORNER_RADIUS = _OUTLINE.corner_radius
 ARC_X = X_TIP + HALF_WIDTH  # centre of the semicircular end
-CORNER_RADIUS = 1.15e-3  # of the two corners at the square end
+BACK_Y, THICKNESS = _DOME.back_y, _DOME.thickness
 
-# The part of the lattice that is an even grid: a little more than the camera sees (13 x 17 mm: docs/sources.md).
-WINDOW_X, WINDOW_Z = (-16.2e-3, 1.2e-3), (-6.6e-3, 6.6e-3)
-WINDOW_NODES = (51, 39)  # 0.348 x 0.347 mm between nodes: at most 0.35 where the camera looks
+WINDOW_X, WINDOW_Z, WINDOW_NODES = _LATTICE.window_x, _LATTICE.window_z, _LATTICE.window_nodes
 SPACING = (WINDOW_X[1] - WINDOW_X[0]) / (WINDOW_NODES[0] - 1)
-RIM_TIP, RIM_BASE, RIM_SIDE = 4, 6, 4  # nodes from the window's edge to the outline
-
-_DOME_DEGREE_X, _DOME_DEGREE_Z = 8, 3  # 36 coefficients leave 5 um rms on the profile table, 7 um near the rim
-_DOME_MARGIN = 0.4e-3  # the outermost cells of the table are its rounded edge
-_EDGE_DROP, _EDGE_WIDTH = 0.25e-3, 0.4e-3  # of that edge, on the public mesh
+RIM_TIP, RIM_BASE, RIM_SIDE = _LATTICE.rim_tip, _LATTICE.rim_base, _LATTICE.rim_side
 
 
 def _dome_basis(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     t = np.clip((2 * x - X_TIP - X_BASE) / (X_BASE - X_TIP), -1, 1)
-    chebyshev = np.cos(np.arange(_DOME_DEGREE_X + 1) * np.arccos(t)[..., None])
-    even = ((z / HALF_WIDTH) ** 2)[..., None] ** np.arange(_DOME_DEGREE_Z + 1)
+    chebyshev = np.cos(np.arange(_DOME.degree_along + 1) * np.arccos(t)[..., None])
+    even = ((z / HALF_WIDTH) ** 2)[..., None] ** np.arange(_DOME.degree_across + 1)
     return (chebyshev[..., :, None] * even[..., None, :]).reshape(*x.shape, -1)
 
 
@@ -43,9 +37,9 @@ def outline_distance(x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _dome_coefficients() -> np.ndarray:
-    table = load_profile("digit_gel_profile.csv")
+    table = read_heights(DESCRIPTOR.folder / _DOME.profile)
     x, z, height = table[:, 0] * 1e-3, table[:, 1] * 1e-3, table[:, 2] * 1e-3
-    inside = np.isfinite(height) & (outline_distance(x, z) > _DOME_MARGIN)
+    inside = np.isfinite(height) & (outline_distance(x, z) > _DOME.margin)
     return np.linalg.lstsq(_dome_basis(x[inside], z[inside]), height[inside], rcond=1e-10)[0]
 
 
@@ -56,8 +50,8 @@ def dome_height(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     along and even powers across; the table is a faceted surface sampled on a grid, hence the smoothing.
     """
     x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))
-    edge = np.clip(1 - outline_distance(x, z) / _EDGE_WIDTH, 0, 1)
-    return _dome_basis(x, z) @ _dome_coefficients() - _EDGE_DROP * edge**2
+    edge = np.clip(1 - outline_distance(x, z) / _DOME.edge_width, 0, 1)
+    return _dome_basis(x, z) @ _dome_coefficients() - _DOME.edge_drop * edge**2
 
 
 def dome_point(x: float, z: float) -> tuple[np.ndarray, np.ndarray]:

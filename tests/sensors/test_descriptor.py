@@ -1,0 +1,95 @@
+"""Sensors' descriptors: what ships is sound, and what is wrong in one is said in words."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from tactile_core import sensors
+from tactile_core.errors import TactileError
+from tactile_core.sensors import biotac, descriptor
+from tactile_core.sensors.electrodes import read_places
+from tactile_core.sensors.profiles import read_radii
+
+
+def changed(folder, old, new, name="biotac"):
+    """A copy of a shipped sensor whose descriptor has other words in one place."""
+    shutil.copytree(descriptor.FOLDER / name, folder / name)
+    file = folder / name / descriptor.FILE
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return folder / name
+
+
+@pytest.mark.parametrize("name", descriptor.names())
+def test_what_ships_is_read_and_names_its_sources(name):
+    found = descriptor.descriptor(name)
+    assert found.sources and found.title
+
+
+def test_decimals_are_shifted_before_they_are_rounded():
+    assert 1e-3 * -20.06 != -20.06e-3
+    assert sensors.digit.X_TIP == -20.06e-3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("youngs_mpa = 4.1", "youngs_pa = 4.1e6", "material: youngs_pa; expected youngs_mpa"),
+        ("thickness_mm = 1.58", "thickness = 1.58", "skin: thickness; expected thickness_mm"),
+        ("thickness_mm = 1.58", "", "skin: thickness_mm missing"),
+        ("[skin]", "[skin]\ncolour = 1", "skin: unknown colour"),
+        ("[fluid]", "[liquid]", "top level: unknown liquid"),
+        ("poisson = 0.48", "poisson = 0.5", "material, poisson: 0.5; expected above 0 and below 0.5"),
+        ("poisson = 0.48", "poisson = nan", "material, poisson: NaN"),
+        ("bits = 12", "bits = 12.5", "readout, bits"),
+        ("inner_poles_mm = [-19.725, 5.08]", "inner_poles_mm = [5.08]", "a list of 2"),
+        ('polarity = "falls"', 'polarity = "down"', "falls or rises"),
+        ('kind = "fluid"', 'kind = "solid"', "fluid or gel"),
+        ("tactile-sensor-1", "tactile-sensor-9", "format"),
+        ("[skin]", "[skin", "sensor.toml"),
+    ],
+)
+def test_what_is_wrong_in_a_descriptor_is_said(tmp_path, old, new, words):
+    with pytest.raises(TactileError) as refusal:
+        descriptor.read(changed(tmp_path, old, new))
+    assert words in str(refusal.value) and descriptor.FILE in str(refusal.value)
+
+
+def test_a_name_that_is_no_sensor_is_refused_with_those_that_are():
+    with pytest.raises(TactileError, match="biotac, digit"):
+        descriptor.descriptor("biotak")
+    with pytest.raises(TactileError, match="kind fluid"):
+        descriptor.of_kind("biotac", descriptor.Gel)
+
+
+def test_an_open_profile_is_refused(tmp_path):
+    lines = (biotac.DESCRIPTOR.folder / "profile.csv").read_text().splitlines()
+    at = next(k for k, line in enumerate(lines) if k > 72 * 30 and ",0," in line)
+    x, theta, _, inner, core = lines[at].split(",")
+    path = tmp_path / "profile.csv"
+    path.write_text("\n".join([*lines[:at], f"{x},{theta},nan,{inner},{core}", *lines[at + 1 :]]))
+    with pytest.raises(TactileError, match="open profile"):
+        read_radii(path)
+    path.write_text("\n".join(lines[:-1]))
+    with pytest.raises(TactileError, match="close round the axis"):
+        read_radii(path)
+
+
+def test_electrodes_outside_the_body_are_refused(tmp_path):
+    every = np.concatenate([sensors.electrodes(), sensors.excitation_electrodes()])
+    biotac.check_inside(every)
+    for axis, by in ((1, -4e-3), (2, -8e-3), (0, 30e-3)):
+        moved = every.copy()
+        moved[3, axis] += by
+        with pytest.raises(TactileError, match="outside the body"):
+            biotac.check_inside(moved)
+
+
+@pytest.mark.parametrize("row", ["E1,1,2,3", "E1,1,2,up,3000"])
+def test_a_row_of_electrodes_that_is_none_is_named(tmp_path, row):
+    path = tmp_path / "electrodes.csv"
+    path.write_text(f"name,x_mm,y_mm,z_mm,rest_counts\n{row}\n")
+    with pytest.raises(TactileError, match="row 2"):
+        read_places(path)
