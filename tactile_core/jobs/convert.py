@@ -89,23 +89,6 @@ def _solver(gel: Gel) -> Solver | None:
     return solved_gel.solved
 
 
-def choose_preset(tools: Tools, levels: float, calibration: str | os.PathLike | None = None) -> tuple[Tools, str]:
-    """Tools whose pictures are within a bound, grey levels, and in words what was chosen, and why.
-
-    calibration : the file that the tools were loaded with
-
-    Raises TactileError where none are.
-    """
-    from ..pictures import presets
-
-    chosen = presets.fitting(levels)
-    if chosen != presets.FAST:
-        from ..pictures.renderer import Renderer
-
-        tools = dataclasses.replace(tools, shade=Renderer(calibration, chosen), preset=chosen)
-    return tools, presets.describe_choice(chosen, levels)
-
-
 @dataclasses.dataclass(frozen=True)
 class Done:
     """A finished conversion. folder : the result; warnings : what the user should know of it.

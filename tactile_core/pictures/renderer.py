@@ -74,9 +74,6 @@ class Renderer:
         self._domed = rest is None and calibration.dome_scale != 1
         own = rest_height_map(self.camera) if rest is None else rest
         resting = self._heights(own, "rest height map")
-        self._response = np.ascontiguousarray(
-            calibration.response.matrices(self.camera).transpose(2, 3, 0, 1), np.float32
-        )
         # The fast one spreads its own.
         self._spread = CoatingSpread(self.camera, 0.0 if preset == FAST else calibration.coating.spread)
         if preset == FAST:
@@ -96,6 +93,9 @@ class Renderer:
         self.dots = None if calibration.markers is None else MarkerField(calibration)
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")
+        self._response = np.ascontiguousarray(
+            calibration.response.matrices(self.camera).transpose(2, 3, 0, 1), np.float32
+        )
 
     def __call__(self, height_map: np.ndarray, marks: np.ndarray | None = None) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.

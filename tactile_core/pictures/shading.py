@@ -47,7 +47,6 @@ class Shader:
         self._dome = rest is None  # heights have the public mesh's dome, which the unit's own takes the place of
         rest = of_unit(rest_height_map(camera), calibration) if rest is None else rest
         rest = camera_array(rest, camera.shape, "rest height map")
-        self._response = np.ascontiguousarray(calibration.response.matrices(camera).transpose(2, 3, 0, 1), np.float32)
         self._view = Perspective(camera, rest)
         check_reach(rest, calibration, "rest height map")
         self.rest = self._view(rest)
@@ -58,6 +57,7 @@ class Shader:
             background = resting_picture(calibration, np.moveaxis(self._rest_radiance, 0, -1))
         self.background = camera_array(background, (*camera.shape, 3), "background")
         self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
+        self._response = np.ascontiguousarray(calibration.response.matrices(camera).transpose(2, 3, 0, 1), np.float32)
 
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""

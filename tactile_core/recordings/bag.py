@@ -26,6 +26,7 @@ from .recording import Recording
 
 LOOKED_AT = 100  # frames from which the fingers of a hand are recognised
 STARTS = {b"#ROSBAG V": "ros1", b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite"}
+START_BYTES = 16  # bytes of a file from which its kind is known
 MARK = "metadata.yaml"  # of a folder that is a ROS 2 bag
 MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk; recorders make them of 1 to 16 MB (assumed enough)
 MAX_METADATA = 2**20  # bytes of YAML, of which four times as many take 30 s (assumed enough)
@@ -43,12 +44,13 @@ class Bag:
     reader: Any
 
 
-def kind(path: Path) -> str | None:
-    """Return the kind of bag at a path: ros1, mcap, sqlite or folder; None for anything else."""
-    if path.is_dir():
-        return "folder" if (path / MARK).is_file() else None
-    with outside.open_file(path, "a recording") as file:
-        start = file.read(16)
+def is_bag_folder(path: str) -> bool:
+    """Return true for the folder of a ROS 2 bag."""
+    return os.path.isfile(os.path.join(path, MARK))
+
+
+def kind_of(start: bytes) -> str | None:
+    """Return the kind of bag that a file's first START_BYTES begin: ros1, mcap or sqlite; None for any other file."""
     return next((name for mark, name in STARTS.items() if start.startswith(mark)), None)
 
 
@@ -62,19 +64,15 @@ def open_bag(path: str) -> Iterator[Bag]:
 
     _bound_unpacking()
     path, finger = split(path)
-    what = kind(Path(path))
-    if what == "folder":
-        with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:
-            metadata = file.read(MAX_METADATA + 1)
-        if len(metadata) > MAX_METADATA or PACKED.search(metadata):
-            advice = "Unpack it: ros2 bag convert"
-            raise TactileError(path, "a bag packed file by file, or with huge metadata", "a plain bag", advice)
-        for name in sorted(os.listdir(path)):
-            if not os.path.isdir(os.path.join(path, name)):
-                outside.check(outside.inside(path, name, "a bag's own file"), "a bag's own file")
+    kind: str | None = "folder"
+    if is_bag_folder(path):
+        _check_folder(path)
+    else:
+        with outside.open_file(path, "a recording") as file:
+            kind = kind_of(file.read(START_BYTES))
     openers: dict[str | None, Any] = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
     with damage_told(path, "bag"):
-        reader = openers[what](Path(path))
+        reader = openers[kind](Path(path))
         reader.open()
     try:
         if not all(isinstance(name, str) for one in reader.connections for name in (one.topic, one.msgtype)):
@@ -82,9 +80,21 @@ def open_bag(path: str) -> Iterator[Bag]:
         topics: dict[str, list[Any]] = {}
         for connection in sorted(reader.connections, key=lambda one: one.topic):
             topics.setdefault(connection.msgtype, []).append(connection)
-        yield Bag(path, what == "ros1", finger, topics, reader)
+        yield Bag(path, kind == "ros1", finger, topics, reader)
     finally:
         reader.close()
+
+
+def _check_folder(path: str) -> None:
+    """Raise TactileError for a ROS 2 bag that is compressed file by file, or holds links out of its folder."""
+    with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:
+        metadata = file.read(MAX_METADATA + 1)
+    if len(metadata) > MAX_METADATA or PACKED.search(metadata):
+        advice = "Unpack it: ros2 bag convert"
+        raise TactileError(path, "a bag packed file by file, or with huge metadata", "a plain bag", advice)
+    for name in sorted(os.listdir(path)):
+        if not os.path.isdir(os.path.join(path, name)):
+            outside.check(outside.inside(path, name, "a bag's own file"), "a bag's own file")
 
 
 def _bound_unpacking() -> None:

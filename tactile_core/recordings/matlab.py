@@ -33,7 +33,8 @@ def open_matlab(path: str) -> Iterator[Store]:
         if file.read(len(START_OF_HDF5)) == START_OF_HDF5:
             advice = "Save it in MATLAB with save(..., '-v7'), or as CSV"
             raise TactileError(path, "a MATLAB 7.3 file", "MATLAB 5 to 7", advice)
-    _check_unpacked(path)
+        with damage_told(path, "MATLAB file"):
+            _check_unpacked(path, file)
     try:
         from scipy.io import loadmat, whosmat
     except ModuleNotFoundError as error:
@@ -64,16 +65,16 @@ def open_matlab(path: str) -> Iterator[Store]:
     yield Store(path, shapes, load)
 
 
-def _check_unpacked(path: str) -> None:
+def _check_unpacked(path: str, file: IO[bytes]) -> None:
     """Raise TactileError for a compressed variable of more than MOST_UNPACKED bytes, which scipy would load."""
-    with damage_told(path, "MATLAB file"), outside.open_file(path) as file:
-        order = {b"IM": "<", b"MI": ">"}[file.read(HEADER)[-2:]]
-        while len(tag := file.read(8)) == 8:
-            kind, length = struct.unpack(f"{order}II", tag)
-            end = file.tell() + length
-            if kind == PACKED:
-                _check_packed(path, file, length)
-            file.seek(end)
+    file.seek(0)
+    order = {b"IM": "<", b"MI": ">"}[file.read(HEADER)[-2:]]
+    while len(tag := file.read(8)) == 8:
+        kind, length = struct.unpack(f"{order}II", tag)
+        end = file.tell() + length
+        if kind == PACKED:
+            _check_packed(path, file, length)
+        file.seek(end)
 
 
 def _check_packed(path: str, file: IO[bytes], length: int) -> None:

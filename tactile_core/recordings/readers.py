@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
-from pathlib import Path
 from types import ModuleType
 
 from ..errors import TactileError
@@ -15,7 +14,7 @@ from ..files import outside
 from ..files.registry import modules_of
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
-from .bag import fingers_of, kind, open_bag, read_bag
+from .bag import START_BYTES, fingers_of, is_bag_folder, kind_of, open_bag, read_bag
 from .column_map import ColumnMap, read_mapped, refuse_other
 from .fingers import named, split
 from .matlab import START, START_OF_HDF5, open_matlab
@@ -125,23 +124,25 @@ def reading(path: str) -> Iterator[None]:
 def container_of(path: str) -> str:
     """Detect the container: csv, hdf5, npz, mat or bag. Raises TactileError for what is no file."""
     path, finger = split(path)
-    if os.path.isdir(path) and kind(Path(path)) is None:
+    if is_bag_folder(path):
+        return "bag"
+    if os.path.isdir(path):
         scene = os.path.isfile(os.path.join(path, "scene.toml"))
         advice = "Simulate it first: tactile simulate" if scene else "Name the recording inside the folder"
         raise TactileError(path, "a scene" if scene else "a folder", "one recording file", advice)
     if not os.path.exists(path):
         raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT or bag)", "Check the path")
-    if not os.path.isfile(path) and not os.path.isdir(path):
+    if not os.path.isfile(path):
         raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT or bag)")
-    if kind(Path(path)) is not None:
-        return "bag"
     with outside.open_file(path, "a recording") as file:
-        start = file.read(8)
+        start = file.read(START_BYTES)
+    if kind_of(start) is not None:
+        return "bag"
     if start.startswith((START, START_OF_HDF5)):
         return "mat"
     if finger is not None:
         raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
-    if start == b"\x89HDF\r\n\x1a\n":
+    if start.startswith(b"\x89HDF\r\n\x1a\n"):
         return "hdf5"
     return "npz" if start.startswith(ZIP_STARTS) else "csv"
 

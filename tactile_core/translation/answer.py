@@ -58,6 +58,16 @@ class Answer:
         return (f"contacts lie {x:g} mm along x and {z:g} mm along z from their place on the DIGIT (--mount-shift)",)
 
 
+def parse_answer(kind: Estimate, frames_apart: bool, mount_shift: str | None, samples: int) -> Answer:
+    """Return the options of a command line; mount_shift : ``"X,Z"`` mm, or None for no shift.
+
+    Raises TactileError for a shift or a number of samples out of range.
+    """
+    if not 0 <= samples <= MOST_SAMPLES:
+        raise TactileError("--samples", str(samples), f"0 to {MOST_SAMPLES}")
+    return Answer(kind, frames_apart, (0.0, 0.0) if mount_shift is None else parse_shift(mount_shift), samples)
+
+
 def parse_shift(text: str) -> tuple[float, float]:
     """Parse ``"4,-1.5"`` to (4.0, -1.5) mm; raises TactileError for anything else, or a shift longer than the gel."""
     number = r"\s*([+-]?\d{1,3}(?:\.\d{0,6})?)\s*"

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import types
 from pathlib import Path
 
 import fake_tools
@@ -301,13 +302,17 @@ def test_a_conversion_is_as_deep_as_its_deepest_node(sampled, run, slide_csv, tm
 
 def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
     drawn = []
-    monkeypatch.setattr(renderer, "Renderer", lambda calibration, preset: drawn.append(preset) or str)
+
+    def draw(calibration, preset, variant):
+        drawn.append(preset)
+        return types.SimpleNamespace(dots=None)
+
+    monkeypatch.setattr(renderer, "Renderer", draw)
     monkeypatch.setattr(presets, "choose_variant", lambda wanted: Choice(SCALAR, ""))
-    tools, told = convert.choose_preset(fake_tools.tools(), 5)
-    assert (tools.preset, drawn) == ("fast", []) and "fast" in told
+    assert presets.fitting(5) == "fast" and "fast" in presets.describe_choice("fast", 5)
     exact = presets.measured()["presets"]["quality"]["error"]
-    tools, told = convert.choose_preset(fake_tools.tools(), exact)
-    assert (tools.preset, tools.shade, drawn) == ("quality", str, ["quality"]) and "quality" in told
+    assert (preset := presets.fitting(exact)) == "quality" and "quality" in presets.describe_choice(preset, exact)
+    assert convert.load_tools(preset=preset).preset == "quality" and drawn == ["quality"]
 
 
 def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys):

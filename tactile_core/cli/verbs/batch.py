@@ -13,7 +13,6 @@ from .common import (
     PRESETS,
     RESUMES,
     answer_arguments,
-    answer_words,
     prepare_arguments,
     prepare_words,
     progress_argument,
@@ -138,6 +137,7 @@ def _recipe(options: argparse.Namespace) -> Translate:
     from ...pictures.mitsuba.variant import variant_for
     from ...recordings import electrode_gains
     from ...translation import translate
+    from ...translation.answer import parse_answer
 
     keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
     prepare = Prepare(**prepare_words(options))
@@ -161,7 +161,8 @@ def _recipe(options: argparse.Namespace) -> Translate:
 
         MarkerField(load_calibration(options.calibration))  # refused here where the unit has no dots
     pictures = unit, preset, variant_for(preset)
-    return Translate(list(keep), sha256, frames, prepare, sensor, *pictures, answer_words(options), options.gel)
+    answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
+    return Translate(list(keep), sha256, frames, prepare, sensor, *pictures, answer, options.gel)
 
 
 def _status(folder: Path, job: Job) -> int:

@@ -9,7 +9,6 @@ from ...errors import TactileError
 
 if TYPE_CHECKING:
     from ...recordings.column_map import ColumnMap
-    from ...translation.answer import Answer
 
 # What a stopped verb leaves.
 NOTHING = "no half file is left"
@@ -121,16 +120,6 @@ def answer_arguments(verb: argparse.ArgumentParser) -> None:
         help="the DIGIT's gel as the networks translate it, or by contact mechanics: a ball of the dent's curvature at"
         " the found place and force, some 10 ms a frame; needs the extra [fem] (default: translated)",
     )
-
-
-def answer_words(options: argparse.Namespace) -> Answer:
-    """The `Answer` that the arguments of `answer_arguments` say."""
-    from ...translation.answer import MOST_SAMPLES, Answer, parse_shift
-
-    if not 0 <= options.samples <= MOST_SAMPLES:
-        raise TactileError("--samples", str(options.samples), f"0 to {MOST_SAMPLES}")
-    shift = (0.0, 0.0) if options.mount_shift is None else parse_shift(options.mount_shift)
-    return Answer(options.answer, options.frames_apart, shift, options.samples)
 
 
 def error_argument(verb: argparse.ArgumentParser, what: str) -> None:

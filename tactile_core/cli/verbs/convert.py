@@ -12,7 +12,6 @@ from ..terminal import bar, complain, say, tell
 from .common import (
     NOTHING,
     answer_arguments,
-    answer_words,
     error_argument,
     prepare_arguments,
     prepare_words,
@@ -88,20 +87,24 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     from ... import accuracy
     from ...jobs import convert, frame_range, results
+    from ...pictures import presets
     from ...recordings import PrepareOptions, electrode_gains
+    from ...translation.answer import parse_answer
 
     prepare = PrepareOptions(**prepare_words(options))
     keep, frames = results.parse_keep(options.keep), frame_range.parse_frames(options.frames)
+    answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     budget = None if options.error is None else accuracy.parse_budget(options.error)
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     paths, failed = _fingers(options.recordings), 0
     made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
-    tools = convert.load_tools(options.weights, options.calibration, answer=answer_words(options), gel=options.gel)
-    if budget is not None and budget.levels is not None:
-        tools, why = convert.choose_preset(tools, budget.levels, options.calibration)
-        say(why)
+    levels = None if budget is None else budget.levels
+    preset = presets.FAST if levels is None else presets.fitting(levels)
+    tools = convert.load_tools(options.weights, options.calibration, preset, answer=answer, gel=options.gel)
+    if levels is not None:
+        say(presets.describe_choice(preset, levels))
     for path, folder in zip(paths, folders, strict=True):
         try:
             with bar(folder.name, "frame", options.progress) as shown:
