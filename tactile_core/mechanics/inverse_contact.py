@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from .. import sensors
-from ..sensors import biotac, digit
 from ..sensors.unrolling import node_normals
 from .fast.compliance import compliance_of
 from .fast.compliance_rows import ComplianceRows
@@ -25,7 +24,7 @@ _LAYER = 1e-3
 def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) -> np.ndarray:
     """Traction (n, 3) Pa on a sensor's resting surface, displaced by (n, 3) m and touched in ``patch`` (n,) bool.
 
-    sensor : ``"biotac"`` or ``"digit"``; nodes of the patch that cannot be touched carry none. Linear elasticity, the
+    sensor : its name; nodes of the patch that cannot be touched carry none. Linear elasticity, the
     BioTac's fluid included, its core left out.
     """
     compliance, areas = compliance_of(sensor), node_areas(sensor)
@@ -50,9 +49,7 @@ def _solved(sensor: str, block: np.ndarray, areas: np.ndarray, displacement: np.
 
     block : (3 k, 3 k) m/N. Weighted by the areas' roots it stays symmetric, and the layer is the same everywhere.
     """
-    material, thickness = (
-        (sensors.DIGIT_GEL, digit.THICKNESS) if sensor == "digit" else (sensors.BIOTAC_SKIN, biotac.SKIN_THICKNESS)
-    )
+    material, thickness = sensors.describe(sensor).material, sensors.thickness(sensor)
     root = np.repeat(np.sqrt(areas), 3)
     matrix = block.astype(float) * root[:, None] * root
     matrix.flat[:: len(root) + 1] += _LAYER * thickness / material.youngs

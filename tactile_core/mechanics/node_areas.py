@@ -6,19 +6,19 @@ import functools
 
 import numpy as np
 
-from .solids.hex_mesh import gel_mesh, outer_faces, skin_mesh
+from .solids.hex_mesh import outer_faces, solid_mesh
 
 _GAUSS = np.sqrt(0.6) * np.array([-1.0, 0, 1]), np.array([5.0, 8, 5]) / 9
 
 
 @functools.cache
 def node_areas(sensor: str) -> np.ndarray:
-    """Area (n,) m2 of each resting surface node of ``"biotac"`` or ``"digit"``: the integral of its shape function.
+    """Area (n,) m2 of each resting surface node of a sensor: the integral of its shape function.
 
     Surfaces are of quadratic faces, on which an even pressure loads corners, edges and middles as 1 : 4 : 16; divided
     by these areas it is even again.
     """
-    mesh = skin_mesh() if sensor == "biotac" else gel_mesh()
+    mesh = solid_mesh(sensor)
     faces, areas = outer_faces(mesh), np.zeros(len(mesh.nodes))
     corners = mesh.nodes[faces].reshape(-1, 3, 3, 3)  # face, b along eta, a along xi, axis
     for xi, by_xi in zip(*_GAUSS, strict=True):

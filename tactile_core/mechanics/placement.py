@@ -37,16 +37,21 @@ def biotac_pose(indenter: Indenter, place: Placement) -> Pose:
     return first_touch(sensors.biotac_surface(), indenter, pose)
 
 
-def digit_pose(indenter: Indenter, place: Placement) -> Pose:
-    """First touch on the DIGIT's gel at (x, z), leaning as much off the dome's normal as off the BioTac's."""
-    point, outward = digit.dome_point(place.x, place.z)
+def gel_pose(sensor: str, indenter: Indenter, place: Placement) -> Pose:
+    """First touch on a gel at (x, z), leaning as much off the dome's normal as off the BioTac's."""
+    point, outward = sensors.shape_of(sensor).dome_point(place.x, place.z)
     pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
-    return first_touch(sensors.digit_surface(), indenter, pose)
+    return first_touch(sensors.sensor_surface(sensor), indenter, pose)
+
+
+def digit_pose(indenter: Indenter, place: Placement) -> Pose:
+    """First touch on the DIGIT's gel; see ``gel_pose``."""
+    return gel_pose("digit", indenter, place)
 
 
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
-    """First touch on ``"biotac"`` or ``"digit"``."""
-    return (biotac_pose if sensor == "biotac" else digit_pose)(indenter, place)
+    """First touch on a sensor."""
+    return gel_pose(sensor, indenter, place) if sensors.is_gel(sensor) else biotac_pose(indenter, place)
 
 
 def on_gel(x: float, z: float, margin: float = 0.0) -> bool:

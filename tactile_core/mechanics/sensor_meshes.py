@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import TactileError
 from ..sensors import sensor_surface
 from . import mesh_files
-from .solids.hex_mesh import HexMesh, gel_mesh, skin_mesh
+from .solids.hex_mesh import HexMesh, solid_mesh
 from .solution import Sensor, Solution
 
 SUFFIXES = (".ply", ".stl", ".vtu")
@@ -27,7 +27,7 @@ def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
     """The resting sensor: ``.vtu`` its volume, ``.ply`` and ``.stl`` its surface. Raises what the writers raise."""
     check_suffix(path)
     if Path(path).suffix.lower() == ".vtu":
-        mesh_files.write_vtu(path, skin_mesh() if sensor == "biotac" else gel_mesh())
+        mesh_files.write_vtu(path, solid_mesh(sensor))
     else:
         write_surface(path, sensor, np.zeros_like(sensor_surface(sensor).rest), {})
 

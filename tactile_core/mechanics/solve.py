@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from .. import sensors
 from ..errors import TactileError
 from ..geometry.indenters import Indenter, Pose
 from . import error_estimate
@@ -38,8 +39,8 @@ def solve(
 ) -> Solution:
     """Press ``indenter`` into ``sensor`` at ``place`` to a depth, m, or a force along the motion, N.
 
-    sensor : ``"biotac"`` or ``"digit"``; indenter : of ``tactile.indenters``, in m; place : a ``tactile.Placement``,
-        or the indenter's pose at first touch
+    sensor : the name of one that is there, as ``"digit"``; indenter : of ``tactile.indenters``, in m
+    place : a ``tactile.Placement``, or the indenter's pose at first touch
     depth, force : one of the two: m beyond first touch, or N, found to a thousandth
     tier : ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round
         the contact (seconds; with friction ten or more; a minute or more for indenters that need a finer mesh),
@@ -175,7 +176,7 @@ class _Fast:
 
 
 def _films(sensor: Sensor, contact: Contact) -> np.ndarray:
-    return sensing_films(contact) if sensor == "biotac" else np.empty(0)
+    return np.empty(0) if sensors.is_gel(sensor) else sensing_films(contact)
 
 
 def _fast_errors(

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import sensors
 from ..geometry.indenters import Indenter, Pose
-from ..sensors import biotac, digit
+from ..sensors import biotac
 
 DEPTH_LIMIT = 0.6  # of the thickness: the deepest that contacts are asked for
 _DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
@@ -20,14 +20,13 @@ _FARTHEST = 8e-3  # m, more than from the pad to the finger's axis
 def thickness(sensor: str, point: np.ndarray) -> float:
     """Rest distance, m, from the outer surface to the rigid support along the inward normal near ``point`` (3,) m.
 
-    ``"digit"``: to the flat back of the gel; ``"biotac"``: through skin and fluid to the core, or to the finger's axis
-    where the normal passes the core by. Raises ValueError for another sensor.
+    To the flat back of a gel; through skin and fluid to the core, or to the finger's axis where the normal passes the
+    core by. Raises TactileError for a sensor that is not there.
     """
-    if sensor == "digit":
-        on_dome, outward = digit.dome_point(float(point[0]), float(point[2]))
-        return float((digit.BACK_Y - on_dome[1]) / -outward[1])
-    if sensor != "biotac":
-        raise ValueError(f"the thickness of a {sensor!r} is not known")
+    if sensors.is_gel(sensor):
+        shape = sensors.shape_of(sensor)
+        on_dome, outward = shape.dome_point(float(point[0]), float(point[2]))
+        return float((shape.back_y - on_dome[1]) / -outward[1])
     node = int(np.argmin(((sensors.biotac_surface().rest - point) ** 2).sum(axis=1)))
     return _to_core(point, _outward()[node])
 
@@ -55,9 +54,9 @@ def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
         reach *= 4
         nodes, gap = surface.blocks.near(indenter, pose, reach)
     node = int(nodes[np.argmin(gap)])
-    if sensor == "biotac":
-        return _to_core(surface.rest[node], _outward()[node])
-    return thickness(sensor, surface.rest[node])
+    if sensors.is_gel(sensor):
+        return thickness(sensor, surface.rest[node])
+    return _to_core(surface.rest[node], _outward()[node])
 
 
 def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:

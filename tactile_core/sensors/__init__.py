@@ -11,13 +11,14 @@ import numpy as np
 
 from ..geometry.lattice import Lattice
 from . import biotac, digit
-from .descriptor import FALLS, Material
+from .descriptor import FALLS, Gel, Material, describe
 from .electrodes import Places, read_places
+from .gel_shape import shape_of
 
 __all__ = [
     "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PRESSURE_PER_COUNT", "REST_COUNTS",
-    "SAMPLE_RATE", "Lattice", "Material", "biotac_surface", "digit_surface", "electrodes", "excitation_electrodes",
-    "from_syntouch", "sensor_surface",
+    "SAMPLE_RATE", "Lattice", "Material", "biotac_surface", "describe", "digit_surface", "electrodes",
+    "excitation_electrodes", "from_syntouch", "is_gel", "sensor_surface", "shape_of", "thickness", "title",
 ]  # fmt: skip
 
 BIOTAC_SKIN, DIGIT_GEL = biotac.DESCRIPTOR.material, digit.DESCRIPTOR.material
@@ -68,5 +69,20 @@ def digit_surface() -> Lattice:
 
 
 def sensor_surface(sensor: str) -> Lattice:
-    """The resting surface of ``"biotac"`` or ``"digit"``."""
-    return biotac_surface() if sensor == "biotac" else digit_surface()
+    """The resting surface of a sensor that is there, as ``"biotac"`` or ``"digit"``."""
+    return shape_of(sensor).surface() if is_gel(sensor) else biotac_surface()
+
+
+def is_gel(sensor: str) -> bool:
+    """Return true for a sensor whose descriptor tells of a gel, false for skin over fluid."""
+    return isinstance(describe(sensor), Gel)
+
+
+def thickness(sensor: str) -> float:
+    """Thickness, m, of a gel at its apex, or of the skin."""
+    return shape_of(sensor).thickness if is_gel(sensor) else biotac.SKIN_THICKNESS
+
+
+def title(sensor: str) -> str:
+    """A sensor's name in words."""
+    return describe(sensor).title

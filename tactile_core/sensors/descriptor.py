@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import os
 import tomllib
 import typing
 from decimal import Decimal
@@ -19,6 +20,7 @@ from ..errors import TactileError
 from ..files.text_file import read_toml_text
 
 FOLDER = Path(__file__).parent
+OWN = "TACTILE_SENSORS"  # environment variable: a folder with sensors of one's own
 FILE, FORMAT = "sensor.toml", "tactile-sensor-1"
 FALLS, RISES = POLARITIES = ("falls", "rises")
 ROUND, SQUARE = TIPS = ("round", "square")
@@ -165,22 +167,30 @@ class Outline:
 
 
 @dataclasses.dataclass(frozen=True)
-class Dome:
-    """The height of a gel over its flat back. Lengths in m.
+class Body:
+    """A gel between its surface and its flat back, which is bonded to a rigid window. Lengths in m.
 
-    profile : table of heights; back_y : of the back, bonded to a rigid window; thickness : at the apex
+    thickness : at the apex; edge_drop, edge_width : of the rounded edge
+    """
+
+    back_y: float = _in("mm")
+    thickness: float = _in("mm", above=0)
+    edge_drop: float = _in("mm", above=-1e-9)
+    edge_width: float = _in("mm", above=0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Dome:
+    """The height of a gel over its back. profile : table of heights
+
     degree_along, degree_across : of the polynomials through the table, in x, and in the square of z
-    margin : outer edge of the table that is left out; edge_drop, edge_width : of the rounded edge
+    margin : m, outer edge of the table that is left out
     """
 
     profile: str
-    back_y: float = _in("mm")
-    thickness: float = _in("mm", above=0)
     degree_along: int = _in(above=-1)
     degree_across: int = _in(above=-1)
     margin: float = _in("mm", above=-1e-9)
-    edge_drop: float = _in("mm", above=-1e-9)
-    edge_width: float = _in("mm", above=0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -222,37 +232,46 @@ class Fluid:
 
 @dataclasses.dataclass(frozen=True)
 class Gel:
-    """A gel on a window that a camera looks through, as the DIGIT. title : its name in words"""
+    """A gel on a window that a camera looks through, as the DIGIT. title : its name in words; dome : None for flat"""
 
     folder: Path
     title: str
     sources: tuple[str, ...]
     outline: Outline
-    dome: Dome
+    body: Body
     lattice: GelLattice
     material: Material
     camera: Camera
+    dome: Dome | None = None
 
 
 KINDS: dict[str, type[Fluid] | type[Gel]] = {"fluid": Fluid, "gel": Gel}
 
 
+def _folders() -> dict[str, Path]:
+    """Folders with a descriptor by their names: those that ship, and those in ``$TACTILE_SENSORS``."""
+    own = os.environ.get(OWN)
+    places = [Path(own), FOLDER] if own else [FOLDER]
+    return {path.parent.name: path.parent for place in places for path in sorted(place.glob(f"*/{FILE}"))}
+
+
 def names() -> tuple[str, ...]:
-    """List the sensors that are there: folders with a descriptor."""
-    return tuple(sorted(path.parent.name for path in FOLDER.glob(f"*/{FILE}")))
+    """List the sensors that are there: those that ship, and folders of one's own in ``$TACTILE_SENSORS``."""
+    return tuple(sorted(_folders()))
 
 
 @functools.cache
-def descriptor(name: str) -> Fluid | Gel:
+def describe(name: str) -> Fluid | Gel:
     """Read the descriptor of a sensor that is there. Raises TactileError for a name that is none."""
-    if name not in names():
+    folder = _folders().get(name)
+    if folder is None:
         raise TactileError("sensor", repr(name), ", ".join(names()), "Name one that is there")
-    return read(FOLDER / name)
+    return read(folder)
 
 
 def of_kind(name: str, form: type[_S]) -> _S:
     """Read the descriptor of a sensor of one kind, ``Fluid`` or ``Gel``. Raises TactileError for another's."""
-    found = descriptor(name)
+    found = describe(name)
     if not isinstance(found, form):
         kinds = {form: kind for kind, form in KINDS.items()}
         raise TactileError(f"sensor {name!r}", f"of kind {kinds[type(found)]}", f"a sensor of kind {kinds[form]}")
@@ -283,8 +302,10 @@ def _sensor(content: dict[str, Any], folder: Path) -> Fluid | Gel:
     kind = content.get("kind")
     if kind not in KINDS:
         raise TactileError("kind", repr(kind), " or ".join(KINDS))
-    form, types = KINDS[kind], typing.get_type_hints(KINDS[kind])
-    parts = [field.name for field in dataclasses.fields(form) if field.name != "folder"]
+    form = KINDS[kind]
+    types = {name: _required(hint) for name, hint in typing.get_type_hints(form).items()}
+    fields = [field for field in dataclasses.fields(form) if field.name != "folder"]
+    parts = [field.name for field in fields if field.name in content or field.default is dataclasses.MISSING]
     _check_names("top level", content, ("format", "kind", *parts))
     found = {
         name: _table(types[name], content[name], name) if dataclasses.is_dataclass(types[name])
@@ -292,6 +313,11 @@ def _sensor(content: dict[str, Any], folder: Path) -> Fluid | Gel:
         for name in parts
     }  # fmt: skip
     return form(folder=folder, **found)
+
+
+def _required(hint: Any) -> Any:
+    """The type of a field that may be left out, where it is there."""
+    return next((each for each in typing.get_args(hint) if dataclasses.is_dataclass(each)), hint)
 
 
 def _table(form: type[_T], content: Any, where: str) -> _T:

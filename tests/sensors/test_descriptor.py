@@ -9,6 +9,7 @@ from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.sensors import biotac, descriptor
 from tactile_core.sensors.electrodes import read_places
+from tactile_core.sensors.gel_shape import GelShape
 from tactile_core.sensors.profiles import read_radii
 
 
@@ -24,7 +25,7 @@ def changed(folder, old, new, name="biotac"):
 
 @pytest.mark.parametrize("name", descriptor.names())
 def test_what_ships_is_read_and_names_its_sources(name):
-    found = descriptor.descriptor(name)
+    found = descriptor.describe(name)
     assert found.sources and found.title
 
 
@@ -59,7 +60,7 @@ def test_what_is_wrong_in_a_descriptor_is_said(tmp_path, old, new, words):
 
 def test_a_name_that_is_no_sensor_is_refused_with_those_that_are():
     with pytest.raises(TactileError, match="biotac, digit"):
-        descriptor.descriptor("biotak")
+        descriptor.describe("biotak")
     with pytest.raises(TactileError, match="kind fluid"):
         descriptor.of_kind("biotac", descriptor.Gel)
 
@@ -75,6 +76,17 @@ def test_an_open_profile_is_refused(tmp_path):
     path.write_text("\n".join(lines[:-1]))
     with pytest.raises(TactileError, match="close round the axis"):
         read_radii(path)
+
+
+def test_a_gel_with_a_hole_in_its_table_is_refused(tmp_path):
+    folder = tmp_path / "digit"
+    shutil.copytree(descriptor.FOLDER / "digit", folder)
+    file = folder / "profile.csv"
+    lines = [f"{line.rsplit(',', 2)[0]},nan,nan" if line.startswith("-8.00,-7.93,") else line
+             for line in file.read_text().splitlines()]  # fmt: skip
+    file.write_text("\n".join(lines))
+    with pytest.raises(TactileError, match=r"x_mm -8, z_mm -7.93: an open profile"):
+        GelShape(descriptor.read(folder)).dome_height(np.zeros(1), np.zeros(1))
 
 
 def test_electrodes_outside_the_body_are_refused(tmp_path):

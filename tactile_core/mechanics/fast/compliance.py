@@ -24,7 +24,7 @@ from ...geometry.lattice import Lattice
 from ...sensors import Material, digit
 from ...sensors import unrolling as surface
 from ..solids.fluid_cavity import FluidCavity
-from ..solids.hex_mesh import HexMesh, gel_mesh, inner_faces, skin_mesh
+from ..solids.hex_mesh import HexMesh, inner_faces, solid_mesh
 from .condense import condense, mirror_nodes
 from .mirror_symmetry import MirrorSymmetry, axes_of
 from .sensing_points import ON_PLANE, electrode_feet, facing_nodes, images, sensing_points_of
@@ -41,7 +41,7 @@ _BESIDE_GEL = 2.0e-3
 class Compliance:
     """Answers of a sensor's surface to forces, SI units.
 
-    name : ``"biotac"`` or ``"digit"``
+    name : of the sensor
     surface : the sensor's surface lattice, n nodes
     touchable : (m,) int, surface nodes that can carry contact force
     move : (3 r, 3 n) float32, m/N; row 3 i + k is the surface displacement under 1 N along axis k at the i-th of the r
@@ -91,21 +91,20 @@ class Arrays(NamedTuple):
     inner_pressure: np.ndarray
 
 
-@functools.cache
 def biotac_compliance() -> Compliance:
-    """The BioTac's skin over incompressible fluid; built in about a minute, then read from the cache."""
-    return _cached(_solid("biotac"))
+    """The BioTac's skin over incompressible fluid; see ``compliance_of``."""
+    return compliance_of("biotac")
+
+
+def digit_compliance() -> Compliance:
+    """The DIGIT's gel; see ``compliance_of``."""
+    return compliance_of("digit")
 
 
 @functools.cache
-def digit_compliance() -> Compliance:
-    """The DIGIT's gel; built in about a minute, then read from the cache."""
-    return _cached(_solid("digit"))
-
-
 def compliance_of(sensor: str) -> Compliance:
-    """Return the compliance of ``"biotac"`` or ``"digit"``."""
-    return biotac_compliance() if sensor == "biotac" else digit_compliance()
+    """Return the compliance of a sensor that is there; built in about a minute, then read from the cache."""
+    return _cached(_solid(sensor))
 
 
 class _Solid(NamedTuple):
@@ -119,10 +118,9 @@ class _Solid(NamedTuple):
 
 
 def _solid(sensor: str) -> _Solid:
-    if sensor == "biotac":
-        return _Solid(sensor, sensors.biotac_surface(), _touchable_skin(), skin_mesh(), sensors.BIOTAC_SKIN)
-    lattice = sensors.digit_surface()
-    return _Solid(sensor, lattice, np.arange(len(lattice.rest)), gel_mesh(), sensors.DIGIT_GEL)
+    lattice, material = sensors.sensor_surface(sensor), sensors.describe(sensor).material
+    touchable = np.arange(len(lattice.rest)) if sensors.is_gel(sensor) else _touchable_skin()
+    return _Solid(sensor, lattice, touchable, solid_mesh(sensor), material)
 
 
 class Stored(NamedTuple):
@@ -139,7 +137,7 @@ class Stored(NamedTuple):
 
 
 def stored(sensor: str) -> Stored:
-    """Return the cache entry of ``"biotac"`` or ``"digit"``; builds and loads nothing."""
+    """Return the cache entry of a sensor; builds and loads nothing."""
     solid = _solid(sensor)
     folder = _folder(solid)
     files = [folder / f"{array}.npy" for array in Arrays._fields]

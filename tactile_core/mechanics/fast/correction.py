@@ -18,7 +18,6 @@ from ... import sensors
 from ...files.compiled import available
 from ...files.shipped import shipped
 from ...sensors import biotac, unrolling
-from ...sensors import digit as digit_shape
 from .compliance import Compliance
 from .contact_state import Contact
 from .surface_loops import add_field
@@ -147,8 +146,8 @@ def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 @functools.cache
 def plane(sensor: str) -> np.ndarray:
     """Unrolled places (n, 2) = (x, z) m of a sensor's surface nodes; the BioTac's back goes on round its axis."""
-    if sensor == "digit":
-        return digit_shape.gel_surface().rest[:, [0, 2]]
+    if sensors.is_gel(sensor):
+        return sensors.sensor_surface(sensor).rest[:, [0, 2]]
     x, z = np.broadcast_arrays(unrolling._rolled_x()[1:-1, None], unrolling.PAD_RADIUS * biotac.angles())
     ends = [[unrolling._rolled_x()[0], 0.0], [unrolling._rolled_x()[-1], 0.0]]
     return np.concatenate([np.stack([x, z], -1).reshape(-1, 2), ends])
@@ -157,9 +156,9 @@ def plane(sensor: str) -> np.ndarray:
 @functools.cache
 def node_frames(sensor: str) -> np.ndarray:
     """Axes (n, 3, 3) of each surface node as columns: along the finger, outward, across."""
-    if sensor == "digit":
+    if sensors.is_gel(sensor):
         axes = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
-        return np.broadcast_to(axes, (len(digit_shape.gel_surface().rest), 3, 3))
+        return np.broadcast_to(axes, (len(sensors.sensor_surface(sensor).rest), 3, 3))
     lattice = biotac.skin_surface()
     outward = unrolling.node_normals(lattice.rest, lattice.faces)
     along = np.array([1.0, 0, 0]) - outward[:, :1] * outward
@@ -183,9 +182,7 @@ def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
 
     All are continuous in the nodal forces, so that a force can be searched for.
     """
-    digit = compliance.name == "digit"
-    material = sensors.DIGIT_GEL if digit else sensors.BIOTAC_SKIN
-    thickness = digit_shape.THICKNESS if digit else biotac.SKIN_THICKNESS
+    material, thickness = sensors.describe(compliance.name).material, sensors.thickness(compliance.name)
     nodes = compliance.touchable[contact.nodes]
     load = np.linalg.norm(contact.nodal_force, axis=1)
     share = load / load.sum()

@@ -9,13 +9,12 @@ import numpy as np
 
 from ... import sensors
 from ...geometry.indenters import Indenter, Pose
-from ...sensors import biotac, digit
 from ..penetration import BLUNT, check_follows, penetration_between
 from ..sharpness import BENDS, sharpest
 from ..solids.biotac_core import BiotacCore, facing_core
 from ..solids.finite_strain import FiniteStrainSolid
 from ..solids.fluid_cavity import FluidCavity
-from ..solids.graded_mesh import Footprint, GradedMesh, graded_gel, graded_skin
+from ..solids.graded_mesh import Footprint, GradedMesh, graded
 from ..solids.hex_mesh import inner_faces, outer_faces
 from ..solids.neo_hookean import NeoHookean
 from ..solids.split_bulk_modulus import SplitBulkModulus
@@ -28,7 +27,7 @@ from .tolerance import EXACT, Tolerance
 ONE_STEP, FRICTION_STEP = 5e-3, 0.25e-3
 # Gaps to 1/100 of the penetration that the target allows. A last step of 0.15 um left forces in balance to 1e-6.
 _FULL = Tolerance(10e-9, 1e-7, 0.15e-6)
-_FIRST_SHARE = {"biotac": 0.7, "digit": 0.5}  # a ball on a half-space touches where it overlaps by half of the depth
+_FIRST_GEL, _FIRST_SKIN = 0.5, 0.7  # a ball on a half-space touches where it overlaps by half of the depth
 _REACH = 1.5e-3  # m, nodes this far outside the indenter at the greatest depth may come to touch it
 # Nodes wanted across the fine part of a graded mesh. Normals under a 7 mm ball 1.2 mm deep in the gel were 1.4 to 1.5
 # degrees off with 10, 1.2 with 11, 1.0 with 12 at a fifth more time.
@@ -58,7 +57,7 @@ class Body:
             self.solid, near[~mesh.clamped[near]], indenter, pose, self.cavity, friction=friction,
             core=BiotacCore() if len(self.core_nodes) else None, inner=self.core_nodes,
             factor=self.graded.factor, tolerance=_FULL if self.tier == "full" else EXACT,
-            first_share=_FIRST_SHARE[self.sensor],
+            first_share=_first_share(self.sensor),
             faces=None if friction else self._faces(indenter, pose.moved(depth), near),  # friction holds nodes at edges
         )  # fmt: skip
 
@@ -76,7 +75,7 @@ class Body:
         """
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
-        where, closed = f"{self.tier} tier, {self.sensor}", self.sensor == "biotac"
+        where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)
         normals = touch.normals[touch.pressing > 0]
         check_follows(where, surface, indenter, touch.pose, touch.depth, normals, closed=closed)
         return penetration_between(where, surface, indenter, touch.pose, touch.depth, closed=closed)
@@ -107,27 +106,29 @@ def graded_body(
     """
     place = _footprint(sensor, indenter, pose, depth)
     footprint = dataclasses.replace(place, spacing=spacing * place.spacing, refine=1 if tier == "full" else 2)
-    graded = graded_gel(footprint) if sensor == "digit" else graded_skin(footprint)
-    mesh = graded.mesh
-    if sensor == "digit":
-        solid = FiniteStrainSolid(
-            mesh, SplitBulkModulus.from_law(NeoHookean.from_material(sensors.DIGIT_GEL)), graded.pattern
-        )
-        return Body(sensor, tier, solid, None, np.empty(0, int), graded)
-    solid = FiniteStrainSolid(mesh, sensors.BIOTAC_SKIN, graded.pattern)
+    fine = graded(sensor, footprint)
+    mesh, material = fine.mesh, sensors.describe(sensor).material
+    if sensors.is_gel(sensor):
+        solid = FiniteStrainSolid(mesh, SplitBulkModulus.from_law(NeoHookean.from_material(material)), fine.pattern)
+        return Body(sensor, tier, solid, None, np.empty(0, int), fine)
+    solid = FiniteStrainSolid(mesh, material, fine.pattern)
     free = mesh.inner[~mesh.clamped[mesh.inner]]
     cavity = FluidCavity(inner_faces(mesh), len(mesh.nodes))
-    return Body(sensor, tier, solid, cavity, np.sort(free[facing_core(mesh.nodes[free])]), graded)
+    return Body(sensor, tier, solid, cavity, np.sort(free[facing_core(mesh.nodes[free])]), fine)
+
+
+def _first_share(sensor: str) -> float:
+    return _FIRST_GEL if sensors.is_gel(sensor) else _FIRST_SKIN
 
 
 def _footprint(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float) -> Footprint:
     """Row and column range of the lattice where the indenter, ``depth`` m in, overlaps the resting surface."""
-    lattice = digit.gel_surface() if sensor == "digit" else biotac.skin_surface()
+    lattice = sensors.sensor_surface(sensor)
     rows, columns = lattice.shape
     distance, _ = pose.moved(depth).distance(indenter, lattice.rest[: rows * columns])
     deepest = distance.min()
-    inside = np.flatnonzero(distance <= (_FIRST_SHARE[sensor] * deepest if deepest < 0 else deepest))
-    at = np.column_stack([inside // columns + (sensor == "biotac"), inside % columns])
+    inside = np.flatnonzero(distance <= (_first_share(sensor) * deepest if deepest < 0 else deepest))
+    at = np.column_stack([inside // columns + (not sensors.is_gel(sensor)), inside % columns])
     low, high = at.min(axis=0).astype(float), at.max(axis=0).astype(float)
     middle, half = (low + high) / 2, np.maximum((high - low) / 2, _LEAST_HALF) * (1 + _MARGIN)
     spacing = float(np.clip(2 * half.max() / _ACROSS, *_SPACING))

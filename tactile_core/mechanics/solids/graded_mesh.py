@@ -10,13 +10,15 @@ import dataclasses
 
 import numpy as np
 
+from ... import sensors
 from ...geometry.catmull_rom import catmull_rom
-from ...sensors import biotac, digit
+from ...sensors import biotac
+from ...sensors.gel_shape import GelShape
 from .block_pattern import BlockPattern
 from .hex_mesh import SKIN_LAYERS, HexMesh, gel_solid, glued_skin, skin_solid
 from .sparse_cholesky import PatternFactor
 
-_WIDEST = {"biotac": 6.0, "digit": 10.0}  # lattice lines, the widest cell; the skin bends everywhere
+_WIDEST_GEL, _WIDEST_SKIN = 10.0, 6.0  # lattice lines, the widest cell; the skin bends everywhere
 _KEPT = 6  # patterns kept, each with the analysis and the last factor of its matrix: about 100 MB
 
 
@@ -90,26 +92,30 @@ class GradedMesh:
         return np.concatenate([body.reshape(-1, k), poles])
 
 
-def graded_gel(footprint: Footprint) -> GradedMesh:
-    """The DIGIT's gel, fine under ``footprint``."""
-    plan = digit.plan_grid()
-    window = digit.gel_surface().window
+def graded(sensor: str, footprint: Footprint) -> GradedMesh:
+    """A sensor's solid, fine under ``footprint``."""
+    return _graded_gel(sensor, footprint) if sensors.is_gel(sensor) else _graded_skin(footprint)
+
+
+def _graded_gel(sensor: str, footprint: Footprint) -> GradedMesh:
+    shape = sensors.shape_of(sensor)
+    plan = shape.plan_grid()
+    window = shape.surface().window
     marks = [(0, part.start, part.stop - 1, size - 1) for part, size in zip(window, plan.shape[:2], strict=True)]
-    rows, columns = (_lines(marks[k], footprint, k, _WIDEST["digit"]) for k in range(2))
+    rows, columns = (_lines(marks[k], footprint, k, _WIDEST_GEL) for k in range(2))
     place = _bilinear(plan, rows, columns)
-    top = np.stack([place[..., 0], digit.BACK_Y - digit.dome_height(*np.moveaxis(place, -1, 0)), place[..., 1]], -1)
-    mesh = gel_solid(top, _divided(_gel_layers(footprint.spacing), 2 * footprint.refine))
-    pattern, factor = _pattern(mesh, "digit", len(rows), len(columns))
+    top = np.stack([place[..., 0], shape.back_y - shape.dome_height(*np.moveaxis(place, -1, 0)), place[..., 1]], -1)
+    mesh = gel_solid(top, shape.back_y, _divided(_gel_layers(shape, footprint.spacing), 2 * footprint.refine))
+    pattern, factor = _pattern(mesh, sensor, len(rows), len(columns))
     to_rows, to_columns = _spline(rows, plan.shape[0]), _spline(columns, plan.shape[1])
     return GradedMesh(mesh, pattern, factor, rows, columns, to_rows, to_columns)
 
 
-def graded_skin(footprint: Footprint) -> GradedMesh:
-    """The BioTac's skin, fine under ``footprint``."""
+def _graded_skin(footprint: Footprint) -> GradedMesh:
     glued = glued_skin()
     stations, around = glued.shape
-    rows = _lines((0, *_SKIN_ROW_MARKS, stations - 1), footprint, 0, _WIDEST["biotac"])
-    columns = _lines((0, *_SKIN_COLUMN_MARKS, around), footprint, 1, _WIDEST["biotac"])
+    rows = _lines((0, *_SKIN_ROW_MARKS, stations - 1), footprint, 0, _WIDEST_SKIN)
+    columns = _lines((0, *_SKIN_COLUMN_MARKS, around), footprint, 1, _WIDEST_SKIN)
     outer, inner = (_skin_points(layer, rows, columns[:-1]) for layer in ("outer", "inner"))
     nearest = glued[np.rint(rows).astype(int)][:, np.rint(columns[:-1]).astype(int) % around]
     mesh = skin_solid(outer, inner, nearest, 2 * footprint.refine * (SKIN_LAYERS // 2) + 1)
@@ -124,9 +130,9 @@ _SKIN_ROW_MARKS = (10, 18, 45, 52)
 _SKIN_COLUMN_MARKS = (9, 12, 52, 55)
 
 
-def _gel_layers(spacing: float) -> np.ndarray:
+def _gel_layers(shape: GelShape, spacing: float) -> np.ndarray:
     """Places, 0 = back, 1 = surface, of the cells through the gel: the top one twice the spacing, growing downward."""
-    top = min(2 * spacing * digit.SPACING / digit.THICKNESS, 0.2)
+    top = min(2 * spacing * shape.spacing / shape.thickness, 0.2)
     growth = (0.5 / top) ** 0.5 if top > _THIN_TOP else (0.5 / top) ** (1 / 3)
     cells = np.array([0.5, *top * growth ** np.arange(1 if top > _THIN_TOP else 2, -1, -1)])
     return 1 - np.r_[np.cumsum((cells / cells.sum())[::-1])[::-1], 0.0]

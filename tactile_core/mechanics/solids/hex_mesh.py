@@ -7,7 +7,8 @@ import functools
 
 import numpy as np
 
-from ...sensors import biotac, digit
+from ... import sensors
+from ...sensors import biotac
 
 SKIN_LAYERS = 5  # nodes through the skin: two quadratic elements
 # Through the gel, 0 = bonded back, 1 = surface: three quadratic elements, thinner toward the contact.
@@ -48,13 +49,13 @@ def _shift(part: slice, by: int) -> slice:
     return slice(part.start + by, part.stop + by, part.step)
 
 
-def gel_solid(top: np.ndarray, layers: np.ndarray = GEL_LAYERS) -> HexMesh:
-    """The gel below a grid (rows, columns, 3) m of its surface, both odd, bonded at its flat back.
+def gel_solid(top: np.ndarray, back_y: float, layers: np.ndarray = GEL_LAYERS) -> HexMesh:
+    """The gel below a grid (rows, columns, 3) m of its surface, both odd, bonded at its flat back at ``back_y`` m.
 
     layers : places of the nodes through the gel, 0 = back, 1 = surface, an odd number
     """
     back = top.copy()
-    back[..., 1] = digit.BACK_Y
+    back[..., 1] = back_y
     nodes = back[..., None, :] + layers[:, None] * (top - back)[..., None, :]
     ids = np.arange(nodes[..., 0].size).reshape(nodes.shape[:-1])
     clamped = np.zeros(ids.size, bool)
@@ -101,16 +102,22 @@ def outer_faces(mesh: HexMesh) -> np.ndarray:
 
 
 @functools.cache
-def gel_mesh() -> HexMesh:
-    """The DIGIT's gel on the lattice of its surface; about 20,000 nodes."""
-    surface = digit.gel_surface()
-    return gel_solid(surface.grid(surface.rest))
+def gel_mesh(sensor: str = "digit") -> HexMesh:
+    """A sensor's gel on the lattice of its surface; the DIGIT's has about 20,000 nodes."""
+    shape = sensors.shape_of(sensor)
+    surface = shape.surface()
+    return gel_solid(surface.grid(surface.rest), shape.back_y)
 
 
 @functools.cache
 def skin_mesh() -> HexMesh:
     """The BioTac's skin on its lattice, clamped where its inner side lies on or in the rigid core; 18,200 nodes."""
     return skin_solid(biotac.skin_grid("outer"), biotac.skin_grid("inner"), glued_skin())
+
+
+def solid_mesh(sensor: str) -> HexMesh:
+    """The solid of a sensor: its gel, or its skin."""
+    return gel_mesh(sensor) if sensors.is_gel(sensor) else skin_mesh()
 
 
 @functools.cache
