@@ -136,7 +136,8 @@ def convert(
             added = _added(options, made)
             with clock.stage("sheet"):
                 made.draw_sheet(partial / results.SHEET)
-            atomic.write_json(partial / results.NOTE, note(recording, made, options, tools))
+            origin = note(recording, made, options, tools)
+            atomic.write_json(partial / results.NOTE, origin)
             machine = provenance.machine()
             timings = {**clock.per_frame(len(frames)), "frames": len(frames), "machine": machine}
             atomic.write_json(partial / results.TIMINGS, timings)

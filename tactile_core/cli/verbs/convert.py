@@ -98,13 +98,14 @@ def run(options: argparse.Namespace) -> int:
     budget = None if options.error is None else accuracy.parse_budget(options.error)
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     paths, failed = _fingers(options.recordings), 0
-    made = not os.path.lexists(options.out)
-    folders = results.result_folders(paths, options.out, options.overwrite)
     levels = None if budget is None else budget.levels
     preset = presets.FAST if levels is None else presets.fitting(levels)
+    made = not os.path.lexists(options.out)
+    folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(options.weights, options.calibration, preset, answer=answer, gel=options.gel)
     if levels is not None:
-        say(presets.describe_choice(preset, levels))
+        why = presets.describe_choice(preset, levels)
+        say(why)
     for path, folder in zip(paths, folders, strict=True):
         try:
             with bar(folder.name, "frame", options.progress) as shown:
