@@ -15,8 +15,7 @@ from ...tactile_core.recordings import PrepareOptions, Recording, Signals
 from ...tactile_core.recordings.polarity import AUTO
 from ...tactile_core.recordings.signals import FRAMEWISE
 from ...tactile_core.translation import translate
-from ...tactile_core.translation.contact_track import Tracked
-from ...tactile_core.translation.networks import Posterior
+from ...tactile_core.translation.contact_track import Evidence, Tracked
 from ...tactile_core.translation.translate import Translation
 from ..process import recording_reader
 
@@ -62,7 +61,7 @@ def _translated(path: str, tare: str, frames: str, progress: Callable[[float], N
     options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)
     signals = recordings.prepare(recording, options)
 
-    def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
+    def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Evidence]:
         return recording.time[start:stop], translator().posterior(_part(signals, np.arange(start, stop)))
 
     tracked, parts = Tracked(read_posteriors, len(recording)), []

@@ -112,7 +112,9 @@ def rounding() -> float:
     doubled = {net: {name: array.astype(float) for name, array in nets.tensors[net].items()} for net in nets.tensors}
     double = Double(nets.tensors, nets.card)
     double.tensors = doubled
-    gels = [one.decode_digit(one.m2m(one.s2m(one.encode_signal(signals.typical[60:340:10])))) for one in (nets, double)]
+    gels = [
+        one.decode_digit(one.likely_latents(one.encode_signal(signals.typical[60:340:10]))[1]) for one in (nets, double)
+    ]
     return float(np.abs(gels[0] - gels[1]).max())
 
 

@@ -19,7 +19,7 @@ from ..sensors import PRESSURE_PER_COUNT
 from ..sensors.camera import Camera
 from ..translation.answer import Answer
 from ..translation.card_errors import doubt
-from ..translation.contact_track import Tracked
+from ..translation.contact_track import Evidence, Tracked
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet
 from .frames_file import FramesFile, kept
@@ -28,7 +28,6 @@ from .sampling_error import depth_share
 if TYPE_CHECKING:
     from ..pictures.marker_field import MarkerField
     from ..recordings import Recording, Signals
-    from ..translation.networks import Posterior
     from ..translation.translate import Translation
 
 Solver = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
@@ -56,7 +55,7 @@ class Tools:
     height_map : (T, M, 3) m -> (T, H, W) m
     shade : (H, W) m, and the ``marks`` of dots if there are any -> (H, W, 3) uint8, by a preset of ``pictures.presets``
     camera : of the DIGIT that is drawn, by which contacts beside its picture are flagged; None: none are
-    posterior : Signals -> Posterior, by which contacts are followed through time; None: each frame is translated alone
+    posterior : Signals -> Evidence, by which contacts are followed through time; None: each frame is translated alone
     plausible : Signals and frames (T,) -> contacts drawn for each, by ``plausible.NAMES``; None: none are
     answer : what the translator was asked for
     solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
@@ -70,7 +69,7 @@ class Tools:
     shade: Callable[..., np.ndarray]
     preset: str = "fast"
     camera: Camera | None = None
-    posterior: Callable[[Signals], Posterior] | None = None
+    posterior: Callable[[Signals], Evidence] | None = None
     plausible: Callable[[Signals, np.ndarray], dict[str, np.ndarray]] | None = None
     answer: Answer = dataclasses.field(default_factory=Answer)
     solve: Solver | None = None
@@ -97,7 +96,7 @@ class Tools:
         if self.posterior is None:
             return None
 
-        def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
+        def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Evidence]:
             """Times and posteriors of these frames."""
             time, signals = read(start, stop)
             return time, self.posterior(signals)

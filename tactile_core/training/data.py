@@ -86,7 +86,7 @@ class Contacts:
         pressure = torch.from_numpy(self.pairs.pressure[at])[:, None] * touching(rows)
         scaled = np.stack([np.linalg.norm(force, axis=-1) / FORCE_SCALE, self.depth[at] / DEPTH_SCALE], -1)
         strength = torch.from_numpy(np.arcsinh(scaled).astype(np.float32)) * touching(rows)
-        state = torch.cat([self.biotac.true_place(rows), strength], -1)
+        state = torch.cat([self.digit.true_place(rows), strength], -1)
         read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load, pressure, state
         signed = np.where(signal[:, ELECTRODES] > 0, SILENT, rows)
         return Batch(rows, signed, *(each.to(self.device) for each in read))

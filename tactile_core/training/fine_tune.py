@@ -21,8 +21,8 @@ from .. import accuracy
 from ..accuracy import Row, row
 from ..files import outside
 from ..translation import networks, reference_signals
-from ..translation.contact_frame import on_skin
-from ..translation.network_sizes import NETS, PLACE
+from ..translation.gel_place import on_gel
+from ..translation.network_sizes import NETS, PLACE, STATE
 from ..translation.networks import COMPRESSED_LIMIT, FORCE_SCALE, Networks
 from ..translation.weights import CARD_NAME, card_bytes, read_bytes, sha256, to_safetensors, write_bytes
 from .export import versions
@@ -54,7 +54,7 @@ def fine_tune(
     """
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
-    data = read_labelled(path, before.frames["MVB"], seed)
+    data = read_labelled(path, before.frames["MVD"], seed)
     typical = reference_signals.read(source).typical.astype(np.float32)
     prepare_folder(Path(out_folder), overwrite)
     net = "R2MPN" if data.rectified else "S2MPN"
@@ -91,7 +91,7 @@ def _train(
     rehearsed = torch.from_numpy(nets.encode_signal(np.abs(typical) if data.rectified else typical, data.rectified))
     place, force = torch.from_numpy(data.place), torch.from_numpy(data.force)
     with torch.no_grad():
-        held, kept = module(latent), module(rehearsed)
+        held, kept = module(latent), _state_and_latent(module, rehearsed)
         spread = kept.std(0).clamp(min=1e-3)
 
     def loss(rows: Tensor) -> Tensor:
@@ -100,7 +100,7 @@ def _train(
         miss = (state[:, :PLACE] - place[rows]).square().sum(-1).add(PLACE_FLOOR**2).sqrt().mean()
         load = FORCE_SCALE * torch.sinh(state[:, PLACE].clamp(0.0, COMPRESSED_LIMIT))
         share = ((load - force[rows]).abs() / (force[rows] + FORCE_FLOOR)).mean()
-        shape = ((found - held[rows]) / spread)[:, PLACE:].square().mean()
+        shape = ((found - held[rows]) / spread[STATE:])[:, PLACE:].square().mean()
         return miss + share + HOLD * shape
 
     optimiser = torch.optim.AdamW(module.parameters(), lr=RATE, weight_decay=0.0)
@@ -115,11 +115,17 @@ def _train(
         generator = torch.Generator().manual_seed(int(np.random.default_rng([seed, epoch]).integers(2**62)))
         for rows in train[torch.randperm(len(train), generator=generator)].split(BATCH):
             again = torch.randint(len(rehearsed), (len(rows),), generator=generator)
-            rehearsal = ((module(rehearsed[again]) - kept[again]) / spread).square().mean()
+            rehearsal = ((_state_and_latent(module, rehearsed[again]) - kept[again]) / spread).square().mean()
             optimiser.zero_grad()
             (loss(rows) + HOLD * rehearsal).backward()
             optimiser.step()
     return {name: tensor.numpy().astype(np.float16) for name, tensor in state.items()}
+
+
+def _state_and_latent(module: ContactPosterior, latent_signal: Tensor) -> Tensor:
+    """Map latent_signal (B, K) to the most plausible contact's state and latent_biotac, (B, STATE + L)."""
+    state = module.contact(latent_signal)
+    return torch.cat([state, module.given(latent_signal, state)], -1)
 
 
 def _module(nets: Networks, net: str) -> ContactPosterior:
@@ -133,11 +139,11 @@ def _module(nets: Networks, net: str) -> ContactPosterior:
 def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
     """Median miss of place and force on the presses kept for it; baseline: always the training's median."""
     test, train = data.split.test, data.split.train
-    frame = nets.frames["MVB"]
+    frame = nets.frames["MVD"]
     latent = nets.encode_signal(data.change[test], data.rectified)
     state = nets.contact(latent, data.rectified)
-    true, middle = on_skin(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
-    miss, null = (accuracy.lengths(on_skin(frame, each) - true) for each in (state[:, :PLACE], middle))
+    true, middle = on_gel(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
+    miss, null = (accuracy.lengths(on_gel(frame, each) - true) for each in (state[:, :PLACE], middle))
     estimated = nets.force_in(state, nets.given(latent, state, data.rectified))
     load, usual = accuracy.lengths(estimated), np.median(data.force[train])
     share, nothing = (100 * np.abs(each - data.force[test]) / data.force[test] for each in (load, usual))

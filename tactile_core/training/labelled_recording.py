@@ -11,8 +11,10 @@ from .. import sensors
 from ..errors import TactileError
 from ..recordings import prepare, read
 from ..recordings.flags import Flag
+from ..sensors import unrolling
 from ..simulation.pairs_file import Split, split_presses
-from ..translation.contact_frame import PLACE_UNIT, ContactFrame
+from ..translation.contact_frame import ContactFrame
+from ..translation.gel_place import place_on
 
 # A place in millimetres reads as tens, in metres as hundredths: no fingertip is longer than half a metre.
 METRES_BELOW = 0.5
@@ -29,7 +31,7 @@ class LabelledRecording:
     """Frames in contact, F of them.
 
     change : (F, 19) float32 counts          rectified : whether their sign is lost
-    place : (F, 2) float32, as the first two numbers of a BioTac latent          force : (F,) float32 N, magnitude
+    place : (F, 2) float32, as the first two numbers of a DIGIT latent           force : (F,) float32 N, magnitude
     split : of the frames, by press          dropped : sentences on what was left out
     """
 
@@ -42,10 +44,10 @@ class LabelledRecording:
 
 
 def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> LabelledRecording:
-    """Read a recording with contact places and forces (Narang et al.: contact_loc, force_vec) for this frame.
+    """Read a recording with contact places and forces (Narang et al.: contact_loc, force_vec) for the gel's frame.
 
     Places are taken to be SynTouch's frame of the electrodes (docs/sources.md), in m or mm as their size shows; of
-    forces only the magnitude counts, whatever their frame.
+    forces only the magnitude counts, whatever their frame. Places are unrolled onto the gel.
     Raises TactileError: no labels, places that are not on the skin, too few contacts.
     """
     recording = read(path)
@@ -64,7 +66,7 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
         dropped.append(f"{(touched & ~whole).sum()} frames with a saturated or dead electrode")
     place, off = _places(recording.position[used], frame, path)
     if off.any():
-        dropped.append(f"{off.sum()} contacts that are not on the skin")
+        dropped.append(f"{off.sum()} contacts that are not on the pad")
     used, place = used[~off], place[~off]
     if len(used) < FEWEST:
         found = f"{len(used)} usable frames in contact ({', '.join(dropped) or f'force above {TOUCH} N'})"
@@ -77,11 +79,11 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
 
 
 def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
-    """Places (F, 2) on the lattice, in its units, of contacts (F, 3); and which lie off the skin (F,)."""
+    """Places (F, 2) on the gel's lattice, in its units, of contacts (F, 3); and which lie off the pad (F,)."""
     if not len(position):
         return np.zeros((0, 2)), np.zeros(0, bool)
     metres = position if np.abs(position).max() < METRES_BELOW else 1e-3 * position
-    rest = sensors.biotac_surface().rest[: frame.rows * frame.columns]
+    rest, unrolled = sensors.biotac_surface().rest, unrolling.unrolled_nodes()
     points = sensors.from_syntouch(metres)
     nearest, gap = np.empty(len(points), int), np.empty(len(points))
     for start in range(0, len(points), FEWEST):  # bounds the table of distances
@@ -94,8 +96,11 @@ def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) 
             f"{os.fspath(path)}, contact places", f"{off.mean():.0%} lie more than {OFF_SKIN * 1e3:g} mm off the skin",
             "places in SynTouch's frame (x to the tip, z <= 0 on the pad), m or mm", "Turn them into that frame",
         )  # fmt: skip
-    at = np.stack(np.divmod(nearest, frame.columns), -1)
-    return (at - np.array([frame.rows - 1, frame.columns - 1]) / 2) / PLACE_UNIT, off
+    on_gel = unrolled[nearest]
+    off |= np.isnan(on_gel[:, 0])  # the finger's back rolls onto no gel
+    place = np.zeros_like(on_gel)
+    place[~off] = place_on(frame, on_gel[~off])
+    return place, off
 
 
 def _presses(used: np.ndarray) -> np.ndarray:

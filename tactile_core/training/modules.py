@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from ..sensors import ELECTRODES
 from ..translation.layers import NORM_EPSILON
 from ..translation.network_sizes import PLACE, SIGNAL_HIDDEN, STATE
-from ..translation.networks import COUNT_SCALE, LEAST_SPREAD, SPREAD_LIMITS
+from ..translation.networks import COUNT_SCALE, LEAST_FORCE, LEAST_SPREAD, MEAN_SHIFTS, SPREAD_LIMITS
 from .surface_codec import SurfaceCodec
 
 
@@ -65,13 +65,13 @@ class ContactPosterior(nn.Module):
     """S2MPN or R2MPN: what a signal's latent leaves open about the contact, and the BioTac's latent once it is known.
 
     A mixture of Gaussians over the contact's state (a mixture density network, Bishop 1994) and a network that gives
-    the code of the dent's shape from the signal and a state. A shape thus is never averaged over places and depths.
+    the latent of the BioTac's dent from the signal and a state. A shape thus is never averaged over places and depths.
     """
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int, components: int) -> None:
         super().__init__()
         self.posterior = Residual(inputs, components * (1 + 2 * STATE), width, blocks)
-        self.code = Residual(inputs + STATE, outputs - PLACE, width, blocks)
+        self.code = Residual(inputs + STATE, outputs, width, blocks)
         self.components = components
 
     def mixture(self, latent: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -89,16 +89,23 @@ class ContactPosterior(nn.Module):
 
     def given(self, latent: Tensor, state: Tensor) -> Tensor:
         """Map latent_signal (B, K) and a state (B, STATE) to latent_biotac (B, L)."""
-        return torch.cat([state[:, :PLACE], self.code(torch.cat([latent, state], -1))], -1)
+        return self.code(torch.cat([latent, state], -1))
 
     def forward(self, latent: Tensor) -> Tensor:
         """Map latent_signal (B, K) to latent_biotac (B, L) of the most plausible contact."""
         return self.given(latent, self.contact(latent))
 
     def contact(self, latent: Tensor) -> Tensor:
-        """Map latent_signal (B, K) to the state (B, STATE), mean of the heaviest component."""
-        weight, mean, _ = self.mixture(latent)
-        return mean[torch.arange(len(mean)), weight.argmax(-1)]
+        """Map latent_signal (B, K) to the state (B, STATE) of the most plausible contact: see `Posterior.likely`."""
+        weight, mean, spread = self.mixture(latent)
+        state = mean[torch.arange(len(mean)), weight.argmax(-1)]
+        place, spread = mean[..., :PLACE], spread[..., :PLACE]
+        other = (mean[..., PLACE] >= LEAST_FORCE) != (state[:, None, PLACE] >= LEAST_FORCE)
+        known = (weight - spread.log().sum(-1)).masked_fill(other, -math.inf)
+        for _ in range(MEAN_SHIFTS):
+            share = (known - 0.5 * ((state[:, None, :PLACE] - place) / spread).square().sum(-1)).softmax(-1)
+            state = (share[..., None] * mean).sum(1)
+        return state
 
 
 class Vae(nn.Module):

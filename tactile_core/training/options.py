@@ -42,10 +42,10 @@ class Options:
     latent_signal: int = 16
     latent_biotac: int = 128
     latent_digit: int = 128
-    wide_biotac: int = 80
+    wide_biotac: int = 48
     near_biotac: int = 160
     half_biotac: int = 12
-    wide_digit: int = 32
+    wide_digit: int = 64
     near_digit: int = 224
     half_digit: int = 16
     width: int = 256

@@ -92,10 +92,10 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
     nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
     signal = nets.encode_signal(change)
     state = nets.contact(signal)
-    biotac = nets.given(signal, state)
+    biotac, digit = nets.latents(signal, state)
     return {
         "biotac_m": accuracy.lengths(nets.decode_biotac(biotac)).max(-1),
-        "digit_m": accuracy.lengths(nets.decode_digit(nets.m2m(biotac))).max(-1),
+        "digit_m": accuracy.lengths(nets.decode_digit(digit)).max(-1),
         "force_N": accuracy.lengths(nets.force_in(state, biotac)),
     }
 

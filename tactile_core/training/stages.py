@@ -45,10 +45,12 @@ class Model(nn.Module):
         self.direct_decoder = MeshVae(contacts.digit, digit, width, blocks)
         initialise(self, generator)
 
-    def from_signal(self, signal: Tensor) -> Tensor:
-        """Map signal (B, 20) to latent_biotac."""
-        latent = self.SVB.mean(compress(signal))
-        return torch.where(signal[:, ELECTRODES:] > 0, self.R2MPN(latent), self.S2MPN(latent))
+    def from_signal(self, signal: Tensor) -> tuple[Tensor, Tensor]:
+        """Map signal (B, 20) to latent_biotac and latent_digit of the most plausible contact."""
+        latent, rectified = self.SVB.mean(compress(signal)), signal[:, ELECTRODES:] > 0
+        state = torch.where(rectified, self.R2MPN.contact(latent), self.S2MPN.contact(latent))
+        biotac, _ = self.given(signal, state)
+        return biotac, self.to_digit(state, biotac)
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """Map signal (B, 20) and its contact's state (B, STATE) to latent_biotac, and the surprise (B,) at the
@@ -62,6 +64,10 @@ class Model(nn.Module):
     def across(self, latent_biotac: Tensor) -> Tensor:
         """Map latent_biotac to latent_digit."""
         return self.M2MPN(self.MVB.placed(latent_biotac))
+
+    def to_digit(self, state: Tensor, latent_biotac: Tensor) -> Tensor:
+        """Map a contact's state (B, STATE) and its latent_biotac to latent_digit, whose place is the state's."""
+        return torch.cat([state[:, :PLACE], self.across(latent_biotac)[:, PLACE:]], -1)
 
     def back(self, latent_digit: Tensor) -> Tensor:
         """Map latent_digit to latent_biotac."""
@@ -150,19 +156,19 @@ def latent_loss(found: Tensor, target: Tensor) -> Tensor:
 def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Compute the loss of the whole chain: a frozen chain is 23-26 % worse than signal -> DIGIT directly.
 
-    docs/sources.md, Networks, has the figure.
-    Shapes are held against the truth where the contact truly is, places by themselves: a dent beside its
-    place would be paid for with being faint. The autoencoders' own losses stay in at half, so that latents keep their
-    meaning and meshes can be encoded. What the signal says of the contact is learned before and stays as it is.
+    docs/sources.md, Networks, has the figure. Shapes are held against the truth where the contact truly is, places by
+    themselves: a dent beside its place would be paid for with being faint. The gel's place is the state's, which the
+    signal's surprise has learned. The autoencoders' own losses stay in at half, so that latents keep their meaning and
+    meshes can be encoded. What the signal says of the contact is learned before and stays as it is.
     """
     biotac, _ = model.given(batch.signal, batch.state)
-    digit, across = model.across(biotac), model.across(model.MVB.mean(batch.biotac))
+    digit, across = model.to_digit(batch.state, biotac), model.across(model.MVB.mean(batch.biotac))
     given = (model, contacts, batch, options, generator)
     return (
         model.MVB.shape_loss(biotac, batch.rows)
         + model.MVD.shape_loss(digit, batch.rows)
         + model.MVD.shape_loss(across, batch.rows)
-        + options.astray * (model.MVD.astray(digit, batch.rows) + model.MVD.astray(across, batch.rows))
+        + options.astray * (model.MVB.astray(biotac, batch.rows) + model.MVD.astray(across, batch.rows))
         + 0.5 * (mvb_loss(*given) + mvd_loss(*given))
     )
 
@@ -196,8 +202,8 @@ def length(vectors: Tensor) -> Tensor:
 def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Largest node error of the chain, in its logarithm: the mean absolute deviation is least at the median."""
     with torch.no_grad():
-        biotac = model.from_signal(batch.signal)
-        answers = ((model.MVB, biotac), (model.MVD, model.across(biotac)))
+        biotac, digit = model.from_signal(batch.signal)
+        answers = (model.MVB, biotac), (model.MVD, digit)
         true = torch.stack([largest_error(vae, latent, batch.rows) for vae, latent in answers], -1)
     return (model.expected_error(batch.signal) - (true / ERROR_UNIT).log()).abs().mean()
 

@@ -71,7 +71,7 @@ def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bo
     patch = pairs.contact_patch_digit[rows]
     mesh, read = nets.encode_biotac(skin), nets.encode_signal(change)
     state = nets.contact(read)
-    signal = nets.given(read, state)
+    signal, chained = nets.latents(read, state)
     found = {
         **mesh_columns("null_biotac", np.zeros_like(skin), skin, accuracy.lengths),
         **mesh_columns("null_digit", np.zeros_like(gel), gel),
@@ -80,8 +80,8 @@ def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bo
         **mesh_columns("S2MPN", nets.decode_biotac(signal), skin, accuracy.lengths),
         "S2MPN_position_mm": 1e3 * _skin_offset(nets.decode_biotac(signal), skin, bodies),
     }
-    for name, latent in (("M2MPN", mesh), ("chain", signal)):
-        answer = nets.decode_digit(nets.m2m(latent))
+    for name, latent in (("M2MPN", nets.m2m(mesh)), ("chain", chained)):
+        answer = nets.decode_digit(latent)
         found |= mesh_columns(name, answer, gel) | digit_columns(name, answer, patch, bodies)
     back = nets.m2m_back(nets.encode_digit(gel))
     found |= mesh_columns("D2B", nets.decode_biotac(back), skin, accuracy.lengths)
@@ -113,8 +113,8 @@ def error_columns(
 
     ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m.
     """
-    biotac = nets.s2m(nets.encode_signal(change, rectified), rectified)
-    answers = {"biotac": nets.decode_biotac(biotac), "digit": nets.decode_digit(nets.m2m(biotac))}
+    biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
+    answers = {"biotac": nets.decode_biotac(biotac), "digit": nets.decode_digit(digit)}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}
     found = {f"{name}_max_m": accuracy.max_error(answer, truth[name]) for name, answer in answers.items()}
     expected = nets.expected_error(change, rectified)

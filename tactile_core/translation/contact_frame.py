@@ -131,12 +131,6 @@ def frame_of(sensor: str, half: int) -> ContactFrame:
     return ContactFrame(*lattice.shape, half, turn)
 
 
-def on_skin(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
-    """Points (F, 3) m on the resting skin at places (F, 2) on its lattice, by bilinear interpolation."""
-    rest = sensors.biotac_surface().rest[: frame.rows * frame.columns].reshape(frame.rows, frame.columns, 3)
-    return between_nodes(rest, place)
-
-
 def between_nodes(grid: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Interpolate values at a lattice's nodes (rows, columns, k) bilinearly at places (F, 2); returns (F, k)."""
     size = np.array(grid.shape[:2])

@@ -4,7 +4,9 @@ A finger's contact moves little in 10 ms, so a frame whose signals leave two pla
 Each frame's posterior is a mixture; first the best path through its components is found, by their weights less the cost
 of each step (Viterbi 1967), then the places on it are smoothed both ways (Kalman filter; Rauch, Tung and Striebel
 1965). Force and depth may change within a frame, so they are not smoothed: they are the frame's own estimates, given
-its place. `Follower` runs the filter alone, frame by frame, on live signals.
+its place. What changes slowly is the force over the size of the signals (at one place, under one object, force is
+proportional to it), and that is smoothed in the force's stead. `Follower` runs the filters alone, frame by frame, on
+live signals.
 
 A path may jump without contact, where frames are missing, and, at a cost, anywhere.
 """
@@ -12,25 +14,45 @@ A path may jump without contact, where frames are missing, and, at a cost, anywh
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from .network_sizes import PLACE
-from .networks import FORCE_SCALE, Posterior
+from .network_sizes import PLACE, STATE
+from .networks import COMPRESSED_LIMIT, LEAST_FORCE, Posterior, touches
 
-# Standard deviation of what a state changes by in 10 ms. Places are in tens of cells: 0.3 cells, so 30 mm/s; asinh of
-# force and depth 0.6, which a tap that is over in 50 ms still reaches (chosen on the shipped recording with gains off).
-STEP = np.array([0.03, 0.03, 0.6, 0.6])
+# Standard deviation of what a state changes by in 10 ms. Places are in tens of cells of the gel, 0.4 mm each: 0.18 mm;
+# asinh of force and depth 0.6, which a tap that is over in 50 ms still reaches (chosen on the shipped recording with
+# gains off).
+STEP = np.array([0.045, 0.045, 0.6, 0.6])
+# Of rectified signals, whose places err by more and together: their steps of place are that much shorter (chosen on
+# sample 7 of the slides: rank of force .905 to .926, spread of place along the finger .71 to .51 mm).
+RECTIFIED_STEP = 0.3
+# Standard deviations of the logarithm of force over the signals' size: of its change in 10 ms, and of a frame's
+# estimate (chosen on scenes/training/test_sequences.npz: force 8.6 % to 7.8 %, .02 to .3 and .05 to .2 within .3).
+# Within a simulated press force goes with size to the power .98 (50,000 pairs), so that no lag comes of it.
+RATIO_STEP, RATIO_NOISE = 0.05, 0.1
+LEAST_SIZE = 0.1  # counts, below any reading's noise: a logarithm's floor
 FRAME = 0.01  # s
 GAP = 0.1  # s without a frame: nothing is known of what happened meanwhile (assumed)
-ANYWHERE = 2.0  # tens of cells: the standard deviation of a place that may be anywhere on a sensor
-# Of a contact's state, below which nothing touches: half the force of the lightest contact that training knows, 0.06 N.
-LEAST_FORCE = float(np.arcsinh(0.03 / FORCE_SCALE))
+ANYWHERE = 3.0  # tens of cells: the standard deviation of a place that may be anywhere on the gel
 JUMP = 8.0  # price of a jump in mid-contact: that of a step of four standard deviations (assumed)
 BLOCK, MARGIN = 256, 64  # frames smoothed at once, and how many more are read on either side (a course forgets sooner)
 
-Read = Callable[[int, int], tuple[np.ndarray, Posterior]]
+
+@dataclass(frozen=True)
+class Evidence(Posterior):
+    """Posterior of each frame alone, and what its signals show beside it.
+
+    size : (T,) counts, root mean square of the changes; rectified : (T,) bool
+    """
+
+    size: np.ndarray
+    rectified: np.ndarray
+
+
+Read = Callable[[int, int], tuple[np.ndarray, Evidence]]
 
 
 class _Course(NamedTuple):
@@ -45,15 +67,38 @@ class _Course(NamedTuple):
     free: np.ndarray
 
 
-def track(posterior: Posterior, time: np.ndarray) -> np.ndarray:
+def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
     """Estimate the state (T, STATE) float32 of the contact in T frames at times (T,) s from their posterior,
     smoothed both ways.
     """
     if len(time) == 0:
-        return np.zeros(posterior.mean.shape[::2], np.float32)
-    course = _best_course(posterior, time)
-    steps = np.where(course.free[:, None], ANYWHERE**2, _steps(time)[:, :PLACE])
-    return _given(_smoothed(course, steps), course.touched, _components(posterior)).astype(np.float32)
+        return np.zeros(evidence.mean.shape[::2], np.float32)
+    steps = _steps(time, evidence.rectified)
+    course = _best_course(evidence, steps)
+    walk = np.where(course.free[:, None], ANYWHERE**2, steps[:, :PLACE])
+    place = _smoothed(course.mean, course.variance, walk)
+    state = np.concatenate([place, evidence.near(place, course.touched)[:, PLACE:]], axis=-1)
+    state[course.touched, PLACE] = _even_force(state[:, PLACE], evidence.size, course, time)[course.touched]
+    return state.astype(np.float32)
+
+
+def _even_force(force: np.ndarray, size: np.ndarray, course: _Course, time: np.ndarray) -> np.ndarray:
+    """Smooth force over size: (T,) asinh scale, of forces (T,) on it and signals' sizes (T,) counts."""
+    ratio, touched = _log_ratio(force, size), course.touched
+    apart = course.free | ~touched | ~np.concatenate([[False], touched[:-1]])
+    step = np.where(apart, ANYWHERE**2, np.minimum(RATIO_STEP**2 * _elapsed(time) / FRAME, ANYWHERE**2))
+    noise = np.full((len(ratio), 1), RATIO_NOISE**2)
+    return _force_of(_smoothed(ratio[:, None], noise, step[:, None])[:, 0], size)
+
+
+def _log_ratio(force: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Logarithm of forces, given on their asinh scale, over signals' sizes, counts."""
+    return np.log(np.sinh(np.clip(force, LEAST_FORCE, COMPRESSED_LIMIT)) / np.maximum(size, LEAST_SIZE))
+
+
+def _force_of(log_ratio: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Forces on their asinh scale: the inverse of `_log_ratio`."""
+    return np.arcsinh(np.exp(log_ratio) * np.maximum(size, LEAST_SIZE))
 
 
 class Tracked:
@@ -82,34 +127,41 @@ class Tracked:
 
 
 class Follower:
-    """Forward filter alone: one frame after another, without later ones."""
+    """Forward filters alone: one frame after another, without later ones."""
 
     def __init__(self) -> None:
         self._score: np.ndarray | None = None
-        self._place = np.zeros(PLACE)
-        self._variance: np.ndarray
+        self._place, self._place_variance = np.zeros(PLACE), np.full(PLACE, ANYWHERE**2)
+        self._ratio: np.ndarray
+        self._ratio_variance: np.ndarray
         self._frame: _Frame
         self._time: float
 
-    def __call__(self, posterior: Posterior, time: float) -> np.ndarray:
+    def __call__(self, evidence: Evidence, time: float) -> np.ndarray:
         """Estimate the state (1, STATE) float32 of a contact from the posterior of one frame at `time` s."""
-        now = _Frame(*(each[0] for each in _components(posterior)))
-        score, before = now.weight, np.full(PLACE, ANYWHERE**2)
+        now = _Frame(*(each[0] for each in _components(evidence)))
+        score, before, ratio_before = now.weight, np.full(PLACE, ANYWHERE**2), None
         if self._score is not None and 0 <= time - self._time < GAP:
-            step = _step(time - self._time)
+            step = _step(time - self._time, evidence.rectified[0])
             moves, free = _moves(self._frame, now, step)
             total = self._score[:, None] + moves
             score = total.max(axis=0) + now.weight
             if not free[total[:, score.argmax()].argmax(), score.argmax()]:
-                before = self._variance + step[:PLACE]
+                before = self._place_variance + step[:PLACE]
+                ratio_before = self._ratio_variance + RATIO_STEP**2 * (time - self._time) / FRAME
         best = int(score.argmax())
-        gain = before / (before + now.spread[best, :PLACE] ** 2)
-        place = self._place + gain * (now.mean[best, :PLACE] - self._place)
-        variance = (1 - gain) * before
+        place = now.mean[best, :PLACE], np.square(now.spread[best, :PLACE])
+        self._place, self._place_variance = _updated(self._place, before, *place)
         self._score, self._frame, self._time = score - score.max(), now, time
-        self._place, self._variance = place, variance
-        frame = _Frame(*(each[None] for each in now))
-        return _given(place[None], _touched(now.mean[best])[None], frame).astype(np.float32)
+        touched = touches(now.mean[best])
+        state = np.concatenate([self._place[None], evidence.near(self._place[None], touched[None])[:, PLACE:]], axis=-1)
+        if touched:
+            now_known = _log_ratio(state[:, PLACE], evidence.size), np.full(1, RATIO_NOISE**2)
+            if ratio_before is not None:
+                now_known = _updated(self._ratio, ratio_before, *now_known)
+            self._ratio, self._ratio_variance = now_known
+            state[:, PLACE] = _force_of(self._ratio, evidence.size)
+        return state.astype(np.float32)
 
 
 class _Frame(NamedTuple):
@@ -125,16 +177,21 @@ def _components(posterior: Posterior) -> _Frame:
     return _Frame(*(np.asarray(each, np.float64) for each in (weight, posterior.mean, posterior.spread)))
 
 
-def _step(seconds: np.ndarray | float) -> np.ndarray:
-    """Variance (..., STATE) of the change of a state in that time."""
-    return np.square(STEP) * np.asarray(seconds)[..., None] / FRAME
+def _step(seconds: np.ndarray | float, rectified: np.ndarray | bool) -> np.ndarray:
+    """Variance (..., STATE) of the change of a state in that time (...,)."""
+    shorter = np.where(np.asarray(rectified)[..., None] & (np.arange(STATE) < PLACE), RECTIFIED_STEP, 1.0)
+    return np.square(shorter * STEP) * np.asarray(seconds)[..., None] / FRAME
 
 
-def _steps(time: np.ndarray) -> np.ndarray:
-    """Variance (T, STATE) of the change since the frame before; free at the first frame and after gaps."""
+def _elapsed(time: np.ndarray) -> np.ndarray:
+    """Seconds (T,) since the frame before; infinite at the first frame, after gaps and where a clock runs backwards."""
     seconds = np.diff(time, prepend=-np.inf)
-    close = (seconds >= 0) & (seconds < GAP)  # a clock that runs backwards carries no information
-    return np.where(close[:, None], _step(np.where(close, seconds, 0)), ANYWHERE**2)
+    return np.where((seconds >= 0) & (seconds < GAP), seconds, np.inf)
+
+
+def _steps(time: np.ndarray, rectified: np.ndarray) -> np.ndarray:
+    """Variance (T, STATE) of the change since the frame before; free at the first frame and after gaps."""
+    return np.minimum(_step(_elapsed(time), rectified), ANYWHERE**2)
 
 
 def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -155,53 +212,41 @@ def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, n
     return -np.minimum(price, JUMP), untouched | (price > JUMP)
 
 
-def _best_course(posterior: Posterior, time: np.ndarray) -> _Course:
-    """Find the best path through the components of each frame."""
-    all_frames = _components(posterior)
+def _best_course(evidence: Evidence, steps: np.ndarray) -> _Course:
+    """Find the best path through the components of each frame; steps (T, STATE) as of `_steps`."""
+    all_frames = _components(evidence)
     before, now = (_Frame(*(each[part] for each in all_frames)) for part in (slice(None, -1), slice(1, None)))
-    moves, free = _moves(before, now, _steps(time)[1:])
-    score, came = all_frames.weight[0], np.zeros(posterior.weight.shape, int)
-    for frame in range(1, len(time)):
+    moves, free = _moves(before, now, steps[1:])
+    score, came = all_frames.weight[0], np.zeros(evidence.weight.shape, int)
+    for frame in range(1, len(steps)):
         total = score[:, None] + moves[frame - 1]
         came[frame] = total.argmax(axis=0)
         score = total.max(axis=0) + all_frames.weight[frame]
-    path = np.empty(len(time), int)
+    path = np.empty(len(steps), int)
     path[-1] = score.argmax()
-    for frame in range(len(time) - 1, 0, -1):
+    for frame in range(len(steps) - 1, 0, -1):
         path[frame - 1] = came[frame, path[frame]]
-    each = np.arange(len(time))
+    each = np.arange(len(steps))
     begins = np.concatenate([[True], free[each[:-1], path[:-1], path[1:]]])
     mean, spread = (values[each, path, :PLACE] for values in all_frames[1:])
-    return _Course(mean, np.square(spread), _touched(all_frames.mean[each, path]), begins)
+    return _Course(mean, np.square(spread), touches(all_frames.mean[each, path]), begins)
 
 
-def _touched(mean: np.ndarray) -> np.ndarray:
-    return mean[..., PLACE] >= LEAST_FORCE
+def _updated(
+    mean: np.ndarray, variance: np.ndarray, value: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance of a state, known as given, once it is measured with a variance `noise` (Kalman 1960)."""
+    gain = variance / (variance + noise)
+    return mean + gain * (value - mean), (1 - gain) * variance
 
 
-def _given(place: np.ndarray, touched: np.ndarray, components: _Frame) -> np.ndarray:
-    """States (T, STATE) at places (T, PLACE): force and depth are means over components, weighted by their nearness to
-    the place.
-
-    touched : (T,), which components count: without contact the place is zero, where contacts lie too
-    """
-    far = (place[:, None] - components.mean[..., :PLACE]) / components.spread[..., :PLACE]
-    share = components.weight - (0.5 * np.square(far) + np.log(components.spread[..., :PLACE])).sum(axis=-1)
-    share = np.where(_touched(components.mean) == touched[:, None], share, -np.inf)
-    share = np.exp(share - share.max(axis=-1, keepdims=True))
-    share /= share.sum(axis=-1, keepdims=True)
-    return np.concatenate([place, (share[..., None] * components.mean[..., PLACE:]).sum(axis=1)], axis=-1)
-
-
-def _smoothed(course: _Course, steps: np.ndarray) -> np.ndarray:
-    """Means (T, PLACE) of a random walk given all its measurements."""
-    mean, variance, expected = (np.empty_like(course.mean) for _ in range(3))
-    now, spread = course.mean[0], np.zeros(PLACE)
+def _smoothed(value: np.ndarray, noise: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Means (T, k) of a random walk of variances `steps` (T, k), given all its measurements and their variances."""
+    mean, variance, expected = (np.empty_like(value) for _ in range(3))
+    now, spread = value[0], np.zeros(value.shape[1])
     for frame, step in enumerate(steps):
         expected[frame] = spread + step
-        gain = expected[frame] / (expected[frame] + course.variance[frame])
-        now = now + gain * (course.mean[frame] - now)
-        spread = (1 - gain) * expected[frame]
+        now, spread = _updated(now, expected[frame], value[frame], noise[frame])
         mean[frame], variance[frame] = now, spread
     for frame in range(len(steps) - 2, -1, -1):
         back = variance[frame] / expected[frame + 1]

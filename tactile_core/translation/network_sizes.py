@@ -12,7 +12,7 @@ from .weights import ADVICE
 
 SIGNAL_HIDDEN = (256, 128, 64)  # the published SVB's (docs/sources.md, Networks)
 PLACE = 2  # numbers of a mesh's latent that are the place of its dent
-STATE = PLACE + 2  # numbers of a contact's state: the place of its dent, and on asinh scales its force and depth
+STATE = PLACE + 2  # numbers of a contact's state: the place of the gel's dent, on asinh scales its force and depth
 SURFACES = ("biotac", "digit")
 ERROR_FEATURES = 3  # beside the latent: what SVB leaves, how large the signal is, whether it is rectified
 NETS = ("SVB", "MVB", "S2MPN", "R2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "pressure", "error")
@@ -31,7 +31,7 @@ def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]
     width, blocks = sizes["width"], sizes["blocks"]
     if net in POSTERIORS:
         shapes = residual_shapes("posterior", sizes["inputs"], sizes["components"] * (1 + 2 * STATE), width, blocks)
-        return shapes | residual_shapes("code", sizes["inputs"] + STATE, sizes["outputs"] - PLACE, width, blocks)
+        return shapes | residual_shapes("code", sizes["inputs"] + STATE, sizes["outputs"], width, blocks)
     if net in ("MVB", "MVD"):
         wide, near, latent, window = sizes["wide"], sizes["near"], sizes["latent"], (2 * sizes["half"] + 1) ** 2
         shapes = residual_shapes("encoder", wide + near + 2 * PLACE, 2 * (latent - PLACE), width, blocks)

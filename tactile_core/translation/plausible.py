@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .contact_track import LEAST_FORCE
 from .gel_place import on_gel
 from .network_sizes import PLACE, STATE
-from .networks import COMPRESSED_LIMIT, FORCE_SCALE, Networks, Posterior
+from .networks import COMPRESSED_LIMIT, FORCE_SCALE, Networks, Posterior, touches
 
 SEED = 0  # the same recording, the same contacts
 NAMES = "sample_center", "sample_force"
@@ -25,19 +24,15 @@ def draw(posterior: Posterior, frames: np.ndarray, count: int) -> np.ndarray:
     return drawn
 
 
-def contacts(
-    nets: Networks, latent_signal: np.ndarray, states: np.ndarray, rectified: np.ndarray, shift: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Map states (T, count, STATE) of frames' signals (T, K) to the DIGIT, by ``NAMES``.
+def contacts(nets: Networks, states: np.ndarray, shift: np.ndarray) -> dict[str, np.ndarray]:
+    """Map states (T, count, STATE) to the DIGIT, by ``NAMES``.
 
     sample_center : (T, count, 2) = (x, z) m, moved by shift (2,) m, NaN without contact; sample_force : (T, count) N
     """
     shape = states.shape[:2]
     flat = states.reshape(-1, STATE)
-    signal, of_rectified = (np.repeat(each, shape[1], axis=0) for each in (latent_signal, rectified))
-    latent = nets.m2m(nets.given(signal, flat, of_rectified))
-    center = on_gel(nets.frames["MVD"], latent[:, :PLACE]) + shift
-    touched = flat[:, PLACE] > LEAST_FORCE
+    center = on_gel(nets.frames["MVD"], flat[:, :PLACE]) + shift
+    touched = touches(flat)
     force = FORCE_SCALE * np.sinh(np.clip(flat[:, PLACE], 0, COMPRESSED_LIMIT))
     center = np.where(touched[:, None], center, np.nan).reshape(*shape, 2)
     return dict(zip(NAMES, (center, np.where(touched, force, 0).reshape(shape)), strict=True))

@@ -17,11 +17,11 @@ from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
 from . import error_bounds, gel_place, networks, plausible
 from .answer import MEAN, Answer
-from .contact_frame import STILL, ContactFrame, on_skin
-from .contact_track import LEAST_FORCE, track
+from .contact_frame import STILL, ContactFrame
+from .contact_track import Evidence, track
 from .error_bounds import KINDS
 from .network_sizes import PLACE, SURFACES
-from .networks import Networks, Posterior
+from .networks import Networks, Posterior, touches
 from .two_contacts import two_contacts
 from .weights import ADVICE
 
@@ -87,13 +87,13 @@ def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) ->
 
 
 def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Share (T,) of the posterior in contacts whose place on the skin is ``APART`` m and more from that of states
+    """Share (T,) of the posterior in contacts whose place on the gel is ``APART`` m and more from that of states
     (T, STATE).
     """
     place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
-    points = on_skin(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 3)
-    far = accuracy.lengths(points - on_skin(frame, place)[:, None]) > APART
-    return (posterior.weight * (far & (posterior.mean[..., PLACE] > LEAST_FORCE))).sum(-1)
+    points = gel_place.on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
+    far = accuracy.lengths(points - gel_place.on_gel(frame, place)[:, None]) > APART
+    return (posterior.weight * (far & touches(posterior.mean))).sum(-1)
 
 
 class Translator:
@@ -106,11 +106,13 @@ class Translator:
         self._shift = gel_place.Shift(nets.frames["MVD"], moved) if moved.any() else None
         self._unrolled = surface.unrolled_nodes()
 
-    def posterior(self, signals: Signals) -> Posterior:
-        """Return each frame's posterior of its contact, from that frame alone; ``contact_track`` tracks it
-        through time.
+    def posterior(self, signals: Signals) -> Evidence:
+        """Return each frame's posterior of its contact, from that frame alone, and what ``contact_track`` needs
+        beside it to track the contact through time.
         """
-        return self.nets.posterior(self._latent_signal(signals), _rectified(signals))
+        rectified, latent = _rectified(signals), self._latent_signal(signals)
+        size = np.sqrt(np.square(signals.typical).mean(axis=1))
+        return Evidence(**vars(self.nets.posterior(latent, rectified)), size=size, rectified=rectified)
 
     def followed(self, signals: Signals, time: np.ndarray) -> Translation:
         """Translate a recording at once: frames at times (T,) s, each estimated with its neighbours."""
@@ -120,7 +122,7 @@ class Translator:
         """Draw contacts for each frame, the number given by the options, by ``plausible.NAMES``; frames : (T,)."""
         rectified, latent = _rectified(signals), self._latent_signal(signals)
         states = plausible.draw(self.nets.posterior(latent, rectified), frames, self.answer.samples)
-        return plausible.contacts(self.nets, latent, states, rectified, self.answer.mount_shift)
+        return plausible.contacts(self.nets, states, self.answer.mount_shift)
 
     def _latent_signal(self, signals: Signals) -> np.ndarray:
         return self.nets.encode_signal(np.asarray(signals.typical, np.float32), _rectified(signals))
@@ -138,10 +140,9 @@ class Translator:
         alone = state is None
         posterior = nets.posterior(latent_signal, rectified)
         if state is None:
-            state = posterior.average if self.answer.kind == MEAN else posterior.heaviest
-        latent_biotac = nets.given(latent_signal, state, rectified)
-        latent_digit = nets.m2m(latent_biotac)
-        touched = state[:, PLACE] > LEAST_FORCE
+            state = posterior.average if self.answer.kind == MEAN else posterior.likely
+        latent_biotac, latent_digit = nets.latents(latent_signal, state, rectified)
+        touched = touches(state)
         biotac, digit = (
             decode(latent) * touched[:, None, None]
             for decode, latent in ((nets.decode_biotac, latent_biotac), (nets.decode_digit, latent_digit))
@@ -156,7 +157,7 @@ class Translator:
         confidence = self._confidence(change, flags, rectified)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
         flags[two_contacts(change, rectified)] |= np.uint16(Flag.TWO_CONTACTS)
-        undecided = touched & (elsewhere(posterior, state, nets.frames["MVB"]) > UNDECIDED)
+        undecided = touched & (elsewhere(posterior, state, nets.frames["MVD"]) > UNDECIDED)
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(
             latent_signal, latent_biotac, latent_digit, biotac, digit,

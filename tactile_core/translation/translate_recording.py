@@ -13,8 +13,7 @@ from ..recordings import PrepareOptions, Recording, electrode_gains
 from ..recordings.fingers import split
 from ..recordings.signals import FRAMEWISE, Signals
 from .answer import Answer
-from .contact_track import Tracked
-from .networks import Posterior
+from .contact_track import Evidence, Tracked
 from .translate import Translation, Translator, load_translator
 
 CHUNK = 64  # frames translated at a time: bounds the networks' intermediate memory to about 20 MB
@@ -83,7 +82,7 @@ def _tracked(translator: Translator, recording: Recording, signals: Signals) -> 
     if not translator.answer.follows:
         return None
 
-    def read(start: int, stop: int) -> tuple[np.ndarray, Posterior]:
+    def read(start: int, stop: int) -> tuple[np.ndarray, Evidence]:
         return recording.time[start:stop], translator.posterior(_part(signals, np.arange(start, stop)))
 
     return Tracked(read, len(recording))

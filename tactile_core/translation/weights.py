@@ -20,7 +20,7 @@ from ..files import atomic, outside
 from ..recordings.polarity import FALLS
 
 CARD_NAME = "card.json"
-CARD_FORMAT = "tactile-weights-3"
+CARD_FORMAT = "tactile-weights-4"
 DTYPES: dict[str, np.dtype] = {"F32": np.dtype("<f4"), "F16": np.dtype("<f2")}
 MAX_HEADER_BYTES = 1_000_000  # our headers are about 3 kB; the limit keeps a damaged length from asking for gigabytes
 MAX_FILE_BYTES = 500_000_000  # shipped files are a few MB

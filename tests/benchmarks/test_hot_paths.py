@@ -28,9 +28,9 @@ def test_translation(nets: networks.Networks, benchmark: Callable, frames: int) 
     change = np.random.default_rng(0).normal(0, 30, (frames, 19)).astype(np.float32)
 
     def translate() -> np.ndarray:
-        latent = nets.s2m(nets.encode_signal(change))
-        nets.decode_biotac(latent)
-        return nets.decode_digit(nets.m2m(latent))
+        biotac, digit = nets.likely_latents(nets.encode_signal(change))
+        nets.decode_biotac(biotac)
+        return nets.decode_digit(digit)
 
     assert np.isfinite(benchmark.pedantic(translate, **QUICK)).all()
 

@@ -39,6 +39,7 @@ CASES = {
     ("batch", "--columns"): ["batch {csv} --out {out} --columns {x.toml}"],
     ("watch", "--columns"): ["watch {csv} --play --speed 0 --out {out} --columns {x.toml}"],
     ("watch", "--sensor"): ["watch {csv} --play --speed 0 --out {out} --sensor {x.toml}"],
+    ("watch", "--camera"): ["watch {csv} --play --speed 0 --out {out} --camera {x.mp4}"],
     ("info", "--columns"): ["info {csv} --columns {x.toml}"],
     ("adapt", "--columns"): ["adapt {csv} --out {out} --columns {x.toml}"],
     ("export", "job"): ["export {job} --to npz --out {out}", "export {x} --to npz --out {out}"],

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tactile_core.sensors import unrolling
 from tactile_core.simulation.pairs_file import read_pairs
-from tactile_core.translation import networks
 
 PAIRS = Path(__file__).resolve().parents[2] / "scenes" / "training" / "test_contacts.h5"
 HELD, PAUSE = 6, 4  # frames a contact is held, and without contact before it
@@ -17,14 +17,11 @@ MM = 1e3
 
 def labelled_arrays() -> dict[str, np.ndarray]:
     """Readings of a sensor whose gains differ by 40 %, with places (mm, SynTouch's frame) and forces."""
-    from tactile_core.translation.contact_frame import on_skin
-
     pairs = read_pairs(PAIRS)
     pairs = pairs.select_rows(np.flatnonzero(pairs.press < BALANCED))
     random = np.random.default_rng(5)
     gain = np.exp(0.4 * random.standard_normal(19))
-    frame = networks.load().frames["MVB"]
-    skin = on_skin(frame, frame.place(pairs.displacement_biotac.astype(np.float32)))
+    skin = np.array([unrolling.roll_up(center)[0] for center in pairs.contact_center])
     place = np.column_stack([-MM * skin[:, 0] - 13.97, MM * skin[:, 2], MM * skin[:, 1]])
     held = np.r_[np.zeros(PAUSE), np.ones(HELD)]
     frames = len(pairs.press) * len(held)

@@ -101,7 +101,7 @@ def test_a_batch_tells_the_state_of_each_contact(contacts):
     rows = np.array([0, 3, -1])
     state = contacts.batch(rows, contacts.read(rows, np.random.default_rng(0))).state.numpy()
     pairs = contacts.pairs
-    np.testing.assert_array_equal(state[:2, :2], contacts.biotac.place[rows[:2]])
+    np.testing.assert_array_equal(state[:2, :2], contacts.digit.place[rows[:2]])
     force = np.linalg.norm(pairs.force[rows[:2]], axis=-1)
     deepest = (pairs.displacement_digit[rows[:2]].astype(float) * pairs.scale_digit)[..., 1].max(-1)
     np.testing.assert_allclose(np.sinh(state[:2, 2:]).T, [force / 0.1, deepest / 20e-6], rtol=1e-5)

@@ -1,11 +1,12 @@
 """Contacts followed through time: what is decided by neighbours, and what must not be smeared over them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from tactile_core.translation import contact_track
-from tactile_core.translation.contact_track import Follower, Tracked, track
-from tactile_core.translation.networks import Posterior
+from tactile_core.translation.contact_track import Evidence, Follower, Tracked, track
+from tactile_core.translation.networks import touches
 
 SPREAD = np.float32([0.1, 0.1, 0.1, 0.1])  # a cell, and 10 % of a force
 OTHER = np.float32([0.8, -0.6, 0, 0])  # where another contact would answer for the same signals
@@ -17,11 +18,12 @@ def posterior(states, rng, right=0.9):
     means = states + SPREAD * rng.standard_normal(states.shape).astype(np.float32)
     weight = np.where(rng.random(len(states)) < right, 0.6, 0.4).astype(np.float32)
     mean = np.stack([means, means + OTHER], axis=1)
-    return Posterior(np.stack([weight, 1 - weight], axis=1), mean, np.broadcast_to(SPREAD, mean.shape))
+    size, signed = 100 * np.sinh(states[:, 2]), np.zeros(len(states), bool)  # counts, in proportion to the force
+    return Evidence(np.stack([weight, 1 - weight], axis=1), mean, np.broadcast_to(SPREAD, mean.shape), size, signed)
 
 
 def part(whole, start, stop):
-    return Posterior(whole.weight[start:stop], whole.mean[start:stop], whole.spread[start:stop])
+    return Evidence(**{name: values[start:stop] for name, values in vars(whole).items()})
 
 
 def follow(whole, time):
@@ -43,7 +45,7 @@ def sliding():
 
 def test_neighbours_decide_between_two_places(sliding):
     truth, told, time = sliding
-    alone, both, causal = (place_error(each, truth) for each in (told.heaviest, track(told, time), follow(told, time)))
+    alone, both, causal = (place_error(each, truth) for each in (told.likely, track(told, time), follow(told, time)))
     assert np.mean(alone > 0.5) > 0.05  # what there is to decide
     assert both.max() < 0.5
     assert np.median(both) < 0.5 * np.median(alone)
@@ -58,7 +60,7 @@ def test_a_tap_keeps_its_frames_and_its_force(frames):
     truth[30 : 30 + frames] = STATE
     told, time = posterior(truth, np.random.default_rng(2), right=1.0), np.arange(60) / 100
     for found in (track(told, time), follow(told, time)):
-        touched = found[:, 2] > contact_track.LEAST_FORCE
+        touched = touches(found)
         assert np.array_equal(np.flatnonzero(touched), np.arange(30, 30 + frames))
         assert np.abs(found[touched, 2] - STATE[2]).max() < 3 * SPREAD[2]
 
@@ -84,6 +86,30 @@ def test_nothing_is_smoothed_over_a_gap():
     assert np.allclose(found, np.concatenate(apart), atol=2e-3)  # what an all but free step still ties
     clock = np.concatenate([time[20:], time[:20]])  # one that was set back
     assert np.isfinite(track(told, clock)).all()
+
+
+def test_force_is_calmed_by_the_size_of_the_signals():
+    """The signals show how the force changes from frame to frame better than each frame's own estimate does."""
+    truth = np.tile(STATE, (300, 1))
+    truth[:, 2] += 0.5 * np.sin(2 * np.arange(300, dtype=np.float32))
+    told, time = posterior(truth, np.random.default_rng(9), right=1.0), np.arange(300) / 100
+    unknown = dataclasses.replace(told, size=np.full(300, told.size.mean()))
+    off = {name: np.std(each[:, 2] - truth[:, 2]) for name, each in (
+        ("both ways", track(told, time)), ("causal", follow(told, time)), ("unknown", track(unknown, time)),
+    )}  # fmt: skip
+    assert off["both ways"] < 0.6 * SPREAD[2]
+    assert off["causal"] < 0.8 * SPREAD[2]
+    assert off["unknown"] > SPREAD[2]
+
+
+def test_rectified_places_move_less():
+    """Their errors outlast a frame, so that their steps are taken as shorter."""
+    truth = np.tile(STATE, (300, 1))
+    told, time = posterior(truth, np.random.default_rng(10), right=1.0), np.arange(300) / 100
+    rectified = dataclasses.replace(told, rectified=np.ones(300, bool))
+    for each in (track, follow):
+        calm, other = (np.std(each(one, time)[50:, :2], axis=0) for one in (rectified, told))
+        assert (calm < 0.8 * other).all()
 
 
 def test_no_lag_in_a_ramp(sliding):
@@ -118,5 +144,5 @@ def test_a_frame_depends_on_no_choice_of_frames():
 def test_no_frame_and_one_frame():
     told = posterior(STATE[None], np.random.default_rng(8), right=1.0)
     assert track(part(told, 0, 0), np.empty(0)).shape == (0, 4)
-    assert np.allclose(track(told, np.zeros(1)), told.heaviest, atol=2e-3)
-    assert np.allclose(follow(told, np.zeros(1)), told.heaviest, atol=4e-3)  # a weak prior draws it to the middle
+    assert np.allclose(track(told, np.zeros(1)), told.likely, atol=2e-3)
+    assert np.allclose(follow(told, np.zeros(1)), told.likely, atol=4e-3)  # a weak prior draws it to the middle

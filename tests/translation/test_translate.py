@@ -143,15 +143,15 @@ def test_a_contact_beyond_the_gel_is_flagged(translator):
 
 
 def test_a_place_is_undecided_by_what_lies_elsewhere(translator):
-    frame = translator.nets.frames["MVB"]
+    frame = translator.nets.frames["MVD"]
     rows = frame.rows - 1
     mean = np.zeros((3, 2, network_sizes.STATE), np.float32)
     mean[..., network_sizes.PLACE] = 3.0  # in contact
-    mean[1:, 1, 0] = 0.25 * rows / contact_frame.PLACE_UNIT  # a quarter of the finger's length away
+    mean[1:, 1, 0] = 0.25 * rows / contact_frame.PLACE_UNIT  # a quarter of the gel's length away
     mean[2, 1, network_sizes.PLACE] = 0.0  # no contact at all lies nowhere else
     weight = np.tile(np.float32([0.6, 0.4]), (3, 1))
     posterior = networks.Posterior(weight, mean, np.full_like(mean, 0.1))
-    np.testing.assert_allclose(translate.elsewhere(posterior, posterior.heaviest, frame), [0.0, 0.4, 0.0])
+    np.testing.assert_allclose(translate.elsewhere(posterior, posterior.likely, frame), [0.0, 0.4, 0.0])
 
 
 def test_weights_for_another_surface_are_refused(monkeypatch):

@@ -24,8 +24,10 @@ class TorchChain:
     @torch.inference_mode()
     def __call__(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         signal = torch.cat([torch.from_numpy(change), torch.zeros(len(change), 1)], -1)
-        biotac = self.s2m(self.encoder(modules.compress(signal))[:, : self.latent])
-        digit = self.m2m(self.skin.placed(biotac)[0])
+        latent = self.encoder(modules.compress(signal))[:, : self.latent]
+        state = self.s2m.contact(latent)
+        biotac = self.s2m.given(latent, state)
+        digit = torch.cat([state[:, :PLACE], self.m2m(self.skin.placed(biotac)[0])[:, PLACE:]], -1)
         return self.skin(biotac).numpy(), self.gel(digit).numpy()
 
 

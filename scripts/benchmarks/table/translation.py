@@ -64,8 +64,8 @@ def _numpy() -> Surfaces:
     nets = load_translator().nets
 
     def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
-        biotac = nets.s2m(nets.encode_signal(change))
-        return nets.decode_biotac(biotac), nets.decode_digit(nets.m2m(biotac))
+        biotac, digit = nets.likely_latents(nets.encode_signal(change))
+        return nets.decode_biotac(biotac), nets.decode_digit(digit)
 
     return surfaces
 

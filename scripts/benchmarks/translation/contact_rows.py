@@ -16,10 +16,9 @@ from tactile_core.jobs import solved_gel
 from tactile_core.sensors import COUNT_SIGN
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, parts, true_displacement
-from tactile_core.translation.contact_frame import on_skin
-from tactile_core.translation.contact_track import LEAST_FORCE
+from tactile_core.translation.gel_place import on_gel
 from tactile_core.translation.network_sizes import PLACE
-from tactile_core.translation.networks import FORCE_SCALE, Networks, Posterior
+from tactile_core.translation.networks import FORCE_SCALE, Networks, Posterior, touches
 
 from .gel_force import carried_force
 
@@ -69,8 +68,8 @@ def gel_force_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
     ratios: dict[str, list[np.ndarray]] = {"gel_force": [], "gel_force_ceiling": []}
     for part in parts(len(change)):
         read = nets.encode_signal(change[part])
-        state = nets.posterior(read).heaviest
-        gel = nets.decode_digit(nets.m2m(nets.given(read, state)))
+        state = nets.posterior(read).likely
+        gel = nets.decode_digit(nets.latents(read, state)[1])
         known = (gel, FORCE_SCALE * np.sinh(state[:, PLACE])), (true_displacement(pairs, "digit", part), None)
         for name, (surface, force) in zip(ratios, known, strict=True):
             size = accuracy.lengths(pairs.force[part]) if force is None else force
@@ -96,13 +95,13 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
     columns: dict[str, list[np.ndarray]] = {"peak": [], "true": [], "place": [], "silent": []}
     for part in parts(len(change)):
         read = nets.encode_signal(folded[part], True)
-        state = nets.posterior(read, True).heaviest
-        gel, true = nets.decode_digit(nets.m2m(nets.given(read, state, True))), true_displacement(pairs, "digit", part)
+        state = nets.posterior(read, True).likely
+        gel, true = nets.decode_digit(nets.latents(read, state, True)[1]), true_displacement(pairs, "digit", part)
         columns["peak"].append(1e6 * accuracy.height(gel).max(1))
         columns["true"].append(1e6 * accuracy.height(true).max(1))
         places = digit_columns("read", gel, pairs.contact_patch_digit[part], bodies)
         columns["place"].append(places["read_position_mm"])
-        columns["silent"].append(state[:, PLACE] < LEAST_FORCE)
+        columns["silent"].append(~touches(state))
     still = ~pairs.slide.any(-1)
     peak, true, place, silent = (np.concatenate(values)[still] for values in columns.values())
     of = f"{still.sum()} contacts read without their signs"
@@ -127,14 +126,14 @@ def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
         inside = float((denser.mean(0) < share).mean())
         one = row(f"place_in_{100 * share:g}_percent_region", inside, "1", high, of=f"{low:g} to {high:g} wanted")
         found.append(one | {"ok": bool(low <= inside <= high)})
-    frame = nets.frames["MVB"]
-    truth = 1e3 * on_skin(frame, true)
-    points = 1e3 * on_skin(frame, drawn.reshape(-1, PLACE)).reshape(*drawn.shape[:2], 3)
+    frame = nets.frames["MVD"]
+    truth = 1e3 * on_gel(frame, true)
+    points = 1e3 * on_gel(frame, drawn.reshape(-1, PLACE)).reshape(*drawn.shape[:2], 2)
     half = DRAWS // 2
     score = accuracy.lengths(points - truth).mean(0) - 0.5 * accuracy.lengths(points[:half] - points[half:]).mean(0)
     others = accuracy.lengths(truth[:, None] - truth).mean(0)
     null = float((others - 0.5 * others.mean()).mean())
-    likely = 1e3 * on_skin(frame, posterior.heaviest[:, :PLACE])
+    likely = 1e3 * on_gel(frame, posterior.likely[:, :PLACE])
     of = "all test contacts; baseline: all their places alike"
     found.append(row("place_energy_score", float(score.mean()), "mm", null=null, of=of))
     alone = float(accuracy.lengths(likely - truth).mean())
@@ -159,8 +158,7 @@ def _density(posterior: Posterior, places: np.ndarray) -> np.ndarray:
 
 
 def _true_place(nets: Networks, pairs: Pairs, part: slice) -> np.ndarray:
-    frame = nets.frames["MVB"]
-    return frame.place(frame.to_local(true_displacement(pairs, "biotac", part)))
+    return nets.frames["MVD"].place(true_displacement(pairs, "digit", part))
 
 
 def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodies: Bodies) -> Columns:
@@ -168,8 +166,8 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
     posterior = nets.posterior(read)
     mean = (posterior.weight[:, :, None] * posterior.mean).sum(1)
     found = {}
-    for name, state in (("likely", posterior.heaviest), ("mean", mean)):
-        gel, force = nets.decode_digit(nets.m2m(nets.given(read, state))), FORCE_SCALE * np.sinh(state[:, PLACE])
+    for name, state in (("likely", posterior.likely), ("mean", mean)):
+        gel, force = nets.decode_digit(nets.latents(read, state)[1]), FORCE_SCALE * np.sinh(state[:, PLACE])
         found |= _figures(name, gel, force, pairs, part, bodies)
         if name == "likely":
             found |= _figures("solved", solved_gels(gel, force), force, pairs, part, bodies)

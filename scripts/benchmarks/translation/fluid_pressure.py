@@ -60,10 +60,15 @@ def grip_row(prepared: Iterable[Signals], network: Translator) -> Row:
 
 
 def _frames(path: Path, network: Translator, sensor: ElectrodeGains | None) -> np.ndarray:
-    """Frames surely in contact, (T, 3): pressure measured and estimated, Pa, and the electrodes' sum, counts."""
-    signals = prepare_unit(read(path), None, sensor)
+    """Frames surely in contact, (T, 3): pressure measured and estimated, Pa, and the electrodes' sum, counts.
+
+    Contacts are followed, as `convert` does: a light frame alone may look like none, and then has no pressure.
+    """
+    recording = read(path)
+    signals = prepare_unit(recording, None, sensor)
     measured = PRESSURE_PER_COUNT * signals.pdc
-    columns = np.column_stack([measured, network(signals).pressure, np.abs(signals.change).sum(axis=1)])
+    estimated = network.followed(signals, recording.time).pressure
+    columns = np.column_stack([measured, estimated, np.abs(signals.change).sum(axis=1)])
     return columns[measured > CONTACT]
 
 

@@ -117,7 +117,7 @@ def _cases(translator: Translator, pairs: Pairs) -> bytes:
 
     nets, gel = translator.nets, sensors.digit_surface()
     change = as_read(pairs.signal, SEED)
-    found = nets.decode_digit(nets.m2m(nets.s2m(nets.encode_signal(change))))
+    found = nets.decode_digit(nets.likely_latents(nets.encode_signal(change))[1])
     true = true_displacement(pairs, "digit", np.arange(len(change)))
     figures = mesh_columns("chain", found, true) | mesh_columns("null", 0 * true, true)
     share = np.where(true[..., 1].max(1) >= 1e-4, figures["chain_rms_um"] / figures["null_rms_um"], np.nan)

@@ -121,8 +121,8 @@ def speed_rows(translator: Translator, pairs: Pairs) -> list[Row]:
     nets, found = translator.nets, []
 
     def surfaces(change: np.ndarray) -> None:
-        biotac = nets.s2m(nets.encode_signal(change))
-        nets.decode_biotac(biotac), nets.decode_digit(nets.m2m(biotac))
+        biotac, digit = nets.likely_latents(nets.encode_signal(change))
+        nets.decode_biotac(biotac), nets.decode_digit(digit)
 
     def trust(change: np.ndarray) -> None:
         surfaces(change)

@@ -23,12 +23,12 @@ class DigitCamera:
     """
 
     def __init__(self, source: str) -> None:
-        import cv2
-
         is_device = source.isdigit()
         if not is_device and not Path(source).is_file():
-            expected = "the number of a camera (0 is /dev/video0), or a video file"
+            expected = "the number of a camera (0 is /dev/video0), or a regular file that holds a video"
             raise TactileError("--camera", f"{source}, which is neither", expected)
+        import cv2
+
         self._capture = cv2.VideoCapture(int(source) if is_device else source)
         if not self._capture.isOpened():
             raise TactileError("--camera", f"{source}, which OpenCV cannot open", "a camera or video", "Plug it in")

@@ -27,7 +27,7 @@ def rows_of(posterior, true, monkeypatch):
     """name -> row, where contacts truly lie at ``true``."""
     monkeypatch.setattr(contact_rows, "_true_place", lambda nets, pairs, part: true[part])
     nets = types.SimpleNamespace(
-        posterior=lambda latent: posterior, encode_signal=lambda change: change, frames={"MVB": frame_of("biotac", 12)}
+        posterior=lambda latent: posterior, encode_signal=lambda change: change, frames={"MVD": frame_of("digit", 16)}
     )
     return {row["name"]: row for row in contact_rows.posterior_rows(nets, None, np.zeros((CONTACTS, 19)))}
 
