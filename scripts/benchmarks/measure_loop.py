@@ -4,9 +4,11 @@
     python scripts/benchmarks/measure_loop.py --count 18                                  a quick look
 
 Random contacts of nine indenters on each sensor, with friction. Alone: each from nothing. On a path: ten depths to the
-same goal, the first left out. Median and 95 % of CPU and wall ms a contact on one core, warm; both ways of computing
-take turns by contact, so that a busy machine slows both. Beside them the error: of the fast tier against the full one
-(`mechanics_tiers.json`), and how far what is compiled lies from numpy. Needs the extras [fem] and [fast].
+same goal, the first left out. A step and picture: what a simulator's loop asks of a ``Gel`` of the DIGIT, five depths
+to the goal and five slides of 0.1 mm along the finger. Median, 95 and 99 % of CPU and wall ms a contact on one core,
+warm; both ways of computing take turns by contact, so that a busy machine slows both. Beside them the error: of the
+fast tier against the full one (`mechanics_tiers.json`), and how far what is compiled lies from numpy. Needs the extras
+[fem] and [fast].
 """
 
 from __future__ import annotations
@@ -28,10 +30,11 @@ one_thread()  # before numpy is imported: the times are those of one core
 
 import numpy as np  # noqa: E402
 
-from benchmarks.mechanics.random_contacts import random_contacts  # noqa: E402
+from benchmarks.mechanics.random_contacts import RandomContact, random_contacts  # noqa: E402
 from tactile_core.accuracy import HEADER, Row, line, row  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.files import atomic, compiled  # noqa: E402
+from tactile_core.jobs.gel import Gel  # noqa: E402
 from tactile_core.mechanics.error_estimate import measured  # noqa: E402
 from tactile_core.mechanics.fast.active_set import UnsolvedError  # noqa: E402
 from tactile_core.mechanics.fast.compliance import compliance_of  # noqa: E402
@@ -42,6 +45,8 @@ from tactile_core.pictures.height_map import digit_mapper, folds_counted  # noqa
 from tactile_core.pictures.renderer import Renderer  # noqa: E402
 
 STEPS, SEED = 10, 20261125
+SLIDE = 0.1e-3  # m a step
+LEVELS = (0.5, 0.95, 0.99)
 WARM = 9  # contacts before the first that counts, one of each indenter
 HOW = ("numpy", "compiled")
 Times = list[tuple[float, float]]  # CPU and wall, ms
@@ -57,9 +62,13 @@ def main(arguments: list[str] | None = None) -> int:
     if not compiled.available():
         print("measure_loop: the extra [fast] is not installed, or switched off", file=sys.stderr)
         return 2
-    rows, table = [], [
-        "| | way | CPU ms: median | 95 % | wall ms: median | 95 % | error |", "|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    rows, table = (
+        [],
+        [
+            "| | way | CPU ms: median | 95 % | 99 % | wall ms: median | 95 % | 99 % | error |",
+            "|---|---|---|---|---|---|---|---|---|",
+        ],
+    )
     for name, times, error in all_measured(options.count):
         for how in HOW:
             middle = figures(times[how])
@@ -75,17 +84,18 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def figures(times: Times) -> list[float]:
-    """Median and 95 % of CPU, then of wall ms."""
-    return [float(np.quantile(each, level)) for each in np.array(times).T for level in (0.5, 0.95)]
+    """Median, 95 and 99 % of CPU, then of wall ms."""
+    return [float(np.quantile(each, level)) for each in np.array(times).T for level in LEVELS]
 
 
 def as_rows(name: str, times: dict[str, Times], error: dict[str, str]) -> list[Row]:
-    """Four rows a way of computing."""
+    """Six rows a way of computing."""
     rows = []
     for how in HOW:
         key = f"loop_{name.replace(', ', '_').replace(' ', '_')}_{how}"
         of = f"{len(times[how])} contacts, one core; error {error[how]}"
-        for label, value in zip(("cpu", "cpu_95", "wall", "wall_95"), figures(times[how]), strict=True):
+        labels = [f"{kind}{level}" for kind in ("cpu", "wall") for level in ("", "_95", "_99")]
+        for label, value in zip(labels, figures(times[how]), strict=True):
             rows.append(row(f"{key}_{label}", value, "ms", of=of))
     return rows
 
@@ -97,6 +107,7 @@ def all_measured(count: int):  # noqa: ANN201
             yield name, times, error
             if sensor == "digit" and name.endswith("path"):
                 yield from pictures(last)
+    yield gel_steps(count)
 
 
 def of_sensor(sensor: str, count: int):  # noqa: ANN201
@@ -155,6 +166,39 @@ def pictures(contacts: list[FastContact]):  # noqa: ANN201
         levels.append(np.abs(seen[0] - seen[1]).max())
     yield "digit, height map", heights, {"numpy": "0.1 um", "compiled": f"{max(apart):.2g} um from numpy"}
     yield "digit, fast picture", shading, {"numpy": "see optics.md", "compiled": f"{max(levels)} levels from numpy"}
+
+
+def gel_steps(count: int) -> tuple[str, dict[str, Times], dict[str, str]]:
+    """The same of whole steps of a ``Gel`` along paths, with their pictures."""
+    times: dict[str, Times] = {how: [] for how in HOW}
+    levels = []
+    for number, contact in enumerate(random_contacts(-(-count // STEPS) + WARM, SEED)):
+        seen: dict[str, list[np.ndarray]] = {how: [] for how in HOW}
+        for how in HOW:
+            switch(how)
+            gel = Gel("digit", contact.indenter)
+            for step, pose in enumerate(pressed_and_slid(contact)):
+                took, picture = timed(lambda g=gel, p=pose: (g.press(p), g.picture())[1])
+                seen[how].append(picture.astype(int))
+                if number >= WARM and step:
+                    times[how].append(took)
+        levels.append(np.abs(np.subtract(*seen.values())).max())
+    error = f"{np.quantile(levels, 0.9):.0f} levels from numpy on 9 of 10 paths"
+    return "digit, step and picture", times, {"numpy": "see above", "compiled": error}
+
+
+def pressed_and_slid(contact: RandomContact) -> list[np.ndarray]:
+    """Poses (4, 4) on the DIGIT: first touch, depths to the contact's own, and slides from there toward the base."""
+    pose = pose_at("digit", contact.indenter, contact.place)
+    deepest = contact.depth * thickness_under("digit", contact.indenter, pose)
+    half = STEPS // 2
+    poses = []
+    for step in range(STEPS + 1):
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = pose.axes, pose.moved(deepest * min(step / half, 1)).apex
+        matrix[0, 3] += SLIDE * max(step - half, 0)
+        poses.append(matrix)
+    return poses
 
 
 def switch(how: str) -> None:

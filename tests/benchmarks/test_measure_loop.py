@@ -16,5 +16,5 @@ def test_the_table_has_both_ways_and_their_errors(tmp_path, monkeypatch, compile
     assert measure_loop.main(["--count", "2", "--json", str(written[0]), "--markdown", str(written[1])]) == 0
     rows, table = json.loads(written[0].read_text()), written[1].read_text()
     assert {row["unit"] for row in rows} == {"ms"} and all(row["value"] > 0 for row in rows)
-    assert table.count("| numpy |") == table.count("| compiled |") == 6
+    assert table.count("| numpy |") == table.count("| compiled |") == 7
     assert "um from numpy" in table and "from the full tier" in table
