@@ -100,8 +100,9 @@ def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera
 
 
 def left_out(scene: bpy.types.Scene) -> list[str]:
-    """Names of lamps that do not reach the picture: suns, spots and areas."""
-    return [t.name for t in scene.objects if t.type == "LIGHT" and t.data.type != "POINT" and not t.hide_render]
+    """Names of the user's lamps that do not reach the picture: suns, spots and areas."""
+    lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
+    return [lamp.name for lamp in lamps if lamp.data.type != "POINT"]
 
 
 def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN001, ANN202

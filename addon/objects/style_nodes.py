@@ -41,13 +41,23 @@ def input_of(tree: bpy.types.NodeTree, name: str) -> str:
     return next(item.identifier for item in tree.interface.items_tree if item.name == name and item.in_out == "INPUT")
 
 
-def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> None:
-    """Set the value of a group's input in a modifier. Blender 5.2 holds inputs as properties, not by their keys."""
+def input_property(modifier: bpy.types.NodesModifier, name: str) -> tuple[bpy.types.bpy_struct, str]:
+    """What holds the value of a group's input in a modifier, and its name there, as layouts take them.
+
+    Blender 5.2 holds inputs as properties, not by their keys.
+    """
     key = input_of(modifier.node_group, name)
     if hasattr(modifier, "properties"):
-        getattr(modifier.properties.inputs, key).value = value
+        return getattr(modifier.properties.inputs, key), "value"
+    return modifier, f'["{key}"]'
+
+
+def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> None:
+    """Set the value of a group's input in a modifier."""
+    if hasattr(modifier, "properties"):
+        setattr(*input_property(modifier, name), value)
     else:
-        modifier[key] = value
+        modifier[input_of(modifier.node_group, name)] = value
 
 
 def input_path(modifier: bpy.types.NodesModifier, name: str) -> str:

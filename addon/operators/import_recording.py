@@ -70,6 +70,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
             timeline.set_timeline(scene, found.recording.rate, int(frames[0]), int(frames[-1]))
             firmest = np.linalg.norm(found.translation.force, axis=1).argmax()
             scene.frame_set(int(frames[firmest]))
+            view.fit_timeline(context)
         view.open_tab(context)
         view.show(context, [skin])
         for warning in found.signals.warnings:

@@ -53,6 +53,12 @@ class TACTILE_PT_render(bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Called by Blender."""
         draw_settings(self.layout, context)
+        draw_parts(self.layout, context)
+
+
+def draw_error(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The bound on the toolkit's own error, of simulations and pictures."""
+    layout.prop(context.scene.tactile_render, "error", placeholder="50um,0.6levels")
 
 
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -61,30 +67,33 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     layout.use_property_split = True
     layout.operator(TACTILE_OT_set_up_render.bl_idname, icon="RESTRICT_RENDER_OFF")
     layout.prop(settings, "preset")
-    layout.prop(settings, "error")
+    draw_error(layout, context)
     if settings.preset != "fast" and reports.missing("mitsuba"):
         layout.label(text="mitsuba is missing: see Preferences", icon="ERROR")
     layout.prop(settings, "calibration")
+
+
+def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """LEDs and coating of the DIGIT as they stand, and what puts them back or keeps them; nothing without a DIGIT."""
     gel = properties.of_role(context.scene, "DIGIT", context.object)
-    if gel is not None:
-        draw_parts(layout, context, gel)
-
-
-def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context, gel: bpy.types.Object) -> None:
-    """LEDs and coating of a gel as they stand, and what puts them back or keeps them."""
+    if gel is None:
+        return
+    layout.use_property_split = True
     leds = digit_body.leds_of(gel)
     for colour in COLOURS if leds else ():
         row = layout.row(align=True)
         if colour in leds:
             row.prop(leds[colour].data, "energy", text=f"{colour.title()} LED")
-            row.prop(leds[colour].data, "color", text="")
+            hue = row.row()
+            hue.ui_units_x = 1  # what is left holds the energy with its unit
+            hue.prop(leds[colour].data, "color", text="")
         else:
             row.label(text=f"{colour.title()} LED deleted: off", icon="INFO")
     coating = digit_body.coating_of(gel) if leds else None
     for name, socket in digit_materials.sockets_of(coating).items() if coating else ():
         layout.prop(socket, "default_value", text=name)
     for name in digit_unit.left_out(context.scene)[:2]:
-        layout.label(text=f"{name} is left out: point lamps reach the picture", icon="INFO")
+        layout.label(text=f"{name}: no point lamp, left out", icon="INFO")
     row = layout.row(align=True)
     row.operator("tactile.reset_to_calibration", text="Reset", icon="LOOP_BACK")
     row.operator("tactile.save_as_calibration", text="Save As", icon="FILE_TICK")

@@ -39,8 +39,11 @@ class TACTILE_OT_set_style(TactileOperator):
         sensors = _sensors(context)
         if self.style == "ELECTRODES" and not any(map(_counts, sensors)):
             raise TactileError("Tactile", "no electrodes' readings", "an imported recording", "Import it (again)")
+        before = len(context.scene.objects)
         for thing in sensors:
             self._give(thing)
+        if len(context.scene.objects) > before:  # a first legend
+            view.look_at(context, sensors)
         view.colour_by(context, "OBJECT" if self.style == "NONE" else "VERTEX")
 
     def _give(self, thing: bpy.types.Object) -> None:

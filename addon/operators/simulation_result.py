@@ -12,7 +12,7 @@ import numpy as np
 from ...tactile_core import sensors
 from ...tactile_core.translation import contact_patch
 from ..objects import axes, curves, custom_properties, frame_attribute, motion
-from ..ui import properties
+from ..ui import properties, view
 from . import pictures
 
 STANDING = "{} simulated"
@@ -67,7 +67,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
         if role == "DIGIT":
             patch = contact_patch.contact_patch(moved[sample], surface)
             frame_attribute.add(sensor, frame_attribute.PATCH, patch, frames[0], 1.0)
-            pictures.update(sensor, context.evaluated_depsgraph_get())
+            view.show_picture(context, pictures.update(sensor, context.evaluated_depsgraph_get()))
     if thing.tactile.press_by == "HEIGHT":
         curves.write_curve(thing, "tactile.force", frames, np.linalg.norm(force, axis=1))
     _stand(context, thing, result, sample, frames)

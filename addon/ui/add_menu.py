@@ -104,7 +104,7 @@ class TACTILE_OT_add_indenter(TactileOperator):
         thing = indenter_objects.add_indenter(context.collection, spec, sensor.tactile.per_metre)
         thing.parent = sensor
         thing.location = (_MIDDLE * sensor.tactile.per_metre, 0, _ABOVE * sensor.tactile.per_metre)
-        view.show(context, [thing])
+        view.show(context, [thing], beside=[sensor])
 
 
 def _as_typed(value: float) -> float:

@@ -4,10 +4,11 @@ import json
 
 import bpy
 
-from ..operators import preview, snap_to_gel
+from ..objects import style_nodes, styles
+from ..operators import preview, render_setup, snap_to_gel
 from ..operators.import_recording import TACTILE_OT_import_recording
 from ..operators.preview import TACTILE_OT_live_picture
-from ..operators.render_setup import draw_settings
+from ..operators.render_setup import draw_parts, draw_settings
 from ..operators.scene_files import TACTILE_OT_export_scene, TACTILE_OT_import_scene
 from ..operators.simulate import TACTILE_OT_simulate
 from ..operators.translate_recording import TACTILE_OT_translate
@@ -42,7 +43,19 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator_menu_enum("tactile.set_style", "style", icon="COLOR")
         row.operator("tactile.force_arrow", text="", icon="EMPTY_SINGLE_ARROW")
+        for role in ("BIOTAC", "DIGIT"):
+            _exaggeration(layout, properties.of_role(context.scene, role, context.object))
         _numbers(layout, skin)
+
+
+def _exaggeration(layout: bpy.types.UILayout, sensor: bpy.types.Object | None) -> None:
+    """How many times a sensor's style draws its dent: an input of the style's modifier."""
+    modifier = sensor.modifiers.get(styles.MODIFIER) if sensor is not None else None
+    if modifier is None or modifier.node_group is None:
+        return
+    if style_nodes.EXAGGERATION in modifier.node_group.interface.items_tree:  # a group of the user's own has none
+        holder, name = style_nodes.input_property(modifier, style_nodes.EXAGGERATION)
+        layout.prop(holder, name, text=f"{sensor.name}: Exaggeration")
 
 
 def _numbers(layout: bpy.types.UILayout, skin: bpy.types.Object | None) -> None:
@@ -55,10 +68,10 @@ def _numbers(layout: bpy.types.UILayout, skin: bpy.types.Object | None) -> None:
     column.label(text=f"Force {size:.3f} N", icon="FORCE_FORCE")
     if "confidence" in skin:
         trusted = skin["confidence"] >= timeline.LOW
-        words = "Signals like those of the training" if trusted else "Signals far from the training's: a guess"
-        if "expected_error_um" in skin:
-            words += f", expected error {1e-3 * skin['expected_error_um']:.2f} mm"
+        words = "Signals as in training" if trusted else "Unlike training: a guess"
         column.label(text=words, icon="CHECKMARK" if trusted else "ERROR")
+    if "expected_error_um" in skin:
+        column.label(text=f"Expected error {1e-3 * skin['expected_error_um']:.2f} mm", icon="BLANK1")
 
 
 class TACTILE_PT_picture(_Panel, bpy.types.Panel):
@@ -75,6 +88,24 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
         if preview.failure():
             layout.label(text=preview.failure(), icon="ERROR")
         draw_settings(layout, context)
+
+
+class TACTILE_PT_parts(_Panel, bpy.types.Panel):
+    """LEDs and coating of the DIGIT"""
+
+    bl_idname = "TACTILE_PT_parts"
+    bl_label = "Lights and Coating"
+    bl_parent_id = TACTILE_PT_picture.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 (Blender reads plain class attributes)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return true where there is a DIGIT."""
+        return properties.of_role(context.scene, "DIGIT", context.object) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Called by Blender."""
+        draw_parts(self.layout, context)
 
 
 def _shape(spec: str) -> str:
@@ -96,35 +127,40 @@ class TACTILE_PT_author(_Panel, bpy.types.Panel):
         layout.menu(TACTILE_MT_add.bl_idname, text="Add Sensor or Indenter", icon="ADD")
         thing = properties.of_role(context.scene, "INDENTER", context.object)
         if thing is not None:
-            column = layout.column(align=True)
-            column.label(text=thing.name, icon="MESH_ICOSPHERE")
-            column.prop(thing.tactile, "press_by")
-            if thing.tactile.press_by == "FORCE":
-                column.prop(thing.tactile, "force", text="Force (N)")
-            column.prop(thing.tactile, "friction")
-            column.prop(thing.tactile, "tilt")
-            _depth(column, context, thing)
-            if thing.tactile.spec:
-                row = column.row(align=True)
-                row.label(text=_shape(thing.tactile.spec))
-                row.operator("tactile.use_as_indenter", text="Press with Mesh")
-        layout.prop(context.scene.tactile_render, "error", text="Largest Error", placeholder="50um,0.6levels")
+            _indenter(layout.column(), context, thing)
         layout.operator(TACTILE_OT_simulate.bl_idname, icon="PHYSICS")
         row = layout.row(align=True)
         row.operator(TACTILE_OT_import_scene.bl_idname, text="Import Scene", icon="IMPORT")
         row.operator(TACTILE_OT_export_scene.bl_idname, text="Export Scene", icon="EXPORT")
 
 
+def _indenter(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object) -> None:
+    """Draw what presses, and how."""
+    shape = _shape(thing.tactile.spec) if thing.tactile.spec else "its own mesh"
+    column.label(text=f"{thing.name}: {shape}", icon="MESH_ICOSPHERE")
+    fields = column.column()
+    fields.use_property_split, fields.use_property_decorate = True, False
+    fields.prop(thing.tactile, "press_by")
+    if thing.tactile.press_by == "FORCE":
+        fields.prop(thing.tactile, "force", text="Force (N)")
+    fields.prop(thing.tactile, "friction")
+    fields.prop(thing.tactile, "tilt")
+    render_setup.draw_error(fields, context)
+    _depth(column, context, thing)
+    if thing.tactile.spec:
+        column.operator("tactile.use_as_indenter", text="Press with the Mesh as It Is", icon="MESH_MONKEY")
+
+
 def _depth(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object) -> None:
     """Draw how deep an indenter stands in the resting gel on this frame, and the button that puts it there."""
     sensor = properties.of_role(context.scene, "DIGIT") or properties.of_role(context.scene, "BIOTAC")
-    row = column.row(align=True)
     if sensor is not None and not missing("msgspec"):
         depth = snap_to_gel.depth_of(thing, sensor, context.evaluated_depsgraph_get())
         if depth is not None:
-            row.label(text=f"{1e3 * abs(depth):.2f} mm {'above' if depth < 0 else 'below'} the resting gel")
-    row.operator("tactile.snap_to_gel")
+            side = "above" if depth < 0 else "below"
+            column.label(text=f"{1e3 * abs(depth):.2f} mm {side} the resting gel", icon="DRIVER_DISTANCE")
+    column.operator("tactile.snap_to_gel", icon="SNAP_ON")
 
 
-CLASSES = (TACTILE_PT_recording, TACTILE_PT_picture, TACTILE_PT_author)
+CLASSES = (TACTILE_PT_recording, TACTILE_PT_picture, TACTILE_PT_parts, TACTILE_PT_author)
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -15,6 +17,8 @@ _UNTOUCHED = (
     ("Camera", "CAMERA", (7.3589, -6.9258, 4.9583)),
 )
 _SHARE = 0.68  # of a 3D view that it keeps beside the picture
+_DRAWN = 0.2  # s, until a split view is drawn in its new size
+_MARGIN = 1.1  # of a view, around what is looked at
 
 
 def hide_untouched(scene: bpy.types.Scene) -> None:
@@ -56,8 +60,18 @@ def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:
         editor = next((area for area in screen.areas if area not in before), None)
         if editor is not None:
             editor.type = "IMAGE_EDITOR"
+            # Until it is drawn, the view keeps its old width.
+            look = functools.partial(_look_at_selected, context.window_manager, context.window)
+            bpy.app.timers.register(look, first_interval=_DRAWN)
     if editor is not None:
         editor.spaces.active.image = image
+
+
+def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window) -> None:
+    """Look once more, after a view has changed its size."""
+    if window in windows.windows[:] and bpy.context.selected_objects:
+        with bpy.context.temp_override(window=window):
+            look_at(bpy.context, bpy.context.selected_objects)
 
 
 def open_tab(context: bpy.types.Context) -> None:
@@ -71,34 +85,54 @@ def open_tab(context: bpy.types.Context) -> None:
                         region.active_panel_category = "Tactile"
 
 
-def show(context: bpy.types.Context, things: list[bpy.types.Object]) -> None:
-    """Select the things, colour solid views by object, and look at them. Without a window, select only."""
+def fit_timeline(context: bpy.types.Context) -> None:
+    """Show the scene's whole frame range in each timeline."""
+    for area, region in _main_regions(context, "DOPESHEET_EDITOR"):
+        with context.temp_override(window=context.window, area=area, region=region):
+            bpy.ops.action.view_all()
+
+
+def show(context: bpy.types.Context, things: list[bpy.types.Object], beside: Sequence[bpy.types.Object] = ()) -> None:
+    """Select the things, colour solid views by object, and look at them, what is beside them, and their parts.
+
+    Without a window, select only.
+    """
     for thing in context.view_layer.objects:
         thing.select_set(thing in things)
     context.view_layer.objects.active = things[0]
-    window = context.window
-    for area in window.screen.areas if window else ():
-        if area.type != "VIEW_3D":
-            continue
+    for area, _ in _main_regions(context, "VIEW_3D"):
         area.spaces.active.shading.color_type = "OBJECT"
-        region = next((region for region in area.regions if region.type == "WINDOW"), None)
-        if region is not None:
-            with context.temp_override(window=window, area=area, region=region):
-                bpy.ops.view3d.view_selected()
-            _clear_sidebar(area, region)
+    look_at(context, [*things, *beside])
 
 
-def _clear_sidebar(area: bpy.types.Area, region: bpy.types.Region) -> None:
-    """Move what is looked at into the part of a view that its sidebar, drawn over it, leaves free."""
-    sidebar = next((each for each in area.regions if each.type == "UI"), None)
-    if sidebar is None or not 1 < sidebar.width < region.width:
-        return
-    seen, free = area.spaces.active.region_3d, 1 - sidebar.width / region.width
-    right = seen.view_rotation @ Vector((1.0, 0.0, 0.0))
-    seen.view_distance /= free
-    # Width that the view shows at what it looks at: Blender's lens is for a sensor of 72 mm along the longer side.
-    wide = seen.view_distance * 72 / area.spaces.active.lens * region.width / max(region.width, region.height)
-    seen.view_location += right * wide * (1 - free) / 2
+def _main_regions(context: bpy.types.Context, kind: str) -> list[tuple[bpy.types.Area, bpy.types.Region]]:
+    """Each of the window's areas of a kind, with the region that holds what it shows; none without a window."""
+    areas = context.window.screen.areas if context.window else ()
+    return [(a, region) for a in areas if a.type == kind for region in a.regions if region.type == "WINDOW"]
+
+
+def look_at(context: bpy.types.Context, things: Sequence[bpy.types.Object]) -> None:
+    """Turn no view, but let each show the things and their parts in what toolbar and sidebar, drawn over it, leave."""
+    context.view_layer.update()
+    shown = {part for thing in things for part in (thing, *thing.children) if part.type == "MESH"}
+    corners = np.array([part.matrix_world @ Vector(corner) for part in shown for corner in part.bound_box])
+    for area, region in _main_regions(context, "VIEW_3D"):
+        tools, sidebar = (max((r.width for r in area.regions if r.type == kind), default=0) for kind in ("TOOLS", "UI"))
+        if region.width <= tools + sidebar + 1:
+            continue
+        free = region.width - tools - sidebar
+        seen, longest = area.spaces.active.region_3d, max(region.width, region.height)
+        right, up, toward = np.array(seen.view_rotation.to_matrix()).T
+        sides = np.stack([corners @ right, corners @ up, corners @ toward])  # (3, n)
+        middle = (sides.min(axis=1) + sides.max(axis=1)) / 2
+        sides -= middle[:, None]
+        # Half of what a view shows, a unit of distance: Blender's lens is for a sensor of 72 mm along the longer side.
+        half = 36 / area.spaces.active.lens / longest * np.array([free, region.height])
+        seen.view_distance = float((sides[2] + _MARGIN * (np.abs(sides[:2]) / half[:, None]).max(axis=0)).max())
+        beyond = (
+            seen.view_distance * half[0] * (sidebar - tools) / free
+        )  # the view's middle is right of the free part's
+        seen.view_location = np.array([right, up, toward]).T @ (middle + np.array([beyond, 0.0, 0.0]))
 
 
 def colour_by(context: bpy.types.Context, kind: str) -> None:
