@@ -15,6 +15,8 @@ from benchmarks.translation.noise import as_read
 from benchmarks.translation.test_set import SEED
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
+from tactile_core.errors import TactileError
+from tactile_core.files import atomic
 from tactile_core.pictures.presets import measured as measured_presets
 from tactile_core.recordings import prepare, read
 from tactile_core.sensors.calibration_file import load_calibration
@@ -29,6 +31,7 @@ from .mechanics import EVERY
 from .method import ROOT, TEST_SET, TRAINING
 from .promise import TABLE, Promise
 
+PLACE = re.compile(re.escape(TABLE) + r"\n(?:\|.*\n)+")  # of the table of bounds in docs/benchmark.md
 FOLDS = 5
 EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/benchmarks/measure_tiers.py has them
 SCENES = "press", "press_roll_slide", "edge", "ring", "roll", "slide", "user_mesh"
@@ -63,6 +66,22 @@ the region, grey levels.
 | photograph | promised | found | doing nothing |
 |---|---|---|---|
 """
+
+
+def renew(docs: Path) -> list[Row]:
+    """Hold bounds of mechanics and translation against errors anew, in seconds: the plot and its table; their rows.
+
+    Raises TactileError where docs/benchmark.md has no such table.
+    """
+    page = docs / "benchmark.md"
+    text = page.read_text(encoding="utf-8")
+    if len(PLACE.findall(text)) != 1:
+        raise TactileError(page, "not one table of bounds", "one with these columns: " + TABLE.split("\n")[0])
+    promises = [*of_mechanics(quick=False), *of_translation(quick=False)]
+    table = "\n".join([TABLE, *(line for promise in promises for line in promise.lines()), ""])
+    atomic.write_bytes(page, PLACE.sub(lambda _: table, text).encode())
+    atomic.write_bytes(docs / "promised.png", plot(promises))
+    return [promise.row() for promise in promises]
 
 
 def promised(rows: Sequence[Row], quick: bool) -> tuple[list[Row], str, bytes]:

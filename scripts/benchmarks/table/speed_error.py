@@ -4,6 +4,7 @@
     python scripts/benchmark.py --quick --json FILE  under three minutes; writes FILE alone
     python scripts/benchmark.py --only chain --json FILE    some stages, or methods such as "translation numpy_1"
     python scripts/benchmark.py PRESSES              pictures beside photographs too: a folder of a 6 mm ball's presses
+    python scripts/benchmark.py --promised           bounds against errors alone, in seconds: docs/promised.png
     python scripts/benchmark.py --across PAIRS       first trains ACROSS's networks and ours on PAIRS, for 10 minutes
 
 Stages: contact mechanics by tier and sensor; translation, in numpy, in torch and by ACROSS's network shapes; pictures
@@ -38,6 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("presses", nargs="?", metavar="PRESSES", help="folder of photographs")
     parser.add_argument("--quick", action="store_true", help="fewer contacts, coarser reference pictures")
     parser.add_argument("--only", nargs="+", default=(), metavar="STAGE", help="measure these alone; writes no report")
+    parser.add_argument("--promised", action="store_true", help="the bounds alone, in docs/promised.png and its table")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
     parser.add_argument("--across", type=Path, metavar="PAIRS", help="train both on these pairs first")
     options = parser.parse_args(arguments)
@@ -47,9 +49,13 @@ def main(arguments: list[str] | None = None) -> int:
             from benchmarks.table.same_pairs import train_both
 
             train_both(options.across)
-        methods = list(all_measured(options, missing))
+        methods = [] if options.promised else list(all_measured(options, missing))
         rows, text, picture = [each for method in methods for each in method.rows()], "", b""
-        if not options.only:
+        if options.promised:
+            from benchmarks.table.promised import renew
+
+            rows = renew(ROOT / "docs")
+        elif not options.only:
             from benchmarks.table.promised import promised
 
             found, text, picture = promised(rows, options.quick)
@@ -62,7 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"left out: {name}, {why}", file=sys.stderr)
     if options.json:
         atomic.write_json(options.json, rows)
-    if not options.quick and not options.only:
+    if not (options.quick or options.only or options.promised):
         from benchmarks.table.benchmark_page import write_report
         from benchmarks.table.summary import write_summary
 
