@@ -60,7 +60,7 @@ def tracked() -> list[str]:
 
 
 def fetch(platform: str, python: str, folder: Path) -> list[Path]:
-    """The wheels, downloaded into a folder; pip says what is missing."""
+    """Download the wheels into a folder; pip says what is missing."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:",
                "--implementation", "cp", "--python-version", python, "--dest", str(folder)]  # fmt: skip
     for name in PLATFORMS[platform]:

@@ -360,7 +360,7 @@ def write_stamp(folder: Path, content: dict) -> None:
 
 
 def sources_hash() -> str:
-    """Changes when the list of packages does."""
+    """Return a hash that changes when the list of packages does."""
     digest = hashlib.sha256()
     for name in ("pyproject.toml", "constraints.txt"):
         digest.update((ROOT / name).read_bytes())
@@ -372,7 +372,7 @@ def python_version() -> str:
 
 
 def relative(path: Path) -> str:
-    """A path as short as the working folder of the reader allows."""
+    """Return a path as short as the reader's working folder allows."""
     try:
         return str(path.relative_to(ROOT))
     except ValueError:

@@ -106,7 +106,7 @@ def wrapper(tree: Path) -> Path:
 
 
 def photograph(binary: Path) -> None:
-    """The window at each stage, out/screenshots/<stage>.png."""
+    """Photograph the window at each stage, out/screenshots/<stage>.png."""
     out = ROOT / "out" / "screenshots"
     out.mkdir(parents=True, exist_ok=True)
     ask = [str(binary), "-b", "--python-expr", "import sys; print('PY %d.%d' % sys.version_info[:2])"]

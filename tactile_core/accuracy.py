@@ -48,7 +48,7 @@ def max_error(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def height(displacement: np.ndarray) -> np.ndarray:
-    """Displacement (C, n) m of nodes along +y, into the DIGIT's gel."""
+    """Return the displacement (C, n) m of nodes along +y, into the DIGIT's gel."""
     return np.asarray(displacement[..., 1], np.float64)
 
 
@@ -89,7 +89,7 @@ def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) ->
 
 
 def mean(values: np.ndarray) -> float | None:
-    """Mean over contacts without NaN; None if none is left (JSON has no NaN)."""
+    """Return the mean over contacts without NaN; None where all are NaN (JSON has no NaN)."""
     values = np.asarray(values)[np.isfinite(values)]
     return float(values.mean()) if len(values) else None
 
@@ -139,7 +139,7 @@ def failed(rows: list[Row]) -> list[Row]:
 
 
 def order(sizes: list[float], errors: list[float]) -> float:
-    """Observed order of accuracy: slope of the straight line fitted to log(error) over log(size)."""
+    """Return the observed order of accuracy: slope of the straight line fitted to log(error) over log(size)."""
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
 
 

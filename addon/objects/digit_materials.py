@@ -40,7 +40,7 @@ def set_coating(material: bpy.types.Material, coating: Coating) -> None:
 
 
 def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
-    """The coating's numbers as sockets, by name; one whose node was deleted is left out."""
+    """Return the coating's numbers as sockets, by name, without those whose node was deleted."""
     nodes = material.node_tree.nodes
     return {name: nodes[name].outputs[0] for name in _PLACES if name in nodes}
 

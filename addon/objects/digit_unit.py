@@ -99,8 +99,8 @@ def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera
     return [_lamp(t, gel, depsgraph, camera) for t in things if t.data.type == "POINT" and t.data.energy > 0]
 
 
-def left_out(scene: bpy.types.Scene) -> list[str]:
-    """Names of the user's lamps that do not reach the picture: suns, spots and areas."""
+def ignored_lamps(scene: bpy.types.Scene) -> list[str]:
+    """List the user's lamps that do not reach the picture: suns, spots and areas."""
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
     return [lamp.name for lamp in lamps if lamp.data.type != "POINT"]
 

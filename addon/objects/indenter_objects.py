@@ -37,7 +37,7 @@ def add_indenter(group: bpy.types.Collection, spec: Any, per_metre: float) -> bp
 
 
 def fingerprint(thing: bpy.types.Object) -> str:
-    """Changes when the mesh's own vertices do."""
+    """Return a hash that changes when the mesh's own vertices do."""
     nodes = np.empty(len(thing.data.vertices) * 3, np.float32)
     thing.data.vertices.foreach_get("co", nodes)
     return hashlib.sha256(nodes.tobytes()).hexdigest()[:16]

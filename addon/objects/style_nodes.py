@@ -72,7 +72,7 @@ def material() -> bpy.types.Material:
 
 
 def legend_material() -> bpy.types.Material:
-    """The attribute's colours as they are, whatever the light."""
+    """Return the material that shows the attribute's colours as they are, whatever the light."""
     made = _material(LEGEND, "Emission Color")
     shader = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value, shader.inputs["Emission Strength"].default_value = (0, 0, 0, 1), 1.0
@@ -120,7 +120,7 @@ class _Nodes:
         return node
 
     def math(self, operation: str, *links: object) -> bpy.types.NodeSocket:
-        """The result of a number's operation."""
+        """Add a math node and return its output."""
         return self.add("ShaderNodeMath", *links, operation=operation).outputs[0]
 
     def attribute(self, name: str, kind: str = "FLOAT") -> bpy.types.NodeSocket:

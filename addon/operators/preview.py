@@ -53,7 +53,7 @@ def _draw_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
 
 @persistent
 def _end(*_: object) -> None:
-    """Called before another file is opened: the picture and its worker end with this one."""
+    """End the picture and its worker before another file is opened; called by Blender."""
     switch_off()
 
 

@@ -50,7 +50,7 @@ def sensor_of(context: bpy.types.Context) -> bpy.types.Object:
 
 
 def authored(context: bpy.types.Context) -> Authored:
-    """The scene as Blender has it now. Raises TactileError for what cannot be simulated."""
+    """Return the scene as Blender has it now. Raises TactileError for what cannot be simulated."""
     from ...tactile_core.simulation.scene import Scene
 
     thing, sensor, scene = indenter_of(context), sensor_of(context), context.scene
@@ -126,7 +126,7 @@ def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.typ
 
 
 def motion_of(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001
-    """Apex (P, 3) m in the sensor's frame and force (P,) N; the scene is left on the frame it was on."""
+    """Return apex (P, 3) m in the sensor's frame and force (P,) N; the scene keeps its current frame."""
     scene, now = context.scene, (context.scene.frame_current, context.scene.frame_subframe)
     apex, force = [], []
     try:

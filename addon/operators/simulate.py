@@ -62,7 +62,7 @@ class TACTILE_OT_simulate(TactileOperator):
         self.report({"INFO"}, summary)
 
     def _keep(self, context: bpy.types.Context) -> None:
-        """The simulated recording beside the saved .blend, so that it can be translated like a real one."""
+        """Save the simulated recording beside the .blend, so that it can be translated like a real one."""
         skin = properties.of_role(context.scene, "BIOTAC")
         if not bpy.data.is_saved or skin is None:
             return
@@ -121,7 +121,7 @@ class TACTILE_OT_simulate(TactileOperator):
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Blender is closing, or another file is opened."""
+        """Stop the job when Blender closes or another file is opened."""
         self._close(context)
 
     def _close(self, context: bpy.types.Context) -> None:

@@ -89,7 +89,7 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
         thing.matrix_world = matrix
 
     def _built(self, thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Any:
-        """The indenter as it is simulated."""
+        """Return the indenter as it is simulated."""
         import msgspec
 
         spec, mesh = indenter_objects.spec_of(thing, indenter_objects.world_axes(thing, sensor), depsgraph)

@@ -98,7 +98,7 @@ def _claimed(folder: Path, options: argparse.Namespace) -> Path:
 
 
 def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
-    """A recording as a .blend."""
+    """Write a recording as a .blend."""
     _fresh()
     words = {"tare": options.tare, "frames": options.frames, "polarity": options.polarity}
     bpy.ops.tactile.import_recording(filepath=str(path.resolve()), **words)
@@ -108,7 +108,7 @@ def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
 
 
 def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
-    """A scene as a .blend, its recording beside it."""
+    """Write a simulated scene as a .blend, its recording beside it."""
     file = path / "scene.toml" if path.is_dir() else path
     _fresh()
     bpy.ops.tactile.import_scene(filepath=str(file.resolve()))
@@ -120,7 +120,7 @@ def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
 
 
 def render(path: Path, folder: Path, options: argparse.Namespace) -> None:
-    """Pictures of a .blend or a recording."""
+    """Render pictures of a .blend or a recording."""
     if path.suffix.lower() != ".blend":
         options.pictures = True
         convert(path, folder, options)

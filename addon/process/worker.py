@@ -136,7 +136,7 @@ def _at_frame(indenter: str, job: dict, k: int, depth: float | None, found: str,
 
 
 def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -> Exception:
-    """The same error in the words of the scene, where it names a moment or a point of its file."""
+    """Return the same error in the words of the scene, where it names a moment or a point of its file."""
     from tactile_core.simulation.scene import load_scene
 
     spec, where = load_scene(folder)[0].recording, str(error.where)
@@ -214,7 +214,7 @@ def _renderer(folder: Path, preset: str) -> Any:
 
 
 def variant(folder: Path, job: dict, progress: Progress) -> None:
-    """FOLDER/variant.txt: which variant of Mitsuba this machine runs, and why, in a sentence."""
+    """Write FOLDER/variant.txt: which variant of Mitsuba this machine runs, and why, in a sentence."""
     from tactile_core.pictures.mitsuba.variant import LLVM, OLDEST_LLVM, choose_variant
 
     choice = choose_variant()

@@ -14,7 +14,7 @@ LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"  # by which Mitsuba finds the library
 
 
 def of(context: bpy.types.Context) -> bpy.types.AddonPreferences:
-    """The extension's preferences."""
+    """Return the extension's preferences."""
     return context.preferences.addons[ID].preferences
 
 

@@ -92,7 +92,7 @@ def set_up(thing: bpy.types.Object, role: str, per_metre: float) -> TactileObjec
 
 
 def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
-    """The scene's object of a role: ``near`` itself, else one in its collections, else the scene's first."""
+    """Return the scene's object of a role: ``near`` itself, else one in its collections, else the scene's first."""
     if near is not None:
         beside = [near, *(thing for group in near.users_collection for thing in group.objects)]
         found = next((thing for thing in beside if thing.tactile.role == role), None)

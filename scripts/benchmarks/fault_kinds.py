@@ -32,7 +32,7 @@ from benchmarks.fault_bench import (
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine import tasks
-from tactile_core.jobs.engine.local import Here
+from tactile_core.jobs.engine.local import InProcess
 
 
 def killed_workers(bench: Bench) -> Lost:
@@ -102,7 +102,7 @@ def in_child(folder: Path, cut: int | None) -> bool:
     os.fsync, os.replace = cutting(os.fsync), cutting(os.replace)
     try:
         with runs.opened(folder, None):
-            runs.run(folder, jobs.read(folder), Here(folder), None, lambda done, total: None)
+            runs.run(folder, jobs.read(folder), InProcess(folder), None, lambda done, total: None)
     except BaseException:
         traceback.print_exc()
         os._exit(1)

@@ -119,7 +119,7 @@ def rounding() -> float:
 
 
 class Double(networks.Networks):
-    """The same networks in float64, all frames at once."""
+    """Run the same networks in float64, all frames at once."""
 
     def _blocks(self, function: networks.Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
         return function(np.asarray(x, float))

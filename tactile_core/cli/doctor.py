@@ -61,7 +61,7 @@ LIBRARIES = (
 
 
 def report() -> Iterator[str]:
-    """Lines to print; raises nothing."""
+    """Return the lines to print; raises nothing."""
     yield f"tactile {__version__}, Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} cores"
     found = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:

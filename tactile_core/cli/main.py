@@ -77,7 +77,7 @@ def _stopped(stop: KeyboardInterrupt, left: str) -> int:
 
 
 def _check_out(options: argparse.Namespace) -> None:
-    """An empty name, as a script's unset variable gives it, would be the current folder, or as if it were not given."""
+    """Refuse an empty --out, as a script's unset variable gives it: it would mean the current folder."""
     if getattr(options, "out", None) == "":
         raise TactileError("--out", "an empty name", "a file or folder to write", "Name one")
     for name in PATHS:

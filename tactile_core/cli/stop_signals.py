@@ -21,7 +21,7 @@ class Stopped(KeyboardInterrupt):
 
 @contextmanager
 def stopping() -> Iterator[None]:
-    """Inside the block the signals raise Stopped; leaving it brings the former handlers back.
+    """Make stop signals raise Stopped inside the block; restore the former handlers after it.
 
     A signal that is ignored (nohup) or handled by the program around us stays so. After the first signal the others
     are ignored up to the block's end: `timeout` and terminals send two, and the second would cut the clean-up short.

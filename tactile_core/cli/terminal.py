@@ -10,7 +10,7 @@ from ..errors import TactileError
 
 
 def tell(text: str) -> None:
-    """A result, on stdout; its lines stay lines."""
+    """Print a result on stdout; its line breaks are kept."""
     sys.stdout.write("\n".join(map(printable, text.split("\n"))) + "\n")
 
 
@@ -20,12 +20,14 @@ def say(text: str) -> None:
 
 
 def printable(text: str) -> str:
-    """The text with control characters as escapes: in a file's name they could move the cursor or change the title."""
+    """Return the text with control characters as escapes: in a file's name they could move the cursor or change the
+    title.
+    """
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
 
 
 def complain(text: str) -> None:
-    """An error, on stderr."""
+    """Print an error on stderr."""
     say("error: " + text)
 
 

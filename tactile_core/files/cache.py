@@ -18,5 +18,5 @@ def cache_folder() -> pathlib.Path:
 
 
 def entries() -> list[pathlib.Path]:
-    """The folders of the cache that hold arrays of ours, which are computed again where they are missing."""
+    """List the cache's folders that hold our arrays, which are computed again where they are missing."""
     return sorted(file.parent for file in cache_folder().glob(f"*/{HASHES}"))

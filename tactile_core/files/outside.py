@@ -48,7 +48,9 @@ def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -
 
 
 def inside(folder: str | os.PathLike, name: str, expected: str = "a regular file") -> Path:
-    """Path of a file in a folder that others made, which need not exist. Raises TactileError for a link out of it."""
+    """Return the path of a file in a third-party folder; it need not exist. Raises TactileError for a link out of the
+    folder.
+    """
     path = Path(folder) / name
     try:
         within = path.resolve().is_relative_to(Path(folder).resolve())

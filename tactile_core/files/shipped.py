@@ -9,5 +9,5 @@ _DATA = Path(__file__).parents[1] / "data"
 
 
 def shipped(name: str) -> Path:
-    """Path of a file or folder that ships with the package, named relative to ``data/``."""
+    """Return the path of a file or folder that ships with the package, named relative to ``data/``."""
     return _DATA / name

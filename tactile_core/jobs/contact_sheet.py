@@ -93,7 +93,7 @@ def contact_sheet(path: str | os.PathLike, shown: Contents, camera: Camera | Non
 
 @contextlib.contextmanager
 def _plain_matplotlib() -> Iterator[None]:
-    """Matplotlib in our style alone: a user's own settings must not change the bytes."""
+    """Use matplotlib in our style alone: a user's own settings must not change the bytes."""
     import matplotlib
 
     with matplotlib.rc_context(), python_warnings.catch_warnings():
@@ -132,7 +132,7 @@ def _drawn(shown: Contents, camera: Camera) -> SheetFigure:
 
 
 def _sentences(warnings: Sequence[str], confidence: np.ndarray) -> list[str]:
-    """Warnings as lines that fit the sheet, no more than it has room for."""
+    """Return warnings as lines that fit the sheet, no more than it has room for."""
     lines = [line for text in warnings for line in textwrap.wrap(text, WARNING_WIDTH, subsequent_indent="   ")]
     if len(confidence) and np.nanmax(confidence, initial=0) < LOW_CONFIDENCE:
         lines.insert(0, "Low confidence in every frame shown: take this as a guess.")

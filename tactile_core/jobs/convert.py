@@ -51,7 +51,7 @@ def load_tools(
     answer: Answer | None = None,
     gel: Gel = TRANSLATED,
 ) -> Tools:
-    """The shipped weights, or those in a folder, and the camera and lights of a DIGIT: the shipped unit's, or a file's.
+    """Load the weights, shipped or of a folder, and the camera and lights of a DIGIT, the shipped unit's or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
     answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``

@@ -176,7 +176,7 @@ class FramePass:
                 file.annotate("marker_motion", rest=self.tools.needed_dots().rest)
 
     def warnings(self) -> tuple[str, ...]:
-        """Warnings for the user: of the recording, and of its translated frames."""
+        """Return warnings for the user: of the recording, and of its translated frames."""
         found = [*self.signals.warnings, *self.tools.answer.describe_shift(), *filter(None, [doubt(self.tools.card)])]
         for name, meaning in REMARKABLE.items():
             if self.flagged[name]:
@@ -205,7 +205,7 @@ class FramePass:
         return describe_miss(*np.concatenate(self._forces, axis=1))
 
     def _press(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Tractions of translated frames, where they are kept."""
+        """Compute tractions of translated frames, where they are kept."""
         if "traction" not in self.keep:
             return {}
         from .gel_traction import gel_traction  # with all of contact mechanics
@@ -260,14 +260,14 @@ class FramePass:
             self.flagged[name] += int(np.count_nonzero(bits & bit))
 
     def _remember(self, frames: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
-        """Copies, so that the chunk can be forgotten."""
+        """Copy what the contact sheet needs, so that the chunk can be freed."""
         for index in np.flatnonzero(np.isin(frames, list(self.shown))):
             shown = self.shown[int(frames[index])]
             for name in SHEET_ARRAYS:
                 shown[name] = np.array(arrays[name][index])
 
     def draw_sheet(self, path: Path) -> None:
-        """The contact sheet of the frames kept for it; call after `write`."""
+        """Draw the contact sheet of the frames kept for it; call after `write`."""
         shown = np.array(list(self.shown))
         columns = {name: np.stack([at[name] for at in self.shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
         truth = self.recording.truth

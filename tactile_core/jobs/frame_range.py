@@ -20,7 +20,7 @@ def parse_frames(text: str) -> slice:
 
 
 def select(frames: slice, count: int) -> np.ndarray:
-    """Indices (n,) of the selected ones of `count` frames; raises TactileError when none is left."""
+    """Return the indices (n,) of the selected ones of `count` frames; raises TactileError where there is none."""
     chosen = np.arange(count)[frames]
     if not len(chosen):
         found = f"{frames_text(frames)} takes none of the {count} frames"
@@ -29,6 +29,6 @@ def select(frames: slice, count: int) -> np.ndarray:
 
 
 def frames_text(frames: slice) -> str:
-    """The form that `parse_frames` reads; "all" for a selection without limits."""
+    """Return the text that `parse_frames` reads; "all" for a selection without limits."""
     first, last, step = [("" if part is None else str(part)) for part in (frames.start, frames.stop, frames.step)]
     return ":".join([first, last, step] if step else [first, last]) if first or last or step else "all"

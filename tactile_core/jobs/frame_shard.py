@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def count(frames: int, job: Job) -> int:
-    """Shards of a recording of so many frames."""
+    """Return the number of shards of a recording of so many frames."""
     return -(-frames // job.recipe.shard_frames)
 
 

@@ -73,7 +73,7 @@ LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk 
 
 
 def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
-    """Words of KEPT for words of results.KEEPABLE: contacts that are drawn are kept as well."""
+    """Return words of KEPT for words of results.KEEPABLE: drawn contacts are kept as well."""
     return (*keep, SAMPLES) if answer.samples else tuple(keep)
 
 

@@ -27,8 +27,8 @@ from .engine import job as jobs
 from .engine import result_parts, scene_input
 from .engine import run as runs
 from .engine.job import Job
-from .engine.kinds import Seen
-from .engine.local import Here, Local
+from .engine.kinds import InputFacts
+from .engine.local import InProcess, Local
 from .engine.recipes import Pairs
 from .engine.run import Place
 from .engine.scene_input import load
@@ -62,7 +62,8 @@ def make_pairs(
     job, names, text = plan(scene_path, count, seed, out, electrodes)
     digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
     with result_parts.begun(out, job) as folder:
-        where = (place or (lambda folder: Here(folder) if workers == 1 else Local(folder.resolve(), workers)))(folder)
+        open_place = place or (InProcess if workers == 1 else lambda folder: Local(folder.resolve(), workers))
+        where = open_place(folder)
         result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
         merge(blocks(folder, job), count, out, text, seed, names, electrodes)
         atomic.write_json(card_path(out), card(out))
@@ -73,7 +74,7 @@ def plan(
     scene_path: str | os.PathLike, count: int, seed: int, out: pathlib.Path, electrodes: str = SHEET
 ) -> tuple[jobs.Job, list[str], str]:
     """The job, the names of the indenters and the scene's text; raises what ``make_pairs`` raises before it begins."""
-    scene, text, inputs, files = scene_input.found(scene_path, ["presses"])
+    scene, text, inputs, files = scene_input.read_inputs(scene_path, ["presses"])
     if scene.pairs is None:
         raise TactileError(f"{scene_path}, pairs", "missing", "a [pairs] table", "See scenes/press_sphere/scene.toml")
     if count < 1:
@@ -93,7 +94,7 @@ def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
 
 
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
-    """The contacts of some presses."""
+    """Solve the contacts of some presses."""
     from ..simulation.pair_sampling import press_rows
 
     one = job.inputs[index]
@@ -108,12 +109,12 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
+def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
     """Return the number of blocks needed in all, by the counts in the present ones; None if there are none."""
     counts = _counts(folder, job, index)
     if not counts:
         return None
-    return Seen(wanted(counts, job.recipe.count, job.inputs[index].path))
+    return InputFacts(wanted(counts, job.recipe.count, job.inputs[index].path))
 
 
 def blocks(folder: Path, job: Job) -> list[Path]:

@@ -171,14 +171,14 @@ def _part(name: str) -> dict[str, float]:
 
 
 def _each(what: str, verb: str, extent: str, frames: int, name: str, beside: str) -> Part:
-    """Cost of one output a frame beyond what is done beside it anyway."""
+    """Return the cost of one output a frame beyond the work that is done in any case."""
     own, other = _part(name), _part(beside)
     seconds, disk = (max(own[key] - other[key], 0) * frames / 1e3 for key in ("ms", "kb"))
     return Part(what, verb, extent, seconds, max(own["mb"] - other["mb"], 0), disk)
 
 
 def _matrices(sensor: str) -> list[Part]:
-    """Surface compliance, and its building where it is not cached."""
+    """Return the surface compliance as a part of the plan, with the cost of building it where it is not cached."""
     from ..mechanics.fast.compliance import stored
 
     found = stored(sensor)

@@ -140,7 +140,7 @@ def _one_polarity(path: str, options: PrepareOptions) -> tuple[PrepareOptions, s
 
 
 def _decided_once(signals: Signals, doubts: np.uint16, evidence: str, *, first: bool) -> Signals:
-    """A part's signals under what was decided of the whole recording's polarity, which is reported once."""
+    """Return a part's signals under the polarity decided for the whole recording, which is reported once."""
     flags = (signals.flags & ~DOUBTS) | doubts
     report = signals.report | ({"polarity_evidence": evidence} if evidence else {})
     keep = first and not evidence
@@ -157,7 +157,7 @@ def _rest_pdc(recording: Recording, signals: Signals) -> float:
 
 
 def _carried(recording: Recording, signals: Signals, rest: np.ndarray, rest_pdc: float, given: bool) -> Signals:
-    """A part without rest of its own, from the rest (19,) and PDC at the end of the part before."""
+    """Prepare a part without a rest of its own, from the rest (19,) and PDC at the end of the part before."""
     drift = np.zeros_like(signals.drift)
     warnings = tuple(text for text in signals.warnings if not text.startswith(("no quiet part", "rest is the unit's")))
     if not given:
@@ -225,14 +225,14 @@ class Prepared:
         return self._read(lambda file: len(file["time"]))
 
     def about(self) -> About:
-        """Facts reported of the recording."""
+        """Return the facts reported of the recording."""
         return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
     def rows(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
         """Times (T,) s and signals of the frames from `start` up to `stop`; `rest` is that of the first of them."""
 
         def read(file: h5py.File) -> tuple[np.ndarray, Signals]:
-            """The same of an open file."""
+            """Read times (T,) s and signals of frames `start` to `stop` of an open file."""
             arrays = {name: file[name][start:stop] for name in COLUMNS}
             part = int(np.searchsorted(file["part"][()], start, side="right")) - 1
             rest = file["rest"][part]

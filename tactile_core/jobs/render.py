@@ -130,7 +130,7 @@ def render(
 
 
 def claimed(out: Path, options: Options) -> str:
-    """The preset, when `out` may be written; raises TactileError where not, and what `choose_preset` raises."""
+    """Check that `out` may be written and return the preset; raises TactileError, as `choose_preset` does."""
     results.check_free(out, options.overwrite, MAKER)
     results.check_writable(out.parent)
     atomic.sweep(out.parent)
@@ -138,7 +138,7 @@ def claimed(out: Path, options: Options) -> str:
 
 
 def choose_preset(options: Options) -> str:
-    """The preset asked for, the cheapest that is exact enough, or the default.
+    """Return the preset that was named, the cheapest that is exact enough, or the default.
 
     Raises TactileError for both, or an error that no preset has.
     """
@@ -201,7 +201,7 @@ class Pictures:
             (folder / EXR).mkdir()
 
     def write_rest(self, folder: Path) -> None:
-        """The undeformed gel, where OpenEXR is asked for."""
+        """Write the undeformed gel, where OpenEXR is asked for."""
         if self.exr:
             self._write_exr(folder / REST, self.renderer.rest_radiance, self.about)
             self._write_camera(folder / CAMERA)
@@ -234,7 +234,7 @@ class Pictures:
         write_exr(path, {name: radiance[..., k] for k, name in enumerate("RGB")}, about)
 
     def _write_camera(self, path: Path) -> None:
-        """The response to each LED's light, and what is left of the picture at rest."""
+        """Write the response to each LED's light, and the part of the picture at rest that is not from LEDs."""
         from ..files.exr import write_exr
 
         ambient = self.renderer.background - self.renderer.in_levels(self.renderer.rest_radiance)

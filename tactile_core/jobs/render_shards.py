@@ -19,7 +19,7 @@ from .engine import job as jobs
 from .engine import run as runs
 from .engine.inputs import content_hash
 from .engine.job import Job
-from .engine.kinds import Seen
+from .engine.kinds import InputFacts
 from .engine.recipes import Render
 from .engine.run import Place
 from .frame_range import frames_text
@@ -53,7 +53,7 @@ def render_in_parts(
 
 
 def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> Job:
-    """The job. Raises TactileError for what can be refused before any work."""
+    """Plan the job. Raises TactileError for what can be refused before any work."""
     preset = claimed(Path(out), options)
     file = Path(path).resolve()
     file = file / "scene.toml" if file.is_dir() else file
@@ -124,12 +124,12 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
+def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
     """Frames of an input that was read."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
     frames = _frames(folder, job, index)
-    return Seen(count(folder, job, index), frames)
+    return InputFacts(count(folder, job, index), frames)
 
 
 def count(folder: Path, job: Job, index: int) -> int:

@@ -42,7 +42,7 @@ def parse_keep(text: str) -> tuple[str, ...]:
 
 
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:
-    """The result folder of each recording; all that can be refused before any work is refused here.
+    """Return the result folder of each recording, after all checks that need no work.
 
     Makes `out` where it is missing, and clears what killed runs left in it. Raises TactileError: an empty `out`,
     two recordings of the same name, a result that exists (unless `overwrite`), something that is no result in its

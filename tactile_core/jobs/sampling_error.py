@@ -37,7 +37,7 @@ def _bin_of(share: float) -> dict[str, float]:
 
 
 def rounding() -> float:
-    """Largest change, um, that float32 makes in a translated gel."""
+    """Return the largest change, um, that float32 makes in a translated gel."""
     return 1e6 * measured()["float32_m"]
 
 

@@ -62,7 +62,7 @@ class SheetFigure:
         self.figure.text(left / WIDTH, 1 - (self.top + down) / self.height, text, **style)
 
     def title(self, name: str, simulated: bool) -> None:
-        """The name, and the warnings below it."""
+        """Draw the name, and the warnings below it."""
         self._text(LEFT, 0.36, name, size=15, weight="bold", va="center", parse_math=False)
         if simulated:
             box = {"boxstyle": "round,pad=0.35", "facecolor": MARK, "edgecolor": "none"}
@@ -107,7 +107,7 @@ class SheetFigure:
         self.top += PRESSURE + TIME_AXIS
 
     def headings(self, seconds: np.ndarray) -> None:
-        """Number and time (k,) s of each column."""
+        """Write number and time (k,) s above each column."""
         for k, at in enumerate(seconds):
             self._text(self._middle(k), 0.17, f"{k + 1}:  {at:.2f} s", size=10, weight="bold", ha="center", va="center")
         self.top += HEADING
@@ -182,7 +182,7 @@ class SheetFigure:
         bar.set_label("displacement, mm", size=8)
 
     def picture_row(self, label: str, pictures: np.ndarray) -> None:
-        """Pictures (k, H, W, 3) uint8."""
+        """Draw pictures (k, H, W, 3) uint8."""
         height = self.column_width * self.camera.height / self.camera.width
         for k in range(self.columns):
             axes = self._axes(LEFT + k * (self.column_width + GAP), self.column_width, height)
@@ -209,7 +209,7 @@ class SheetFigure:
         self._text(LEFT, 0.05, foot, size=7.5, color="0.35", va="center")
 
     def png(self) -> bytes:
-        """The figure as a file: equal figures make equal bytes."""
+        """Return the figure as a file: equal figures make equal bytes."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         content = io.BytesIO()

@@ -24,8 +24,8 @@ from .engine import job as jobs
 from .engine import result_parts, scene_input
 from .engine import run as runs
 from .engine.job import Job
-from .engine.kinds import Seen
-from .engine.local import Here
+from .engine.kinds import InputFacts
+from .engine.local import InProcess
 from .engine.recipes import Simulate
 from .engine.run import Place
 from .engine.scene_input import load
@@ -48,7 +48,8 @@ def simulate_grid(
     """
     digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
     with result_parts.begun(Path(out), job) as folder:
-        result_parts.check(runs.run(folder, job, (place or Here)(folder), None, progress or (lambda done, known: None)))
+        where = (place or InProcess)(folder)
+        result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
         _put_together(folder, job, Path(out))
         result_parts.finished(folder)
 
@@ -68,7 +69,7 @@ def plan(
     Raises TactileError for a bad scene, grid or place, before any work.
     """
     values = combinations(grid)
-    scene, _, inputs, files = scene_input.found(scene_path, [name_of(one) for one in values])
+    scene, _, inputs, files = scene_input.read_inputs(scene_path, [name_of(one) for one in values])
     for one in values:
         check_places(scene_path, recording_of(with_values(scene, one, str(scene_path)), scene_path))
     atomic.claim(out)
@@ -113,6 +114,6 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
+def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
     """Return one shard: a recording is not split."""
-    return Seen(1)
+    return InputFacts(1)

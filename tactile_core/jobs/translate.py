@@ -10,7 +10,7 @@ from ..errors import TactileError
 from . import frame_shard, prepared_signals
 from .engine import job as jobs
 from .engine.inputs import unit_hash
-from .engine.kinds import Seen
+from .engine.kinds import InputFacts
 from .frame_pass import Tools
 
 if TYPE_CHECKING:
@@ -34,14 +34,14 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit))
 
 
-def inspect_input(folder: Path, job: Job, index: int) -> Seen | None:
+def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
     """Shards, frames and warnings of a prepared recording."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
     try:
         about = prepared_signals.Prepared(file).about()
     except TactileError:  # none yet, or a damaged one, which the next run makes again
         return None
-    return Seen(frame_shard.count(about["frames"], job), about["frames"], tuple(about["warnings"]))
+    return InputFacts(frame_shard.count(about["frames"], job), about["frames"], tuple(about["warnings"]))
 
 
 @functools.lru_cache(maxsize=2)
@@ -55,7 +55,7 @@ def _tools(
     answer: Answer,
     gel: Gel,
 ) -> Tools:
-    """The networks and the unit, once a process. Raises TactileError where they are not those of the job."""
+    """Load the networks and the unit, once a process. Raises TactileError where they are not those of the job."""
     from .convert import load_tools
 
     check_unit(calibration, unit_sha256)

@@ -42,7 +42,7 @@ def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
 
 
 def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hidden: float) -> Errors:
-    """The same in the full and the reference tier.
+    """Return the errors of a contact in the full or the reference tier.
 
     across : nodes across the contact, by the full tier's spacing; hidden : m, how deep the surface lies in the indenter
     between nodes

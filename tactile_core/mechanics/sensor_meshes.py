@@ -33,7 +33,7 @@ def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
 
 
 def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) -> None:
-    """A solved contact.
+    """Write a solved contact.
 
     Of a tier that solves the volume: ``.vtu`` that volume, ``.ply`` and ``.stl`` its surface at its own nodes, with the
     force on each (N) and its von Mises stress (Pa). Of the fast tier the deformed surface, with the touching nodes.

@@ -122,7 +122,7 @@ def _check(step: Step, limit: float) -> None:
 def _guessed_depths(
     sensor: Sensor, indenter: Indenter, pose: Pose, steps: list[Step], limit: float, friction: float
 ) -> list[float]:
-    """The steps' depths, m; where forces are asked for, those at which the fast tier finds them, else the limit."""
+    """Return the steps' depths, m; for given forces, the depths at which the fast tier reaches them, else the limit."""
     if not any(step.force for step in steps):
         return [step.depth or 0.0 for step in steps]
     fast = _Fast(sensor, indenter, pose, 1.0, limit, friction)

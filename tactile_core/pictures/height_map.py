@@ -112,7 +112,7 @@ class HeightMapper:
     def follow(
         self, displacement: np.ndarray, x: np.ndarray, z: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where gel points that rest at places x, z (n,) m come to: x, z and height (n,) m.
+        """Return the displaced places x, z and heights (n,) m of gel points that rest at places x, z (n,) m.
 
         displacement : (n_nodes, 3) m
         """

@@ -91,7 +91,7 @@ class Perspective:
         return row, np.clip(column, 0, 2 * self._middle[1], out=column)
 
     def _from_above(self, height: np.ndarray) -> np.ndarray:
-        """The same by a search along each ray from the highest level down: slower, and right where gel hides gel."""
+        """Find the seen heights along each ray from the highest level down: slower, and right where gel hides gel."""
         high, low = np.float32(height.max() + 1e-6), np.float32(height.min() - 1e-6)
         above = np.full(self.camera.shape, high)
         below = np.full(self.camera.shape, low)

@@ -156,7 +156,7 @@ class Lamp:
         return light
 
     def _compiled_radiance(self, surface: SeenSurface) -> np.ndarray:
-        """The same, by a compiled loop; shadows are numpy's."""
+        """Compute the same radiance by a compiled loop; shadows are numpy's."""
         strength = np.float32(np.square(self.led.position).sum())
         facing, distance, light = np.empty((3, *surface.near.shape), np.float32)
         first_row, last_row, first_column, last_column = lamp_light(

@@ -100,13 +100,13 @@ def open_hdf5(path: str) -> Iterator[Store]:
             shapes[_plain(name)] = (tuple(item.shape), item.dtype)
 
     with ExitStack() as stack:
-        with damage_told(path, "HDF5"):
+        with damage_reported(path, "HDF5"):
             file = stack.enter_context(open_checked(path))
             file.visititems(note)
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
 
         def attributes_of(name: str) -> dict[str, Any]:
-            with damage_told(f"{path}, {name}", "attributes"):
+            with damage_reported(f"{path}, {name}", "attributes"):
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
         def load(name: str, rows: Any = ()) -> np.ndarray:
@@ -117,7 +117,7 @@ def open_hdf5(path: str) -> Iterator[Store]:
 
 
 @contextmanager
-def damage_told(where: str, what: str) -> Iterator[None]:
+def damage_reported(where: str, what: str) -> Iterator[None]:
     """Turn any error of a file library into a TactileError; see Store._loaded."""
     try:
         yield
@@ -145,7 +145,7 @@ def open_npz(path: str) -> Iterator[Store]:
     """Open for reading; never unpickles. Sizes come from the arrays' own headers, not from unpacking them."""
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
     with ExitStack() as stack:
-        with damage_told(path, "NPZ"):
+        with damage_reported(path, "NPZ"):
             archive = stack.enter_context(zipfile.ZipFile(stack.enter_context(outside.open_file(path, "an NPZ file"))))
             for member in archive.infolist():
                 if member.filename.endswith(".npy"):

@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import TactileError
 from ..files import outside
 from ..sensors import ELECTRODES
-from .array_store import damage_told
+from .array_store import damage_reported
 from .assemble import MAX_FRAMES, assemble, check_electrodes
 from .fingers import named, split
 from .recording import Recording
@@ -71,7 +71,7 @@ def open_bag(path: str) -> Iterator[Bag]:
         with outside.open_file(path, "a recording") as file:
             kind = kind_of(file.read(START_BYTES))
     openers: dict[str | None, Any] = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
-    with damage_told(path, "bag"):
+    with damage_reported(path, "bag"):
         reader = openers[kind](Path(path))
         reader.open()
     try:
@@ -179,7 +179,7 @@ def _blocks(bag: Bag, layout: ModuleType, frames: int) -> Iterator[np.ndarray]:
 def _messages(bag: Bag, layout: ModuleType, connections: list[Any]) -> Iterator[tuple[float, Any]]:
     """Yield stamps (unix s) and decoded messages of one topic; the header's stamp, or the bag's where that is 0."""
     decode = None
-    with damage_told(bag.path, "bag"):
+    with damage_reported(bag.path, "bag"):
         messages = bag.reader.messages(connections)
         for connection, written, data in messages:
             decode = decode or _decoder(bag, layout, connection)

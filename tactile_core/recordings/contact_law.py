@@ -26,9 +26,9 @@ def touching(change: np.ndarray) -> np.ndarray:
     return np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
 
 
-def left_over(change: np.ndarray) -> tuple[float, int]:
-    """Share of changes in contact (n, 19) counts, of a typical unit, that simulated contacts leave, the mean over
-    different contacts; and the number of these. (0, 0) of none.
+def unexplained_share(change: np.ndarray) -> tuple[float, int]:
+    """Return the share of changes in contact (n, 19) counts, of a typical unit, that simulated contacts do not
+    explain, the mean over different contacts, and their number; (0, 0) without contacts.
     """
     if not len(change):
         return 0.0, 0
@@ -54,7 +54,7 @@ def limit(contacts: int) -> float:
 
 def doubt(change: np.ndarray) -> str:
     """Say why changes in contact (n, 19) counts, of a typical unit, are doubted; empty where they are not."""
-    left, contacts = left_over(change)
+    left, contacts = unexplained_share(change)
     if contacts < FEWEST or left <= limit(contacts):
         return ""
     return (

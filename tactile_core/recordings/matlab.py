@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import installed, outside
-from .array_store import Store, damage_told
+from .array_store import Store, damage_reported
 
 START, START_OF_HDF5 = b"MATLAB 5", b"MATLAB 7"
 CLASSES = {
@@ -33,14 +33,14 @@ def open_matlab(path: str) -> Iterator[Store]:
         if file.read(len(START_OF_HDF5)) == START_OF_HDF5:
             advice = "Save it in MATLAB with save(..., '-v7'), or as CSV"
             raise TactileError(path, "a MATLAB 7.3 file", "MATLAB 5 to 7", advice)
-        with damage_told(path, "MATLAB file"):
+        with damage_reported(path, "MATLAB file"):
             _check_unpacked(path, file)
     try:
         from scipy.io import loadmat, whosmat
     except ModuleNotFoundError as error:
         advice = installed.advice("matlab")
         raise TactileError(path, "a MATLAB file, which scipy reads", "scipy", advice) from error
-    with damage_told(path, "MATLAB file"), warnings.catch_warnings():
+    with damage_reported(path, "MATLAB file"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of variables that are there twice: the first is read
         listed = whosmat(path)
     names = [name for name, _, _ in listed]

@@ -17,7 +17,7 @@ _TILTS_DEG = tuple(range(0, 46, 5))
 
 
 def card(path: str | os.PathLike) -> dict:
-    """Counts, hash and histograms of a file of pairs; its name is left out, since whoever makes it names it."""
+    """Return counts, hash and histograms of a file of pairs; without its name, which its maker chooses."""
     import h5py
 
     with h5py.File(path) as file:

@@ -36,7 +36,7 @@ DEFAULT = ("electrodes", "displacement_biotac", "displacement_digit")
 
 
 class _Frame(NamedTuple):
-    """What is kept of a frame.
+    """Hold the outputs kept of a frame.
 
     moved, pressed : by sensor, displacement (n, 3) float32 m and traction (n, 3) float32 Pa
     force : (3,) N; pressure : Pa, rise of the fluid's
@@ -105,7 +105,7 @@ def simulate_recording(
         fluid = " " + _describe_fluid(pressure, electrodes)
     write_simulated(
         out, time=time, **counts, truth=_truth(frames, keep), scene=text, seed=seed,
-        made_by=f"tactile {__version__}, mechanics.recording{_tiers_told(tiers)}",
+        made_by=f"tactile {__version__}, mechanics.recording{_describe_tiers(tiers)}",
         note=f"Simulated, not measured: {scene.description}{fluid}",
     )  # fmt: skip
 
@@ -123,7 +123,7 @@ def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
     return scene.recording
 
 
-def _tiers_told(tiers: Mapping[Sensor, Tier] | None) -> str:
+def _describe_tiers(tiers: Mapping[Sensor, Tier] | None) -> str:
     return "" if not tiers else ", " + ", ".join(f"{sensor} {tier}" for sensor, tier in sorted(tiers.items()))
 
 

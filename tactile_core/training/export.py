@@ -146,7 +146,7 @@ def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
 
 
 def assemble(tensors: dict, sizes: dict) -> Networks:
-    """The numpy networks before there is a card."""
+    """Return the numpy networks before there is a card."""
     return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in NETS}})
 
 

@@ -155,7 +155,7 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
 
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
-    """The weights folder: all files of the source but the tuned one, and the card with a note of it, last."""
+    """Write the weights folder: all files of the source but the tuned one, and the card with a note of it, last."""
     for name in [*(f"{net}.safetensors" for net in NETS if net != tuned), reference_signals.FILE]:
         write_bytes(folder / name, read_bytes(source / name))
     data = to_safetensors(state)

@@ -87,7 +87,7 @@ class Options:
     checkpoint_seconds: float = 30.0
 
     def epochs(self, stage: str) -> int:
-        """Passes over the data in a stage, at least one unless it is left out."""
+        """Return the passes over the data in a stage, at least one unless the stage is left out."""
         if stage in self.left_out:
             return 0
         return max(1, round(self.effort * getattr(self, f"{stage.lower()}_epochs")))

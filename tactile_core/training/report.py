@@ -66,7 +66,7 @@ def error_rows(measure: Measure, model: Model) -> list[Row]:
 
 
 def direct_columns(model: Model, measure: Measure) -> Columns:
-    """Errors of the direct network, the bar that the chain must reach."""
+    """Return the errors of the direct network, the bar that the chain must reach."""
     pairs = measure.contacts.pairs
 
     def answer(part: slice) -> Columns:
@@ -149,7 +149,7 @@ def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[
 
 
 def write_log(path: Path, history: list[list]) -> None:
-    """The losses of every epoch as CSV."""
+    """Write the losses of every epoch as CSV."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["stage", "epoch", "train", "validation"])

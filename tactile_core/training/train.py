@@ -177,7 +177,7 @@ def run_stage(
 
 
 def share_done(options: Options, state: checkpoint.State) -> float:
-    """Epochs done over all epochs."""
+    """Return the epochs done over all epochs."""
     lengths = [options.epochs(stage.name) for stage in STAGES]
     return (sum(lengths[: state.stage]) + state.epoch) / sum(lengths)
 
@@ -224,7 +224,7 @@ def train_epoch(
 
 
 def validate(stage: Stage, model: Model, contacts: Contacts, seed: int, index: int) -> float:
-    """The stage's loss on the validation presses, with the same noise in every epoch."""
+    """Compute the stage's loss on the validation presses, with the same noise in every epoch."""
     rng = np.random.default_rng([seed, index, VALIDATION_SEED])
     generator = torch.Generator().manual_seed(seed)
     rows = contacts.with_silence(contacts.split.validation)

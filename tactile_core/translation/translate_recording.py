@@ -89,5 +89,5 @@ def _tracked(translator: Translator, recording: Recording, signals: Signals) -> 
 
 
 def _part(signals: Signals, frames: np.ndarray) -> Signals:
-    """Signals of some frames (n,)."""
+    """Return the signals of some frames (n,)."""
     return dataclasses.replace(signals, **{name: getattr(signals, name)[frames] for name in FRAMEWISE})

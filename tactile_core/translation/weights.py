@@ -37,7 +37,7 @@ def write_bytes(path: str | os.PathLike, data: bytes) -> None:
 
 
 def sha256(data: bytes) -> str:
-    """Hexadecimal SHA-256 of some bytes."""
+    """Return the hexadecimal SHA-256 of some bytes."""
     return hashlib.sha256(data).hexdigest()
 
 

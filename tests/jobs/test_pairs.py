@@ -12,7 +12,7 @@ from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.jobs.engine import result_parts
 from tactile_core.jobs.engine import run as runs
-from tactile_core.jobs.engine.local import Here
+from tactile_core.jobs.engine.local import InProcess
 from tactile_core.jobs.pairs import make_pairs, plan, wanted
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve
@@ -96,7 +96,7 @@ def test_parts_of_an_array_make_the_same_bytes(made, scene, tmp_path):
     shards = []
     for part in ((1, 2), (0, 2)):
         with runs.opened(folder, part):
-            shards.append(runs.run(folder, job, Here(folder), part, lambda done, known: None).made)
+            shards.append(runs.run(folder, job, InProcess(folder), part, lambda done, known: None).made)
     assert min(shards) >= 1
     before = len(list(folder.glob("shards/*.h5")))
     make_pairs(scene, 40, 7, out, progress=lambda done, known: before <= known)

@@ -183,7 +183,7 @@ def perceptron(sizes: tuple[int, ...], activation: type[nn.Module], dropout: tup
 
 
 class Across(nn.Module):
-    """All five, and signal to both displacements in units of ``rms`` (2,) m."""
+    """Hold all five networks, and translate signals to both displacements in units of ``rms`` (2,) m."""
 
     def __init__(self, biotac: Lattice, digit: Lattice) -> None:
         super().__init__()

@@ -100,7 +100,7 @@ def run_epoch(loss: Callable, optimiser: torch.optim.Optimizer, batches: Batches
 
 
 def shuffled(rows: np.ndarray, size: int, seed: int, epoch: int) -> Iterator[np.ndarray]:
-    """All rows in batches, in an order of this epoch."""
+    """Yield all rows in batches, in an order of this epoch."""
     order = np.random.default_rng([seed, epoch]).permutation(rows)
     yield from (order[start : start + size] for start in range(0, len(order), size))
 

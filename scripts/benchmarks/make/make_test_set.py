@@ -73,7 +73,7 @@ def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
 
 
 def _coarsen(fine: pathlib.Path, out: pathlib.Path) -> None:
-    """The same file in a third of the bytes: displacements in steps of STEP, packed as well as gzip can."""
+    """Write the file again in a third of the bytes: displacements in steps of STEP, packed as well as gzip can."""
     import h5py
 
     with h5py.File(fine) as source, h5py.File(out, "w") as file:

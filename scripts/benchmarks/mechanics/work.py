@@ -26,7 +26,7 @@ def energy_gap(contact: FiniteStrainContact, depth: float, steps: int) -> float:
 
 
 def left_after(contact: FiniteStrainContact, depth: float, step: float) -> float:
-    """Largest displacement, of the depth, that is left when the indenter has come and gone."""
+    """Return the largest displacement, as a share of the depth, that remains once the indenter has come and gone."""
     pressed = contact.press(depth, step=step)
     gone = contact.move(contact.pose.moved(-step), pressed, step)
     return float(np.abs(gone.state.displacement).max() / depth)

@@ -42,7 +42,7 @@ def write_summary(path: Path, methods: Sequence[Method]) -> None:
 
 
 def table(methods: Sequence[Method]) -> str:
-    """Markdown; a line whose methods were left out is left out."""
+    """Return the table as Markdown, without lines whose methods were left out."""
     lines = [HEADER]
     for stage, label, names in LINES:
         found = [each for name in names for each in methods if named(each, name)]

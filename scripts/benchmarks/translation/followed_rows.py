@@ -48,7 +48,7 @@ def _over(values: np.ndarray, level: int | None) -> float:
 
 
 def _read_by(signals: Signals, random: np.random.Generator) -> Signals:
-    """The same touch by another unit."""
+    """Return the same touch as another unit reads it."""
     gain = 1 + GAIN * random.standard_normal(signals.change.shape[1])
     return dataclasses.replace(
         signals, change=signals.change * gain + NOISE * random.standard_normal(signals.change.shape)

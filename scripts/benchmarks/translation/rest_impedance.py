@@ -38,10 +38,10 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
         "sheet": sheet[:, None],
         "sheet_and_interface": np.column_stack([sheet, ones]),
     }
-    null = _of_the_other(units, ones[:, None])
+    null = _cross_error(units, ones[:, None])
     for name, terms in models.items():
         of = f"fitted on the other finger; {_constants(units, terms)}"
-        yield row(f"rest_impedance_{name}", _of_the_other(units, terms), "percent rms", null=null, of=of)
+        yield row(f"rest_impedance_{name}", _cross_error(units, terms), "percent rms", null=null, of=of)
 
 
 def impedance_at_rest(paths: list[Path], finger: int) -> np.ndarray:
@@ -55,8 +55,8 @@ def _fitted(impedance: np.ndarray, terms: np.ndarray) -> np.ndarray:
     return np.linalg.lstsq(terms / impedance[:, None], np.ones(len(impedance)), rcond=None)[0]
 
 
-def _of_the_other(units: list[np.ndarray], terms: np.ndarray) -> float:
-    """Per cent rms, the worse of the two ways round."""
+def _cross_error(units: list[np.ndarray], terms: np.ndarray) -> float:
+    """Fit the terms to each of two units and return their error on the other, per cent rms, the worse of the two."""
     pairs = ((units[0], units[1]), (units[1], units[0]))
     return max(100 * float(np.sqrt(np.mean((terms @ _fitted(a, terms) / b - 1) ** 2))) for a, b in pairs)
 

@@ -57,7 +57,7 @@ def inverted(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 
 def doubled(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Some channels twice as large."""
+    """Double the gains of some channels."""
     gain = np.ones(change.shape[1])
     gain[random.choice(len(gain), CHANNELS, replace=False)] = FACTOR
     return change * gain
@@ -105,7 +105,7 @@ def fit() -> tuple[float, float]:
     """The limit's numbers, by least squares over contacts of what all but CHOSEN of right recordings stay below."""
     counts, levels = [], []
     for contacts in CONTACTS:
-        left = [contact_law.left_over(each) for each in recordings(signals(odd=False), contacts, right, seed=1)]
+        left = [contact_law.unexplained_share(each) for each in recordings(signals(odd=False), contacts, right, seed=1)]
         levels.append(np.quantile([share for share, _ in left], 1 - CHOSEN))
         counts.append(np.mean([different for _, different in left]))
     more, base = np.polyfit(1 / np.sqrt(counts), levels, 1)

@@ -103,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _job(folder: Path, options: argparse.Namespace) -> Job:
-    """The job of the folder, made from the options where there is none. Raises TactileError where the two differ."""
+    """Return the folder's job, made from the options where it has none. Raises TactileError where the two differ."""
     from ...jobs.engine import inputs
     from ...jobs.engine import job as jobs
 
@@ -130,7 +130,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
 
 
 def _recipe(options: argparse.Namespace) -> Translate:
-    """The recipe that the options say."""
+    """Return the recipe that the options describe."""
     from ...jobs import results
     from ...jobs.engine.inputs import unit_hash
     from ...jobs.engine.recipes import MAX_SHARD_FRAMES, SHARD_FRAMES, Prepare, Translate

@@ -67,7 +67,7 @@ def columns_argument(verb: argparse.ArgumentParser) -> None:
 
 
 def columns_of(options: argparse.Namespace) -> ColumnMap | None:
-    """The map that ``--columns`` names; None without."""
+    """Return the map that ``--columns`` names; None where it is not given."""
     if options.columns is None:
         return None
     from ...recordings import column_map

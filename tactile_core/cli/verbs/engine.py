@@ -69,14 +69,14 @@ def place(folder: Path, options: argparse.Namespace) -> Place:
 
 
 def place_or_none(options: argparse.Namespace) -> Callable[[Path], Place] | None:
-    """Makes the place that was asked for; None for this process alone."""
+    """Return what opens the workers that the options ask for, given the job's folder; None for this process alone."""
     if options.cluster is None and (options.workers or 1) == 1:
         return None
     return lambda folder: place(folder, options)
 
 
 def report_failures(done: Done) -> int:
-    """Complain of what was set aside; the exit status."""
+    """Print what was set aside as errors; returns the exit status."""
     for name, why in done.aside.items():
         complain(f"{name}: {why}")
     return 2 if done.aside else 0

@@ -89,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Options that belong together, before any work."""
+    """Refuse options that do not fit together, before any work."""
     if options.frames and options.press:
         raise TactileError("--press", "given with --frames", "one of the two")
     if (options.frames is None) != (options.frame is None):

@@ -81,7 +81,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _keep(text: str | None) -> tuple[str, ...]:
-    """Words of ``recording.OUTPUTS``; ``traction`` is that of both sensors. Raises TactileError for other words."""
+    """Return the words of ``recording.OUTPUTS``; ``traction`` is that of both sensors. Raises TactileError for other
+    words.
+    """
     from ...jobs import results
     from ...simulation.recording import DEFAULT, OUTPUTS
 

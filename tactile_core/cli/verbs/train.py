@@ -83,7 +83,7 @@ def _say_error(card: dict) -> None:
 
 
 def _fine_tune(options: argparse.Namespace) -> int:
-    """S2MPN on a labelled recording."""
+    """Train S2MPN further on a labelled recording."""
     for name, usual in (("effort", 1.0), ("without", []), ("without_below_x", None), ("device", "auto")):
         if getattr(options, name) != usual:
             raise TactileError(f"--{name.replace('_', '-')}", "beside s2mpn", "--real, --weights, --out and --seed")

@@ -136,7 +136,7 @@ def _follow(source: Rows, view: View, camera: DigitCamera | None, outputs: list[
         raise
     finally:
         if not failed:
-            say(f"rest from {view.rest_found}" if view.rest_found else "rest was not found")
+            say(f"rest from {view.rest_source}" if view.rest_source else "rest was not found")
             say(f"counts that {view.polarity.name[:-1]}: {view.polarity.evidence}")
             tell(f"{view.frames} frames: {view.describe_latency()}")
 
@@ -160,7 +160,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _unit(sensor: str | None, path: str) -> ElectrodeGains | None:
-    """The unit of the sensor file that made this recording; None without a file."""
+    """Return the unit of the sensor file that made this recording; None without a file."""
     if sensor is None:
         return None
     from ...recordings import electrode_gains
@@ -170,7 +170,7 @@ def _unit(sensor: str | None, path: str) -> ElectrodeGains | None:
 
 
 def _followed(options: argparse.Namespace, columns: ColumnMap | None) -> Rows:
-    """New rows of a growing file and when they came; None now and then while there are none."""
+    """Yield new rows of a growing file and their arrival time; None from time to time while there are none."""
     from ...jobs.live import Growing
 
     growing, last, bad = Growing(options.recording, columns), time.perf_counter(), 0
@@ -210,7 +210,7 @@ def _played(path: str, speed: float, columns: ColumnMap | None) -> Rows:
 
 
 def _due(recording: Recording, passed: float) -> int:
-    """Frames whose time is within `passed` s of the first."""
+    """Return the number of frames whose time is within `passed` s of the first."""
     return int(recording.time.searchsorted(passed, side="right"))
 
 
@@ -241,7 +241,7 @@ def _drawn(draw: Callable[[np.ndarray], bool]) -> Output:
 
 
 def _file(path: str) -> Callable[[np.ndarray], bool]:
-    """Writes pictures to a file that is always whole."""
+    """Write pictures to a file that is complete at every moment."""
     import io
 
     from ...files import atomic
@@ -260,7 +260,7 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
 
 
 def _window(title: str) -> Callable[[np.ndarray], bool]:
-    """Shows pictures in a window; False when it was closed. Raises TactileError without a display."""
+    """Show pictures in a window; False once the user closes it. Raises TactileError without a display."""
     from matplotlib import pyplot
 
     if pyplot.get_backend().lower() == "agg":

@@ -88,7 +88,7 @@ class MeshIndenter(Indenter):
 
     @classmethod
     def _cached(cls, digest: str, make: Callable[[], Any], where: str | os.PathLike, spacing: float) -> MeshIndenter:
-        """The indenter of a mesh (mm) that ``make`` gives, from the cache where its grid has been built before."""
+        """Return the indenter of a mesh (mm) that ``make`` builds, from the cache where its grid is there already."""
         folder = cache_folder() / f"indenter-{digest[:16]}"
         try:
             arrays = _load(folder)

@@ -42,7 +42,7 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 
 
 def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> Any:
-    """The mesh (a trimesh, mm) in an indenter's own frame: its lowest flat or point touches z = 0 at the origin.
+    """Return the mesh (a trimesh, mm) in an indenter's own frame: its lowest flat or point touches z = 0 at the origin.
 
     where : the file, for its suffix and for messages; scale : m per unit of the file
     up : the file's axis, one of ``UPS``, that points out of the sensor

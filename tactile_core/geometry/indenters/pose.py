@@ -44,7 +44,7 @@ class Pose:
         return Pose(self.apex + depth * self.direction, self.axes, self.push)
 
     def slid(self, along: float, across: float) -> Pose:
-        """The pose after sliding, m, along the indenter's own x and y."""
+        """Return the pose after sliding, m, along the indenter's own x and y."""
         return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes, self.push)
 
     def to_own(self, points: np.ndarray) -> np.ndarray:

@@ -41,7 +41,7 @@ class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def find(words: Sequence[str], out: Path) -> list[Path]:
-    """The recordings that `words` name, in their order, each once; what lies in the folder `out` is left out.
+    """Return the recordings that `words` name, in that order, each once; files in the folder `out` are ignored.
 
     Raises TactileError for a word that names nothing, and for a glob that would go through a folder again and again.
     """
@@ -69,7 +69,7 @@ def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
-    """The recordings of a path or glob. within : those in a folder."""
+    """Return the recordings of a path or glob. within : those in a folder."""
     there = os.path.lexists(word) or not glob.has_magic(word)
     for path in [word] if there else _globbed(word):
         real = os.path.realpath(path)

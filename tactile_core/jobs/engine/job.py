@@ -51,7 +51,7 @@ def _hash(content: Any) -> str:
 
 
 def make(inputs: list[Input], recipe: Recipe, weights: str | None, calibration: str | None = None) -> Job:
-    """A new job."""
+    """Create a new job."""
     networks, unit = (None if path is None else os.path.abspath(path) for path in (weights, calibration))
     return Job(FORMAT, inputs, recipe, networks, unit, provenance.versions())
 
@@ -76,7 +76,7 @@ def exists(folder: Path) -> bool:
 
 
 def read(folder: Path) -> Job:
-    """The job of a folder. Raises TactileError for none, for one that is damaged or of another version."""
+    """Read the job of a folder. Raises TactileError for none, for one that is damaged or of another version."""
     file = folder / FILE
     try:
         job = msgspec.convert(json.loads(read_small(file, MOST)), Job)

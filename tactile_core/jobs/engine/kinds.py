@@ -28,7 +28,7 @@ MODULES = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Seen:
+class InputFacts:
     """Facts known of an input. shards : their number; frames : of a recording; warnings : to report"""
 
     shards: int
@@ -37,5 +37,5 @@ class Seen:
 
 
 def module_for(job: Job) -> ModuleType:
-    """The module that does a job."""
+    """Return the module that does a job."""
     return importlib.import_module(f"...{MODULES[type(job.recipe)]}", __name__)

@@ -118,7 +118,7 @@ class _Worker:
         self.cause = ""
 
     def ask(self, task: dict[str, Any]) -> dict[str, Any] | None:
-        """The reply of a process to a task; None where it died over it, `cause` says how."""
+        """Send a task to a process and return its reply; None where the process died, `cause` says how."""
         if self._process is None:
             self._process, self._served = self._start(), 0
         line = ""
@@ -148,7 +148,7 @@ class _Worker:
             self._process = None
 
 
-class Here:
+class InProcess:
     """The place of a job that needs no other process."""
 
     def __init__(self, folder: Path) -> None:
@@ -164,7 +164,7 @@ class Here:
             task = self._todo.popleft()
             yield task, msgspec.convert(tasks.run(str(self._folder), msgspec.to_builtins(task)), Reply)
 
-    def __enter__(self) -> Here:
+    def __enter__(self) -> InProcess:
         return self
 
     def __exit__(self, *error: object) -> None:

@@ -69,7 +69,7 @@ def _aside(folder: Path) -> dict[str, str]:
 
 
 def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
-    """Files of a job that are not as they were written; each is read once. progress : (files done, in all)
+    """List the files of a job that are not as they were written; each is read once. progress : (files done, in all)
 
     Where the job was done once, by its manifest: shards that are gone, and whole ones of another place or job, too.
     """
@@ -120,7 +120,7 @@ def write(folder: Path, job: Job) -> None:
 
 def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
     one = job.inputs[index]
-    seen = kinds.module_for(job).inspect_input(folder, job, index) or kinds.Seen(0)
+    seen = kinds.module_for(job).inspect_input(folder, job, index) or kinds.InputFacts(0)
     listed: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
     for number in range(seen.shards):
         path = jobs.shard_file(folder, one.name, number)

@@ -54,7 +54,7 @@ def finished(folder: Path) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Remove the job's own files, the job last, and the folder where no third-party file is left in it."""
+    """Remove the job's own files, the job last, and the folder where it is empty then."""
     for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
         shutil.rmtree(folder / name, ignore_errors=True)
     for file in (jobs.MANIFEST, jobs.FILE, lock.FILE, DONE):

@@ -123,7 +123,7 @@ class _Work:
         self._asked, self._open = Counter[int](), Counter[int]()  # shards of each input: so far, and not done of them
 
     def awaited(self) -> int:
-        """Tasks whose reply has not come."""
+        """Return the tasks whose reply has not come."""
         return self.known - self.finished
 
     def first_tasks(self) -> list[Task]:

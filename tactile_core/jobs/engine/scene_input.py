@@ -12,8 +12,8 @@ from ...simulation.scene import Scene, load_scene
 from .inputs import Input, content_hash
 
 
-def found(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, list[Input], list[str]]:
-    """A scene, its text, an input for each of some names, and the hashes of its meshes in order.
+def read_inputs(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, list[Input], list[str]]:
+    """Read a scene; return it, its text, an input for each of some names, and the hashes of its meshes in order.
 
     Raises TactileError for a bad scene.
     """
@@ -26,7 +26,7 @@ def found(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, 
 
 
 def load(one: Input, files: tuple[str, ...]) -> tuple[Scene, str]:
-    """The scene of an input, and its text. Raises TactileError where it or a mesh changed since the job was made."""
+    """Load an input's scene and its text. Raises TactileError where it or a mesh changed since the job was made."""
     scene, text = load_scene(one.path)
     if content_hash(Path(one.path))[0] != one.sha256 or tuple(_hashes(scene)) != files:
         found = "another content than when the job was made"

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import TactileError
 from ...files import checksummed
 from ...files.hdf5_checked import declared, open_checked
-from ...recordings.array_store import damage_told
+from ...recordings.array_store import damage_reported
 from .. import frame_shard
 from ..engine import job as jobs
 from ..engine import manifest
@@ -72,7 +72,7 @@ class Finished:
 
 
 def load(folder: Path) -> Finished:
-    """The job of a folder. Raises TactileError where a shard is missing or not as a job of ours has it."""
+    """Load the job of a folder. Raises TactileError where a shard is missing or not as a job of ours has it."""
     job = jobs.read(folder)
     if not isinstance(job.recipe, Translate):
         raise TactileError(folder, "a job of another verb", "one of `tactile batch`", "Give the verb's command again")
@@ -103,7 +103,7 @@ def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
         raise TactileError(path, "another shard under this name", f"shard {number} of {job.inputs[index].name}", ADVICE)
     rows = min(job.recipe.shard_frames, frames - number * job.recipe.shard_frames)
     expected = set(arrays_of(kept(job.recipe.keep, job.recipe.answer), shard=True))
-    with damage_told(str(path), "shard"), open_checked(path) as file:
+    with damage_reported(str(path), "shard"), open_checked(path) as file:
         if set(file) != expected:
             raise TactileError(path, f"arrays {', '.join(sorted(file))}", ", ".join(sorted(expected)), ADVICE)
         for name, data in file.items():

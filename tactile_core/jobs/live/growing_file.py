@@ -34,7 +34,8 @@ class Growing:
         self._file = _identity(self._path.stat())
 
     def poll(self) -> Recording | None:
-        """The rows that came since the last call; None where none did, or too many are bad: all are passed over.
+        """Return the rows that came since the last call; None where none did, or where too many are bad and all are
+        skipped.
 
         Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row that
         names another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN.

@@ -95,7 +95,7 @@ class LiveSignals:
         return known.agrees(level(self._seen[first:last]), float(np.median(self._pdc[first:last])))
 
     def _decide(self) -> None:
-        """The polarity, by the frames so far, looked at again now and then; once it is sure it stays."""
+        """Decide the polarity from the frames so far, repeated from time to time; once it is sure it stays."""
         if self.kind == "rectified":
             self.polarity = Polarity(FALLS, "the sign is lost", True)
         if self.polarity.sure or len(self._seen) < self._looked_at + AGAIN:

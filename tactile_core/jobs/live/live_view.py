@@ -62,7 +62,7 @@ class View:
         return self._signals.polarity
 
     @property
-    def rest_found(self) -> str:
+    def rest_source(self) -> str:
         """Source of the rest level; empty while it is not known."""
         return self._signals.found
 
@@ -91,7 +91,7 @@ class View:
         return self._tools.translate(signals, state)
 
     def describe_latency(self) -> str:
-        """The latencies of the last pictures in words."""
+        """Describe the latencies of the last pictures."""
         if not self.latencies:
             return "no picture yet: waiting for a quiet part"
         (middle, work), (late, _) = 1e3 * np.percentile(np.array(self.latencies), [50, 99], axis=0)

@@ -50,7 +50,7 @@ class Contact:
         )
 
     def at_depth(self, depth: float) -> Contact:
-        """The same contact, whose depth, m, is counted from elsewhere."""
+        """Return the same contact with its depth, m, measured from another first touch."""
         moved = dataclasses.replace(self, depth=depth)
         if "displacement" in vars(self):  # is known already, and does not depend on it
             vars(moved)["displacement"] = self.displacement

@@ -235,7 +235,7 @@ def _frames_by_axis(sensor: str) -> np.ndarray:
 
 @functools.cache
 def learned() -> dict[str, Correction]:
-    """The shipped correction of each sensor."""
+    """Load the shipped correction of each sensor."""
     names = [field.name for field in dataclasses.fields(Learned)]
     with shipped(FILE).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         return {
@@ -263,7 +263,7 @@ def force_factor(compliance: Compliance, contact: Contact) -> float:
 
 
 def correct(compliance: Compliance, contact: Contact, parts: Correction | None = None) -> Corrected:
-    """A fast contact as the full tier would have it, at the same depth."""
+    """Correct a fast contact to what the full tier gives at the same depth."""
     parts = parts or learned()[compliance.name]
     if not len(contact.nodes):
         return Corrected(contact.displacement, 1.0)

@@ -89,7 +89,7 @@ class Pace:
         return self.after_wrong(max(-gap.min(), np.abs(gap[active]).max(initial=0.0)))
 
     def after_wrong(self, wrong: float) -> float:
-        """The same from the largest of these gaps, or the deepest place in the indenter, m."""
+        """Return the share of the next step from the largest of these gaps, or the deepest place in the indenter, m."""
         self._calls += 1
         if wrong > max(_PROGRESS * self._last, GAP_TOLERANCE) and self._calls > _FREE_ITERATIONS:
             self._trust = max(_SHRINK * self._trust, _LEAST_TRUST)
@@ -173,7 +173,7 @@ class Frictionless:
         return _Model(mixed, self.block.turned(older.matrix, mixed, stale), {})
 
     def _offset(self, gap, normal, place, model, solved) -> np.ndarray:  # noqa: ANN001
-        """Gaps without any forces; with a model of older normals only the change of the forces is left to it."""
+        """Return the gaps without any forces; a model of older normals accounts for the change of forces alone."""
         if solved is None or model.normal is normal:
             return np.concatenate([gap - np.einsum("ai,ai->a", normal, place), self.core_gap])
         k = self.block.k

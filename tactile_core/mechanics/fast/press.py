@@ -137,7 +137,7 @@ class CorrectedPress:
         raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
 
     def _by_depths(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """The same among contacts at depths: where all points feel the turn of their normals those are found quicker.
+        """Search the contact among depths: faster where all points feel the turn of their normals.
 
         Raises PenetrationError and UnsolvedError.
         """

@@ -139,11 +139,11 @@ class ContactSet:
         self._trial = -self.grip * (away - np.einsum("ki,ki->k", away, self.normals)[:, None] * self.normals)
 
     def _rub(self) -> None:
-        """Friction from the normal forces and the springs."""
+        """Compute friction from the normal forces and the springs."""
         self.rubbing, self.slipping[self.active] = self._capped(self._trial)
 
     def _capped(self, trial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Limit pulls (k, 3) N by friction; returns what is left (k, 3), and which (k,) slip."""
+        """Limit pulls (k, 3) N by friction; returns the limited pulls (k, 3), and which (k,) slip."""
         bound, size = self.friction * np.maximum(self.pressing, 0), np.linalg.norm(trial, axis=1)
         slips = size > bound
         return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips

@@ -54,5 +54,5 @@ class ContactState:
 
 
 def guarded(touch: ContactState) -> ContactState:
-    """The same contact, for going on with a surface that keeps the indenter out between its nodes."""
+    """Return the same contact with a surface that keeps the indenter out between its nodes, to continue from."""
     return dataclasses.replace(touch, guarded=True)

@@ -34,7 +34,7 @@ class SplitBulkModulus:
 
     @property
     def bulk(self) -> float:
-        """Pa, what is left for the cells' pressures."""
+        """Return the bulk modulus, Pa, that the cells' pressures carry."""
         return self.law.bulk - self.at_points
 
     def energy(self, f: np.ndarray, j: np.ndarray) -> np.ndarray:

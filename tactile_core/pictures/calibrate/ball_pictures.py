@@ -46,7 +46,7 @@ class BallPictures(abc.ABC):
 
 
 class FastPictures(BallPictures):
-    """By the fast picture of ``shading``."""
+    """Draw the pictures of balls by the fast preset of ``shading``."""
 
     def __init__(self, calibration: Calibration) -> None:
         super().__init__(calibration)

@@ -45,7 +45,7 @@ def _profile(distance: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _radius_of(gap: np.ndarray, radius: float) -> np.ndarray:
-    """The inverse of ``_profile``."""
+    """Invert ``_profile``: the distance, m, from the axis where the ball is ``gap`` m above its lowest point."""
     edge = SPHERE_TO * radius
     fall = np.sqrt(radius**2 - edge**2)
     inner = np.minimum(gap, radius - fall)

@@ -126,14 +126,14 @@ class _Search:
         self._none = np.zeros(len(NAMES), bool)
 
     def place(self) -> None:
-        """Presses and gain alone, the unit's numbers as in the start."""
+        """Fit presses and gain alone, with the unit's numbers as in the start."""
         bench = FastPictures(self.start)
         balls = [1e3 * np.array(fit_ball(bench, sight, self.radius)[0].numbers[:3]) for sight in self._sights]
         self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
         self._minimise(np.concatenate(balls), PLACING_STEPS)
 
     def put_aside(self) -> None:
-        """Leave out photographs that show no such ball. Raises TactileError if none is left."""
+        """Leave out photographs that show no such ball. Raises TactileError where none does."""
         left = self._problem.unexplained()
         good = [k for k, share in enumerate(left) if share < UNEXPLAINED]
         if not good:
@@ -176,7 +176,7 @@ class _Search:
     def fit(
         self, free: np.ndarray, pictures: Callable[[Calibration], BallPictures] = FastPictures, steps: int = STEPS
     ) -> None:
-        """Go on from where the search stands with some of the unit's numbers free."""
+        """Continue the search with some of the unit's numbers free."""
         numbers, balls = parameters_of(self._problem.unit(self._x)), self._problem.balls(self._x)
         self._problem, self._free = UnitResiduals(self.start, self._sights, self.radius, free, pictures), free
         self._minimise(np.concatenate([numbers[free], balls.ravel()]), steps)

@@ -62,7 +62,8 @@ class Sight:
 def fit_ball(
     bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, opaque: bool = True
 ) -> tuple[Ball, float]:
-    """The ball whose picture is nearest the photograph's, and the mean square of what is left, grey levels squared.
+    """Fit the ball whose picture is nearest the photograph's; returns it and the mean squared residual, grey levels
+    squared.
 
     bench : in working pixels; radius : m, the ball's, or where its search starts
     opaque : whether no light comes through the coating; else it is fitted as well (``contact_light``)

@@ -75,7 +75,7 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
 
 
 def square_pixels(camera: Camera) -> Camera:
-    """The same view with pixels as high as wide: as many rows as that makes, to half a row."""
+    """Return the same view with square pixels: as many rows as that makes, to half a row."""
     rows = round(camera.height * camera.px_per_mm_x / camera.px_per_mm_y)
     return dataclasses.replace(camera, height=rows, px_per_mm_y=camera.px_per_mm_x)
 

@@ -36,7 +36,7 @@ class Occluder:
 
 @dataclasses.dataclass(frozen=True)
 class Surroundings:
-    """All lamps and bodies beside a unit's own."""
+    """Hold all lamps and bodies beside a unit's own."""
 
     lamps: tuple[Lamp, ...] = ()
     occluders: tuple[Occluder, ...] = ()

@@ -26,7 +26,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _write(archive: zipfile.ZipFile, one: Recorded, name: str, shape: tuple[int, ...], kind: np.dtype) -> None:
-    """An array of any length: its header first, then its rows, shard by shard."""
+    """Write an array of any length: its header first, then its rows, shard by shard."""
     import h5py
 
     header = {"descr": np.lib.format.dtype_to_descr(kind), "fortran_order": False, "shape": shape}
