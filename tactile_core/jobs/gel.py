@@ -40,6 +40,7 @@ FLAGS = {
     "too deep": "the pose lies deeper than 60 % of the thickness; the values are those at that depth",
     "force not reached": "no depth bears the force; the values are those of the nearest contact that was solved",
     "began inside": "the first pose lies in the gel; the indenter was taken to come straight in along +y",
+    "friction forgotten": "no equilibrium was found on the path; the indenter was taken to come straight in along +y",
     "jumped": "the step is too long to follow; friction was forgotten, and the indenter taken to come in along +y",
 }
 # Farther, or turned by more, in one step a contact is another one, assumed: at 100 Hz that is 0.3 m/s and 2 turns a s.
@@ -138,7 +139,7 @@ class Gel:
             self._press, self._contact = None, self._untouched(here)
             return self._contact
         try:
-            found = self._moved_to(here, force, flags, began=before is None)
+            found = self._solved_at(here, force, flags, began=before is None)
             if jumps and found is not None:
                 flags.insert(0, "jumped")
         except UnsolvedError:
@@ -225,6 +226,24 @@ class Gel:
         moved = pose.apex - self._pose.apex
         turn = np.arccos(np.clip((np.trace(pose.axes.T @ self._pose.axes) - 1) / 2, -1, 1))
         return bool(np.linalg.norm(moved) > _LONGEST_STEP or turn > _LARGEST_TURN)
+
+    def _solved_at(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
+        """See ``_moved_to``; where the path leads to no contact, the one of an indenter that comes straight in."""
+        path = self._press
+        try:
+            return self._moved_to(pose, force, flags, began=began)
+        except UnsolvedError:
+            if path is None:
+                raise
+        again: list[str] = []
+        self._press = None
+        try:
+            found = self._moved_to(pose, force, again, began=False)
+        except UnsolvedError:
+            self._press = path
+            raise
+        flags[:] = [*again, "friction forgotten"] if self.friction else again  # without friction the path is nothing
+        return found
 
     def _moved_to(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
         """The contact at a pose or force; None where nothing touches. Raises UnsolvedError."""

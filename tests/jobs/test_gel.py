@@ -10,6 +10,8 @@ from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Sphere
 from tactile_core.jobs.gel import FLAGS, Gel, GelContact
+from tactile_core.mechanics.fast.active_set import UnsolvedError
+from tactile_core.mechanics.fast.press import CorrectedPress
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve
 from tactile_core.sensors import digit
@@ -246,6 +248,27 @@ def test_flags_tell_what_is_wrong_and_the_loop_goes_on():
     assert gel.press(shifted(gel.touching(-14e-3, 3e-3), z=50e-3), force=1.0).flags == ("force not reached",)
     assert gel.press(gel.touching(-8e-3, 0.0, 0.02e-3)).flags == ()
     assert {"began inside", "jumped", "too deep", "force not reached"} <= set(FLAGS)
+
+
+@pytest.mark.parametrize(("friction", "flags"), [(0.78, ("friction forgotten",)), (0.0, ())])
+def test_where_the_path_leads_to_no_contact_one_that_comes_straight_in_is_found(friction, flags, monkeypatch):
+    gel, straight = Gel("digit", BALL, friction=friction), Gel("digit", BALL, friction=friction)
+    *before, last = path(gel)
+    for pose in before:
+        gel.press(pose)
+
+    def unsolved(*_, **__):
+        raise UnsolvedError("no equilibrium")
+
+    monkeypatch.setattr(gel._press, "at_depth", unsolved)
+    found = gel.press(last)
+    assert found.flags == flags
+    np.testing.assert_array_equal(found.displacement, straight.press(last).displacement)
+    assert gel.press(shifted(last, x=0.1e-3)).flags == ()  # and the path goes on from there
+    monkeypatch.setattr(CorrectedPress, "at_depth", unsolved)
+    here = gel.contact
+    assert gel.press(last).flags == ("unsolved",)
+    np.testing.assert_array_equal(gel.contact.force, here.force)
 
 
 def test_meshes_and_sensors_that_cannot_be_are_refused():
