@@ -44,9 +44,12 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
     press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of 20-50 ms
     is not flat; a contact that comes and goes within one single sample (10 ms) looks like a glitch. At the
     start and end of a recording only one jump can be seen; there it must exceed 100 counts, within 3 samples.
+    The search ends where the rows are found to be no time series, see `is_time_series`.
     """
     found = np.zeros(values.shape, bool)
     for _ in range(ROUNDS):
+        if not is_time_series(found):
+            break  # nothing will be repaired, and noise has such runs everywhere: hours in a long file
         new = (_short_runs(values) | _end_runs(values)) & ~found
         if not new.any():
             new = _stuck_runs(values) & ~found
@@ -63,39 +66,54 @@ def is_time_series(glitches: np.ndarray) -> bool:
 
 
 def _short_runs(values: np.ndarray) -> np.ndarray:
-    """Glitches of 1 to 5 samples, in all columns at once."""
+    """Glitches of 1 to 5 samples, a column at a time, which bounds the memory of a long recording."""
     frames = len(values)
     found = np.zeros(values.shape, bool)
-    steps = np.diff(values, axis=0)  # steps[i] leads from sample i to i + 1
-    large = np.abs(steps) > LIMIT
-    if not large.any():
-        return found
-    calm = np.abs(np.pad(steps, ((1, 1), (0, 0)), mode="edge"))  # calm[i] = |step| into sample i
+    jumping = np.flatnonzero(np.abs(np.diff(values, axis=0)).max(axis=0, initial=0.0) > LIMIT)
     for length in range(1, min(SHORT, frames - 2) + 1):
-        starts = frames - 1 - length  # run = samples i+1 .. i+length for i < starts
-        into, out = steps[:starts], steps[length : length + starts]
-        candidate = large[:starts] & large[length : length + starts] & (into * out < 0)
-        for i, j in np.argwhere(candidate):
-            if found[i : i + length + 2, j].any():
-                continue  # its neighbour is a glitch: judge it in the next round, against the repaired level
-            before, after = float(calm[i, j]), float(calm[min(i + length + 2, frames), j])
-            found[i + 1 : i + 1 + length, j] = _is_run(values[:, j], i, i + length + 1, min(before, after))
+        for j in jumping:
+            _mark_short(values[:, j], found[:, j], length)
+        if not is_time_series(found):
+            break
     return found
 
 
-def _is_run(column: np.ndarray, first: int, last: int, neighbour_step: float) -> bool:
-    """Return true if the samples between first (level before) and last (level after) are a glitch."""
+def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
+    """Mark in ``found`` (T,) the glitches of so many samples in a column (T,), beside those that are marked."""
+    steps = np.diff(column)  # steps[i] leads from sample i to i + 1
+    large = np.abs(steps) > LIMIT
+    calm = np.abs(np.pad(steps, 1, mode="edge"))  # calm[i] = |step| into sample i
+    starts = len(column) - 1 - length  # run = samples i+1 .. i+length for i < starts
+    into, out = steps[:starts], steps[length : length + starts]
+    first = np.flatnonzero(large[:starts] & large[length:][:starts] & (into * out < 0))
+    around = np.minimum(calm[first], calm[np.minimum(first + length + 2, len(column))])
+    for i in first[_is_flat_jump(column[first + np.arange(length + 2)[:, None]], around)].tolist():
+        if not found[i : i + length + 2].any():  # else judge it in the next round, against the repaired level
+            found[i + 1 : i + 1 + length] = _leaves_usual(column, i, i + length + 1)
+
+
+def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np.ndarray:
+    """Return (N,) whether runs jump away, steeper than around them, stay on one level and return.
+
+    samples : (n + 2, N) counts, the level before, the n samples of each run, the level after; neighbour_step : (N,)
+    """
+    jump = np.minimum(np.abs(samples[1] - samples[0]), np.abs(samples[-1] - samples[-2]))
+    run = samples[1:-1]
+    returns = np.abs(samples[-1] - samples[0]) <= np.maximum(LEVEL, FLATNESS * jump)
+    flat = np.ptp(run, axis=0) <= FLATNESS * jump
+    steep = jump > STEEPER * neighbour_step
+    apart = np.abs(run - 0.5 * (samples[0] + samples[-1])).min(axis=0) > LIMIT
+    return returns & flat & steep & apart
+
+
+def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
+    """Return true if a run between first and last leaves the level of the second around it; a gap between two
+    glitches does not.
+    """
     samples = column[first : last + 1]
     jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
-    run = samples[1:-1]
-    returns = abs(samples[-1] - samples[0]) <= max(LEVEL, FLATNESS * jump)
-    flat = np.ptp(run) <= FLATNESS * jump
-    steep = jump > STEEPER * neighbour_step
-    apart = np.abs(run - 0.5 * (samples[0] + samples[-1])).min() > LIMIT
-    if not (returns and flat and steep and apart):
-        return False
-    usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])  # a gap between two glitches is no glitch
-    return bool(abs(run.mean() - usual) > max(LEVEL, FLATNESS * jump))
+    usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])
+    return bool(abs(samples[1:-1].mean() - usual) > max(LEVEL, FLATNESS * jump))
 
 
 def _end_runs(values: np.ndarray) -> np.ndarray:
@@ -117,19 +135,36 @@ def _end_runs(values: np.ndarray) -> np.ndarray:
 def _stuck_runs(values: np.ndarray) -> np.ndarray:
     """Runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level."""
     found = np.zeros(values.shape, bool)
-    steps = np.diff(values, axis=0)
-    large = np.abs(steps) > LIMIT
+    large = np.abs(np.diff(values, axis=0)) > LIMIT
     alone = large.sum(axis=1) <= ALONE
     for j in np.flatnonzero(large.any(axis=0)):
-        edges = np.flatnonzero(large[:, j] & alone).tolist()
-        for first, start in enumerate(edges):
-            for end in edges[first + 1 :]:
-                if end - start > STUCK:
-                    break
-                around = [abs(steps[k, j]) for k in (start - 1, end + 1) if 0 <= k < len(steps)]
-                if steps[start, j] * steps[end, j] < 0 and _is_run(
-                    values[:, j], start, end + 1, min(around, default=0.0)
-                ):
-                    found[start + 1 : end + 1, j] = True
-                    break
+        column, ended = values[:, j], -1
+        for start, end, around in _opposite_jumps(column, np.flatnonzero(large[:, j] & alone)):
+            samples = column[start : end + 2, None]
+            if start != ended and _is_flat_jump(samples, around)[0] and _leaves_usual(column, start, end + 1):
+                found[start + 1 : end + 1, j] = True
+                ended = start  # a run ends at the first jump that may end it
     return found
+
+
+def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, int, float]]:
+    """Return pairs of opposite jumps that may begin and end a stuck run, in order.
+
+    edges : samples before large steps. Each pair has its two edges, and the calmer of the steps just outside. A noisy
+    electrode has millions of pairs: what a run's two ends show is looked at here, for all at once.
+    """
+    steps = np.diff(column)
+    beside = np.abs(np.concatenate([[np.inf], steps, [np.inf]]))
+    pairs = []
+    for apart in range(1, min(STUCK, len(edges) - 1) + 1):
+        start, end = edges[:-apart], edges[apart:]
+        near = end - start <= STUCK
+        if not near.any():
+            break
+        start, end = start[near], end[near]
+        around = np.minimum(beside[start], beside[end + 2])
+        around[np.isinf(around)] = 0.0  # the run leaves no step outside
+        ends = column[np.stack([start, start + 1, end, end + 1])]
+        kept = (steps[start] * steps[end] < 0) & _is_flat_jump(ends, around)
+        pairs += zip(start[kept].tolist(), end[kept].tolist(), around[kept].tolist(), strict=True)
+    return sorted(pairs)

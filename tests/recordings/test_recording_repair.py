@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tactile_core.recordings import repair
 from tactile_core.recordings.repair import fill, find_glitches, is_time_series
 
 
@@ -85,3 +86,24 @@ def test_fill_takes_the_line_between_and_the_nearest_at_the_ends():
     bad = np.array([[True], [False], [True], [False], [True]])
     assert fill(values, bad)[:, 0].tolist() == [1, 1, 2, 3, 3]
     assert fill(values, np.ones((5, 1), bool))[:, 0].tolist() == [0] * 5
+
+
+def test_the_search_ends_where_rows_are_no_time_series(monkeypatch):
+    """A stranger's noise of some hours was searched for days: a call for each of millions of runs, in 12 rounds."""
+    judged, rounds = [], []
+    usual, ends = repair._leaves_usual, repair._end_runs
+    monkeypatch.setattr(repair, "_leaves_usual", lambda *run: judged.append(run) or usual(*run))
+    monkeypatch.setattr(repair, "_end_runs", lambda values: rounds.append(0) or ends(values))
+    noise = np.random.default_rng(0).uniform(1800, 3600, (2000, 19))
+    assert not is_time_series(find_glitches(noise))
+    assert len(rounds) == 1
+    assert len(judged) < noise.size / 10
+
+
+def test_a_noisy_electrode_is_judged_in_few_pairs_of_jumps(press, monkeypatch):
+    judged, usual = [], repair._leaves_usual
+    monkeypatch.setattr(repair, "_leaves_usual", lambda *run: judged.append(run) or usual(*run))
+    values = press.electrodes.copy()
+    values[:, 3] = np.random.default_rng(0).uniform(1800, 3600, len(values))
+    find_glitches(values)
+    assert len(judged) < 5 * len(values)
