@@ -187,6 +187,23 @@ def test_watch_without_a_display_says_what_to_do(slide_csv, monkeypatch, capsys)
     assert "--out now.png" in capsys.readouterr().err
 
 
+def test_a_window_that_is_closed_ends_the_watch(slide_csv, monkeypatch, capsys):
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    drawn = []
+    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(pyplot, "get_backend", lambda: "a window's")
+    monkeypatch.setattr(pyplot, "show", lambda block: drawn.append(block))
+    monkeypatch.setattr(pyplot, "fignum_exists", lambda number: drawn.append(number) or len(drawn) < 4)
+    assert main(["watch", str(slide_csv(frames=90)), "--play", "--speed", "0"]) == 0
+    pyplot.close("all")
+    frames = int(capsys.readouterr().out.split(" frames: ")[0])
+    assert len(drawn) == 4 and drawn[0] is False and frames < 90  # shown once, and three pictures in it
+
+
 def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
     pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
     import bags
