@@ -64,6 +64,7 @@ points = [
 # What is run by another test -> its file, and the words it is run by.
 ELSEWHERE = {
     "tactile simulate scenes/press_roll_slide --grid": ("tests/jobs/engine/test_batch_kinds.py", "--grid"),
+    "TACTILE_SENSORS=": ("tests/jobs/test_pairs.py", "TACTILE_SENSORS"),
     "tactile watch --rosbag-play": ("tests/jobs/live/test_live.py", "--rosbag-play"),
     "tactile watch touch.csv --serve": ("tests/jobs/live/test_frame_server.py", "--serve"),
     "tactile render frames.h5": ("tests/jobs/engine/test_batch_kinds.py", "--workers"),

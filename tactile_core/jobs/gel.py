@@ -48,6 +48,7 @@ _LONGEST_STEP, _LARGEST_TURN = 3e-3, 0.13  # m, rad
 _LEAST_FORCE = 1e-5  # N, the weight of 1 mg: less is lost in rounding
 _LARGEST_DROP = 1e3  # of the force, in one search: larger ones go by way of a force between (assumed)
 _SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the greatest depth, at which to stand where a force is not reached
+PICTURED = "digit"  # of which pictures are drawn
 _ENDED: Any = object()  # stands for poses or forces that are used up
 _BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (assumed: 20 mm/s at 100 Hz)
 
@@ -86,7 +87,7 @@ class Gel:
     >>> contact = gel.press(pose)                        # contact.force N, .displacement m, .traction Pa
     >>> picture = gel.picture()                          # (320, 240, 3) uint8
 
-    sensor : "digit" or "biotac"
+    sensor : the name of one that is there, as "digit" or "biotac"
     indenter : one of ``geometry.indenters``, or a closed ``trimesh.Trimesh`` in metres
     friction : Coulomb's coefficient; 0 for none
     calibration : of the camera and its lights, None for the one that ships; preset : of the pictures
@@ -102,8 +103,6 @@ class Gel:
         calibration: Calibration | None = None,
         preset: str = FAST,
     ) -> None:
-        if sensor not in ("digit", "biotac"):
-            raise TactileError("Gel, sensor", repr(sensor), "digit or biotac")
         if preset not in NAMES:
             raise TactileError("Gel, preset", repr(preset), f"one of {', '.join(NAMES)}")
         self.sensor, self.preset = sensor, preset
@@ -178,8 +177,9 @@ class Gel:
 
         Where a hard slide folds the gel over itself the height there is a guess. Raises TactileError for the BioTac.
         """
-        if self.sensor != "digit":
-            raise TactileError("Gel, picture", "the BioTac has no camera", "a Gel of the DIGIT")
+        if self.sensor != PICTURED:
+            found = f"the {sensors.title(self.sensor)}, of which no picture can be drawn"
+            raise TactileError("Gel, picture", found, f"a Gel of the {sensors.title(PICTURED)}")
         with folds_counted():
             return digit_mapper(self._renderer.camera)(self._contact.displacement)
 

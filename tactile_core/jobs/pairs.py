@@ -19,9 +19,10 @@ from .. import sensors
 from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
 from ..mechanics.electrodes.law import SHEET
-from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
+from ..mechanics.fast.compliance import compliance_of
+from ..sensors.descriptor import Fluid, Gel, of_kind
 from ..simulation.pairs_card import card, card_path
-from ..simulation.pairs_file import merge
+from ..simulation.pairs_file import SENSORS, merge
 from ..simulation.scene import Scene
 from .engine import job as jobs
 from .engine import result_parts, scene_input
@@ -49,31 +50,39 @@ def make_pairs(
     progress: Callable[[int, int], None] | None = None,
     place: Callable[[pathlib.Path], Place] | None = None,
     electrodes: str = SHEET,
+    pair: tuple[str, str] = SENSORS,
 ) -> None:
     """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
 
     progress : called with (blocks of presses done, known so far). Blocks wait in ``<out>.parts``, a folder as of
         ``tactile batch``, which is removed at the end; the file's card (``pairs_card``) is written beside it.
     workers : processes, this one alone for 1; place : where blocks are made instead, from the job's folder
-    electrodes : the law of their counts, of ``law.LAWS``
+    electrodes : the law of their counts, of ``law.LAWS``; pair : the sensors, source and target
     Raises TactileError for a bad scene, count, or for parts of another scene or seed.
     """
     out = pathlib.Path(out)
-    job, names, text = plan(scene_path, count, seed, out, electrodes)
-    digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
+    job, names, text = plan(scene_path, count, seed, out, electrodes, pair)
+    compliance_of(pair[1]), compliance_of(pair[0])  # built once here, not by every worker at the same time
     with result_parts.begun(out, job) as folder:
         open_place = place or (InProcess if workers == 1 else lambda folder: Local(folder.resolve(), workers))
         where = open_place(folder)
         result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
-        merge(blocks(folder, job), count, out, text, seed, names, electrodes)
-        atomic.write_json(card_path(out), card(out))
+        merge(blocks(folder, job), count, out, text, seed, names, electrodes, pair)
+        atomic.write_json(card_path(out), card(out, *pair))
         result_parts.finished(folder)
 
 
 def plan(
-    scene_path: str | os.PathLike, count: int, seed: int, out: pathlib.Path, electrodes: str = SHEET
+    scene_path: str | os.PathLike,
+    count: int,
+    seed: int,
+    out: pathlib.Path,
+    electrodes: str = SHEET,
+    pair: tuple[str, str] = SENSORS,
 ) -> tuple[jobs.Job, list[str], str]:
     """The job, the names of the indenters and the scene's text; raises what ``make_pairs`` raises before it begins."""
+    source, target = pair
+    of_kind(source, Fluid), of_kind(target, Gel)
     scene, text, inputs, files = scene_input.read_inputs(scene_path, ["presses"])
     if scene.pairs is None:
         raise TactileError(f"{scene_path}, pairs", "missing", "a [pairs] table", "See scenes/press_sphere/scene.toml")
@@ -82,8 +91,8 @@ def plan(
     for spec in scene.indenters:
         spec.build()  # an impossible one is refused before anything is written
     atomic.claim(out)
-    surfaces = [sensors.biotac_surface().sha256, sensors.digit_surface().sha256]
-    job = jobs.make(inputs, Pairs(count, seed, surfaces, files, electrodes), None)
+    surfaces = [sensors.sensor_surface(sensor).sha256 for sensor in pair]
+    job = jobs.make(inputs, Pairs(count, seed, surfaces, files, electrodes, source, target), None)
     return job, [spec.name for spec in scene.indenters], text
 
 
@@ -102,8 +111,10 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     if checksummed.verified_checksum(file) is not None:
         return False
     scene = _scene(one, tuple(job.recipe.files))
-    seed, law = job.recipe.seed, job.recipe.electrodes
-    rows = [row for i in range(BLOCK) for row in press_rows(scene, seed, number * BLOCK + i, law)]
+    recipe = job.recipe
+    pair = recipe.source, recipe.target
+    presses = range(number * BLOCK, (number + 1) * BLOCK)
+    rows = [row for press in presses for row in press_rows(scene, recipe.seed, press, recipe.electrodes, pair)]
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
     array_pack.write(file, columns | {COUNT: np.int64(len(rows))})
     return True

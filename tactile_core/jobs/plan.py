@@ -18,6 +18,7 @@ from typing import Any
 from ..accuracy import Budget
 from ..errors import TactileError
 from ..files.shipped import shipped
+from ..sensors import title
 from ..translation import network_sizes
 from . import results
 
@@ -25,7 +26,7 @@ COSTS = shipped("costs.json")
 TIERS = shipped("mechanics_tiers.json")
 OF_SCENE = ("electrodes", "displacement_biotac", "displacement_digit", "translation", "image")
 OF_RECORDING = results.KEEPABLE
-NAMES = {"biotac": "BioTac", "digit": "DIGIT"}
+SENSORS = "biotac", "digit"
 # Once, where matrices are not cached: CPU time measured on one core (AMD EPYC with AVX-512), memory as
 # ``compliance.build`` asks for, and the size of the files.
 BUILD_S, BUILD_MB, MATRICES_MB = {"biotac": 42.0, "digit": 18.0}, 2200.0, {"biotac": 342.0, "digit": 151.0}
@@ -137,7 +138,7 @@ def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | No
         parts.append(Part("electrodes", "simulate", "19, from the film over each; noise and drift", disk=disk))
     parts += _translation(frames, "latent", "convert") if "translation" in keep else []
     parts += _rendered(frames, budget, preset) if "image" in keep else []
-    left = [f"{NAMES[sensor]} and its matrices" for sensor in NAMES if sensor not in used]
+    left = [f"{title(sensor)} and its matrices" for sensor in SENSORS if sensor not in used]
     left += [] if "translation" in keep else ["networks"]
     left += [] if "image" in keep else ["height maps, LEDs and pictures"]
     return Plan(f"scene {scene.name}: {', '.join(keep)}", tuple(parts), tuple(left))
@@ -184,9 +185,9 @@ def _matrices(sensor: str) -> list[Part]:
     found = stored(sensor)
     nodes = f"{found.surface} surface nodes, {found.touchable} of them touchable; solid of {found.volume} nodes"
     if found.bytes:
-        return [Part(f"{NAMES[sensor]} matrices", "simulate", f"{found.bytes / 1e6:.0f} MB, cached; {nodes}")]
+        return [Part(f"{title(sensor)} matrices", "simulate", f"{found.bytes / 1e6:.0f} MB, cached; {nodes}")]
     extent = f"to be built once in {found.folder}; {nodes}"
-    what = f"{NAMES[sensor]} matrices"
+    what = f"{title(sensor)} matrices"
     return [Part(what, "simulate", extent, BUILD_S[sensor], disk=MATRICES_MB[sensor], building=BUILD_MB)]
 
 
@@ -205,7 +206,7 @@ def _contacts(sensor: str, choice: Any, contacts: int, rough: bool, kept: int) -
     extent = f"{contacts} different contacts; {choice.describe(sensor)}"
     disk = part["kb"] * kept / 1e3
     seconds, memory = once + ms * contacts / 1e3, max(part["mb"] - start["mb"], 0) + TIER_MB[choice.tier]
-    return Part(f"{NAMES[sensor]} contacts", "simulate", extent, seconds, memory, disk)
+    return Part(f"{title(sensor)} contacts", "simulate", extent, seconds, memory, disk)
 
 
 def _translation(frames: int, keep: str, verb: str) -> list[Part]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 from typing import Any
 
 from ..files.shipped import shipped
@@ -28,6 +29,7 @@ _ACROSS, _SHAPE, _FORCE = 8.0, 2e-6, 0.01
 # less than 0.35 of it, rms. What stands above covered 16 of the forces.
 _HIDDEN, _HIDDEN_SHAPE, _HIDDEN_FORCE = 100e-6, 0.35, 1.0
 TABLE = shipped("mechanics_tiers.json")
+_UNKNOWN = {"bins": [{"depth_share_to": math.inf, "shape_95_um": math.nan, "force_95": math.nan}]}
 REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of order 2 leaves a quarter; a margin on it)
 
 
@@ -72,9 +74,10 @@ def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
     """Shape error, m rms, and relative force error that 95 of 100 contacts at a depth over thickness stay below.
 
     The fast tier's are from the full tier, whose own come on top; deeper than measured: those of the deepest bin.
+    NaN for a sensor whose errors nobody has measured.
     """
     if share <= 0:
         return 0.0, 0.0
-    bins = measured()["tiers"][tier][sensor]["bins"]
+    bins = measured()["tiers"][tier].get(sensor, _UNKNOWN)["bins"]
     found = next((each for each in bins if share <= each["depth_share_to"]), bins[-1])
     return 1e-6 * found["shape_95_um"], found["force_95"]

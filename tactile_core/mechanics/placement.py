@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import sensors
 from ..geometry.indenters import Indenter, Pose, pose_on
-from ..sensors import digit, unrolling
+from ..sensors import unrolling
 from .first_touch import first_touch
 
 FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (docs/sources.md, BioTac skin), taken for both sensors
@@ -54,6 +54,6 @@ def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
     return gel_pose(sensor, indenter, place) if sensors.is_gel(sensor) else biotac_pose(indenter, place)
 
 
-def on_gel(x: float, z: float, margin: float = 0.0) -> bool:
-    """Return true if a place of the DIGIT's plane lies on the gel, at least ``margin`` m inside its outline."""
-    return bool(digit.outline_distance(np.array(x), np.array(z)) > margin)
+def on_gel(x: float, z: float, margin: float = 0.0, sensor: str = "digit") -> bool:
+    """Return true if a place of the common plane lies on a sensor's gel, at least ``margin`` m inside its outline."""
+    return bool(sensors.shape_of(sensor).outline_distance(np.array(x), np.array(z)) > margin)

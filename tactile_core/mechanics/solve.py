@@ -97,9 +97,10 @@ def solve_path(
 
 
 def _first_touch(sensor: Sensor, indenter: Indenter, place: Placement) -> Pose:
-    if not on_gel(place.x, place.z):
+    if not (on_gel(place.x, place.z, sensor=sensor) if sensors.is_gel(sensor) else on_gel(place.x, place.z)):
         found = f"({place.x * 1e3:g}, {place.z * 1e3:g}) mm"
-        raise TactileError("solve, place", found, "a place on the DIGIT's gel (x, z), see digit_shape.outline_distance")
+        gel = sensors.title(sensor) if sensors.is_gel(sensor) else "DIGIT"  # what of the pad can be touched
+        raise TactileError("solve, place", found, f"a place on the {gel}'s gel (x, z), see digit.outline_distance")
     return pose_at(sensor, indenter, place)
 
 

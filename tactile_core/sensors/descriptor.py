@@ -204,6 +204,14 @@ class GelLattice:
     rim_base: int = _in(above=0)
     rim_side: int = _in(above=0)
 
+    def __post_init__(self) -> None:
+        """Raise TactileError for an even number of rows or columns, which quadratic cells do not fill."""
+        rows = self.rim_tip + self.window_nodes[0] + self.rim_base
+        columns = self.window_nodes[1] + 2 * self.rim_side
+        if rows % 2 == 0 or columns % 2 == 0:
+            found = f"{rows} rows and {columns} columns of nodes, rims included"
+            raise TactileError("lattice, window_nodes", found, "odd numbers of both")
+
 
 @dataclasses.dataclass(frozen=True)
 class Camera:

@@ -45,14 +45,21 @@ DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
 SCALED = ("displacement_biotac", "displacement_digit")
 SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 
-# Unit of each dataset that is written; the leading axis counts contacts. A place is (x, z) on the DIGIT's plane,
-# tilt and heading.
-UNITS = {
-    "displacement_biotac": "m", "displacement_digit": "m", "signal": "counts", "gap": "m", "force": "N",
-    "force_digit": "N", "pressure": "Pa", "depth_biotac": "m", "depth_digit": "m", "contact_center": "m",
-    "place": "m, m, rad, rad", "slide": "m", "contact_patch_biotac": "1", "contact_patch_digit": "1",
-    "beyond_digit": "1", "press": "1", "indenter": "1",
-}  # fmt: skip
+SENSORS = SOURCE, TARGET = "biotac", "digit"  # that pairs are made of where nothing else is asked for
+_NODES = "_nodes_sha256"  # after a sensor's name, the attribute that says which nodes its surface has
+
+
+def units(source: str = SOURCE, target: str = TARGET) -> dict[str, str]:
+    """Return the unit of each dataset that is written; the leading axis counts contacts.
+
+    Datasets are named after the two sensors. A place is (x, z) on the gel's plane, tilt and heading.
+    """
+    return {
+        f"displacement_{source}": "m", f"displacement_{target}": "m", "signal": "counts", "gap": "m", "force": "N",
+        f"force_{target}": "N", "pressure": "Pa", f"depth_{source}": "m", f"depth_{target}": "m",
+        "contact_center": "m", "place": "m, m, rad, rad", "slide": "m", f"contact_patch_{source}": "1",
+        f"contact_patch_{target}": "1", f"beyond_{target}": "1", "press": "1", "indenter": "1",
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -117,6 +124,10 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
             found = str(file.attrs.get("format", ""))
             if found != FORMAT:
                 raise TactileError(path, f"format {found!r}", f"format {FORMAT!r}", ADVICE)
+            of = sorted(name.removesuffix(_NODES) for name in file.attrs if name.endswith(_NODES))
+            if len(of) == 2 and of != sorted(SENSORS):
+                expected = f"pairs of {' and '.join(SENSORS)}, which networks are made for"
+                raise TactileError(path, f"pairs of {' and '.join(of)}", expected)
             missing = [name for name in ATTRIBUTES if name not in file.attrs]
             if missing:
                 raise TactileError(path, f"no attribute {missing[0]}", ", ".join(ATTRIBUTES), ADVICE)
@@ -227,36 +238,38 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
 
 def merge(
     files: list[pathlib.Path], count: int, out: pathlib.Path, text: str, seed: int, names: list[str],
-    electrodes: str = SHEET,
+    electrodes: str = SHEET, pair: tuple[str, str] = SENSORS,
 ) -> None:  # fmt: skip
-    """Join the blocks in order into one HDF5 file, cut to ``count`` contacts; written beside and renamed."""
+    """Join the blocks in order into one HDF5 file, cut to ``count`` contacts; written beside and renamed.
+
+    pair : the sensors, source and target
+    """
     try:
-        _write_merged(files, count, out, text, seed, names, electrodes)
+        _write_merged(files, count, out, text, seed, names, electrodes, pair)
     except (OSError, RuntimeError) as error:  # h5py reports a full disk as either
         raise no_room(out, error) from error
 
 
-def _write_merged(files, count, out, text, seed, names, electrodes) -> None:  # noqa: ANN001
+def _write_merged(files, count, out, text, seed, names, electrodes, pair) -> None:  # noqa: ANN001
     import h5py
 
     with atomic.new_file(out) as partial, Disk(partial) as disk, h5py.File(disk, "w") as file:
         file.attrs.update({
             "format": FORMAT, "scene": text, "seed": seed, "version": __version__, "indenters": json.dumps(names),
-            "biotac_nodes_sha256": sensors.biotac_surface().sha256,
-            "digit_nodes_sha256": sensors.digit_surface().sha256, "polarity": FALLS,
+            **{f"{sensor}{_NODES}": sensors.sensor_surface(sensor).sha256 for sensor in pair}, "polarity": FALLS,
             "electrodes": electrodes,
         })  # fmt: skip
-        done = 0
+        done, unit_of = 0, units(*pair)
         for path in files:
             block = array_pack.read(path)
             take = min(int(block["count"]), count - done)
-            for name in UNITS if take else ():
-                _append(file, name, block[name][:take], count, done)
+            for name in unit_of if take else ():
+                _append(file, name, unit_of[name], block[name][:take], count, done)
             done += take
             disk.check()
 
 
-def _append(file, name: str, values: np.ndarray, count: int, start: int) -> None:  # noqa: ANN001
+def _append(file, name: str, unit: str, values: np.ndarray, count: int, start: int) -> None:  # noqa: ANN001
     if name not in file:
         chunk = (min(32, count), *values.shape[1:])
         dataset = file.create_dataset(
@@ -269,7 +282,7 @@ def _append(file, name: str, values: np.ndarray, count: int, start: int) -> None
             shuffle=True,
             track_times=False,
         )
-        dataset.attrs["unit"] = UNITS[name]
+        dataset.attrs["unit"] = unit
         if values.dtype == np.int16 and name.startswith("displacement"):
             dataset.attrs["scale"] = SCALE
     file[name][start : start + len(values)] = values

@@ -165,10 +165,9 @@ def _solve(
             tier = tiers.get(sensor, "fast")
             found[sensor] = solve(sensor, indenter, place, force=force, tier=tier, friction=friction)
         except UnreachableError as error:
-            which = "BioTac" if sensor == "biotac" else "DIGIT"
             raise TactileError(
                 where, f"{force:.3g} N at ({place.x * 1e3:.1f}, {place.z * 1e3:.1f}) mm",
-                f"a force that the {which} bears within 60 % of its thickness", "Lower force_n there",
+                f"a force that the {sensors.title(sensor)} bears within 60 % of its thickness", "Lower force_n there",
             ) from error  # fmt: skip
     return found
 
@@ -222,7 +221,7 @@ def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
         return np.stack([field[sensor] for field in fields]) if sensor in fields[0] else None
 
     moved, pressed = [frame.moved for frame in frames], [frame.pressed for frame in frames]
-    centre = np.stack([frame.centre for frame in frames]) if "digit" in sensors_of(keep) else None
+    centre = np.stack([frame.centre for frame in frames]) if any(map(sensors.is_gel, sensors_of(keep))) else None
     return Truth(
         stacked(moved, "biotac"), stacked(moved, "digit"), np.stack([frame.force for frame in frames]), centre,
         stacked(pressed, "biotac"), stacked(pressed, "digit"),

@@ -15,6 +15,7 @@ from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement
 from ..mechanics.solve import TIERS, solve
 from ..mechanics.thickness import DEPTH_LIMIT
+from ..sensors import title
 from .scene import RecordingSpec, load_scene
 
 
@@ -31,10 +32,9 @@ class TierChoice(NamedTuple):
 
     def describe(self, sensor: str) -> str:
         """Explain the choice in words."""
-        which = "BioTac" if sensor == "biotac" else "DIGIT"
         return (
-            f"{which}: {self.tier} tier, to {self.share:.0%} of the thickness within {self.error:.3g} um of the exact "
-            "solution in 95 of 100 contacts"
+            f"{title(sensor)}: {self.tier} tier, to {self.share:.0%} of the thickness within {self.error:.3g} um of "
+            "the exact solution in 95 of 100 contacts"
         )
 
 
@@ -58,8 +58,7 @@ def _up_to(tier: str, sensor: str, share: float) -> float:
 def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
     """The cheapest tier within a bound, um; fast without one. Raises TactileError where none is."""
     rows = tier_errors(sensor, share)
-    which = "BioTac" if sensor == "biotac" else "DIGIT"
-    what = f"shape, {which} to {share:.0%} of its thickness"
+    what = f"shape, {title(sensor)} to {share:.0%} of its thickness"
     found = rows[0] if bound is None else cheapest(rows, bound, "um", what)
     return TierChoice(found.name.split()[1], found.error, found.ms, share)
 

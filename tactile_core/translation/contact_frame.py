@@ -125,7 +125,7 @@ def frame_of(sensor: str, half: int) -> ContactFrame:
     """The moving frame of a sensor's surface; the BioTac's nodes are turned with their angle round its axis."""
     lattice = sensors.sensor_surface(sensor)
     turn = np.zeros(len(lattice.rest), np.float32)
-    if sensor == "biotac":
+    if not sensors.is_gel(sensor):
         rows, columns = lattice.shape
         turn[: rows * columns] = np.tile(biotac.angles(), rows)
     return ContactFrame(*lattice.shape, half, turn)

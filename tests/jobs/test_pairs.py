@@ -43,7 +43,7 @@ def test_file_holds_what_it_says(made):
         assert file.attrs["format"] == pairs_file.FORMAT
         assert file.attrs["biotac_nodes_sha256"] == sensors.biotac_surface().sha256
         assert json.loads(file.attrs["indenters"]) == ["sphere_7mm", "sphere_14mm"]
-        assert set(file) == set(pairs_file.UNITS)
+        assert set(file) == set(pairs_file.units())
         assert all(len(file[name]) == 40 and file[name].attrs["unit"] for name in file)
         biotac, digit = file["force"][()], file["force_digit"][()]
         depth, press = file["depth_biotac"][()], file["press"][()]
@@ -231,3 +231,32 @@ def test_a_slide_to_where_the_sensor_falls_away_stays_finite(request):
     rows = press_rows(scene, 3, 590)
     assert any(row["slide"].any() for row in rows)
     assert all(np.isfinite(row[name]).all() for row in rows for name in ("force", "force_digit", "depth_digit"))
+
+
+def test_a_gel_of_ones_own_is_one_folder(request, scene, tmp_path, monkeypatch):
+    """As docs/extend.md says: TACTILE_SENSORS names the folder; here the example, with a coarser lattice."""
+    import h5py
+
+    example = request.config.rootpath / "scenes/sensors/flat_gel/sensor.toml"
+    text = example.read_text(encoding="utf-8").replace("window_nodes = [49, 37]", "window_nodes = [17, 13]")
+    (tmp_path / "coarse_gel").mkdir()
+    (tmp_path / "coarse_gel/sensor.toml").write_text(text, encoding="utf-8")
+    monkeypatch.setenv("TACTILE_SENSORS", str(tmp_path))
+    out = tmp_path / "pairs.h5"
+    make_pairs(scene, 5, 7, out, pair=("biotac", "coarse_gel"))
+    with h5py.File(out) as file:
+        assert set(file) == set(pairs_file.units("biotac", "coarse_gel"))
+        assert file.attrs["coarse_gel_nodes_sha256"] == sensors.sensor_surface("coarse_gel").sha256
+        moved, depth = file["displacement_coarse_gel"][()], file["depth_coarse_gel"][()]
+    # quadratic nodes 1 mm apart need not touch where a ball's apex does: a part of the depth is seen, never more
+    seen = pairs_file.SCALE * moved[:, :, 1].max(axis=1)
+    assert (seen > 0).all() and (seen < depth).all()
+    assert "depth_coarse_gel_mm" in json.loads(card_path(out).read_text())
+    with pytest.raises(TactileError, match="pairs of biotac and coarse_gel; expected pairs of biotac and digit"):
+        pairs_file.read_pairs(out)
+
+
+@pytest.mark.parametrize("pair", [("biotac", "gelsight"), ("biotac", "biotac"), ("digit", "digit")])
+def test_sensors_that_are_none_or_of_the_wrong_kind_are_refused(scene, tmp_path, pair):
+    with pytest.raises(TactileError, match=r"'(gelsight|biotac|digit)'"):
+        make_pairs(scene, 5, 7, tmp_path / "pairs.h5", pair=pair)

@@ -1,5 +1,6 @@
 """Sensors' descriptors: what ships is sound, and what is wrong in one is said in words."""
 
+import ast
 import shutil
 
 import numpy as np
@@ -11,6 +12,8 @@ from tactile_core.sensors import biotac, descriptor
 from tactile_core.sensors.electrodes import read_places
 from tactile_core.sensors.gel_shape import GelShape
 from tactile_core.sensors.profiles import read_radii
+
+PACKAGE = descriptor.FOLDER.parent
 
 
 def changed(folder, old, new, name="biotac"):
@@ -105,3 +108,28 @@ def test_a_row_of_electrodes_that_is_none_is_named(tmp_path, row):
     path.write_text(f"name,x_mm,y_mm,z_mm,rest_counts\n{row}\n")
     with pytest.raises(TactileError, match="row 2"):
         read_places(path)
+
+
+def test_an_even_number_of_rows_is_refused(tmp_path):
+    with pytest.raises(TactileError, match="60 rows and 47 columns"):
+        descriptor.read(changed(tmp_path, "rim_base = 6", "rim_base = 5", "digit"))
+
+
+def compared(path, root=PACKAGE):
+    """Lines of a file that compare something with the name of a sensor that ships."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Compare):
+            sides = (side for each in (node.left, *node.comparators) for side in getattr(each, "elts", [each]))
+            if any(isinstance(side, ast.Constant) and side.value in descriptor.names() for side in sides):
+                yield f"{path.relative_to(root)}:{node.lineno}"
+
+
+def test_nothing_branches_on_a_sensor_s_name():
+    """Whoever needs to know asks the descriptor: ``sensors.is_gel``, ``sensors.describe``."""
+    assert [line for path in PACKAGE.rglob("*.py") for line in compared(path)] == []
+
+
+def test_a_branch_on_a_name_would_be_found(tmp_path):
+    path = tmp_path / "some.py"
+    path.write_text('if sensor == "digit" or sensor not in ("biotac", "other"):\n    pass\n')
+    assert len(list(compared(path, tmp_path))) == 2

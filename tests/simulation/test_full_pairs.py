@@ -180,7 +180,7 @@ def test_solved_presses_are_kept_and_merge_to_the_same_bytes(script, tmp_path):
     assert card == json.loads((tmp_path / "set.h5.card.json").read_text(encoding="utf-8"))
     assert card["contacts"] == card["contacts_wanted"] == 1 and card["lost"] == {}
     with h5py.File(out) as file:
-        assert set(file) == set(pairs_file.UNITS)
+        assert set(file) == set(pairs_file.units())
         assert file.attrs["tier"] == "full" and file.attrs["format"] == pairs_file.FORMAT
         assert file.attrs["digit_nodes_sha256"] == sensors.digit_surface().sha256
         assert file.attrs["unseen_region_x"] == REGION_X

@@ -39,7 +39,7 @@ _EDGE_MM = 0.5  # of a cylinder's rim, as in scenes
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("sensor", choices=("biotac", "digit"))
+    verb.add_argument("sensor", metavar="SENSOR", help="biotac, digit, or one of your own")
     verb.add_argument("--out", required=True, metavar="FILE", help="new file to write: .ply, .stl or .vtu")
     frame = verb.add_argument_group("deformed by a frame")
     frame.add_argument("--frames", metavar="FILE.h5", help="frames.h5 of `tactile convert`, or a simulated recording")
@@ -69,7 +69,9 @@ def run(options: argparse.Namespace) -> int:
     _check(options)
     from ...files import atomic
     from ...mechanics import sensor_meshes
+    from ...sensors import describe
 
+    describe(options.sensor)  # raises for a name that is none
     sensor_meshes.check_suffix(options.out)
     atomic.claim(options.out)
     if options.frames:

@@ -30,6 +30,16 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json, what is in it, goes beside"
     )
+    verb.add_argument(
+        "--from", dest="source", default="biotac", metavar="SENSOR", help="that is felt with: %(default)s"
+    )
+    verb.add_argument(
+        "--to",
+        dest="target",
+        default="digit",
+        metavar="SENSOR",
+        help="gel that is looked at: %(default)s, or one's own",
+    )
     electrodes_argument(verb)
     engine.parts_arguments(verb)
     progress_argument(verb)
@@ -43,15 +53,16 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs import pairs
     from ...jobs.engine import result_parts
 
+    pair = options.source, options.target
     if options.plan:
-        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes)
+        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes, pair)
         tell(str(result_parts.write(options.out, job)))
         return 0
     place = engine.place_or_none(options)
     with bar("pairs", "block", options.progress) as shown:
         pairs.make_pairs(
             options.scene, options.count, options.seed, options.out, progress=shown, place=place,
-            electrodes=options.electrodes,
+            electrodes=options.electrodes, pair=pair,
         )  # fmt: skip
     tell(options.out)
     return 0

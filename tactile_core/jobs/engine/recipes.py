@@ -58,9 +58,9 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
 
 
 class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to paired contacts. surfaces : sha256 of the BioTac's and the DIGIT's nodes; files : of the meshes.
+    """A scene to paired contacts. surfaces : sha256 of both sensors' nodes; files : of the meshes.
 
-    electrodes : the law of their counts
+    electrodes : the law of their counts; source, target : the sensors
     """
 
     count: Annotated[int, Meta(ge=1)]
@@ -68,6 +68,8 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
     surfaces: list[str]
     files: list[str]
     electrodes: Literal["sheet", "gap"] = "sheet"
+    source: str = "biotac"
+    target: str = "digit"
     version: str = __version__
 
 

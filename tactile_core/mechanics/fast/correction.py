@@ -257,15 +257,16 @@ class Corrected:
 
 def force_factor(compliance: Compliance, contact: Contact) -> float:
     """Factor by which a fast contact's forces are too small."""
-    if not len(contact.nodes):
+    parts = learned().get(compliance.name)
+    if not len(contact.nodes) or parts is None:
         return 1.0
-    return learned()[compliance.name].factor(features(compliance, contact, frame(compliance, contact)))
+    return parts.factor(features(compliance, contact, frame(compliance, contact)))
 
 
 def correct(compliance: Compliance, contact: Contact, parts: Correction | None = None) -> Corrected:
-    """Correct a fast contact to what the full tier gives at the same depth."""
-    parts = parts or learned()[compliance.name]
-    if not len(contact.nodes):
+    """Correct a fast contact to what the full tier gives at the same depth; not on a sensor without a correction."""
+    parts = parts or learned().get(compliance.name)
+    if not len(contact.nodes) or parts is None:
         return Corrected(contact.displacement, 1.0)
     at = frame(compliance, contact)
     seen = features(compliance, contact, at)
