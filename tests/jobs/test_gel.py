@@ -163,7 +163,7 @@ def test_a_picture_shows_the_contact():
     assert pressed.shape == rest.shape == (320, 240, 3)
     assert np.abs(pressed.astype(int) - rest).max() > 40
     assert gel.height_map().max() > 0.2e-3
-    with pytest.raises(TactileError, match="no camera"):
+    with pytest.raises(TactileError, match="no picture can be drawn"):
         Gel("biotac", BALL).picture()
 
 
