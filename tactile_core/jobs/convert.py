@@ -50,12 +50,14 @@ def load_tools(
     variant: str | None = None,
     answer: Answer | None = None,
     gel: Gel = TRANSLATED,
+    target: str | None = None,
 ) -> Tools:
     """Load the weights, shipped or of a folder, and the camera and lights of a DIGIT, the shipped unit's or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
     answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``
     gel : the networks', or the found contact solved on the DIGIT (``solved_gel``)
+    target : the sensor that the weights must translate to; None for whichever they do
     Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
     ``renderer.Renderer`` raises.
     """
@@ -63,7 +65,7 @@ def load_tools(
     from ..sensors.calibration_file import load_calibration
     from ..translation import translate
 
-    translator, unit = translate.load_translator(weights, answer), load_calibration(calibration)
+    translator, unit = translate.load_translator(weights, answer, target), load_calibration(calibration)
     mapper = height_map.digit_mapper(unit.camera)
     dots = None
     if preset == "fast" and unit.markers is None:

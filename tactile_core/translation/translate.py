@@ -34,6 +34,7 @@ UNTRAINED_CONFIDENCE = 0.2  # assumed
 IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
 # A place is undecided where more than this share of the posterior lies as far away, m, as two contacts are told apart.
 UNDECIDED, APART = 0.3, 3e-3  # assumed
+_NODES = "_nodes_sha256"  # after a sensor's name in a card, the hash of its surface
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -259,19 +260,30 @@ def _grows(values: Any) -> bool:
     return numbers and all(0 <= v <= sys.float_info.max for v in values) and values == sorted(values)
 
 
-def load_translator(folder: str | os.PathLike | None = None, answer: Answer | None = None) -> Translator:
+def _check_target(card: dict[str, Any], target: str, where: str) -> None:
+    """Check that a card's networks, which its hashes of surfaces name, end in the gel of a sensor."""
+    sensors.shape_of(target)  # raises for a name that is none, and for a sensor without a gel
+    known = sorted(key.removesuffix(_NODES) for key in card if key.endswith(_NODES))
+    if target not in known:
+        raise TactileError(where, f"networks of {' and '.join(known)}", f"networks that translate to {target}")
+
+
+def load_translator(
+    folder: str | os.PathLike | None = None, answer: Answer | None = None, target: str | None = None
+) -> Translator:
     """Load the networks of a weights folder, the shipped ones by default, with options of the estimate.
 
-    Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces.
+    target : the gel that they must translate to; None for whichever they do
+    Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces, and for
+    a target that is no sensor or not theirs.
     """
     nets = networks.load(folder)
     card_file = f"{folder or networks.WEIGHTS_FOLDER}, card.json"
     _check_quantiles(nets.card, card_file)
     error_bounds.check(nets.card, card_file)
-    for key, here in (
-        ("biotac_nodes_sha256", sensors.biotac_surface().sha256),
-        ("digit_nodes_sha256", sensors.digit_surface().sha256),
-    ):
+    if target is not None:
+        _check_target(nets.card, target, card_file)
+    for key, here in ((f"{sensor}{_NODES}", sensors.sensor_surface(sensor).sha256) for sensor in SURFACES):
         if nets.card.get(key) != here:
             raise TactileError(
                 f"{card_file}, {key}", f"{str(nets.card.get(key))[:12]}...",

@@ -155,9 +155,21 @@ def test_a_place_is_undecided_by_what_lies_elsewhere(translator):
 
 
 def test_weights_for_another_surface_are_refused(monkeypatch):
-    monkeypatch.setattr(sensors, "digit_surface", sensors.biotac_surface)
+    monkeypatch.setattr(sensors, "sensor_surface", lambda name: sensors.biotac_surface())
     with pytest.raises(TactileError, match="digit_nodes_sha256"):
         translate.load_translator()
+
+
+def test_weights_of_another_pair_of_sensors_are_refused(request, monkeypatch):
+    monkeypatch.setenv("TACTILE_SENSORS", str(request.config.rootpath / "scenes/sensors"))
+    for target, words in (
+        ("flat_gel", "networks of biotac and digit; expected networks that translate to flat_gel"),
+        ("gelsight", "'gelsight'; expected biotac, digit, flat_gel"),
+        ("biotac", "kind fluid; expected a sensor of kind gel"),
+    ):
+        with pytest.raises(TactileError, match=words):
+            translate.load_translator(target=target)
+    translate.load_translator(target="digit")
 
 
 def test_a_changed_card_is_refused(tmp_path):
