@@ -16,7 +16,7 @@ from .operators import (
     translate_recording,
 )
 from .process import command_line
-from .ui import add_menu, asset_library, panels, preferences, properties, render_settings
+from .ui import add_menu, asset_library, panels, preferences, properties, render_settings, workspace
 
 # In the order of registration: properties before what uses them.
 PARTS = (
@@ -36,6 +36,7 @@ PARTS = (
     snap_to_gel,
     simulate,
     scene_files,
+    workspace,
     panels,
     command_line,
 )

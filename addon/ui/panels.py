@@ -15,6 +15,7 @@ from ..operators.translate_recording import TACTILE_OT_translate
 from . import properties, timeline
 from .add_menu import TACTILE_MT_add
 from .reports import missing
+from .workspace import TACTILE_OT_open_workspace
 
 
 class _Panel:
@@ -32,7 +33,9 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Called by Blender."""
         layout = self.layout
-        layout.operator(TACTILE_OT_import_recording.bl_idname, icon="IMPORT")
+        row = layout.row(align=True)
+        row.operator(TACTILE_OT_import_recording.bl_idname, icon="IMPORT")
+        row.operator(TACTILE_OT_open_workspace.bl_idname, text="", icon="WORKSPACE")
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         if skin is not None and skin.tactile.recording:
             box = layout.column(align=True)

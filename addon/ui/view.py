@@ -60,18 +60,28 @@ def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:
         editor = next((area for area in screen.areas if area not in before), None)
         if editor is not None:
             editor.type = "IMAGE_EDITOR"
-            # Until it is drawn, the view keeps its old width.
-            look = functools.partial(_look_at_selected, context.window_manager, context.window)
-            bpy.app.timers.register(look, first_interval=_DRAWN)
+            look_again(context)
     if editor is not None:
         editor.spaces.active.image = image
 
 
+def look_again(context: bpy.types.Context) -> None:
+    """Look at pictures and what is selected once the window is drawn: until then, a view keeps its old size."""
+    look = functools.partial(_look_at_selected, context.window_manager, context.window)
+    bpy.app.timers.register(look, first_interval=_DRAWN)
+
+
 def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window) -> None:
-    """Look once more, after a view has changed its size."""
-    if window in windows.windows[:] and bpy.context.selected_objects:
-        with bpy.context.temp_override(window=window):
-            look_at(bpy.context, bpy.context.selected_objects)
+    """Look once more at pictures and at what is selected, an indenter with its sensor."""
+    if window not in windows.windows[:]:
+        return
+    selected = bpy.context.selected_objects
+    with bpy.context.temp_override(window=window):
+        if selected:
+            look_at(bpy.context, [*selected, *(thing.parent for thing in selected if thing.parent is not None)])
+        for area, region in _main_regions(bpy.context, "IMAGE_EDITOR"):
+            with bpy.context.temp_override(area=area, region=region):
+                bpy.ops.image.view_all(fit_view=True)
 
 
 def open_tab(context: bpy.types.Context) -> None:

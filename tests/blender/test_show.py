@@ -68,3 +68,7 @@ def test_the_panel_says_an_indenter_s_shape_in_words(scene, part):
     bpy.ops.tactile.add_sensor(sensor="DIGIT")
     bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
     assert part("addon.ui.panels")._shape(bpy.context.object.tactile.spec) == "sphere, radius 3.5 mm"
+
+
+def test_a_workspace_is_offered_in_a_window_alone(extension):
+    assert not bpy.ops.tactile.open_workspace.poll()  # what it opens is photographed by scripts/fetch_blender.py

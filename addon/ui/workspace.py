@@ -1,0 +1,99 @@
+"""The workspace "Tactile": sensors, the picture, what the active object is made of, and a timeline."""
+
+from __future__ import annotations
+
+import functools
+
+import bpy
+
+from . import view
+from .reports import TactileOperator
+
+NAME = "Tactile"
+# Shares of the timeline at the bottom, of what is left of the picture, and of what is below it.
+_TIMELINE, _LEFT, _BELOW = 0.14, 0.7, 0.42
+_STEP = 0.1  # s between two looks whether Blender has opened the workspace
+_LOOKS = 50
+
+
+class TACTILE_OT_open_workspace(TactileOperator):
+    """Open a workspace with the sensors, the DIGIT's picture, properties and a timeline; it is made once a file"""
+
+    bl_idname = "tactile.open_workspace"
+    bl_label = "Tactile Workspace"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (windows are no part of undo)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return true in a window."""
+        return context.window is not None and not bpy.app.background
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        if NAME in bpy.data.workspaces:
+            context.window.workspace = bpy.data.workspaces[NAME]
+            return
+        before = {*bpy.data.workspaces}
+        bpy.ops.workspace.duplicate()
+        made = ({*bpy.data.workspaces} - before).pop()
+        made.name = NAME
+        # Blender opens it once this has returned.
+        later = functools.partial(_arrange_once_open, context.window_manager, context.window, made, [_LOOKS])
+        bpy.app.timers.register(later, first_interval=_STEP)
+
+
+def _arrange_once_open(
+    windows: bpy.types.WindowManager, window: bpy.types.Window, made: bpy.types.WorkSpace, looks: list[int]
+) -> float | None:
+    """Arrange a new workspace as soon as its window shows it; seconds to the next look, None when there is none."""
+    looks[0] -= 1
+    if window not in windows.windows[:] or not looks[0]:
+        return None
+    if window.workspace != made:
+        return _STEP
+    arrange(window)
+    return None
+
+
+def arrange(window: bpy.types.Window) -> None:
+    """Let a window's screen hold a 3D view, the picture over properties to its right, and a timeline below."""
+    kept = max(window.screen.areas, key=lambda area: area.width * area.height)
+    kept.ui_type = "VIEW_3D"
+    for area in [each for each in window.screen.areas if each != kept]:
+        with bpy.context.temp_override(window=window, screen=window.screen, area=area):
+            bpy.ops.screen.area_close()
+    timeline = _split(window, kept, "HORIZONTAL", _TIMELINE, "TIMELINE").spaces.active
+    timeline.show_region_channels, timeline.show_region_ui = False, False
+    picture = _split(window, kept, "VERTICAL", _LEFT, "IMAGE_EDITOR")
+    _split(window, picture, "HORIZONTAL", _BELOW, "PROPERTIES")
+    picture.spaces.active.image = bpy.data.images.get("DIGIT picture")
+    with bpy.context.temp_override(window=window):
+        view.open_tab(bpy.context)
+        view.look_again(bpy.context)
+
+
+def _split(window: bpy.types.Window, area: bpy.types.Area, direction: str, share: float, kind: str) -> bpy.types.Area:
+    """Split an area at a share from its left or lower end; the smaller part, which is new, of a kind."""
+    before = {*window.screen.areas}
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area):
+        bpy.ops.screen.area_split(direction=direction, factor=share)
+    made = ({*window.screen.areas} - before).pop()
+    made.ui_type = kind
+    return made
+
+
+def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.separator()
+    menu.layout.operator(TACTILE_OT_open_workspace.bl_idname, icon="WORKSPACE")
+
+
+def register() -> None:
+    """Called by the package."""
+    bpy.utils.register_class(TACTILE_OT_open_workspace)
+    bpy.types.TOPBAR_MT_window.append(_menu)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    bpy.types.TOPBAR_MT_window.remove(_menu)
+    bpy.utils.unregister_class(TACTILE_OT_open_workspace)
