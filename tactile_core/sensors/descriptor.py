@@ -252,6 +252,24 @@ class Gel:
     camera: Camera
     dome: Dome | None = None
 
+    def __post_init__(self) -> None:
+        """Raise TactileError for a window that does not lie inside the outline, whose mesh would fold."""
+        outline, (low, high) = self.outline, self.lattice.window_z
+        if not outline.tip_x < self.lattice.window_x[0] < self.lattice.window_x[1] < outline.base_x:
+            expected = f"growing, between {1e3 * outline.tip_x:g} and {1e3 * outline.base_x:g} mm"
+            raise TactileError("lattice, window_x_mm", _mm(self.lattice.window_x), expected)
+        straight = outline.half_width - outline.corner_radius  # of a square end
+        if not (low == -high and 0 < high < straight):
+            expected = f"even about 0, below {1e3 * straight:g} mm, half_width_mm less corner_radius_mm"
+            raise TactileError("lattice, window_z_mm", _mm(self.lattice.window_z), expected)
+        beyond = math.hypot(outline.tip_x + outline.half_width - self.lattice.window_x[0], high)
+        if outline.tip == ROUND and beyond >= outline.half_width:
+            raise TactileError("lattice, window_x_mm", _mm(self.lattice.window_x), "corners inside the round tip")
+
+
+def _mm(lengths: tuple[float, ...]) -> str:
+    return f"[{', '.join(f'{1e3 * each:g}' for each in lengths)}]"
+
 
 KINDS: dict[str, type[Fluid] | type[Gel]] = {"fluid": Fluid, "gel": Gel}
 

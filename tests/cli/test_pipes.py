@@ -69,7 +69,7 @@ CASES = {
 }  # fmt: skip
 # Metavars of what is written, and of words that are no files.
 NO_FILES = {"WORDS", "A:B:STEP", "auto|none|A:B", "X,Z", "BOUND", "I/N", "WxH", "TEXT", "NAMES", "NAME", "NAME=A:B:N",
-            "N", "S", "X", "HZ", "MM", "FILE.xml"}  # fmt: skip
+            "N", "S", "X", "HZ", "MM", "FILE.xml", "SENSOR"}  # fmt: skip
 WRITTEN = {"--out", "--json", "--sheet", "--scene-out"}
 
 

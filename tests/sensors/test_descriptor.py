@@ -110,6 +110,25 @@ def test_a_row_of_electrodes_that_is_none_is_named(tmp_path, row):
         read_places(path)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "corner_radius_mm = 1.15",
+            "corner_radius_mm = 3",
+            "window_z_mm: [-6.6, 6.6]; expected even about 0, below 6.17",
+        ),
+        ("window_z_mm = [-6.6, 6.6]", "window_z_mm = [-6.6, 6.5]", "window_z_mm: [-6.6, 6.5]; expected even about 0"),
+        ("window_x_mm = [-16.2, 1.2]", "window_x_mm = [-16.2, 5]", "window_x_mm: [-16.2, 5]; expected growing"),
+        ("window_x_mm = [-16.2, 1.2]", "window_x_mm = [-19, 1.2]", "corners inside the round tip"),
+    ],
+)
+def test_a_window_outside_the_gel_is_refused(tmp_path, old, new, words):
+    with pytest.raises(TactileError) as refusal:
+        descriptor.read(changed(tmp_path, old, new, "digit"))
+    assert words in str(refusal.value)
+
+
 def test_an_even_number_of_rows_is_refused(tmp_path):
     with pytest.raises(TactileError, match="60 rows and 47 columns"):
         descriptor.read(changed(tmp_path, "rim_base = 6", "rim_base = 5", "digit"))
