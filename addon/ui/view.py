@@ -17,7 +17,7 @@ _UNTOUCHED = (
     ("Camera", "CAMERA", (7.3589, -6.9258, 4.9583)),
 )
 _SHARE = 0.68  # of a 3D view that it keeps beside the picture
-_DRAWN = 0.2  # s, until a split view is drawn in its new size
+DRAWN = 0.2  # s, until a split view is drawn in its new size
 _MARGIN = 1.1  # of a view, around what is looked at
 
 
@@ -68,7 +68,7 @@ def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:
 def look_again(context: bpy.types.Context) -> None:
     """Look at pictures and what is selected once the window is drawn: until then, a view keeps its old size."""
     look = functools.partial(_look_at_selected, context.window_manager, context.window)
-    bpy.app.timers.register(look, first_interval=_DRAWN)
+    bpy.app.timers.register(look, first_interval=DRAWN)
 
 
 def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window) -> None:

@@ -52,7 +52,15 @@ def _arrange_once_open(
     if window.workspace != made:
         return _STEP
     arrange(window)
+    bpy.app.timers.register(functools.partial(_bare_timeline, windows, window), first_interval=view.DRAWN)
     return None
+
+
+def _bare_timeline(windows: bpy.types.WindowManager, window: bpy.types.Window) -> None:
+    """Hide channels and sidebar of a timeline; of one that was never drawn, Blender 4.3 crashes."""
+    for area in window.screen.areas if window in windows.windows[:] else ():
+        if area.ui_type == "TIMELINE":
+            area.spaces.active.show_region_channels = area.spaces.active.show_region_ui = False
 
 
 def arrange(window: bpy.types.Window) -> None:
@@ -62,8 +70,7 @@ def arrange(window: bpy.types.Window) -> None:
     for area in [each for each in window.screen.areas if each != kept]:
         with bpy.context.temp_override(window=window, screen=window.screen, area=area):
             bpy.ops.screen.area_close()
-    timeline = _split(window, kept, "HORIZONTAL", _TIMELINE, "TIMELINE").spaces.active
-    timeline.show_region_channels, timeline.show_region_ui = False, False
+    _split(window, kept, "HORIZONTAL", _TIMELINE, "TIMELINE")
     picture = _split(window, kept, "VERTICAL", _LEFT, "IMAGE_EDITOR")
     _split(window, picture, "HORIZONTAL", _BELOW, "PROPERTIES")
     picture.spaces.active.image = bpy.data.images.get("DIGIT picture")
