@@ -36,11 +36,11 @@ def outside_data() -> Callable[[str], Path]:
     return folder
 
 
-@pytest.fixture
-def slide_csv(tmp_path: Path) -> Callable[..., Path]:
-    """``slide_csv("touch", frames=150)`` writes a raw recording: 0.6 s of quiet, then a press, at 100 Hz."""
+@pytest.fixture(scope="session")
+def write_slide() -> Callable[[str, int, Path], Path]:
+    """``write_slide("touch", 150, folder)`` writes a raw recording: 0.6 s of quiet, then a press, at 100 Hz."""
 
-    def write(name: str = "touch", frames: int = 150, folder: Path = tmp_path) -> Path:
+    def write(name: str, frames: int, folder: Path) -> Path:
         random = np.random.default_rng(7)
         press = np.clip(np.arange(frames) - 60, 0, 60)[:, None] * np.linspace(1, 3, 19)
         electrodes = np.rint(3000 + press + random.normal(0, 1, (frames, 19)))
@@ -51,6 +51,16 @@ def slide_csv(tmp_path: Path) -> Callable[..., Path]:
         path = folder / f"{name}.csv"
         np.savetxt(path, rows, fmt=["%.6f"] + ["%d"] * 44, delimiter=",", header=",".join(SLIDE_HEADER), comments="")
         return path
+
+    return write
+
+
+@pytest.fixture
+def slide_csv(tmp_path: Path, write_slide: Callable[[str, int, Path], Path]) -> Callable[..., Path]:
+    """``slide_csv("touch", frames=150)`` writes such a recording into the test's own folder."""
+
+    def write(name: str = "touch", frames: int = 150, folder: Path = tmp_path) -> Path:
+        return write_slide(name, frames, folder)
 
     return write
 

@@ -3,27 +3,39 @@
 from __future__ import annotations
 
 import importlib.util
-import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from tactile_core.cli.main import main
 from tactile_core.jobs.engine import inputs, local, recipes
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
+from tactile_core.translation import translate
 
 WORKER = Path(__file__).parent / "fake_worker.py"
 COMMAND = (sys.executable, str(WORKER))
 
 
 @pytest.fixture
-def recordings(slide_csv, tmp_path) -> list[Path]:
+def recordings(write_slide, tmp_path) -> list[Path]:
     """Two recordings of 130 and 70 frames: shards of 50 are three and two."""
-    folder = tmp_path / "in"
-    folder.mkdir()
-    return [slide_csv("a", frames=130, folder=folder), slide_csv("b", frames=70, folder=folder)]
+    return two_recordings(write_slide, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def shared_recordings(write_slide, tmp_path_factory) -> list[Path]:
+    """The same two, which no test may change."""
+    return two_recordings(write_slide, tmp_path_factory.mktemp("shared"))
+
+
+def two_recordings(write_slide, folder: Path) -> list[Path]:
+    (folder / "in").mkdir()
+    return [write_slide(name, frames, folder / "in") for name, frames in (("a", 130), ("b", 70))]
 
 
 @pytest.fixture
@@ -31,35 +43,66 @@ def new_job(recordings, tmp_path):
     """new_job("out", keep=[...]) -> folder and job."""
 
     def make(name="out", keep=("latent",), paths=None):
-        folder = tmp_path / name
-        recipe = recipes.Translate(list(keep), "0" * 64, shard_frames=50)
-        found = inputs.hashed(paths or recordings, lambda done, total: None)
-        job = jobs.make(found, recipe, None)
-        jobs.write(folder, job)
-        return folder, job
+        return job_of(paths or recordings, tmp_path / name, keep)
 
     return make
+
+
+def job_of(recordings: list[Path], folder: Path, keep=("latent",)) -> tuple[Path, jobs.Job]:
+    recipe = recipes.Translate(list(keep), "0" * 64, shard_frames=50)
+    job = jobs.make(inputs.hashed(recordings, lambda done, total: None), recipe, None)
+    jobs.write(folder, job)
+    return folder, job
 
 
 @pytest.fixture
 def do():
     """do(folder, job, workers=1, part=None) -> what a run did, with fake workers."""
+    return run_job
 
-    def run(folder, job, workers=1, part=None, restart=200):
-        with runs.opened(folder, part):
-            place = local.Local(folder, workers, restart, COMMAND)
-            return runs.run(folder, job, place, part, lambda done, total: None)
 
-    return run
+def run_job(folder: Path, job: jobs.Job, workers=1, part=None, restart=200) -> runs.Done:
+    with runs.opened(folder, part):
+        place = local.Local(folder, workers, restart, COMMAND)
+        return runs.run(folder, job, place, part, lambda done, total: None)
+
+
+@pytest.fixture(scope="session")
+def finished_once(shared_recordings, tmp_path_factory) -> tuple[Path, jobs.Job]:
+    """Folder and job of ``new_job`` after an undisturbed run; tests take their own copy, ``finished``."""
+    folder, job = job_of(shared_recordings, tmp_path_factory.mktemp("finished") / "job")
+    run_job(folder, job)
+    return folder, job
 
 
 @pytest.fixture
-def command():
-    """command("batch", ...) -> the finished process of `tactile batch` with fake workers."""
+def finished(finished_once, tmp_path) -> tuple[Path, jobs.Job]:
+    """A copy of a finished job, to compare with or to damage."""
+    folder, job = finished_once
+    return shutil.copytree(folder, tmp_path / "finished"), job
 
-    def call(*words, **environment):
-        arguments = [*COMMAND, "batch", *map(str, words)]
-        return subprocess.run(arguments, env={**os.environ, **environment}, capture_output=True, text=True, timeout=120)
+
+@pytest.fixture
+def command(monkeypatch, capsys):
+    """command("day1", "--out", "job") -> status and output of `tactile batch` in this process, with fake workers."""
+    monkeypatch.setattr(translate, "load_translator", lambda weights=None: SimpleNamespace(sha256="0" * 64))
+    monkeypatch.setattr(local, "WORKER_COMMAND", COMMAND)
+
+    def call(*words):
+        capsys.readouterr()
+        status = main(["batch", *map(str, words)])
+        printed = capsys.readouterr()
+        return SimpleNamespace(returncode=status, stdout=printed.out, stderr=printed.err)
+
+    return call
+
+
+@pytest.fixture
+def command_process():
+    """The same as a process of its own."""
+
+    def call(*words):
+        return subprocess.run([*COMMAND, "batch", *map(str, words)], capture_output=True, text=True, timeout=120)
 
     return call
 

@@ -56,9 +56,8 @@ def test_parts_behind_a_link_are_removed(new_job, tmp_path):
     assert not list((tmp_path / "scratch").iterdir())
 
 
-def test_shards_that_are_gone_or_exchanged_are_seen_and_made_anew(new_job, do, content):
-    folder, job = new_job()
-    do(folder, job)
+def test_shards_that_are_gone_or_exchanged_are_seen_and_made_anew(finished, do, content):
+    folder, job = finished
     before = content(folder)
     first, second, third, *_ = sorted((folder / jobs.SHARDS).iterdir())
     first.unlink()

@@ -41,9 +41,8 @@ def test_shards_hold_what_convert_makes(new_job, do, recordings, tmp_path):
     assert shards[1].attrs["recording"] == "a" and shards[1].attrs["shards"] == 3
 
 
-def test_workers_and_restarts_change_no_byte(new_job, do, content):
-    folder, job = new_job("one")
-    do(folder, job)
+def test_workers_and_restarts_change_no_byte(finished, new_job, do, content):
+    folder, _ = finished
     other, same = new_job("three")
     do(other, same, workers=3, restart=1)
     assert content(folder) == content(other)
@@ -52,9 +51,8 @@ def test_workers_and_restarts_change_no_byte(new_job, do, content):
     assert [len(one["shards"]) for one in told["recordings"]] == [3, 2] and told["aside"] == {}
 
 
-def test_what_is_whole_is_kept_and_what_is_damaged_made_anew(new_job, do, content):
-    folder, job = new_job()
-    do(folder, job)
+def test_what_is_whole_is_kept_and_what_is_damaged_made_anew(finished, do, content):
+    folder, job = finished
     before = content(folder)
     files = sorted((folder / jobs.SHARDS).iterdir())
     for file, place in zip(files[:3], (3, 600, -1), strict=True):  # in the seal, in the head, in the data
@@ -69,9 +67,8 @@ def test_what_is_whole_is_kept_and_what_is_damaged_made_anew(new_job, do, conten
 
 
 @pytest.mark.parametrize("about", [b"", b"[" * 100_000, b"[]", b"{}"])
-def test_what_is_told_of_a_recording_is_checked(new_job, do, about):
-    folder, job = new_job()
-    do(folder, job)
+def test_what_is_told_of_a_recording_is_checked(finished, about):
+    folder, job = finished
     file = jobs.prepared_file(folder, job.inputs[0].name)
     with h5py.File(file, "r+") as data:
         del data["about"]
@@ -94,9 +91,8 @@ def test_a_shard_that_kills_its_worker_is_set_aside_and_the_rest_goes_on(new_job
     assert manifest.status(folder, job).complete and manifest.status(folder, job).aside == {}
 
 
-def test_a_worker_that_dies_once_costs_nothing(new_job, do, content, monkeypatch, tmp_path):
-    folder, job = new_job("calm")
-    do(folder, job)
+def test_a_worker_that_dies_once_costs_nothing(finished, new_job, do, content, monkeypatch, tmp_path):
+    folder, _ = finished
     other, same = new_job("killed")
     monkeypatch.setenv("FAKE_KILL", "00000_a-000001")
     monkeypatch.setenv("FAKE_KILL_ONCE", str(tmp_path / "once"))
@@ -104,9 +100,8 @@ def test_a_worker_that_dies_once_costs_nothing(new_job, do, content, monkeypatch
     assert (tmp_path / "once").exists() and content(folder) == content(other)
 
 
-def test_array_parts_make_the_same_files_in_any_order(new_job, do, content):
-    folder, job = new_job("whole")
-    do(folder, job)
+def test_array_parts_make_the_same_files_in_any_order(finished, new_job, do, content):
+    folder, _ = finished
     other, same = new_job("parts")
     made = [do(other, same, part=(i, 3)).made for i in (2, 0, 1)]
     assert sum(made) == 5 and min(made) >= 1
@@ -140,9 +135,10 @@ def test_a_recording_that_changed_after_the_job_was_made_is_refused(new_job, do,
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
-def test_a_killed_client_leaves_nothing_half_and_the_same_command_goes_on(new_job, do, content, recordings, command):
-    calm, job = new_job("calm")
-    do(calm, job)
+def test_a_killed_client_leaves_nothing_half_and_the_same_command_goes_on(
+    finished, content, recordings, command_process
+):
+    calm, _ = finished
     folder = calm.parent / "killed"
     words = ["batch", *map(str, recordings), "--out", str(folder), "--keep", "latent", "--shard-frames", "50"]
     process = subprocess.Popen([*COMMAND, *words], env={**os.environ, "FAKE_HOLD": "1"})
@@ -152,7 +148,7 @@ def test_a_killed_client_leaves_nothing_half_and_the_same_command_goes_on(new_jo
     process.wait()
     there = list(folder.glob("shards/*.h5"))
     assert 0 < len(there) < 5 and all(checksummed.verified_checksum(file) for file in there)
-    done = command(*words[1:])
+    done = command_process(*words[1:])
     assert done.returncode == 0, done.stderr
     assert content(folder) == content(calm)
     assert not list(folder.rglob(".*.tactile-partial"))
@@ -160,7 +156,7 @@ def test_a_killed_client_leaves_nothing_half_and_the_same_command_goes_on(new_jo
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on the size of a process's files")
 @pytest.mark.parametrize("limit", [30_000, 120_000])  # below a prepared file (40 kB) and between it and a shard
-def test_a_full_disk_stops_the_job_in_words_and_the_same_command_goes_on(limit, recordings, tmp_path, command):
+def test_a_full_disk_stops_the_job_in_words_and_the_same_command_goes_on(limit, recordings, tmp_path, command_process):
     import resource
 
     folder = tmp_path / "full"
@@ -168,9 +164,9 @@ def test_a_full_disk_stops_the_job_in_words_and_the_same_command_goes_on(limit, 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
     try:
-        done = command(*words[1:])
+        done = command_process(*words[1:])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert done.returncode == 2 and "File too large" in done.stderr and "Make room" in done.stderr
     assert not list(folder.rglob(".*.tactile-partial")) and "Traceback" not in done.stderr
-    assert command(*words[1:]).returncode == 0
+    assert command_process(*words[1:]).returncode == 0

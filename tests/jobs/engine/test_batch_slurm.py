@@ -57,17 +57,17 @@ def slurm(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.fixture
-def calm(recordings, tmp_path):
+@pytest.fixture(scope="module")
+def calm(shared_recordings, tmp_path_factory):
     """A job by one local process, and how to begin it again in another folder."""
     recipe = recipes.Translate(["latent"], translate.load_translator().sha256, shard_frames=50)
 
-    def begin(name):
-        job = jobs.make(inputs.hashed(recordings, lambda done, total: None), recipe, None)
-        jobs.write(tmp_path / name, job)
-        return tmp_path / name, job
+    def begin(folder):
+        job = jobs.make(inputs.hashed(shared_recordings, lambda done, total: None), recipe, None)
+        jobs.write(folder, job)
+        return folder, job
 
-    folder, job = begin("calm")
+    folder, job = begin(tmp_path_factory.mktemp("calm") / "job")
     with runs.opened(folder, None):
         runs.run(folder, job, local.Local(folder, 1), None, lambda done, total: None)
     return folder, begin
@@ -98,10 +98,10 @@ def queue_is_empty():
     return not told.stdout.strip()
 
 
-def test_an_array_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
+def test_an_array_of_a_real_slurm(real_slurm, calm, tmp_path, content, monkeypatch):
     """Cancelled once on its way, and submitted again."""
     folder, begin = calm
-    other, job = begin("array")
+    other, job = begin(tmp_path / "array")
     monkeypatch.chdir(real_slurm)
     for shards in (1, 5):
         subprocess.run(["bash", "-c", the_page_s("sbatch ", other)], check=True, timeout=300, capture_output=True)
@@ -116,10 +116,10 @@ def test_an_array_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
     assert content(folder) == content(other)
 
 
-def test_workers_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
+def test_workers_of_a_real_slurm(real_slurm, calm, tmp_path, content, monkeypatch):
     pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
     folder, begin = calm
-    other, job = begin("queue")
+    other, job = begin(tmp_path / "queue")
     monkeypatch.chdir(real_slurm)
     toml = real_slurm / "slurm.toml"
     toml.write_text(
@@ -131,9 +131,9 @@ def test_workers_of_a_real_slurm(real_slurm, calm, content, monkeypatch):
     wait(queue_is_empty)
 
 
-def test_the_page_s_array(slurm, calm, content):
+def test_the_page_s_array(slurm, calm, tmp_path, content):
     folder, begin = calm
-    other, job = begin("array")
+    other, job = begin(tmp_path / "array")
     command = the_page_s("sbatch ", other)
     subprocess.run(["bash", "-c", command], check=True, timeout=300, capture_output=True)
     with runs.opened(other, None):
@@ -142,10 +142,10 @@ def test_the_page_s_array(slurm, calm, content):
     assert done.kept + done.made == 5, (slurm / "log").read_text()
 
 
-def test_workers_that_a_queue_starts(slurm, calm, content):
+def test_workers_that_a_queue_starts(slurm, calm, tmp_path, content):
     pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
     folder, begin = calm
-    other, job = begin("queue")
+    other, job = begin(tmp_path / "queue")
     toml = slurm / "slurm.toml"
     toml.write_text(
         'queue = "slurm"\njobs = 1\n[options]\ncores = 1\nmemory = "2GB"\nwalltime = "00:10:00"\ninterface = "lo"\n'
