@@ -20,6 +20,7 @@ from .answer import MEAN, Answer
 from .contact_frame import STILL, ContactFrame
 from .contact_track import Evidence, track
 from .error_bounds import KINDS
+from .lost_signs import recovered
 from .network_sizes import PLACE, SURFACES
 from .networks import Networks, Posterior, touches
 from .two_contacts import two_contacts
@@ -111,9 +112,9 @@ class Translator:
         """Return each frame's posterior of its contact, from that frame alone, and what ``contact_track`` needs
         beside it to track the contact through time.
         """
-        rectified, latent = _rectified(signals), self._latent_signal(signals)
+        latent, unsigned = self._latent_signal(signals)
         size = np.sqrt(np.square(signals.typical).mean(axis=1))
-        return Evidence(**vars(self.nets.posterior(latent, rectified)), size=size, rectified=rectified)
+        return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, rectified=_rectified(signals))
 
     def followed(self, signals: Signals, time: np.ndarray) -> Translation:
         """Translate a recording at once: frames at times (T,) s, each estimated with its neighbours."""
@@ -121,12 +122,13 @@ class Translator:
 
     def plausible(self, signals: Signals, frames: np.ndarray) -> dict[str, np.ndarray]:
         """Draw contacts for each frame, the number given by the options, by ``plausible.NAMES``; frames : (T,)."""
-        rectified, latent = _rectified(signals), self._latent_signal(signals)
-        states = plausible.draw(self.nets.posterior(latent, rectified), frames, self.answer.samples)
+        states = plausible.draw(self.nets.posterior(*self._latent_signal(signals)), frames, self.answer.samples)
         return plausible.contacts(self.nets, states, self.answer.mount_shift)
 
-    def _latent_signal(self, signals: Signals) -> np.ndarray:
-        return self.nets.encode_signal(np.asarray(signals.typical, np.float32), _rectified(signals))
+    def _latent_signal(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
+        """Latents (T, K) of the signals, and which (T,) of them have no sign, lost and not recovered."""
+        change, unsigned = recovered(signals.typical, _rectified(signals))
+        return self.nets.encode_signal(change, unsigned), unsigned
 
     def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
         """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours.
@@ -137,12 +139,12 @@ class Translator:
         nets = self.nets
         rectified = _rectified(signals)
         change = np.asarray(signals.typical, np.float32)
-        latent_signal = nets.encode_signal(change, rectified)
+        latent_signal, unsigned = self._latent_signal(signals)
         alone = state is None
-        posterior = nets.posterior(latent_signal, rectified)
+        posterior = nets.posterior(latent_signal, unsigned)
         if state is None:
             state = posterior.average if self.answer.kind == MEAN else posterior.likely
-        latent_biotac, latent_digit = nets.latents(latent_signal, state, rectified)
+        latent_biotac, latent_digit = nets.latents(latent_signal, state, unsigned)
         touched = touches(state)
         biotac, digit = (
             decode(latent) * touched[:, None, None]

@@ -13,10 +13,10 @@ import numpy as np
 from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.jobs import solved_gel
-from tactile_core.sensors import COUNT_SIGN
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, parts, true_displacement
 from tactile_core.translation.gel_place import on_gel
+from tactile_core.translation.lost_signs import recovered
 from tactile_core.translation.network_sizes import PLACE
 from tactile_core.translation.networks import FORCE_SCALE, Networks, Posterior, touches
 
@@ -91,12 +91,13 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
 
     Over contacts that press without sliding; baseline of the depth: the true one, which a translation should reach.
     """
-    folded = COUNT_SIGN * np.abs(change)
+    folded, unsigned = recovered(np.abs(change), np.ones(len(change), bool))
     columns: dict[str, list[np.ndarray]] = {"peak": [], "true": [], "place": [], "silent": []}
     for part in parts(len(change)):
-        read = nets.encode_signal(folded[part], True)
-        state = nets.posterior(read, True).likely
-        gel, true = nets.decode_digit(nets.latents(read, state, True)[1]), true_displacement(pairs, "digit", part)
+        read = nets.encode_signal(folded[part], unsigned[part])
+        state = nets.posterior(read, unsigned[part]).likely
+        gel = nets.decode_digit(nets.latents(read, state, unsigned[part])[1])
+        true = true_displacement(pairs, "digit", part)
         columns["peak"].append(1e6 * accuracy.height(gel).max(1))
         columns["true"].append(1e6 * accuracy.height(true).max(1))
         places = digit_columns("read", gel, pairs.contact_patch_digit[part], bodies)

@@ -1,0 +1,47 @@
+"""Recover the signs of rectified changes where one simulated contact plainly gives such changes.
+
+Which electrodes rise and which fall goes with the pattern of their sizes: on test contacts of a unit with gains 10 %
+off the nearest simulated signal has the right sign in 89 of 100 electrodes, with 98 % of the changes' sum. S2MPN then
+knows more of the place than R2MPN, which must allow for any signs. Real slides resemble no simulated contact as
+closely: there signs would hop from frame to frame, and nearly all frames are left as they are.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..files.shipped import shipped
+from ..recordings.polarity import PATTERNS
+from .networks import compress
+
+# Of the size of a signal on the networks' scale, the most that the nearest simulated one may leave of it. Chosen on
+# sample 7 of the slides (2 frames in 1,000 within): at .25 the rank of force stays .908 (quartile .879), at .28 the
+# quartile falls to .86, at .33 to .81. Of the test contacts half are within, of those from 0.3 mm two in three.
+LEFT = 0.25
+
+
+def recovered(change: np.ndarray, rectified: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Give changes (T, 19) counts their signs where they are plain; returns them and which (T,) are left rectified.
+
+    rectified : (T,) bool, those that have lost their signs
+    """
+    change, rectified = np.array(change, np.float32), np.array(rectified, bool)
+    rows = np.flatnonzero(rectified)
+    patterns, signs = _patterns()
+    sizes = compress(np.abs(change[rows]))
+    # |a - b|^2 of all pairs; a signal of zeros resembles none
+    apart = np.square(sizes).sum(1)[:, None] - 2 * sizes @ patterns.T + np.square(patterns).sum(1)
+    nearest, size = apart.argmin(1), np.square(sizes).sum(1)
+    plain = apart.min(1, initial=np.inf) < LEFT**2 * size
+    change[rows[plain]] = np.abs(change[rows[plain]]) * signs[nearest[plain]]
+    rectified[rows[plain]] = False
+    return change, rectified
+
+
+@functools.cache
+def _patterns() -> tuple[np.ndarray, np.ndarray]:
+    """Sizes (P, 19) of simulated contacts' changes on the networks' scale, and their signs."""
+    patterns = np.load(shipped(PATTERNS), allow_pickle=False).astype(np.float32)
+    return compress(np.abs(patterns)), np.where(patterns > 0, np.float32(1), np.float32(-1))
