@@ -14,8 +14,8 @@ from typing import Any
 
 from ..errors import TactileError
 from ..files import atomic, outside
-from ..files.shipped import shipped
 from ..files.text_file import read_toml_text
+from . import digit
 from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
 from .camera import COLOURS, Camera, Led
 from .coating import Coating
@@ -23,7 +23,7 @@ from .markers import Markers
 
 FORMAT, FORMER = "tactile-calibration-3", "tactile-calibration-1"
 WITHOUT_SPREAD = "tactile-calibration-2"  # whose coatings do not spread light
-SHIPPED = shipped("calibrations/default.toml")
+SHIPPED = digit.DESCRIPTOR.folder / digit.DESCRIPTOR.camera.calibration
 LARGEST = 1e8  # of a unit's numbers, as the radiance of a spot of 0.05 mm; a fit's errors may be larger
 ADVICE = "Make it again with `tactile calibrate`"
 

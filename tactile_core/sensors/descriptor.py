@@ -22,6 +22,7 @@ from ..files.text_file import read_toml_text
 FOLDER = Path(__file__).parent
 OWN = "TACTILE_SENSORS"  # environment variable: a folder with sensors of one's own
 FILE, FORMAT = "sensor.toml", "tactile-sensor-1"
+MOST_NODES = 300  # along a line of a lattice: a compliance of 90,000 nodes fits no memory
 FALLS, RISES = POLARITIES = ("falls", "rises")
 ROUND, SQUARE = TIPS = ("round", "square")
 
@@ -46,6 +47,11 @@ _S = TypeVar("_S", "Fluid", "Gel")
 def _in(unit: str = "", *, above: float = -math.inf, below: float = math.inf) -> Any:
     """A number's unit in the file, and the open interval in which it lies there."""
     return dataclasses.field(metadata={"unit": unit, "above": above, "below": below})
+
+
+def _beside(*, or_none: bool = False) -> Any:
+    """The name of a file beside the descriptor; empty, where it may be left out."""
+    return dataclasses.field(metadata={"beside": True}, default="" if or_none else dataclasses.MISSING)
 
 
 def _one_of(words: tuple[str, ...]) -> Any:
@@ -78,7 +84,7 @@ class Skin:
     pad_half_angle : of the part that unrolls, to either side of the lowest line
     """
 
-    profile: str
+    profile: str = _beside()
     axis_y: float = _in("mm")
     tip_x: float = _in("mm")
     base_x: float = _in("mm")
@@ -103,11 +109,11 @@ class Core:
 class SkinLattice:
     """Node intervals of the skin's surface: along a meridian, and round the axis."""
 
-    tip_rows: int = _in(above=1)
-    trunk_rows: int = _in(above=1)
-    base_rows: int = _in(above=1)
-    pad_intervals: int = _in(above=1)
-    back_intervals: int = _in(above=1)
+    tip_rows: int = _in(above=1, below=MOST_NODES)
+    trunk_rows: int = _in(above=1, below=MOST_NODES)
+    base_rows: int = _in(above=1, below=MOST_NODES)
+    pad_intervals: int = _in(above=1, below=MOST_NODES)
+    back_intervals: int = _in(above=1, below=MOST_NODES)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,7 +132,7 @@ class FluidFilm:
 class Electrodes:
     """The electrodes on the core. places : table of names, places and counts at rest; radius : m"""
 
-    places: str
+    places: str = _beside()
     radius: float = _in("mm", above=0)
 
 
@@ -187,9 +193,9 @@ class Dome:
     margin : m, outer edge of the table that is left out
     """
 
-    profile: str
-    degree_along: int = _in(above=-1)
-    degree_across: int = _in(above=-1)
+    profile: str = _beside()
+    degree_along: int = _in(above=-1, below=30)
+    degree_across: int = _in(above=-1, below=30)
     margin: float = _in("mm", above=-1e-9)
 
 
@@ -199,10 +205,10 @@ class GelLattice:
 
     window_x: tuple[float, float] = _in("mm")
     window_z: tuple[float, float] = _in("mm")
-    window_nodes: tuple[int, int] = _in(above=1)
-    rim_tip: int = _in(above=0)
-    rim_base: int = _in(above=0)
-    rim_side: int = _in(above=0)
+    window_nodes: tuple[int, int] = _in(above=1, below=MOST_NODES)
+    rim_tip: int = _in(above=0, below=MOST_NODES)
+    rim_base: int = _in(above=0, below=MOST_NODES)
+    rim_side: int = _in(above=0, below=MOST_NODES)
 
     def __post_init__(self) -> None:
         """Raise TactileError for an even number of rows or columns, which quadratic cells do not fill."""
@@ -215,9 +221,13 @@ class GelLattice:
 
 @dataclasses.dataclass(frozen=True)
 class Camera:
-    """What the camera looks at. height_zero_y : m, of the plane whose height is zero in pictures"""
+    """What the camera looks at. height_zero_y : m, of the plane whose height is zero in pictures
+
+    calibration : of a unit's camera and lights, see ``calibration_file``; empty where there is none
+    """
 
     height_zero_y: float = _in("mm")
+    calibration: str = _beside(or_none=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -291,7 +301,9 @@ def describe(name: str) -> Fluid | Gel:
     """Read the descriptor of a sensor that is there. Raises TactileError for a name that is none."""
     folder = _folders().get(name)
     if folder is None:
-        raise TactileError("sensor", repr(name), ", ".join(names()), "Name one that is there")
+        raise TactileError(
+            "sensor", repr(name), ", ".join(names()), f"Name one that is there, or put its folder into ${OWN}"
+        )
     return read(folder)
 
 
@@ -326,7 +338,7 @@ def _sensor(content: dict[str, Any], folder: Path) -> Fluid | Gel:
     if content.get("format") != FORMAT:
         raise TactileError("format", repr(content.get("format")), repr(FORMAT))
     kind = content.get("kind")
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise TactileError("kind", repr(kind), " or ".join(KINDS))
     form = KINDS[kind]
     types = {name: _required(hint) for name, hint in typing.get_type_hints(form).items()}
@@ -350,7 +362,10 @@ def _table(form: type[_T], content: Any, where: str) -> _T:
     if not isinstance(content, dict):
         raise TactileError(where, repr(content), "a table")
     types = typing.get_type_hints(form)
-    fields = {_key(field): field for field in dataclasses.fields(form)}  # type: ignore[arg-type]
+    fields = {
+        key: field for field in dataclasses.fields(form)  # type: ignore[arg-type]
+        if (key := _key(field)) in content or field.default is dataclasses.MISSING
+    }  # fmt: skip
     _check_names(where, content, tuple(fields))
     return form(**{
         field.name: _value(types[field.name], content[key], f"{where}, {key}", field.metadata)
@@ -395,6 +410,8 @@ def _value(kind: Any, value: Any, where: str, meta: Any) -> Any:
         words = meta.get("words")
         if not isinstance(value, str) or (words and value not in words):
             raise TactileError(where, repr(value), " or ".join(words) if words else "text")
+        if meta.get("beside") and Path(value).name != value:
+            raise TactileError(where, repr(value), "the name of a file beside the descriptor")
         return value
     return _number(kind, value, where, meta)
 
@@ -404,7 +421,7 @@ def _number(kind: type[float] | type[int], value: Any, where: str, meta: Any) ->
     if not whole and (kind is int or not isinstance(value, Decimal)):
         raise TactileError(where, repr(value), "a whole number" if kind is int else "a number")
     above, below, unit = meta["above"], meta["below"], meta["unit"]
-    if not above < float(value) < below:  # also refuses nan
+    if not above < float(Decimal(value)) < below:  # also refuses nan
         limits = [f"above {above:g}"] * (above > -math.inf) + [f"below {below:g}"] * (below < math.inf)
         raise TactileError(where, str(value), " and ".join(limits) or "a finite number")
     if kind is int:

@@ -13,6 +13,7 @@ from PIL import Image
 
 from tactile_core.cli import main as command
 from tactile_core.files.shipped import shipped
+from tactile_core.sensors.calibration_file import SHIPPED
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
 
@@ -146,7 +147,7 @@ def folders(name, tmp_path, pipes, root):
         pipes.make(folder / "star.stl")
     elif name == "unit.toml":
         pipes.make(tmp_path / "rest.png")
-        text = shipped("calibrations/default.toml").read_text(encoding="utf-8")
+        text = SHIPPED.read_text(encoding="utf-8")
         folder.write_text(text.replace('photograph = ""', 'photograph = "rest.png"'), encoding="utf-8")
     elif name == "nopresses":
         folder.mkdir()

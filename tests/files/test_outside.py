@@ -8,8 +8,7 @@ import pytest
 
 from tactile_core.errors import TactileError
 from tactile_core.files import outside
-from tactile_core.files.shipped import shipped
-from tactile_core.sensors.calibration_file import load_calibration
+from tactile_core.sensors.calibration_file import SHIPPED, load_calibration
 from tactile_core.translation import weights
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
@@ -95,7 +94,7 @@ def test_neither_weights_nor_a_calibration_follow_a_link_out_of_their_folder(tmp
     with pytest.raises(TactileError, match="a link out of its folder"):
         weights.read_card(folder)
     (folder / "rest.png").symlink_to(tmp_path / "secret")
-    text = shipped("calibrations/default.toml").read_text(encoding="utf-8")
+    text = SHIPPED.read_text(encoding="utf-8")
     (folder / "a.toml").write_text(text.replace('photograph = ""', 'photograph = "rest.png"'), encoding="utf-8")
     with pytest.raises(TactileError, match="a link out of its folder"):
         load_calibration(folder / "a.toml")
