@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 
+from tactile_core.mechanics.solids import graded_mesh
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
-from tactile_core.mechanics.solids.graded_mesh import Footprint, graded_gel, graded_skin
+from tactile_core.mechanics.solids.graded_mesh import Footprint
 from tactile_core.sensors import BIOTAC_SKIN, biotac, digit
 
 GEL, SKIN = Footprint((24, 17), (34, 27)), Footprint((26, 27), (36, 37))
-CASES = {"digit": (graded_gel, GEL, digit.gel_surface), "biotac": (graded_skin, SKIN, biotac.skin_surface)}
+CASES = {"digit": (GEL, digit.gel_surface), "biotac": (SKIN, biotac.skin_surface)}
 
 
 @pytest.fixture(scope="module", params=CASES)
 def case(request):
-    make, footprint, surface = CASES[request.param]
-    return make(footprint), footprint, surface()
+    footprint, surface = CASES[request.param]
+    return graded_mesh.graded(request.param, footprint), footprint, surface()
 
 
 def test_lines_are_fine_under_the_footprint_alone(case):
@@ -52,8 +53,9 @@ def test_flags_come_back_as_flags(case):
 
 def test_a_refined_mesh_has_eight_times_the_cells_and_the_same_volume(case):
     graded, footprint, surface = case
-    make = graded_gel if surface.window else graded_skin
-    twice = make(Footprint(footprint.low, footprint.high, refine=2))
+    twice = graded_mesh.graded(
+        "digit" if surface.window else "biotac", Footprint(footprint.low, footprint.high, refine=2)
+    )
     assert len(twice.mesh.cells) == 8 * len(graded.mesh.cells)
     volumes = [FiniteStrainSolid(g.mesh, BIOTAC_SKIN, g.pattern).weight.sum() for g in (graded, twice)]
     assert volumes[0] == pytest.approx(volumes[1], rel=0.01)  # coarse cells at the gel's rim cut its corners
@@ -61,7 +63,7 @@ def test_a_refined_mesh_has_eight_times_the_cells_and_the_same_volume(case):
 
 def test_meshes_of_one_kind_share_their_pattern():
     moved = Footprint((25, 18), (35, 28))
-    first, second = graded_gel(GEL), graded_gel(moved)
+    first, second = graded_mesh.graded("digit", GEL), graded_mesh.graded("digit", moved)
     if len(first.mesh.cells) == len(second.mesh.cells):
         assert first.pattern is second.pattern
-    assert graded_gel(GEL).factor is first.factor
+    assert graded_mesh.graded("digit", GEL).factor is first.factor
