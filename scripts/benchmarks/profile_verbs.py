@@ -101,6 +101,7 @@ CASES = (
     Case("mesh_fast", f"mesh digit {BALL} --out {{}}/fast.ply", "numpy scipy"),
     Case("mesh_full", f"mesh digit {BALL} --tier full --out {{}}/full.ply", "numpy scipy pypardiso"),
     Case("train", "train {}/absent.h5 --out {}/trained", "numpy h5py tqdm torch", status=2),  # what its import costs
+    Case("scenes", "scenes copy press --out {}/scenes"),
     Case("doctor", "doctor"),
 )  # fmt: skip
 

@@ -4,7 +4,39 @@ A verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what is left 
 (parser) and ``run`` (options -> exit status). Its rooms are imported in ``run``, so that help costs nothing.
 """
 
-from . import adapt, batch, calibrate, convert, doctor, export, info, mesh, pairs, plan, render, simulate, train, watch
+from . import (
+    adapt,
+    batch,
+    calibrate,
+    convert,
+    doctor,
+    export,
+    info,
+    mesh,
+    pairs,
+    plan,
+    render,
+    scenes,
+    simulate,
+    train,
+    watch,
+)
 
-ALL = (convert, watch, batch, export, info, adapt, render, calibrate, plan, simulate, pairs, train, mesh, doctor)
+ALL = (
+    convert,
+    watch,
+    batch,
+    export,
+    info,
+    adapt,
+    render,
+    calibrate,
+    plan,
+    scenes,
+    simulate,
+    pairs,
+    train,
+    mesh,
+    doctor,
+)
 VERBS = {verb.__name__.rsplit(".", 1)[1]: verb for verb in ALL}

@@ -1,0 +1,39 @@
+"""``tactile scenes``: the example scenes that ship, copied to where the pages' examples look for them."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..terminal import tell
+from .common import NOTHING
+
+BRIEF = "example scenes, to list and to copy"
+TEXT = """\
+List the example scenes that ship, or copy them (all, or those named) into the folder scenes, where the examples of
+every page look for them. One that is there already is refused, not written over."""
+EPILOG = """\
+examples:
+  tactile scenes
+  tactile scenes copy                      all of them, into the folder scenes
+  tactile scenes copy press --out mine     one, as mine/press"""
+LEAVES = NOTHING
+
+
+def arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the arguments of this verb."""
+    verb.add_argument("action", nargs="?", choices=("list", "copy"), default="list", help="default: list")
+    verb.add_argument("names", nargs="*", metavar="NAME", help="scenes to copy (default: all)")
+    verb.add_argument("--out", default="scenes", metavar="FOLDER", help="where they are copied to (default: scenes)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """List or copy."""
+    from ...files import example_scenes
+
+    if options.action == "list":
+        for line in example_scenes.described():
+            tell(line)
+        return 0
+    for folder in example_scenes.copy(options.names, options.out):
+        tell(str(folder))
+    return 0
