@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import TactileError
 from ..geometry.lattice import Lattice
 from . import biotac, digit
 from .descriptor import FALLS, Gel, Material, describe
@@ -74,8 +75,14 @@ def sensor_surface(sensor: str) -> Lattice:
 
 
 def is_gel(sensor: str) -> bool:
-    """Return true for a sensor whose descriptor tells of a gel, false for skin over fluid."""
-    return isinstance(describe(sensor), Gel)
+    """Return true for a sensor whose descriptor tells of a gel, false for the BioTac.
+
+    Raises TactileError for a name that is none, and for another fluid sensor: ``biotac`` builds the one skin there is.
+    """
+    found = describe(sensor)
+    if not isinstance(found, Gel) and found is not biotac.DESCRIPTOR:
+        raise TactileError(f"sensor {sensor!r}", "another one of kind fluid", "biotac, or a gel")
+    return isinstance(found, Gel)
 
 
 def thickness(sensor: str) -> float:

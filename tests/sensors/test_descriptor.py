@@ -72,6 +72,15 @@ def test_a_name_that_is_no_sensor_is_refused_with_those_that_are():
         descriptor.of_kind("biotac", descriptor.Gel)
 
 
+def test_a_second_fluid_sensor_does_not_pass_for_the_biotac(tmp_path, monkeypatch):
+    """Its skin would be the BioTac's, whatever its descriptor says."""
+    shutil.copytree(descriptor.FOLDER / "biotac", tmp_path / "my_biotac")
+    monkeypatch.setenv(descriptor.OWN, str(tmp_path))
+    for ask in (sensors.is_gel, sensors.sensor_surface, sensors.thickness):
+        with pytest.raises(TactileError, match="'my_biotac': another one of kind fluid; expected biotac, or a gel"):
+            ask("my_biotac")
+
+
 def test_an_open_profile_is_refused(tmp_path):
     lines = (biotac.DESCRIPTOR.folder / "profile.csv").read_text().splitlines()
     at = next(k for k, line in enumerate(lines) if k > 72 * 30 and ",0," in line)
