@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from . import images
+from .node_group import NodeGroup
 
 PATCH = "contact_patch"  # of a gel: 1 where it is touched, 0 elsewhere
 COUNTS = "electrode_counts"  # of a skin: change of the nearest electrode, counts
@@ -49,42 +50,16 @@ def _group(
     label: str, name: str, image: bpy.types.Image, first: float, step: float, column: str | None
 ) -> bpy.types.NodeTree:
     columns, rows = image.size
-    group = bpy.data.node_groups.new(label, "GeometryNodeTree")
-    group.is_modifier = True
-    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    nodes, links = group.nodes, group.links
-
-    def math(operation: str, first_input: bpy.types.NodeSocket, value: float) -> bpy.types.NodeSocket:
-        node = nodes.new("ShaderNodeMath")
-        node.operation = operation
-        links.new(first_input, node.inputs[0])
-        node.inputs[1].default_value = value
-        return node.outputs[0]
-
-    if column is None:
-        index = nodes.new("GeometryNodeInputIndex").outputs[0]
-    else:
-        node = nodes.new("GeometryNodeInputNamedAttribute")
-        node.data_type, node.inputs["Name"].default_value = "INT", column
-        index = next(s for s in node.outputs if s.enabled and s.name == "Attribute")
+    nodes = NodeGroup(label)
+    own = column is None
+    index = nodes.add("GeometryNodeInputIndex").outputs[0] if own else nodes.attribute(column, "INT")
+    frame = nodes.add("GeometryNodeInputSceneTime").outputs["Frame"]
     # Pixel centres: (value + 0.5) / columns across; images are stored from the bottom, frames from the top.
-    u = math("DIVIDE", math("ADD", index, 0.5), columns)
-    row = math("DIVIDE", math("SUBTRACT", nodes.new("GeometryNodeInputSceneTime").outputs["Frame"], first), step)
-    row = math("MINIMUM", math("MAXIMUM", math("ROUND", row, 0.0), 0.0), rows - 1)
-    v = math("MULTIPLY_ADD", row, -1.0 / rows)
-    v.node.inputs[2].default_value = 1.0 - 0.5 / rows
-    place, look = nodes.new("ShaderNodeCombineXYZ"), nodes.new("GeometryNodeImageTexture")
-    links.new(u, place.inputs["X"]), links.new(v, place.inputs["Y"])
-    links.new(place.outputs[0], look.inputs["Vector"])
-    look.interpolation, look.extension = "Closest", "EXTEND"
-    look.inputs["Image"].default_value = image
-    store = nodes.new("GeometryNodeStoreNamedAttribute")
-    store.data_type, store.domain = "FLOAT", "POINT"
-    store.inputs["Name"].default_value = name
-    links.new(nodes.new("NodeGroupInput").outputs[0], store.inputs["Geometry"])
-    links.new(look.outputs["Color"], next(s for s in store.inputs if s.name == "Value" and s.enabled))
-    links.new(store.outputs[0], nodes.new("NodeGroupOutput").inputs[0])
-    for k, node in enumerate(nodes):
-        node.location = (180 * (k % 6), -200 * (k // 6))
-    return group
+    u = nodes.math("DIVIDE", nodes.math("ADD", index, 0.5), columns)
+    row = nodes.math("ROUND", nodes.math("DIVIDE", nodes.math("SUBTRACT", frame, first), step))
+    row = nodes.math("MINIMUM", nodes.math("MAXIMUM", row, 0.0), rows - 1)
+    v = nodes.math("MULTIPLY_ADD", row, -1.0 / rows, 1.0 - 0.5 / rows)
+    place = nodes.add("ShaderNodeCombineXYZ", u, v).outputs[0]
+    look = nodes.add("GeometryNodeImageTexture", image, place, interpolation="Closest", extension="EXTEND")
+    geometry = nodes.tree.nodes.new("NodeGroupInput").outputs[0]
+    return nodes.end(nodes.store(geometry, name, look.outputs["Color"], "FLOAT"))

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import bpy
 
 from . import electrode_markers, frame_attribute
+from .node_group import NodeGroup
 
 COLOUR, DISPLACEMENT = "Tactile colour", "displacement"
 MATERIAL, LEGEND = "Tactile style", "Tactile legend"
@@ -97,62 +98,16 @@ def _material(name: str, takes: str) -> bpy.types.Material:
     return made
 
 
-class _Nodes:
-    """A geometry-node group under construction."""
-
-    def __init__(self, style: str) -> None:
-        self.tree = bpy.data.node_groups.new(NAMES[style], "GeometryNodeTree")
-        self.tree.is_modifier = True
-        for way in ("INPUT", "OUTPUT"):
-            self.tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-
-    def add(self, kind: str, *links: object, **settings: object) -> bpy.types.Node:
-        """A node; links : sockets or values of its enabled inputs, in order, None for those left alone."""
-        node = self.tree.nodes.new(kind)
-        for name, value in settings.items():
-            setattr(node, name, value)
-        for socket, value in zip([s for s in node.inputs if s.enabled], links, strict=False):
-            if isinstance(value, bpy.types.NodeSocket):
-                self.tree.links.new(value, socket)
-            elif value is not None:
-                socket.default_value = value
-        node.location = (190 * (len(self.tree.nodes) % 6), -220 * (len(self.tree.nodes) // 6))
-        return node
-
-    def math(self, operation: str, *links: object) -> bpy.types.NodeSocket:
-        """Add a math node and return its output."""
-        return self.add("ShaderNodeMath", *links, operation=operation).outputs[0]
-
-    def attribute(self, name: str, kind: str = "FLOAT") -> bpy.types.NodeSocket:
-        """A named attribute of the mesh."""
-        node = self.add("GeometryNodeInputNamedAttribute", name, data_type=kind)
-        return next(s for s in node.outputs if s.enabled and s.name == "Attribute")
-
-    def store(self, geometry: bpy.types.NodeSocket, name: str, value: object, kind: str) -> bpy.types.NodeSocket:
-        """The geometry with a named attribute of its points."""
-        return self.add("GeometryNodeStoreNamedAttribute", geometry, None, name, value, data_type=kind,
-                        domain="POINT").outputs[0]  # fmt: skip
-
-    def input(self, name: str, kind: str, text: str, value: object = None, least: float | None = None) -> None:
-        """An input of the group that users change in the modifier."""
-        item = self.tree.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
-        item.description = text
-        if value is not None:
-            item.default_value = value
-        if least is not None:
-            item.min_value = least
-
-    def end(self, geometry: bpy.types.NodeSocket) -> bpy.types.NodeTree:
-        """Give the geometry its material, and out."""
-        painted = self.add("GeometryNodeSetMaterial", geometry)
-        painted.inputs["Material"].default_value = material()
-        self.tree.links.new(painted.outputs[0], self.tree.nodes.new("NodeGroupOutput").inputs[0])
-        return self.tree
+def _painted(nodes: NodeGroup, geometry: bpy.types.NodeSocket) -> bpy.types.NodeTree:
+    """Give the geometry its material and end the group."""
+    painted = nodes.add("GeometryNodeSetMaterial", geometry)
+    painted.inputs["Material"].default_value = material()
+    return nodes.end(painted.outputs[0])
 
 
 def _surface(style: str) -> bpy.types.NodeTree:
     """Colours of a sensor's own surface, and the dent drawn larger."""
-    nodes = _Nodes(style)
+    nodes = NodeGroup(NAMES[style])
     quantity = "Change of the reading, counts," if style == "ELECTRODES" else "Displacement, in the object's units,"
     nodes.input(LARGEST, "Float", f"{quantity} at the colours' upper end", 1.0, 1e-6)
     nodes.input(EXAGGERATION, "Float", "How many times the dent is drawn; pictures keep the true one", 1.0, 0.0)
@@ -173,25 +128,25 @@ def _surface(style: str) -> bpy.types.NodeTree:
     nodes.tree.links.new(more, extra.inputs["Scale"])
     placed = nodes.add("GeometryNodeSetPosition", shown)
     nodes.tree.links.new(extra.outputs[0], placed.inputs["Offset"])
-    return nodes.end(placed.outputs[0])
+    return _painted(nodes, placed.outputs[0])
 
 
-def _moved(nodes: _Nodes, largest: bpy.types.NodeSocket, moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _moved(nodes: NodeGroup, largest: bpy.types.NodeSocket, moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     length = nodes.add("ShaderNodeVectorMath", moved, operation="LENGTH").outputs["Value"]
     return nodes.math("DIVIDE", length, largest)
 
 
-def _touched(nodes: _Nodes, _largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _touched(nodes: NodeGroup, _largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     return nodes.attribute(frame_attribute.PATCH)
 
 
-def _changed(nodes: _Nodes, largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _changed(nodes: NodeGroup, largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """0 where the reading falls by the largest change, 1 where it rises by it."""
     share = nodes.math("DIVIDE", nodes.attribute(frame_attribute.COUNTS), largest)
     return nodes.math("MULTIPLY_ADD", share, 0.5, 0.5)
 
 
-def _near_electrodes(nodes: _Nodes, colour: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _near_electrodes(nodes: NodeGroup, colour: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """The colour near an electrode, grey elsewhere; distances are in metres in any file."""
     near = nodes.add("ShaderNodeMapRange", nodes.attribute(electrode_markers.DISTANCE), *_EDGE, 1.0, 0.0).outputs[0]
     mixed = nodes.add("ShaderNodeMix", near, (*STILL, 1.0), colour, data_type="RGBA")
@@ -212,7 +167,7 @@ def _fill(ramp: bpy.types.ColorRamp, style: str) -> None:
 
 def _arrow(style: str) -> bpy.types.NodeTree:
     """Scale, turn and move a mesh that stands along +Z, 1 unit high, so that its foot is in a sensor's dent."""
-    nodes = _Nodes(style)
+    nodes = NodeGroup(NAMES[style])
     nodes.input(SENSOR, "Object", "A BioTac's skin or a DIGIT's gel")
     nodes.input(FORCE, "Vector", "Force on the sensor, N, in its axes")
     nodes.input(LENGTH, "Float", "Length of 1 N, in the object's units", 5.0, 1e-6)
@@ -230,10 +185,10 @@ def _arrow(style: str) -> bpy.types.NodeTree:
     for name, socket in (("Translation", _deepest(nodes, seen.outputs["Geometry"])), ("Rotation", turn.outputs[0]),
                          ("Scale", length)):  # fmt: skip
         nodes.tree.links.new(socket, placed.inputs[name])
-    return nodes.end(nodes.store(placed.outputs[0], COLOUR, (*ARROW, 1.0), "FLOAT_COLOR"))
+    return _painted(nodes, nodes.store(placed.outputs[0], COLOUR, (*ARROW, 1.0), "FLOAT_COLOR"))
 
 
-def _deepest(nodes: _Nodes, sensor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _deepest(nodes: NodeGroup, sensor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Mean of the nodes' places, weighted by the square of how far each has moved."""
     here = nodes.add("GeometryNodeInputPosition").outputs[0]
     rest = nodes.attribute("rest_position", "FLOAT_VECTOR")

@@ -155,7 +155,7 @@ def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, in
     """
     steps = np.diff(column)
     beside = np.abs(np.concatenate([[np.inf], steps, [np.inf]]))
-    pairs = []
+    pairs: list[tuple[int, int, float]] = []
     for apart in range(1, min(STUCK, len(edges) - 1) + 1):
         start, end = edges[:-apart], edges[apart:]
         near = end - start <= STUCK
