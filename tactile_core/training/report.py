@@ -134,7 +134,7 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """The factors of `error_bounds.fit` on the validation presses; signed and rectified apart. silence : the card's"""
+    """The numbers of `error_bounds.fit` on the validation presses; signed and rectified apart. silence : the card's"""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():
@@ -143,8 +143,8 @@ def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[
             error_columns(nets, contacts.pairs, rows[part], signal[part, :-1], measure.bodies, silent, bool(share))
             for part in parts(len(rows))
         )
-        ratios = {name: columns[f"{name}_max_m"] / columns[f"{name}_expected_m"] for name in SURFACES}
-        bounds[kind] = {name: error_bounds.fit(ratio, columns["x_m"]) for name, ratio in ratios.items()}
+        errors = {name: (columns[f"{name}_max_m"], columns[f"{name}_expected_m"]) for name in SURFACES}
+        bounds[kind] = {name: error_bounds.fit(*error, columns["x_m"]) for name, error in errors.items()}
     return bounds
 
 

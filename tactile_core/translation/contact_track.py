@@ -132,8 +132,7 @@ class Follower:
     def __init__(self) -> None:
         self._score: np.ndarray | None = None
         self._place, self._place_variance = np.zeros(PLACE), np.full(PLACE, ANYWHERE**2)
-        self._ratio: np.ndarray
-        self._ratio_variance: np.ndarray
+        self._ratio: tuple[np.ndarray, np.ndarray] | None = None  # of the frame before, with its variance; in contact
         self._frame: _Frame
         self._time: float
 
@@ -148,19 +147,21 @@ class Follower:
             score = total.max(axis=0) + now.weight
             if not free[total[:, score.argmax()].argmax(), score.argmax()]:
                 before = self._place_variance + step[:PLACE]
-                ratio_before = self._ratio_variance + RATIO_STEP**2 * (time - self._time) / FRAME
+                if self._ratio is not None:
+                    ratio_before = self._ratio[0], self._ratio[1] + RATIO_STEP**2 * (time - self._time) / FRAME
         best = int(score.argmax())
         place = now.mean[best, :PLACE], np.square(now.spread[best, :PLACE])
         self._place, self._place_variance = _updated(self._place, before, *place)
         self._score, self._frame, self._time = score - score.max(), now, time
         touched = touches(now.mean[best])
         state = np.concatenate([self._place[None], evidence.near(self._place[None], touched[None])[:, PLACE:]], axis=-1)
+        self._ratio = None
         if touched:
-            now_known = _log_ratio(state[:, PLACE], evidence.size), np.full(1, RATIO_NOISE**2)
+            ratio = _log_ratio(state[:, PLACE], evidence.size), np.full(1, RATIO_NOISE**2)
             if ratio_before is not None:
-                now_known = _updated(self._ratio, ratio_before, *now_known)
-            self._ratio, self._ratio_variance = now_known
-            state[:, PLACE] = _force_of(self._ratio, evidence.size)
+                ratio = _updated(*ratio_before, *ratio)
+            self._ratio = ratio
+            state[:, PLACE] = _force_of(ratio[0], evidence.size)
         return state.astype(np.float32)
 
 

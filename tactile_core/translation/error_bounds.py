@@ -1,8 +1,9 @@
-"""Factors on expected errors that give bounds on 95 of 100 largest errors: one for each region.
+"""Bounds on 95 of 100 largest errors: a factor on the expected error for each region.
 
 Split conformal prediction in groups with the ratio of the errors as score (Lei et al. 2018, section 5.2; Vovk 2012).
-The groups are regions along the finger in which the contact lies, and results without contact: with one factor for all,
-bounds were too wide over the electrodes and too narrow beyond them.
+The groups are regions along the finger in which the contact lies: with one factor for all, bounds were too wide over
+the electrodes and too narrow beyond them. Results without contact are a group with the error itself as score: nearly
+all are right to a micrometre, and the few that missed a light touch have no ratio to such an expectation.
 """
 
 from __future__ import annotations
@@ -18,37 +19,39 @@ from .weights import ADVICE
 
 LEVEL = 0.95
 EDGES = (-14e-3, -8e-3, -2e-3)  # m, x of the contact's middle: tip, first and last electrodes, base (assumed)
-PLACES = len(EDGES) + 2  # silent answers first
+PLACES = len(EDGES) + 2  # results without contact first
 FEWEST = 100  # contacts of a place: of fewer the 95 % quantile says little, and the factor of all counts (assumed)
 KINDS = ("signed", "rectified")
 
 
 def place(x: np.ndarray) -> np.ndarray:
-    """Index (T,) int of the region's factor. x : (T,) m, contact's middle along the finger, NaN without contact."""
+    """Index (T,) int of the region's number. x : (T,) m, contact's middle along the finger, NaN without contact."""
     return np.where(np.isnan(x), 0, 1 + np.searchsorted(EDGES, x, side="right"))
 
 
-def fit(ratio: np.ndarray, x: np.ndarray) -> list[float]:
-    """Fit the PLACES factors that cover LEVEL of the contacts of each region, four digits.
+def fit(error: np.ndarray, expected: np.ndarray, x: np.ndarray) -> list[float]:
+    """Fit the PLACES numbers that cover LEVEL of the contacts of each region, four digits: m, then factors.
 
-    ratio : (C,) largest error over expected error; x : (C,) m, as in `place`
+    error, expected : (C,) m, the largest node error and what was expected of it; x : (C,) m, as in `place`
     """
-    every = _factor(ratio)
-    parts = [ratio[place(x) == each] for each in range(PLACES)]
-    return [_factor(part) if len(part) >= FEWEST else every for part in parts]
+    ratio, where = error / expected, place(x)
+    scores = [error, *[ratio] * (PLACES - 1)]
+    parts = [score[where == each] for each, score in enumerate(scores)]
+    return [_quantile(part if len(part) >= FEWEST else every) for part, every in zip(parts, scores, strict=True)]
 
 
-def _factor(ratio: np.ndarray) -> float:
-    return float(f"{np.quantile(ratio, min(1.0, LEVEL * (1 + 1 / len(ratio)))):.4g}")
+def _quantile(score: np.ndarray) -> float:
+    return float(f"{np.quantile(score, min(1.0, LEVEL * (1 + 1 / len(score)))):.4g}")
 
 
-def bound(expected: np.ndarray, x: np.ndarray, factors: list[float]) -> np.ndarray:
+def bound(expected: np.ndarray, x: np.ndarray, numbers: list[float]) -> np.ndarray:
     """Bound (T,) float32 m on 95 of 100 largest errors. expected : (T,) m; x : (T,) m, as in `place`."""
-    return (np.asarray(factors)[place(x)] * expected).astype(np.float32)
+    where = place(x)
+    return np.where(where == 0, numbers[0], np.asarray(numbers)[where] * expected).astype(np.float32)
 
 
 def check(card: Mapping[str, object], where: str) -> None:
-    """Raise TactileError unless the card has PLACES positive factors a surface for signed and rectified signals."""
+    """Raise TactileError unless the card has PLACES positive numbers a surface for signed and rectified signals."""
     bounds = card.get("error_bounds")
     for kind in KINDS:
         for name in SURFACES:
@@ -56,7 +59,7 @@ def check(card: Mapping[str, object], where: str) -> None:
             value = kinds.get(name) if isinstance(kinds, dict) else None
             if not (isinstance(value, list) and len(value) == PLACES and all(map(_is_factor, value))):
                 entry = f"{where}, error_bounds.{kind}.{name}"
-                raise TactileError(entry, f"{value!r:.80}", f"{PLACES} factors above 0, one a place", ADVICE)
+                raise TactileError(entry, f"{value!r:.80}", f"{PLACES} numbers above 0, one a place", ADVICE)
 
 
 def _is_factor(value: Any) -> bool:

@@ -112,6 +112,15 @@ def test_rectified_places_move_less():
         assert (calm < 0.8 * other).all()
 
 
+def test_a_live_contact_may_begin_on_a_path_that_did_not_touch():
+    """The best path's frame before may be of a contact that was not the frame's own answer."""
+    truth = np.tile(STATE, (3, 1))
+    told = posterior(truth, np.random.default_rng(11), right=1.0)
+    told.mean[0, 0] = 0.0  # no contact, likelier in the first frame; on the path the other component is
+    told.mean[0, 1] = STATE
+    assert np.isfinite(follow(told, np.arange(3) / 100)).all()
+
+
 def test_no_lag_in_a_ramp(sliding):
     """A force that grows within 0.2 s is not answered late: no frame's force is that of one before or after."""
     ramp = np.concatenate([np.zeros(20), np.linspace(0, 3, 20), np.full(20, 3.0), np.linspace(3, 0, 20), np.zeros(20)])
