@@ -18,6 +18,8 @@ example:
   tactile pairs SCENE --count 50000 --out pairs.h5 --plan       and then, on each of 8 machines:
   tactile batch --out pairs.h5.parts --array 0/8                then the first line again, which puts all together
 
+  TACTILE_SENSORS=scenes/sensors tactile pairs SCENE --count 20 --to flat_gel --out flat.h5      a gel of your own
+
 An interrupted run goes on where it stopped when the same command is given again."""
 LEAVES = RESUMES
 
@@ -38,7 +40,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         dest="target",
         default="digit",
         metavar="SENSOR",
-        help="gel that is looked at: %(default)s, or one's own",
+        help="gel that is looked at: %(default)s, or one of your own, a folder in $TACTILE_SENSORS",
     )
     electrodes_argument(verb)
     engine.parts_arguments(verb)
