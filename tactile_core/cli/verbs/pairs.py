@@ -33,14 +33,14 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json, what is in it, goes beside"
     )
     verb.add_argument(
-        "--from", dest="source", default="biotac", metavar="SENSOR", help="that is felt with: %(default)s"
+        "--from", dest="source", default="biotac", metavar="SENSOR", help="sensor that feels (default: %(default)s)"
     )
     verb.add_argument(
         "--to",
         dest="target",
         default="digit",
         metavar="SENSOR",
-        help="gel that is looked at: %(default)s, or one of your own, a folder in $TACTILE_SENSORS",
+        help="gel that is looked at (default: %(default)s); your own is a folder in $TACTILE_SENSORS",
     )
     electrodes_argument(verb)
     engine.parts_arguments(verb)
