@@ -118,9 +118,9 @@ def photograph(binary: Path) -> None:
         known = {"STAGE": stage, "OUT": str(out / f"{stage}.png"), "ZIP": packed,
                  "BLENDER_USER_RESOURCES": str(out / f"user-{stage}"), "HOME": "/root"}  # fmt: skip
         variables = [f"{name}={value}" for name, value in known.items()]
-        window = ["blender", "--factory-startup", "--window-geometry", "0", "0", "1600", "900", "--python"]
+        window = ["blender", "--factory-startup", "--window-geometry", "0", "0", "1280", "800", "--python"]
         script = ROOT / "tests" / "blender" / "screenshot.py"
-        run = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24", *window, str(script)]
+        run = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", *window, str(script)]
         subprocess.run([str(binary), "--inside", "env", *variables, *run], check=True, timeout=STAGE_SECONDS)
         print(out / f"{stage}.png")
 

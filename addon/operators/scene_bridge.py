@@ -14,7 +14,7 @@ from ...tactile_core.errors import TactileError
 from ..objects import curves, indenter_objects
 from ..ui import properties
 
-DEFAULTS = {"format": "tactile-scene-1", "name": "scene", "description": "Made in Blender.", "pairs": None}
+DEFAULTS = {"format": "tactile-scene-1", "name": "scene", "description": "Made in Blender."}
 DIGITS_S, DIGITS_MM, DIGITS_N = 6, 5, 7  # decimals kept of float32 keyframes
 
 
@@ -60,7 +60,9 @@ def authored(context: bpy.types.Context) -> Authored:
             scene.name, f"frames {scene.frame_start} to {scene.frame_end}", "two frames or more",
             "Set the scene's frame range to the motion",
         )  # fmt: skip
-    document = DEFAULTS | json.loads(thing.tactile.document or "{}")
+    # A scene of one's own can be paired too, under the press's friction; an imported one keeps what it had.
+    pairs = {name: value for name, value in _press(thing).items() if name == "friction"}
+    document = DEFAULTS | {"pairs": pairs} | json.loads(thing.tactile.document or "{}")
     meshes: dict[str, bytes] = {}
     specs = [_spec(thing, sensor, context, meshes)]
     # Other indenters of the file stand in the scene as well, in the order they were added.

@@ -5,88 +5,93 @@ STAGE: imported, translated, rendered or authored; OUT: picture to write; ZIP: e
 
 from __future__ import annotations
 
+import functools
 import os
 import subprocess
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 
 ROOT = Path(__file__).resolve().parents[2]
-NAME = "bl_ext.user_default.tactile"
 RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
-SCENE = ROOT / "scenes" / "ring" / "scene.toml"
-FRAME = {"authored": 95}  # of the ring's firmest press; the recording's is 80
-TAB = ("1308", "250")  # where the sidebar's tab "Tactile" is drawn in a window of 1600 x 900
+# Where the sidebar's tab "Tactile" is drawn in a window of 1280 x 800: alone, beside a picture, in the workspace.
+TABS = {"imported": ("1043", "250"), "authored": ("705", "250")}
+IN_WORKSPACE = ("881", "250")
 SETTLE = 5.0  # s that software OpenGL takes to draw
+BALL, KEYS = 4.0, ((1, -0.5), (6, -0.1), (12, 0.6))  # mm radius; frames and depths, mm, of the authored press
 
 
-def set_up(stage: str) -> None:
-    """What a user would have done."""
+def steps(stage: str) -> list[Callable[[], None]]:
+    """What a user would have done, each once the window has drawn what came before."""
+    if stage == "authored":
+        return [install, author, click]
+    done = [install, lambda: bpy.ops.tactile.import_recording(filepath=str(RECORDING))]
+    if stage in ("translated", "rendered"):
+        done += [bpy.ops.tactile.translate, bpy.ops.tactile.open_workspace]
+        done.append(colour if stage == "translated" else render)
+    return [*done, click]
+
+
+def install() -> None:
+    """The extension, from its zip."""
     bpy.context.preferences.view.show_splash = False
     bpy.ops.extensions.package_install_files(filepath=os.environ["ZIP"], repo="user_default", enable_on_install=True)
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
-    window = bpy.context.window_manager.windows[0]
-    view = next(area for area in window.screen.areas if area.type == "VIEW_3D")
-    region = next(region for region in view.regions if region.type == "WINDOW")
-    view.spaces.active.show_region_ui = True
-    with bpy.context.temp_override(window=window, area=view, region=region):
-        if stage == "authored":
-            bpy.ops.tactile.import_scene(filepath=str(SCENE))
-            bpy.ops.tactile.simulate()
-        else:
-            bpy.ops.tactile.import_recording(filepath=str(RECORDING))
-        if stage in ("translated", "rendered"):
-            bpy.ops.tactile.translate()
-            _picture(window, stage)
-        bpy.context.scene.frame_set(FRAME.get(stage, 80))
-        look()
 
 
-def _picture(window: bpy.types.Window, stage: str) -> None:
-    """The picture in an Image Editor; the rendered one by the most usual of Mitsuba's presets."""
-    scene = bpy.context.scene
-    editor = next(area for area in window.screen.areas if area.type == "OUTLINER")
-    editor.type = "IMAGE_EDITOR"
-    scene.frame_set(80)
-    bpy.ops.tactile.live_picture()
-    if stage == "rendered":
-        bpy.ops.tactile.set_up_render()
-        scene.tactile_render.preset = "quality"
-        bpy.ops.render.render()
-        editor.spaces.active.image = bpy.data.images["Render Result"]
-        properties = next(area for area in window.screen.areas if area.type == "PROPERTIES")
-        properties.spaces.active.context = "RENDER"
+def author() -> None:
+    """A ball that presses both sensors."""
+    for sensor in ("BIOTAC", "DIGIT"):
+        bpy.ops.tactile.add_sensor(sensor=sensor)
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=BALL)
+    ball, scene = bpy.context.object, bpy.context.scene
+    scene.frame_end = KEYS[-1][0]
+    for frame, depth in KEYS:
+        bpy.ops.tactile.snap_to_gel(depth=depth)
+        ball.keyframe_insert("location", frame=frame)
+    bpy.context.area.spaces.active.show_region_ui = True
+    scene.frame_set(scene.frame_end)
+    bpy.ops.tactile.simulate()
 
 
-def look() -> None:
-    """From above and the side, at all sensors."""
-    for thing in bpy.data.objects:
-        thing.select_set(thing.type == "MESH" and thing.tactile.role != "NONE")
-    bpy.ops.view3d.view_axis(type="FRONT")
-    bpy.ops.view3d.view_orbit(angle=0.8, type="ORBITUP")
-    bpy.ops.view3d.view_orbit(angle=0.4, type="ORBITLEFT")
-    bpy.ops.view3d.view_selected()
-    bpy.ops.object.select_all(action="DESELECT")
+def colour() -> None:
+    """Displacement in colours, force as arrows."""
+    bpy.ops.tactile.set_style(style="DISPLACEMENT")
+    bpy.ops.tactile.force_arrow()
 
 
-def begin() -> None:
-    """Once the window stands."""
+def render() -> None:
+    """By the most usual of Mitsuba's presets, its lights in the panel."""
+    bpy.ops.tactile.set_up_render()
+    bpy.context.scene.tactile_render.preset = "quality"
+    bpy.ops.render.render()
+    editor = next(area for area in bpy.context.window.screen.areas if area.type == "IMAGE_EDITOR")
+    editor.spaces.active.image = bpy.data.images["Render Result"]
+
+
+def follow(left: list[Callable[[], None]]) -> None:
+    """Take the next step in the window's 3D view, and come back for those that are left; the last one takes a photo."""
+    if not left:
+        photograph()
     try:
-        set_up(os.environ["STAGE"])
+        window = bpy.context.window_manager.windows[0]
+        view = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+        region = next(region for region in view.regions if region.type == "WINDOW")
+        with bpy.context.temp_override(window=window, area=view, region=region):
+            left[0]()
     except Exception:
         traceback.print_exc()
         os._exit(1)
-    bpy.app.timers.register(click, first_interval=SETTLE)
+    bpy.app.timers.register(functools.partial(follow, left[1:]), first_interval=SETTLE)
 
 
 def click() -> None:
-    """Close the splash, open the sidebar's tab."""
-    moves = ["mousemove", "640", "300", "key", "Escape", "sleep", "2", "mousemove", *TAB, "sleep", "1", "click", "1"]
-    # Not waited for: Blender has to take these in one by one.
-    subprocess.Popen(["xdotool", *moves, "sleep", "1", "mousemove", "500", "700"])
-    bpy.app.timers.register(photograph, first_interval=2 * SETTLE)
+    """Open the sidebar's tab, which no script can in Blender 4.3; not waited for, as Blender has to take it in."""
+    tab = TABS.get(os.environ["STAGE"], IN_WORKSPACE)
+    away = ["mousemove", "300", "640"]
+    moves = [*away, "key", "Escape", "sleep", "1", "mousemove", *tab, "sleep", "1", "click", "1", "sleep", "1", *away]
+    subprocess.Popen(["xdotool", *moves])
 
 
 def photograph() -> None:
@@ -95,4 +100,4 @@ def photograph() -> None:
     os._exit(done.returncode)  # nothing to save, and some Blenders hang at exit
 
 
-bpy.app.timers.register(begin, first_interval=3.0)
+bpy.app.timers.register(functools.partial(follow, steps(os.environ["STAGE"])), first_interval=3.0)
