@@ -11,8 +11,8 @@ BRIEF = "rest, gains and offsets of a sensor, from its recordings"
 TEXT = """\
 Fit a gain and an offset to each electrode of a BioTac, so that its readings in contact look like the simulated ones
 that the networks were trained on. Recordings of one sensor are taken together; what touched it need not be known. The
-more places were touched, softly and hard, the better. An electrode that the recordings do not tell enough of keeps
-gain 1, and a warning says so. Rectified recordings give no offsets. How uncertain gains are is printed; fewer than
+more places were touched, softly and hard, the better. An electrode whose gain the recordings do not determine
+keeps gain 1, and a warning says so. Rectified recordings give no offsets. The gains' uncertainty is printed; fewer than
 five different contacts give none.
 
 Three raw recordings or more also give the unit's rest, from those of the lowest fluid pressure (of the least squeezed

@@ -29,8 +29,8 @@ Convert recordings into the job folder DIR:
   shards/       HDF5, some frames of one recording each, in the layout of frames.h5; pictures inside
   aside/        what could not be done and why; the next run tries it again
   manifest.json all shards and their hashes, once the job is done
-Only what is missing or damaged is made, so the same command goes on after any interruption; without INPUTS it goes on
-without looking whether they changed. The bytes do not depend on the number of workers. INPUTS are files, folders, globs
+Only what is missing or damaged is made, so the same command continues after any interruption; without INPUTS it does
+not check whether recordings changed. The bytes do not depend on the number of workers. INPUTS are files, folders, globs
 (quoted) and @LIST, a text file with one path a line."""
 EPILOG = """\
 examples:

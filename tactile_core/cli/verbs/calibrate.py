@@ -21,13 +21,13 @@ BRIEF = "camera, lights and colours of a DIGIT, from presses of a ball"
 TEXT = """\
 Fit a DIGIT unit's calibration to photographs of a ball pressed into it, anywhere and to any depth: positions of camera
 and lights, their extent, colours, scale. Without a photograph of the untouched gel, its median over the photographs
-takes its place. Ten presses spread over the gel tell most; one or five do, from a calibration of another unit. What
-they tell too little of is held near that one, and named. Writes the calibration, and a sheet to look at (.png).
+takes its place. Ten presses spread over the gel are best; five or even one suffice, since parameters that presses do
+not determine stay near those of --start, and are named. Writes the calibration, and a sheet to look at (.png).
 
 The fit ends on Mitsuba's own pictures, with the light of one bounce, where LLVM works; --quick leaves that out.
 
 With --test, a calibration is tried on photographs instead: place and depth of each press are fitted, all else is the
-calibration's, and the picture is compared with the photograph, beside that of the background alone, the baseline.
+calibration's, and the picture is compared with the photograph. The baseline is the background alone.
 Rows named through also fit light that comes through the coating where the ball touches it; the others leave it out."""
 EPILOG = """\
 examples:

@@ -111,7 +111,7 @@ def answer_arguments(verb: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="draw N contacts for each frame from what its signals say, as sample_center and sample_force in frames.h5",
+        help="draw N contacts a frame from its posterior, as sample_center and sample_force in frames.h5",
     )
     verb.add_argument(
         "--gel",

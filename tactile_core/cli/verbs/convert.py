@@ -30,9 +30,9 @@ Read, tare, translate and shade recordings. Each gets the folder DIR/<file name 
 One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all.
 A file of several fingers gives one result a finger, <name>_finger0, <name>_finger1, ...; hand.bag#1 picks one.
 
---error bounds what the toolkit adds to its networks' answer: levels, of a picture, picks the cheapest preset of
-`tactile render` that was measured to meet it (fast without it); um, of heights and displacements, is what is added
-anyway, or refused. The error of the networks themselves is printed beside it, and is no part of it."""
+--error bounds the error that the toolkit adds to that of its networks. In levels of a picture, it picks the cheapest
+preset of `tactile render` that was measured to stay below (without it: fast). In um of heights and displacements, where
+the added error is fixed, a smaller bound is refused. The networks' own error is printed too; the bound excludes it."""
 # 4 B a number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
 # noisy real one), packed height maps at 200 kB.
 SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"

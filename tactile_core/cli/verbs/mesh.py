@@ -22,9 +22,9 @@ Write the mesh of a sensor in metres, x along the finger, -y out of the pad. The
   .stl  surface alone
   .vtu  volume of 27-node hexahedra, read by ParaView (Warp By Vector shows the deformation) and meshio
 
-At rest; or deformed as in a frame of frames.h5 or of a simulated recording (--frames, its surface alone); or pressed
-(--press). A press holds displacement (m) and contact; the tiers full and reference solve the volume and add the force
-on each node (N), Cauchy stress and von Mises stress (Pa). The tier fast knows the surface alone."""
+The sensor is at rest, deformed as in a frame of frames.h5 or of a simulated recording (--frames, surface alone), or
+pressed (--press). A press holds displacement (m) and contact; the tiers full and reference solve the volume and add
+the force on each node (N), Cauchy stress and von Mises stress (Pa). The fast tier solves the surface alone."""
 EPILOG = """\
 examples:
   tactile mesh biotac --out biotac.ply

@@ -12,7 +12,7 @@ TEXT = """\
 Say, before anything is run, what a scene's `tactile simulate` (and `convert` and `render` after it), or a recording's
 `tactile convert`, will build for the outputs asked for: sensors and their nodes, matrices (cached, or to be built),
 contacts and their tiers, networks, lights; and what time, memory and disk to expect, from measured tables that ship.
-Nothing is written. Of a scene whose matrices are cached, the points of its motion are solved, to see how deep it is."""
+Nothing is written. Where a scene's matrices are cached, contacts on its motion are solved to know their depth."""
 EPILOG = """\
 examples:
   tactile plan scenes/press

@@ -32,14 +32,14 @@ DIR is a new folder, which appears whole or not at all:
 
 Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (`tactile doctor` says how).
   fast       direct light, soft shadows            standard   direct light, traced
-  quality    and the light of one bounce           reference  Mitsuba's path integrator, half a minute a frame
-With LLVM a scene of Mitsuba's makes the light: LEDs that shine, the coating as a material, the window. Without it the
-coating is matte, and standard and quality have no window; half a level apart. `tactile doctor` says which runs here.
+  quality    standard, and one bounce of light     reference  Mitsuba's path integrator, half a minute a frame
+With LLVM, Mitsuba renders a scene: LEDs as lamps, the coating as a material, the window. Without it the coating is
+matte, and standard and quality have no window; pictures differ by half a level. `tactile doctor` says which runs.
 
 --error 0.6levels picks the cheapest preset whose measured error, rms from the full model of the same gel, is at most
 that; --error 50um, for a scene, the tier of contact as `tactile simulate` does. It says what it picked, and why.
 
-With --workers, --cluster or --plan frames are rendered in other processes, by the same bytes. They wait in OUT.parts
+With --workers, --cluster or --plan frames are rendered in other processes, to the same bytes. They wait in OUT.parts
 until all are there, and the same command goes on after any interruption; no timings.json is written."""
 EPILOG = """\
 examples:

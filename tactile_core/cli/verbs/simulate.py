@@ -12,12 +12,12 @@ from .common import NOTHING, check_seed, electrodes_argument, error_argument, pr
 
 BRIEF = "simulate a recording"
 TEXT = """\
-Simulate the recording that a scene describes, marked so and with its true meshes. A sensor that nothing of --keep
-needs is not solved: electrodes, displacement_biotac and traction_biotac need the BioTac, the others the DIGIT.
+Simulate the recording that a scene describes. The file is marked as simulated and holds the true meshes. Only sensors
+that --keep needs are solved: electrodes, displacement_biotac and traction_biotac need the BioTac, the others the DIGIT.
 
---error 50um picks for each sensor the cheapest tier of contact whose measured error (rms of the surface; 95 of 100
-contacts stay below), to the depth that the scene reaches, is at most that, and says which; fast without it. What the
-full or the reference tier will cost is printed first; over a minute is asked about, or needs --yes.
+--error 50um picks for each sensor the cheapest tier of contact mechanics whose measured error is at most 50 um (rms of
+the surface, which 95 of 100 contacts stay below, to the depth that the scene reaches), and prints which; without it:
+fast. The full and reference tiers print their cost first; for more than a minute they ask, or need --yes.
 
 With --grid many recordings are simulated into a folder, with grid.json, which lists the values of each. They wait in
 OUT.parts until all are there, and the same command goes on after any interruption."""

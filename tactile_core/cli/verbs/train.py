@@ -32,10 +32,10 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--weights", metavar="DIR", help="of s2mpn: where it starts (default: the shipped weights)")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder to write")
     seed_argument(verb, "weights")
-    verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="times the usual epochs (default: 1)")
-    verb.add_argument("--without", action="append", default=[], metavar="NAME", help="an indenter to keep apart")
-    verb.add_argument("--without-below-x", type=float, metavar="MM", help="keep apart what touches the pad below x")
-    what = "auto (default): a GPU when torch sees one; cpu; cuda. The same bytes again on the same device alone"
+    verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="factor on the epochs (default: 1)")
+    verb.add_argument("--without", action="append", default=[], metavar="NAME", help="leave this indenter out")
+    verb.add_argument("--without-below-x", type=float, metavar="MM", help="leave contacts below x on the pad out")
+    what = "auto (default): a GPU when torch sees one; cpu; cuda. Bytes repeat on the same device only"
     verb.add_argument("--device", choices=DEVICES, default="auto", help=what)
     verb.add_argument("--overwrite", action="store_true", help="train again over older weights in DIR")
     progress_argument(verb)
