@@ -88,7 +88,7 @@ def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slic
     if windows.pdc is not None:
         start = int(np.argmin(windows.pdc))
     else:
-        start = int(np.argmin(_spread(electrodes, n).max(axis=1)))
+        start = int(np.argmin(np.max([_spread(column, n) for column in electrodes.T], axis=0)))
     return slice(start, start + n)
 
 
@@ -99,7 +99,7 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
     known there, and contact is never taken for drift. Without drift: one level over all quiet frames.
     """
     if not drift or len(quiet.parts) < 2:
-        return np.broadcast_to(level(electrodes[quiet.mask]), electrodes.shape).copy()
+        return np.broadcast_to(level(electrodes[quiet.mask]), electrodes.shape)
     middles = [0.5 * (a + b - 1) for a, b in quiet.parts]
     levels = np.array([level(electrodes[a:b]) for a, b in quiet.parts])
     index = np.arange(len(electrodes))
@@ -127,8 +127,8 @@ def _sums(values: np.ndarray, n: int) -> np.ndarray:
 
 
 def _spread(values: np.ndarray, n: int) -> np.ndarray:
-    """Standard deviation (W, C) within each window."""
-    centred = values - np.median(values, axis=0)  # keeps the squares small
+    """Standard deviation (W,) of values (T,) within each window."""
+    centred = values - np.median(values)  # keeps the squares small
     mean = _sums(centred, n) / n
     return np.sqrt(np.maximum(_sums(centred**2, n) / n - mean**2, 0.0))
 
@@ -136,11 +136,14 @@ def _spread(values: np.ndarray, n: int) -> np.ndarray:
 def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
-    halves = _sums(electrodes, half) / half
-    trend = halves[n - half : n - half + count] - halves[:count]
-    calm = (_spread(electrodes, n).max(axis=1) <= CALM_STD) & (np.abs(trend).max(axis=1) <= CALM_TREND)
+    mean, calm = np.empty((count, electrodes.shape[1])), np.ones(count, bool)
+    for j, column in enumerate(electrodes.T):  # one at a time: sums of all would take seven times the recording
+        halves = _sums(column, half) / half
+        trend = halves[n - half : n - half + count] - halves[:count]
+        calm &= (_spread(column, n) <= CALM_STD) & (np.abs(trend) <= CALM_TREND)
+        mean[:, j] = _sums(column, n) / n
     pressure = _sums(pdc, n) / n if pdc is not None else None
-    return _Windows(n, _sums(electrodes, n) / n, calm, pressure, (np.arange(count) + 0.5 * (n - 1)) / rate)
+    return _Windows(n, mean, calm, pressure, (np.arange(count) + 0.5 * (n - 1)) / rate)
 
 
 def _rest_rectified(windows: _Windows) -> np.ndarray:
@@ -163,7 +166,9 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
         return possible
     anchor = _anchor(windows, calm, kind, duration)
     apart = np.abs(windows.middle - windows.middle[anchor])
-    off = np.abs(windows.mean - windows.mean[anchor]).max(axis=1)
+    off = np.zeros(len(windows.mean))
+    for column in windows.mean.T:
+        np.maximum(off, np.abs(column - column[anchor]), out=off)
     if windows.pdc is None:
         agree = possible & (off <= LEVEL + LEVEL_RATE * apart)
         return agree & _tracked(windows.mean, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)

@@ -26,6 +26,7 @@ SCALED_PEAK = 150.0
 FRAMEWISE = ("change", "electrodes", "quiet", "flags", "pdc")  # arrays of `Signals` with a row for each frame
 UNIT_DRIFT = 60.0  # counts that a unit's rest may drift between recordings (the slide set's: 40 to 51 in two days)
 SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (docs/sources.md, BioTac read-out)
+BLOCK = 2**16  # frames that are converted at a time, which bounds the memory of a long recording
 SHOWN = 8  # bad places spelled out one by one in the warnings
 
 
@@ -120,7 +121,12 @@ class Signals:
 
         Only raw readings show their unit's rest counts; other changes are not converted.
         """
-        return divider.typical(self.change, self.rest) if self.kind == "raw" else self.change
+        if self.kind != "raw":
+            return self.change
+        found = np.empty(self.change.shape)
+        for start in range(0, len(found), BLOCK):
+            found[start : start + BLOCK] = divider.typical(self.change[start : start + BLOCK], self.rest)
+        return found
 
 
 def prepare(recording: Recording, options: PrepareOptions | None = None) -> Signals:
@@ -131,7 +137,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = _kind(recording, readings, options)
     unit = _counts_per_unit(recording, readings, kind, options, warnings)
-    readings = readings * unit
+    readings = readings if unit == 1 else readings * unit
     glitches = _glitches(recording, readings, options, warnings)
     flags[glitches.any(axis=1)] |= np.uint16(Flag.REPAIRED)
     readings = fill(readings, glitches | ~np.isfinite(recording.electrodes))
@@ -145,7 +151,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
         if not quiet.parts:
             flags |= np.uint16(Flag.NO_QUIET_PART)
     else:
-        rest = np.broadcast_to(np.array(unit_rest.counts), readings.shape).copy()
+        rest = np.broadcast_to(np.array(unit_rest.counts), readings.shape)
         quiet = Quiet(np.zeros(len(readings), bool), (), "the unit's own rest: no calm part near it")
     flags |= saturated(recording, readings, kind, warnings) | dead(recording, readings, warnings)
     slope = (rest[-1] - rest[0]) / recording.duration if recording.duration > 0 else np.zeros(rest.shape[1])
@@ -155,8 +161,9 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     flags |= np.uint16(_doubts(polarity, warnings))
     report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope) | {"smoothed_frames": frames}
     report |= {"polarity": polarity.name, "polarity_evidence": polarity.evidence}
+    change *= polarity.sign
     signals = Signals(
-        change=polarity.sign * change, rest=rest[0].copy(), drift=slope, electrodes=readings, kind=kind,
+        change=change, rest=rest[0].copy(), drift=slope, electrodes=readings, kind=kind,
         quiet=quiet.mask, flags=flags, pdc=_pressure_change(recording, kind, quiet, unit_rest),
         warnings=tuple(warnings), report=report,
     )  # fmt: skip
@@ -354,7 +361,7 @@ def _rest(
             f"no quiet part ({quiet.evidence}): rest is guessed from the calmest {guess.stop - guess.start} frames, "
             f"{guess.start}:{guess.stop}"
         )
-        return np.broadcast_to(level(readings[guess]), readings.shape).copy()
+        return np.broadcast_to(level(readings[guess]), readings.shape)
     warnings.append(f"no quiet part ({quiet.evidence}): the file's own zero is taken for rest")
     return np.zeros(readings.shape)
 
