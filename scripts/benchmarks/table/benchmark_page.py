@@ -19,14 +19,14 @@ TITLES = {
     "pictures": "Pictures of known deformations", "photographs": "Pictures beside photographs",
     "chain": "Whole chain, signals to pictures",
 }  # fmt: skip
-TABLE = "| method | ms a frame | MB | error | doing nothing | measured on |\n|---|---|---|---|---|---|"
+TABLE = "| method | ms a frame | MB | error | baseline | measured on |\n|---|---|---|---|---|---|"
 INTRODUCTION = """\
 # Speed against error
 
 Made by `python scripts/benchmark.py` on one machine: {machine}.
 Times are CPU ms a frame (a contact) on one core, the best of several, so that other programs count little; memory is
-the peak of a process that does this alone, Python and libraries included; errors are on held-out sets, beside those of
-doing nothing. `docs/benchmark.json` holds every row. What is missing: {missing}.
+the peak of a process that does this alone, Python and libraries included; errors are on held-out sets, beside the
+baseline's: no deformation, or the background. `docs/benchmark.json` holds every row. Not measured: {missing}.
 
 ![error over time](benchmark.png)
 """
@@ -40,7 +40,7 @@ above are those of a lean rewrite (sparse matrices, Clenshaw); ACROSS's own clas
 project, took 183 to 246 ms a frame on such a machine, as reported to us. Errors: um rms over moving nodes of the test
 contacts, solved by the full tier.
 
-| step | ACROSS's shapes | ours | doing nothing |
+| step | ACROSS's shapes | ours | baseline |
 |---|---|---|---|
 """
 

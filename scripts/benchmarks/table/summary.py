@@ -11,7 +11,7 @@ from tactile_core.files import atomic
 
 from .method import Method
 
-HEADER = "| stage | method | ms a frame | peak MB | error | nothing |\n|---|---|---|---|---|---|"
+HEADER = "| stage | method | ms a frame | peak MB | error | baseline |\n|---|---|---|---|---|---|"
 # Stage, what the methods are called, and their names as they begin in the rows.
 LINES = (
     ("contact, DIGIT", "fast / full / reference tier", ("mechanics digit_fast", "mechanics digit_full",
