@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 PACKAGE = "tactile-core"
@@ -16,6 +18,16 @@ def advice(extra: str) -> str:
         return f'python -m pip install -c constraints.txt -e ".[{extra}]" in {root}{size}'
     found = libraries(extra)
     return f"python -m pip install {' '.join(found)}{size}" if found else f"the libraries of the extra [{extra}]"
+
+
+@contextmanager
+def needing(extra: str) -> Iterator[None]:
+    """Add to a ModuleNotFoundError that leaves the block how to install the extra, for who calls from Python."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        error.add_note(f"Install it: {advice(extra)}")
+        raise
 
 
 def libraries(extra: str) -> list[str]:

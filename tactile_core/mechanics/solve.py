@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
+from ..files.installed import needing
 from ..geometry.indenters import Indenter, Pose
 from . import error_estimate
 from .electrodes.biotac_sheet import sensing_films
@@ -50,13 +51,14 @@ def solve(
     Returns a :class:`Solution`: ``displacement`` (n_nodes, 3) m, ``force`` (3,) N, ``depth`` m, ``pressure`` Pa, and
     the errors expected of the tier.
     Raises TactileError for an impossible request, or for one beyond what the tier finds; UnreachableError beyond 60 %
-    of the thickness.
+    of the thickness; ModuleNotFoundError without the extra [fem].
 
     >>> ball = tactile.indenters.Sphere(radius=3e-3)
     >>> contact = tactile.solve("digit", ball, tactile.Placement(x=-6e-3, z=0.0), force=2.0)
     >>> contact.depth, contact.displacement.shape
     """
-    return next(solve_path(sensor, indenter, place, [Step(depth, force)], tier, friction))
+    with needing("fem"):
+        return next(solve_path(sensor, indenter, place, [Step(depth, force)], tier, friction))
 
 
 def solve_path(

@@ -5,6 +5,7 @@ from importlib import metadata
 import pytest
 
 from tactile_core.files import installed
+from tactile_core.mechanics import solve
 
 REQUIRED = [
     "numpy>=1.26", 'scipy; extra == "fem"', 'trimesh; extra == "fem"', 'tactile-core[fem]; extra == "mkl"',
@@ -34,3 +35,13 @@ def test_a_wheel_s_libraries_are_named_one_by_one(no_checkout, monkeypatch):
 def test_without_metadata_the_extra_is_named(no_checkout, monkeypatch):
     monkeypatch.setattr(installed, "PACKAGE", "no-such-package")
     assert "[fem]" in installed.advice("fem")
+
+
+def test_a_missing_library_says_from_python_too_how_to_install_it(monkeypatch):
+    def missing(*_):
+        raise ModuleNotFoundError("No module named 'scipy'", name="scipy")
+
+    monkeypatch.setattr(solve, "solve_path", missing)
+    with pytest.raises(ModuleNotFoundError) as raised:
+        solve.solve("digit", None, None, force=1.0)
+    assert raised.value.__notes__ == [f"Install it: {installed.advice('fem')}"]
