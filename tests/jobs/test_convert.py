@@ -43,16 +43,27 @@ def run(tmp_path, tools):
     """Convert one recording with options and return its result folder."""
 
     def one(path, out="out", **options):
-        options = convert.Options(**options)
-        (folder,) = results.result_folders([path], tmp_path / out, options.overwrite)
-        return convert.convert(path, folder, options, tools).folder
+        return converted(path, tmp_path / out, tools, **options)
 
     return one
 
 
-def test_a_result_is_complete_and_one_frame_a_row(run, slide_csv):
-    path = slide_csv(frames=FRAMES)
-    folder = run(path)
+@pytest.fixture(scope="module")
+def whole(tools, write_slide, tmp_path_factory):
+    """A recording of FRAMES frames and its result by default, which no test may change."""
+    folder = tmp_path_factory.mktemp("whole")
+    path = write_slide("touch", FRAMES, folder)
+    return path, converted(path, folder / "out", tools)
+
+
+def converted(path, out, tools, **options):
+    options = convert.Options(**options)
+    (folder,) = results.result_folders([path], out, options.overwrite)
+    return convert.convert(path, folder, options, tools).folder
+
+
+def test_a_result_is_complete_and_one_frame_a_row(whole):
+    path, folder = whole
     assert sorted(child.name for child in folder.iterdir()) == sorted(
         ["contact_sheet.png", "frames.h5", "images", "note.json", "timings.json"]
     )
@@ -72,9 +83,9 @@ def test_a_result_is_complete_and_one_frame_a_row(run, slide_csv):
         assert (picture == fake_tools.shade(np.full(fake_tools.SHAPE, depth[frame]))).all()
 
 
-def test_chunks_leave_no_seam(run, slide_csv, tools):
-    folder = run(slide_csv(frames=FRAMES))
-    single = run(slide_csv("again", frames=FRAMES), keep=("displacement",))
+def test_chunks_leave_no_seam(run, whole):
+    path, folder = whole
+    single = run(path, keep=("displacement",))
     with h5py.File(folder / "frames.h5") as file, h5py.File(single / "frames.h5") as other:
         assert (file["displacement_biotac"][:] == other["displacement_biotac"][:]).all()
         depth = file["latent_signal"][:, 0]
@@ -82,18 +93,17 @@ def test_chunks_leave_no_seam(run, slide_csv, tools):
     assert CHUNK in range(60, 120) and np.abs(rises).max() < 4  # counts: the press adds 2 a frame, noise below 2
 
 
-def test_keep_and_frames_choose_what_is_written(run, slide_csv):
-    path = slide_csv(frames=FRAMES)
-    full = run(path, out="full")
+def test_keep_and_frames_choose_what_is_written(run, whole):
+    path, full = whole
     part = run(path, out="part", keep=("height",), frames=slice(20, 120, 25))
     chosen = np.arange(20, 120, 25)
     assert not (part / "images").exists()
-    with h5py.File(part / "frames.h5") as file, h5py.File(full / "frames.h5") as whole:
+    with h5py.File(part / "frames.h5") as file, h5py.File(full / "frames.h5") as all_frames:
         assert set(file) == {*ALWAYS, "height_map"}
         assert file["height_map"].shape == (len(chosen), 320, 240)
         assert (file["frame"][:] == chosen).all()
         for name in ("time", "electrodes", "force", "flags"):
-            assert (file[name][:] == whole[name][:][chosen]).all()  # the tare saw the whole recording
+            assert (file[name][:] == all_frames[name][:][chosen]).all()  # the tare saw the whole recording
     images = run(path, out="images", keep=("image",), frames=slice(-3, None))
     assert [image.name for image in sorted((images / "images").iterdir())] == ["00147.png", "00148.png", "00149.png"]
 

@@ -63,7 +63,7 @@ PHOTOGRAPHS = """
 Photographs that the calibration was not fitted on; promised is what it states of those it was fitted on, mean error in
 the region, grey levels.
 
-| photograph | promised | found | doing nothing |
+| photograph | promised | found | baseline |
 |---|---|---|---|
 """
 
