@@ -13,7 +13,7 @@ from ..presets import Preset
 from .camera_rays import camera_rays
 from .direct_light import evened, lookup
 from .gel_mesh import MM, GelMesh, check_mesh
-from .gel_scene import change_numbers, gel_shape, kinds, lamps, walls
+from .gel_scene import change_numbers, gel_shape, lamps, plugin_names, walls
 from .led_integrator import DIRECTIONS, bounced, direct, register
 from .surroundings import NOTHING, Surroundings
 from .tracer import MOST_MISSED
@@ -68,7 +68,7 @@ class GelLight:
         """
         mi = activate(LLVM)
         mesh = GelMesh(unit.camera, self.preset.spacing)
-        same = kinds(unit) == kinds(self.unit) and unit.camera.shape == self.unit.camera.shape
+        same = plugin_names(unit) == plugin_names(self.unit) and unit.camera.shape == self.unit.camera.shape
         if self.preset.paths or not same or mesh.faces.shape != self._mesh.faces.shape:
             raise TactileError("scene", "another kind of unit", "other numbers alone", "Make a new scene")
         self.unit, self._mesh = unit, mesh

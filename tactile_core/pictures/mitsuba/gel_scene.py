@@ -80,7 +80,7 @@ def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[f
     }  # fmt: skip
 
 
-def kinds(unit: Calibration) -> list[str]:
+def plugin_names(unit: Calibration) -> list[str]:
     """Plugins of the coating and of each LED."""
     return [unit.coating.bsdf, *(lamp["type"] for lamp in lamps(unit).values())]
 
