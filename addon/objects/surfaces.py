@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import bpy
 import numpy as np
 
+_SHARP = math.radians(30)  # between faces that meet in an edge
+
 
 def new_mesh_object(name: str, nodes: np.ndarray, faces: np.ndarray, smooth: bool = True) -> bpy.types.Object:
-    """An object, in no collection yet, of nodes (n, 3) in Blender units and triangles (m, 3)."""
+    """An object, in no collection yet, of nodes (n, 3) in Blender units and triangles (m, 3).
+
+    smooth : all over; else edges stay sharp where faces meet at more than 30 degrees
+    """
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(nodes))
     mesh.vertices.foreach_set("co", np.ascontiguousarray(nodes, np.float32).ravel())
@@ -15,10 +22,11 @@ def new_mesh_object(name: str, nodes: np.ndarray, faces: np.ndarray, smooth: boo
     mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(faces, np.int32).ravel())
     mesh.polygons.add(len(faces))
     mesh.polygons.foreach_set("loop_start", np.arange(0, faces.size, 3, dtype=np.int32))
-    if smooth:
-        mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
     mesh.update(calc_edges=True)
     mesh.validate()
+    if not smooth:
+        mesh.set_sharp_from_angle(angle=_SHARP)
     return bpy.data.objects.new(name, mesh)
 
 

@@ -11,7 +11,7 @@ import bpy
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-CONTACTS, EFFORT = 80, 0.01  # enough for each stage to run, not for a translation to be good
+CONTACTS, EFFORT = 200, 0.01  # enough for each stage to run, not for a translation to be good
 
 
 @pytest.fixture
