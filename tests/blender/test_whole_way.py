@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import runpy
 import subprocess
 import sys
@@ -51,8 +52,8 @@ def test_an_exported_scene_is_paired(authored, tactile, part):
     assert len(pairs.force) == 2 and (pairs.depth_digit > 0).all()
 
 
+@pytest.mark.skipif(importlib.util.find_spec("torch") is None, reason="torch is missing")
 def test_what_was_paired_is_trained_translated_and_drawn(authored, tactile):
-    pytest.importorskip("torch")
     pytest.importorskip("matplotlib")
     pairs, weights = authored / "pairs.h5", authored / "trained" / "weights"
     tactile("pairs", authored / "press" / "scene.toml", "--count", CONTACTS, "--out", pairs)
