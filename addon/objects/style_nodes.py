@@ -43,7 +43,7 @@ def input_of(tree: bpy.types.NodeTree, name: str) -> str:
 
 
 def input_property(modifier: bpy.types.NodesModifier, name: str) -> tuple[bpy.types.bpy_struct, str]:
-    """What holds the value of a group's input in a modifier, and its name there, as layouts take them.
+    """Return what holds the value of a group's input in a modifier, and its name there, as layouts take them.
 
     Blender 5.2 holds inputs as properties, not by their keys.
     """

@@ -52,7 +52,7 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
 
 
 def _exaggeration(layout: bpy.types.UILayout, sensor: bpy.types.Object | None) -> None:
-    """How many times a sensor's style draws its dent: an input of the style's modifier."""
+    """Draw how many times a sensor's style enlarges its dent: an input of the style's modifier."""
     modifier = sensor.modifiers.get(styles.MODIFIER) if sensor is not None else None
     if modifier is None or modifier.node_group is None:
         return

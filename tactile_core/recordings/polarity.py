@@ -109,10 +109,15 @@ def likeness(changes: np.ndarray) -> float:
     return float((unit(changes) @ patterns().T).max(axis=1).mean())
 
 
+def contact_signals() -> np.ndarray:
+    """Load the changes (P, 19) float64 counts of simulated contacts, as raw readings have them."""
+    return np.load(shipped(PATTERNS), allow_pickle=False).astype(np.float64)
+
+
 @functools.cache
 def patterns() -> np.ndarray:
-    """Unit vectors (P, 19) of simulated contacts, in the networks' scale."""
-    return unit(np.load(shipped(PATTERNS), allow_pickle=False).astype(np.float64))
+    """Return unit vectors (P, 19) of simulated contacts, in the networks' scale."""
+    return unit(contact_signals())
 
 
 def unit(changes: np.ndarray) -> np.ndarray:

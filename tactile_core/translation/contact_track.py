@@ -27,11 +27,13 @@ from .networks import COMPRESSED_LIMIT, LEAST_FORCE, Posterior, touches
 # gains off).
 STEP = np.array([0.045, 0.045, 0.6, 0.6])
 # Of rectified signals, whose places err by more and together: their steps of place are that much shorter (chosen on
-# sample 7 of the slides: rank of force .905 to .926, spread of place along the finger .71 to .51 mm).
+# sample 7 of the slides with the weights before these: rank of force .905 to .926, spread of place along the finger
+# .71 to .51 mm).
 RECTIFIED_STEP = 0.3
 # Standard deviations of the logarithm of force over the signals' size: of its change in 10 ms, and of a frame's
-# estimate (chosen on scenes/training/test_sequences.npz: force 8.6 % to 7.8 %, .02 to .3 and .05 to .2 within .3).
-# Within a simulated press force goes with size to the power .98 (50,000 pairs), so that no lag comes of it.
+# estimate (chosen on scenes/training/test_sequences.npz with the weights before these: force 8.6 % to 7.8 %; from .05
+# to .15, and .2 for the second, within .1). Within a simulated press force goes with size to the power .98 (50,000
+# pairs), so that no lag comes of it. A first ratio is left as free as a place that may be anywhere.
 RATIO_STEP, RATIO_NOISE = 0.05, 0.1
 LEAST_SIZE = 0.1  # counts, below any reading's noise: a logarithm's floor
 FRAME = 0.01  # s

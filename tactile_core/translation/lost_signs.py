@@ -12,13 +12,13 @@ import functools
 
 import numpy as np
 
-from ..files.shipped import shipped
-from ..recordings.polarity import PATTERNS
+from ..recordings.polarity import contact_signals
 from .networks import compress
 
 # Of the size of a signal on the networks' scale, the most that the nearest simulated one may leave of it. Chosen on
-# sample 7 of the slides (2 frames in 1,000 within): at .25 the rank of force stays .908 (quartile .879), at .28 the
-# quartile falls to .86, at .33 to .81. Of the test contacts half are within, of those from 0.3 mm two in three.
+# sample 7 of the slides (2 frames in 1,000 within): at .25 the rank of force stays .908 (quartile .879); with a fifth
+# of the posterior left to R2MPN the quartile falls to .86 at .28, to .81 at .33. Of the test contacts half are within,
+# of those from 0.3 mm two in three.
 LEFT = 0.25
 
 
@@ -42,6 +42,6 @@ def recovered(change: np.ndarray, rectified: np.ndarray) -> tuple[np.ndarray, np
 
 @functools.cache
 def _patterns() -> tuple[np.ndarray, np.ndarray]:
-    """Sizes (P, 19) of simulated contacts' changes on the networks' scale, and their signs."""
-    patterns = np.load(shipped(PATTERNS), allow_pickle=False).astype(np.float32)
+    """Return sizes (P, 19) of simulated contacts' changes on the networks' scale, and their signs."""
+    patterns = contact_signals()
     return compress(np.abs(patterns)), np.where(patterns > 0, np.float32(1), np.float32(-1))

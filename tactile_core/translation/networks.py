@@ -165,10 +165,6 @@ class Networks:
         size = self.sizes["SVB"]["latent"]
         return self._blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
 
-    def s2m(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Map latent_signal (T, K), rectified (T,) or one, to latent_biotac (T, L) of the most plausible contact."""
-        return self.given(latent_signal, self.contact(latent_signal, rectified), rectified)
-
     def contact(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Map latent_signal (T, K), rectified (T,) or one, to the state (T, STATE) of the most plausible contact."""
         return self.posterior(latent_signal, rectified).likely

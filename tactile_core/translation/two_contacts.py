@@ -13,8 +13,7 @@ import functools
 
 import numpy as np
 
-from ..files.shipped import shipped
-from ..recordings.polarity import PATTERNS, TOUCHING
+from ..recordings.polarity import TOUCHING, contact_signals
 
 # Shares of the signal's length: what two contacts leave at most, and how much more one leaves. Chosen on 4,000 contacts
 # of training pairs and sums of two: 1 % of the contacts are marked, and a third of the sums.
@@ -57,6 +56,6 @@ def left(signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @functools.cache
 def _patterns() -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors (P, 19) of simulated contacts, and their cosines (P, P)."""
-    patterns = np.load(shipped(PATTERNS), allow_pickle=False).astype(np.float64)
+    patterns = contact_signals()
     patterns /= np.linalg.norm(patterns, axis=1, keepdims=True)
     return patterns, patterns @ patterns.T

@@ -114,8 +114,10 @@ def test_maps(model, nets):
     biotac, digit = (torch.from_numpy(latent(nets.sizes[net]["latent"])) for net in ("MVB", "MVD"))
     rectified = np.arange(len(latent(16))) % 3 == 0
     signed, folded = (net(torch.from_numpy(latent(16))) for net in (model.S2MPN, model.R2MPN))
-    same(nets.s2m(latent(16)), signed)
-    same(nets.s2m(latent(16), rectified), torch.where(torch.from_numpy(rectified)[:, None], folded, signed))
+    same(nets.likely_latents(latent(16))[0], signed)
+    same(
+        nets.likely_latents(latent(16), rectified)[0], torch.where(torch.from_numpy(rectified)[:, None], folded, signed)
+    )
     same(nets.m2m(biotac.numpy()), model.across(biotac))
     state = latent(4)[:40]
     both = torch.from_numpy(state), biotac[:40]
@@ -141,7 +143,7 @@ def test_the_answer_lies_among_the_components_of_the_heaviest_place(model, nets)
     z = latent(16)
     found = nets.posterior(z)
     same(found.likely, model.S2MPN.contact(torch.from_numpy(z)))
-    same(nets.s2m(z), model.S2MPN.given(*(torch.from_numpy(each) for each in (z, found.likely))))
+    same(nets.likely_latents(z)[0], model.S2MPN.given(*(torch.from_numpy(each) for each in (z, found.likely))))
 
 
 def test_posterior(model, nets):

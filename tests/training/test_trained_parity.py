@@ -71,7 +71,7 @@ def test_the_chain(nets, change, rectified):
     change = -np.abs(change) if rectified else change
     latent = nets.encode_signal(change, rectified)
     same(latent, svb.mean(modules.compress(torch.from_numpy(np.concatenate([change, told], -1)))))
-    biotac = nets.s2m(latent, rectified)
+    biotac, _ = nets.likely_latents(latent, rectified)
     same(biotac, posterior(nets, "R2MPN" if rectified else "S2MPN")(torch.from_numpy(latent)))
     digit = nets.m2m(biotac)
     same(digit, residual(nets, "M2MPN")(placed(nets, "MVB", biotac)))

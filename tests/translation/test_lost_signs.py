@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
-from tactile_core.files.shipped import shipped
-from tactile_core.recordings.polarity import PATTERNS
+from tactile_core.recordings.polarity import contact_signals
 from tactile_core.translation.lost_signs import recovered
 
 
 @pytest.fixture(scope="module")
 def contacts():
     """Simulated contacts of 60 counts and more: a fortieth of noise turns no sign that matters."""
-    patterns = np.load(shipped(PATTERNS)).astype(np.float32)
+    patterns = contact_signals()
     return patterns[np.abs(patterns).max(1) > 60]
 
 

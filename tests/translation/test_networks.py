@@ -76,7 +76,7 @@ def calls(nets, count):
     return {
         "encode_signal": (nets.encode_signal, change, (8,)),
         "decode_signal": (nets.decode_signal, latents[8], (19,)),
-        "s2m": (nets.s2m, latents[8], (6,)),
+        "likely_latents": (lambda z: nets.likely_latents(z)[0], latents[8], (6,)),
         "contact": (nets.contact, latents[8], (4,)),
         "m2m": (nets.m2m, latents[6], (7,)),
         "decode_biotac": (nets.decode_biotac, latents[6], (NODES["biotac"], 3)),
