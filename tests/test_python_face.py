@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import pydoc
 import subprocess
 import sys
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 
 import tactile_core as tactile
+from tactile_core.files.installed import advice
 from tactile_core.sensors import digit_surface
 
 ROOT = Path(__file__).parent.parent
@@ -48,6 +51,61 @@ def test_types_ship_with_the_package():
     assert (ROOT / "tactile_core" / "py.typed").exists()
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert "py.typed" in project["tool"]["setuptools"]["package-data"]["tactile_core"]
+
+
+WITHOUT_EXTRAS = """
+import json, sys, types
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {extras!r}:
+            raise ModuleNotFoundError("No module named " + repr(name), name=name)
+
+sys.meta_path.insert(0, Blocker())
+import numpy as np, tactile_core as tactile
+from tactile_core.jobs.gel_observation import observation_space
+
+ball, place = tactile.indenters.Sphere(3e-3), tactile.Placement(-6e-3, 0.0)
+body = types.SimpleNamespace(vertices=4e-3 * np.eye(4)[:, :3], faces=[[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]])
+notes = {{}}
+for extra, call in (
+    ("fem", lambda: tactile.solve("digit", ball, place, force=1.0)),
+    ("fem", lambda: tactile.Gel("digit", ball)),
+    ("fem", lambda: tactile.indenters.MeshIndenter.from_trimesh(body)),
+    ("fem", lambda: tactile.indenters.MeshIndenter.from_file({mesh!r})),
+    ("render", lambda: tactile.Renderer()),
+    ("render", lambda: tactile.Renderer(preset="quality")),
+    ("ros", lambda: tactile.read({bag!r})),
+    ("mujoco", lambda: observation_space(np.zeros((2, 2)))),
+):
+    try:
+        call()
+        notes.setdefault(extra, []).append("no error")
+    except ModuleNotFoundError as error:
+        notes.setdefault(extra, []).append(" ".join(getattr(error, "__notes__", ["no note"])))
+print(json.dumps(notes))
+"""
+
+
+def test_without_extras_each_public_name_says_how_to_install_its_own(tmp_path):
+    bag = tmp_path / "touch.bag"
+    bag.write_text("#ROSBAG V2.0\n", encoding="utf-8")
+    extras = {"scipy", "trimesh", "mitsuba", "drjit", "rosbags", "mujoco", "gymnasium"}
+    mesh = str(ROOT / "scenes" / "user_mesh" / "star.stl")
+    code = WITHOUT_EXTRAS.format(extras=extras, bag=str(bag), mesh=mesh)
+    environment = {**os.environ, "TACTILE_CACHE": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    for extra, notes in json.loads(done.stdout).items():
+        assert set(notes) == {f"Install it: {advice(extra)}"}, extra
+
+
+def test_an_unknown_preset_is_refused_before_mitsuba_is_looked_for(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mitsuba", None)
+    with pytest.raises(tactile.TactileError, match="'best'; expected one of fast, standard"):
+        tactile.Renderer(preset="best")
 
 
 def test_five_lines_from_a_csv_to_pictures(slide_csv):

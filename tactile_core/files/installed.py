@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 PACKAGE = "tactile-core"
@@ -28,6 +29,13 @@ def needing(extra: str) -> Iterator[None]:
     except ModuleNotFoundError as error:
         error.add_note(f"Install it: {advice(extra)}")
         raise
+
+
+def require(extra: str, library: str) -> None:
+    """Raise the same error at once where a library of the extra is missing, before any work is done."""
+    with needing(extra):
+        if find_spec(library) is None:
+            raise ModuleNotFoundError(f"No module named {library!r}", name=library)
 
 
 def libraries(extra: str) -> list[str]:

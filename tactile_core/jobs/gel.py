@@ -18,6 +18,7 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
+from ..files.installed import require
 from ..geometry.indenters import Indenter, MeshIndenter, Pose
 from ..geometry.indenters.rigid_pose import rigid_pose
 from ..mechanics.fast.active_set import UnsolvedError
@@ -91,7 +92,8 @@ class Gel:
     indenter : one of ``geometry.indenters``, or a closed ``trimesh.Trimesh`` in metres
     friction : Coulomb's coefficient; 0 for none
     calibration : of the camera and its lights, None for the one that ships; preset : of the pictures
-    Raises TactileError for another sensor, and for meshes and values that no indenter can have.
+    Raises TactileError for another sensor, and for meshes and values that no indenter can have; ModuleNotFoundError
+    without the extra [fem], and without [render] for presets other than ``fast``.
     """
 
     def __init__(
@@ -105,6 +107,9 @@ class Gel:
     ) -> None:
         if preset not in NAMES:
             raise TactileError("Gel, preset", repr(preset), f"one of {', '.join(NAMES)}")
+        require("fem", "scipy")
+        if preset != FAST:
+            require("render", "mitsuba")
         self.sensor, self.preset = sensor, preset
         self.friction = _not_negative(friction, "Gel, friction", "a coefficient of zero or more")
         self.indenter: Indenter = indenter if _presses(indenter) else MeshIndenter.from_trimesh(indenter)

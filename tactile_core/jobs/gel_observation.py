@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..files.installed import needing
 from ..sensors.calibration_file import load_calibration
 from .gel import Gel
 
@@ -35,7 +36,8 @@ def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str,
 
 def observation_space(markers: np.ndarray, *, picture: bool = True) -> Any:
     """The ``gymnasium.spaces.Dict`` of ``observe``. Raises ModuleNotFoundError without the extra [mujoco]."""
-    from gymnasium.spaces import Box, Dict
+    with needing("mujoco"):
+        from gymnasium.spaces import Box, Dict
 
     camera = load_calibration().camera
     spaces = {

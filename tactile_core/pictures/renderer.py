@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.compiled import available
+from ..files.installed import needing
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from .background import correction, resting_picture
@@ -51,7 +52,7 @@ class Renderer:
     rest : (H, W) heights of the undeformed gel, m; None for the calibration's, whose dome is then applied to heights
     seed : seed of ``reference``'s random samples; the other presets draw none
     Raises TactileError for an unknown preset, arrays of another shape, values that are not finite, and a gel that
-    reaches an LED or the camera; ModuleNotFoundError where mitsuba is missing.
+    reaches an LED or the camera; ModuleNotFoundError without the extra [render], which all presets but ``fast`` need.
 
     >>> renderer = tactile.Renderer(preset="fast")
     >>> pictures = renderer.render(touch.displacement_digit)   # (T, 320, 240, 3) uint8
@@ -80,8 +81,9 @@ class Renderer:
             self.variant = None
             self._light: Light = Shader(calibration, rest=resting)
         else:
-            self.variant = choose_variant(variant).name
             chosen = preset_named(preset)
+            with needing("render"):
+                self.variant = choose_variant(variant).name
             if self.variant == LLVM:
                 self._light = GelLight(calibration, chosen, resting, seed, surroundings)
             else:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..files import outside
+from ..files import installed, outside
 from ..sensors import ELECTRODES
 from .array_store import damage_reported
 from .assemble import MAX_FRAMES, assemble, check_electrodes
@@ -56,11 +56,14 @@ def kind_of(start: bytes) -> str | None:
 
 @contextmanager
 def open_bag(path: str) -> Iterator[Bag]:
-    """Open for reading; raises TactileError for damage, and for a ROS 2 bag that is compressed file by file."""
-    from rosbags.rosbag1 import Reader as Reader1
-    from rosbags.rosbag2 import Reader as Reader2
-    from rosbags.rosbag2.storage_mcap import McapReader
-    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+    """Open for reading; raises TactileError for damage, and for a ROS 2 bag that is compressed file by file,
+    ModuleNotFoundError without the extra [ros].
+    """
+    with installed.needing("ros"):
+        from rosbags.rosbag1 import Reader as Reader1
+        from rosbags.rosbag2 import Reader as Reader2
+        from rosbags.rosbag2.storage_mcap import McapReader
+        from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
     _bound_unpacking()
     path, finger = split(path)

@@ -17,6 +17,7 @@ import numpy as np
 from ...errors import TactileError
 from ...files import array_cache
 from ...files.cache import cache_folder
+from ...files.installed import needing
 from . import mesh_file, mesh_grid
 from .indenter import Indenter
 from .spline_grid import SplineGrid
@@ -47,6 +48,7 @@ class MeshIndenter(Indenter):
     error: tuple[float, float]
 
     @classmethod
+    @needing("fem")
     def from_file(
         cls, path: str | os.PathLike, scale: float = 1e-3, up: str = "z", spacing: float = 0.1e-3
     ) -> MeshIndenter:
@@ -55,7 +57,8 @@ class MeshIndenter(Indenter):
 
         scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
         spacing : m, of the grid; the body's lowest point, or the middle of its lowest flat, becomes the own origin.
-            Raises TactileError for anything that is no closed, outward, uncrossed surface of an indenter's size.
+            Raises TactileError for anything that is no closed, outward, uncrossed surface of an indenter's size;
+            ModuleNotFoundError without the extra [fem].
         """
         _check(path, scale, up, spacing)
         content = mesh_file.read_bytes(path)
@@ -64,6 +67,7 @@ class MeshIndenter(Indenter):
         return cls._cached(digest, lambda: mesh_file.solid(content, path, scale, up), path, spacing)
 
     @classmethod
+    @needing("fem")
     def from_trimesh(cls, mesh: Any, spacing: float | None = None) -> MeshIndenter:
         """Take a ``trimesh.Trimesh``, metres, in its own frame; its grid is built once and cached on disk by its hash.
 
