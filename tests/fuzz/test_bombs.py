@@ -1,241 +1,33 @@
-"""Files that ask for far more than they hold: each loader says no, within the memory that stands here.
-
-Each is read in a child process that may take BOUND more than it has; what it says comes back through a pipe.
-"""
+"""Files that ask for far more than they hold: each loader says no, within the memory of ``bounded_child``."""
 
 from __future__ import annotations
 
 import io
 import json
-import os
-import resource
 import struct
 import zipfile
 import zlib
-from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from benchmarks.isaac import tet_file
 
 from tactile_core import recordings
-from tactile_core.errors import TactileError
-from tactile_core.files import array_pack, hdf5_free_lists
 from tactile_core.files.text_file import MOST
 from tactile_core.geometry.indenters import mesh_file
-from tactile_core.jobs import prepared_signals
 from tactile_core.jobs.engine import dask_cluster, inputs
 from tactile_core.jobs.gel_frames import read_frames
 from tactile_core.pictures.background import read_photograph
 from tactile_core.pictures.shading import Shader
-from tactile_core.recordings import chunks, electrode_gains
+from tactile_core.recordings import electrode_gains
 from tactile_core.sensors.calibration_file import SHIPPED, load_calibration
-from tactile_core.simulation import pairs_file, scene
+from tactile_core.simulation import scene
 from tactile_core.translation import weights
 
-pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows limits no process's memory")
-BOUND = 512 * 2**20  # bytes beyond what the process has: two unpacked chunks of HDF5 of the largest size that is taken
-SECONDS = 20  # of CPU time: the longest takes 3
+pytest.importorskip("resource", reason="Windows limits no process's memory")
+from bounded_child import prepare, refused, report_of
+
 MANY = 10_000_000
-
-
-def told_by_child(load, path) -> str:
-    """What a loader says of a file under BOUND; anything but a TactileError fails."""
-    reader, writer = os.pipe()
-    child = os.fork()
-    if child == 0:
-        said = "no word"
-        try:
-            size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-            resource.setrlimit(resource.RLIMIT_AS, (size + BOUND, resource.RLIM_INFINITY))
-            resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-            load(path)
-            said = "read"
-        except TactileError as error:
-            said = f"told: {error}"
-        except BaseException as error:
-            said = f"{type(error).__name__}: {error}"
-        finally:
-            os.write(writer, said.encode(errors="replace")[:60_000])
-            os._exit(0)
-    os.close(writer)
-    with open(reader, "rb") as pipe:
-        said = pipe.read().decode()
-    status = os.waitpid(child, 0)[1]
-    assert status == 0, f"ended by {status}"
-    return said
-
-
-def prepare(path):
-    for part in chunks.read_parts(path):
-        recordings.prepare(part.recording)
-
-
-def refused(load, path, words):
-    said = told_by_child(load, path)
-    assert said.startswith("told: ") and words in said and len(said) < 1000, said
-    assert "MemoryError" not in said and "machine's memory" not in said, f"only the limit stopped it: {said}"
-
-
-def electrodes(path, **more):
-    with h5py.File(path, "w") as file:
-        return file.create_dataset("electrode_vals/data", **more).id
-
-
-def huge_shape(path):
-    electrodes(path, shape=(10**12, 19), dtype="f8", chunks=(1000, 19))
-
-
-def many_frames_of_nothing(path):
-    """Under the limit of frames and bytes, none of them stored."""
-    electrodes(path, shape=(4_000_000, 19), dtype="i2", chunks=(1000, 19))
-
-
-def huge_chunk(path):
-    electrodes(path, shape=(10**7, 19), dtype="f8", chunks=(10**7, 19), compression="gzip")
-
-
-def packed_zeros(count: int) -> bytes:
-    """A deflate stream of zeros: a stretch of 16 MB, again and again."""
-    stretch = zlib.compressobj(9, zlib.DEFLATED, -15)
-    again = stretch.compress(bytes(2**24)) + stretch.flush(zlib.Z_FULL_FLUSH)
-    return b"\x78\xda" + again * (count // 2**24)
-
-
-PACKED = packed_zeros(2 * BOUND)
-
-
-def chunk_bomb(path):
-    """A chunk of 4 MB by its declaration that unpacks to twice BOUND."""
-    with h5py.File(path, "w") as file:
-        data = file.create_dataset("electrode_vals/data", (27_000, 19), "f8", chunks=(27_000, 19), compression="gzip")
-        data.id.write_direct_chunk((0, 0), PACKED)
-
-
-def external_storage(path):
-    electrodes(path, shape=(60, 19), dtype="u1", external=[("/etc/passwd", 0, 60 * 19)])
-
-
-def external_link(path):
-    with h5py.File(path, "w") as file:
-        file["electrode_vals/data"] = h5py.ExternalLink("/etc/hostname", "/x")
-
-
-def virtual_storage(path):
-    layout = h5py.VirtualLayout((60, 19), "f8")
-    layout[:] = h5py.VirtualSource("other.h5", "x", (60, 19))
-    with h5py.File(path, "w") as file:
-        file.create_virtual_dataset("electrode_vals/data", layout)
-
-
-def strange_filter(path):
-    electrodes(path, shape=(60, 19), dtype="i4", chunks=(60, 19), scaleoffset=0)
-
-
-def driver_information(path):
-    """Of 4 GB, it says; the address of where it says so is the superblock's fourth."""
-    electrodes(path, shape=(60, 19), dtype="f8")
-    with open(path, "r+b") as file:
-        end = file.seek(0, os.SEEK_END)
-        file.write(struct.pack("<B3xI8s", 0, 2**32 - 17, b"NCSAfami") + bytes(64))
-        file.seek(24 + 3 * 8)
-        assert file.read(8) == b"\xff" * 8
-        file.seek(24 + 3 * 8)
-        file.write(struct.pack("<Q", end))
-
-
-def endless_list(path):
-    """A group's heap whose first free place names itself as the next."""
-    electrodes(path, data=np.zeros((60, 19)))
-    with open(path, "r+b") as file:
-        content = file.read()
-        heap = content.index(b"HEAP")
-        _, first, address = struct.unpack_from("<3Q", content, heap + 8)
-        assert struct.unpack_from("<Q", content, address + first)[0] == hdf5_free_lists.END
-        file.seek(address + first)
-        file.write(struct.pack("<Q", first))
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (endless_list, "a list of free places without end"),
-        (driver_information, "a driver's information"),
-        (huge_shape, "GB in memory"), (huge_chunk, "chunks of 1450 MB"), (chunk_bomb, "unpacks to more than"),
-        (external_storage, "other files"), (external_link, "a link to another file"), (virtual_storage, "other files"),
-        (strange_filter, "HDF5 filter 6"),
-    ],
-)  # fmt: skip
-@pytest.mark.parametrize(
-    "load",
-    [
-        prepare, pairs_file.read_pairs, array_pack.read,
-    ],
-)  # fmt: skip
-def test_hdf5(make, words, load, tmp_path):
-    make(tmp_path / "a.h5")
-    if make is huge_shape and load is not prepare:
-        words = ""  # told of its names first
-    elif make is huge_shape:
-        words = "0 stored bytes"
-    refused(load, tmp_path / "a.h5", words)
-
-
-def test_groups_within_groups(tmp_path):
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        group = file
-        for _ in range(3000):
-            group = group.create_group("g")
-    for load in (prepare, pairs_file.read_pairs, array_pack.read):
-        refused(load, tmp_path / "a.h5", "deep")
-
-
-SPOILED = {
-    "change": [
-        ({"shape": (8, 19), "compression": "gzip"}, "packed values"),
-        ({"shape": (8, 19), "external": [("/etc/passwd", 0, 1216)]}, "no plain numbers"),
-        ({"shape": (8, 19), "chunks": (10**6, 19), "maxshape": (None, 19)}, "chunks of shape"),
-        ({"shape": (8, 10**6)}, "change of shape"),
-    ],
-    "about": [({"shape": (10**12,), "chunks": (1000,)}, "stored bytes")],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("name", "options", "words"), [(name, *one) for name, several in SPOILED.items() for one in several]
-)
-def test_prepared_recordings_are_plain(name, options, words, tmp_path):
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        for column, kind in prepared_signals.COLUMNS.items():
-            file[column] = np.zeros((8, 19) if column in ("change", "electrodes") else 8, kind)
-        file["part"], file["rest"], file["about"] = np.zeros(1, int), np.zeros((1, 19)), np.zeros(2, np.uint8)
-        del file[name]
-        file.create_dataset(name, dtype=np.uint8 if name == "about" else float, **options)
-    refused(rows_of, tmp_path / "a.h5", words)
-
-
-@pytest.mark.parametrize(("make", "words"), [(endless_list, "without end"), (driver_information, "a driver's")])
-def test_prepared_recordings_are_looked_at_first(make, words, tmp_path):
-    make(tmp_path / "a.h5")
-    refused(rows_of, tmp_path / "a.h5", words)
-
-
-def rows_of(path):
-    prepared_signals.Prepared(path).rows(0, 4)
-
-
-def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
-    many_frames_of_nothing(tmp_path / "a.h5")
-    said = told_by_child(prepare, tmp_path / "a.h5")
-    assert said.startswith("told: "), said
-    with h5py.File(tmp_path / "b.h5", "w") as file:
-        words = dict.fromkeys(pairs_file.ATTRIBUTES, "x") | {"polarity": "falls", "electrodes": "sheet"}
-        file.attrs.update(words, format=pairs_file.FORMAT)
-        file.create_dataset("displacement_biotac", (10**6, 5000, 3), "i2", chunks=(1, 5000, 3))
-        for name in set(pairs_file.DATASETS) - {"displacement_biotac"}:
-            file[name] = np.zeros(1)
-    refused(pairs_file.read_pairs, tmp_path / "b.h5", "stored bytes")
 
 
 def npy(shape, header=None) -> bytes:
@@ -273,7 +65,7 @@ def long_header():
 def test_npz(content, words, tmp_path):
     archive(tmp_path / "a.npz", content)
     if words is None:
-        assert told_by_child(prepare, tmp_path / "a.npz") == "read"
+        assert report_of(prepare, tmp_path / "a.npz") == "read"
         return
     for load in (prepare, read_frames):
         refused(load, tmp_path / "a.npz", words if load is prepare else "")
