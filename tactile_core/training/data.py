@@ -11,7 +11,7 @@ from torch import Tensor
 from ..sensors import ELECTRODES
 from ..simulation.pairs_file import Pairs, Split
 from ..translation.contact_frame import ContactFrame
-from ..translation.networks import DEPTH_SCALE, FORCE_SCALE
+from ..translation.posterior import DEPTH_SCALE, FORCE_SCALE
 from .mirror_augmentation import across, image_of_electrodes
 from .noise_model import measured
 from .options import Options

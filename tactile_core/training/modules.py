@@ -11,7 +11,8 @@ from torch import Tensor, nn
 from ..sensors import ELECTRODES
 from ..translation.layers import NORM_EPSILON
 from ..translation.network_sizes import PLACE, SIGNAL_HIDDEN, STATE
-from ..translation.networks import COUNT_SCALE, LEAST_FORCE, LEAST_SPREAD, MEAN_SHIFTS, SPREAD_LIMITS
+from ..translation.networks import COUNT_SCALE, LEAST_SPREAD, SPREAD_LIMITS
+from ..translation.posterior import LEAST_FORCE, MEAN_SHIFTS
 from .surface_codec import SurfaceCodec
 
 

@@ -11,7 +11,8 @@ from torch import Tensor, nn
 
 from ..sensors import ELECTRODES
 from ..translation.network_sizes import ERROR_FEATURES, PLACE, SURFACES
-from ..translation.networks import ERROR_UNIT, FORCE_SCALE, PRESSURE_SCALE
+from ..translation.networks import ERROR_UNIT, PRESSURE_SCALE
+from ..translation.posterior import FORCE_SCALE
 from .data import Batch, Contacts
 from .modules import ContactPosterior, MeshVae, Residual, compress, initialise, signal_vae
 from .options import Options

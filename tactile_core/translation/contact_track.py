@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .network_sizes import PLACE, STATE
-from .networks import COMPRESSED_LIMIT, LEAST_FORCE, Posterior, touches
+from .networks import COMPRESSED_LIMIT
+from .posterior import LEAST_FORCE, Posterior, touches
 
 # Standard deviation of what a state changes by in 10 ms. Places are in tens of cells of the gel, 0.4 mm each: 0.18 mm;
 # asinh of force and depth 0.6, which a tap that is over in 50 ms still reaches (chosen on the shipped recording with

@@ -29,17 +29,13 @@ from ..sensors import ELECTRODES
 from .contact_frame import ContactFrame
 from .layers import Tensors, plain, residual
 from .network_sizes import NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, tensor_shapes
+from .posterior import FORCE_SCALE, Posterior
 from .weights import ADVICE, CARD_NAME, read_card, read_verified
 
 Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network
 BLOCK = 64  # frames a block: enough for matrix products at full speed
 COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
-FORCE_SCALE = 0.1  # N: the force is 0.1 N sinh(head), which spans light touches and firm presses alike (assumed)
 COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
-DEPTH_SCALE = 20e-6  # m, likewise, of the depth in a contact's state (assumed)
-# Of a contact's state, below which nothing touches: half the force of the lightest contact that training knows, 0.06 N.
-LEAST_FORCE = float(np.arcsinh(0.03 / FORCE_SCALE))
-MEAN_SHIFTS = 3  # the last moves the places of 90 of 100 test contacts by less than 0.02 mm
 # Of a posterior's components, in units of the state: no place is known to .2 cells, no force to 2 % (assumed).
 LEAST_SPREAD = 0.02
 SPREAD_LIMITS = -8.0, 2.0  # of the logarithm of what a network adds to it
@@ -80,58 +76,6 @@ def compress(change: np.ndarray) -> np.ndarray:
 def expand(compressed: np.ndarray) -> np.ndarray:
     """Convert back to counts: inverse of `compress`."""
     return np.sinh(np.clip(compressed, -COMPRESSED_LIMIT, COMPRESSED_LIMIT)) * np.float32(COUNT_SCALE)
-
-
-@dataclass(frozen=True)
-class Posterior:
-    """Posterior of a contact's state given the signals: a mixture of Gaussians.
-
-    A state (STATE,) is the place of the gel's dent, as in the DIGIT's latent, asinh(force / 0.1 N) and asinh(depth of
-    that dent / 20 um); all zero without contact. The gel is flat and its place plain; at the BioTac's tip, where most
-    real contacts lie, the skin's lattice runs together in a pole and a place on it says little.
-    weight : (T, C), their sum one; mean, spread : (T, C, STATE)
-    """
-
-    weight: np.ndarray
-    mean: np.ndarray
-    spread: np.ndarray
-
-    @property
-    def likely(self) -> np.ndarray:
-        """State (T, STATE) float32 of the most plausible contact, not the average of all.
-
-        From the place of the heaviest component the mean shifts (Cheng 1995) over the components that share it: several
-        often describe one contact, and each alone is less certain.
-        """
-        state = self.mean[np.arange(len(self.mean)), self.weight.argmax(-1)]
-        touched = touches(state)
-        for _ in range(MEAN_SHIFTS):
-            state = self.near(state[:, :PLACE], touched)
-        return state.astype(np.float32)
-
-    def near(self, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
-        """Mean (T, STATE) over components, weighted by their density at places (T, PLACE).
-
-        touched : (T,) bool, whether those in contact count or those without: the latter's place is zero, where contacts
-            lie too
-        """
-        spread = self.spread[..., :PLACE].astype(np.float64)
-        far = (place[:, None] - self.mean[..., :PLACE]) / spread
-        share = np.log(np.maximum(self.weight, np.finfo(np.float32).tiny)) - np.log(spread).sum(-1)
-        share = share - 0.5 * np.square(far).sum(-1)
-        share = np.where(touches(self.mean) == touched[:, None], share, -np.inf)
-        share = np.exp(share - share.max(-1, keepdims=True))
-        return (share[..., None] * self.mean).sum(1) / share.sum(-1)[:, None]
-
-    @property
-    def average(self) -> np.ndarray:
-        """Mean (T, STATE) over all components: the least-squares estimate where there is one component."""
-        return (self.weight[..., None] * self.mean).sum(1)
-
-
-def touches(state: np.ndarray) -> np.ndarray:
-    """Mark states (..., STATE) of contacts; others are of no contact."""
-    return state[..., PLACE] >= LEAST_FORCE
 
 
 class Networks:

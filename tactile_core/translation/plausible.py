@@ -6,7 +6,8 @@ import numpy as np
 
 from .gel_place import on_gel
 from .network_sizes import PLACE, STATE
-from .networks import COMPRESSED_LIMIT, FORCE_SCALE, Networks, Posterior, touches
+from .networks import COMPRESSED_LIMIT, Networks
+from .posterior import FORCE_SCALE, Posterior, touches
 
 SEED = 0  # the same recording, the same contacts
 NAMES = "sample_center", "sample_force"

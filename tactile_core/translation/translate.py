@@ -22,7 +22,8 @@ from .contact_track import Evidence, track
 from .error_bounds import KINDS
 from .lost_signs import recovered
 from .network_sizes import PLACE, SURFACES
-from .networks import Networks, Posterior, touches
+from .networks import Networks
+from .posterior import Posterior, touches
 from .two_contacts import two_contacts
 from .weights import ADVICE
 

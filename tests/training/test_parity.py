@@ -15,7 +15,8 @@ from tactile_core.training.stages import Model  # noqa: E402
 from tactile_core.training.surface_codec import SurfaceCodec  # noqa: E402
 from tactile_core.translation.contact_frame import ContactFrame  # noqa: E402
 from tactile_core.translation.network_sizes import NETS, SURFACES  # noqa: E402
-from tactile_core.translation.networks import FORCE_SCALE, Networks, compress  # noqa: E402
+from tactile_core.translation.networks import Networks, compress  # noqa: E402
+from tactile_core.translation.posterior import FORCE_SCALE  # noqa: E402
 
 OPTIONS = Options()
 SHAPES = {"biotac": (30, 28), "digit": (36, 34)}  # smaller lattices: how long a basis is does not matter

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_core.translation.contact_track import Evidence, Follower, Tracked, track
-from tactile_core.translation.networks import touches
+from tactile_core.translation.posterior import touches
 
 SPREAD = np.float32([0.1, 0.1, 0.1, 0.1])  # a cell, and 10 % of a force
 OTHER = np.float32([0.8, -0.6, 0, 0])  # where another contact would answer for the same signals

@@ -11,6 +11,7 @@ from tactile_core import accuracy, recordings, sensors
 from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
 from tactile_core.translation import contact_frame, network_sizes, networks, translate
+from tactile_core.translation.posterior import Posterior
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +151,7 @@ def test_a_place_is_undecided_by_what_lies_elsewhere(translator):
     mean[1:, 1, 0] = 0.25 * rows / contact_frame.PLACE_UNIT  # a quarter of the gel's length away
     mean[2, 1, network_sizes.PLACE] = 0.0  # no contact at all lies nowhere else
     weight = np.tile(np.float32([0.6, 0.4]), (3, 1))
-    posterior = networks.Posterior(weight, mean, np.full_like(mean, 0.1))
+    posterior = Posterior(weight, mean, np.full_like(mean, 0.1))
     np.testing.assert_allclose(translate.elsewhere(posterior, posterior.likely, frame), [0.0, 0.4, 0.0])
 
 

@@ -18,7 +18,8 @@ from tactile_core.training.step_errors import Bodies, Columns, digit_columns, jo
 from tactile_core.translation.gel_place import on_gel
 from tactile_core.translation.lost_signs import recovered
 from tactile_core.translation.network_sizes import PLACE
-from tactile_core.translation.networks import FORCE_SCALE, Networks, Posterior, touches
+from tactile_core.translation.networks import Networks
+from tactile_core.translation.posterior import FORCE_SCALE, Posterior, touches
 
 from .gel_force import carried_force
 

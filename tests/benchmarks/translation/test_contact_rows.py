@@ -9,7 +9,7 @@ import pytest
 from benchmarks.translation import contact_rows
 
 from tactile_core.translation.contact_frame import frame_of
-from tactile_core.translation.networks import Posterior
+from tactile_core.translation.posterior import Posterior
 
 CONTACTS = 400
 
