@@ -20,7 +20,9 @@ from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
 from ..mechanics.electrodes.law import SHEET
 from ..mechanics.fast.compliance import compliance_of
-from ..sensors.descriptor import Fluid, Gel, of_kind
+from ..sensors.descriptor import of_kind
+from ..sensors.fluid_sensor import Fluid
+from ..sensors.gel_sensor import Gel
 from ..simulation.pairs_card import card, card_path
 from ..simulation.pairs_file import SENSORS, merge
 from ..simulation.scene import Scene

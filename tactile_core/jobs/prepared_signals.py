@@ -24,9 +24,10 @@ from ..recordings import PrepareOptions, Recording, Signals, electrode_gains, pr
 from ..recordings.chunks import read_parts
 from ..recordings.fingers import split
 from ..recordings.flags import Flag
-from ..recordings.polarity import AUTO, FALLS
+from ..recordings.polarity import AUTO
 from ..recordings.signals import Rest
 from ..sensors import ELECTRODES
+from ..sensors.fluid_sensor import FALLS
 from .engine import job as jobs
 from .engine.inputs import content_hash
 

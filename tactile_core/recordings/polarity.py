@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..files.shipped import shipped
+from ..sensors.fluid_sensor import FALLS, POLARITIES, RISES
+from .flags import Flag
 
-FALLS, RISES, AUTO = "falls", "rises", "auto"
-POLARITIES = (FALLS, RISES)
+AUTO = "auto"
 PATTERNS = "contact_patterns.npy"  # (P, 19) counts, changes of simulated contacts as raw readings have them
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a change says nothing
 # Counts of PDC, 0.55 kPa, that pressure must swing by. Under a steady grip the electrodes' drift is larger than what
@@ -47,6 +48,39 @@ class Polarity:
     def sign(self) -> float:
         """Return the factor that turns the recording's changes into those of raw readings."""
         return 1.0 if self.name == FALLS else -1.0
+
+    @property
+    def doubt(self) -> Flag | int:
+        """Return the flag of every frame where the polarity is in doubt, else 0."""
+        if self.sure:
+            return 0
+        return Flag.POLARITY_ASSUMED if self._assumed else Flag.POLARITY_DOUBTED
+
+    @property
+    def warnings(self) -> list[str]:
+        """Return a sentence for the user where the polarity is in doubt, else none."""
+        if self.sure:
+            return []
+        if not self._assumed:
+            return [f"polarity {self.name!r} contradicts the recording ({self.evidence})"]
+        advice = "say --polarity rises if they hold rest minus reading"
+        return [f"polarity {self.evidence}. Counts are taken to fall where the film thins, as raw ones do; {advice}"]
+
+    @property
+    def _assumed(self) -> bool:
+        return self.evidence.startswith("assumed")
+
+
+def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
+    """Return the polarity given by the user, else by the file, else the one that the recording shows.
+
+    A stated one is not sure where the recording shows the other; a word that is no polarity states nothing.
+    """
+    for stated, who in ((given, "as given"), (of_file, "as the file says")):
+        if stated in POLARITIES:
+            doubt = shown.sure and shown.name != stated
+            return Polarity(stated, f"{who}; {shown.evidence}" if shown.sure else who, not doubt)
+    return shown
 
 
 def polarity_of(

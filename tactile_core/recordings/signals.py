@@ -10,11 +10,12 @@ import numpy as np
 
 from ..errors import TactileError
 from ..sensors import divider
+from ..sensors.fluid_sensor import FALLS, POLARITIES
 from . import contact_law
 from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
-from .polarity import AUTO, FALLS, POLARITIES, Polarity, polarity_of
+from .polarity import AUTO, Polarity, choose, polarity_of
 from .recording import Recording
 from .repair import fill, find_glitches, is_time_series
 from .rest_level import TARED_PDC, Quiet, baseline, calmest, find_quiet, level, pressure_rest, window_frames
@@ -158,7 +159,8 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     frames = _smoothed_over(options, kind)
     change = smooth(readings - rest, frames)
     polarity = _polarity(recording, readings, change, kind, quiet, options, rest_known=unit_rest is not None)
-    flags |= np.uint16(_doubts(polarity, warnings))
+    flags |= np.uint16(polarity.doubt)
+    warnings += polarity.warnings
     report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope) | {"smoothed_frames": frames}
     report |= {"polarity": polarity.name, "polarity_evidence": polarity.evidence}
     change *= polarity.sign
@@ -227,29 +229,10 @@ def _polarity(
     recording: Recording, readings: np.ndarray, change: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions,
     *, rest_known: bool,
 ) -> Polarity:  # fmt: skip
-    """Return the polarity given by the user, else by the file, else detected in the recording."""
     if kind == "rectified":
         return Polarity(FALLS, "the sign is lost", True)
     shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known)
-    for stated, who in ((options.polarity, "as given"), (recording.about.get("polarity", ""), "as the file says")):
-        if stated in POLARITIES:
-            doubt = shown.sure and shown.name != stated
-            return Polarity(stated, f"{who}; {shown.evidence}" if shown.sure else who, not doubt)
-    return shown
-
-
-def _doubts(polarity: Polarity, warnings: list[str]) -> int:
-    """Return the flag of every frame for a doubtful polarity, with a warning; 0 where nothing is in doubt."""
-    if polarity.sure:
-        return 0
-    if not polarity.evidence.startswith("assumed"):
-        warnings.append(f"polarity {polarity.name!r} contradicts the recording ({polarity.evidence})")
-        return Flag.POLARITY_DOUBTED
-    warnings.append(
-        f"polarity {polarity.evidence}. Counts are taken to fall where the film thins, as raw ones do; say"
-        " --polarity rises if they hold rest minus reading"
-    )
-    return Flag.POLARITY_ASSUMED
+    return choose(shown, options.polarity, recording.about.get("polarity", ""))
 
 
 def _smoothed_over(options: PrepareOptions, kind: str) -> int:

@@ -23,9 +23,9 @@ import numpy as np
 from ..errors import TactileError
 from ..files import atomic
 from ..sensors import COUNT_MAX, ELECTRODES
+from ..sensors.fluid_sensor import FALLS, RISES
 from .array_store import Store, open_hdf5
 from .assemble import assemble
-from .polarity import FALLS, RISES
 from .recording import Recording, Truth
 
 if TYPE_CHECKING:

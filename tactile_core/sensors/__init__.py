@@ -12,8 +12,11 @@ import numpy as np
 from ..errors import TactileError
 from ..geometry.lattice import Lattice
 from . import biotac, digit
-from .descriptor import FALLS, Gel, Material, describe
+from .descriptor import describe
+from .descriptor_fields import Material
 from .electrodes import Places, read_places
+from .fluid_sensor import FALLS
+from .gel_sensor import Gel
 from .gel_shape import shape_of
 
 __all__ = [

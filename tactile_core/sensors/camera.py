@@ -13,7 +13,8 @@ import math
 import numpy as np
 
 from ..errors import TactileError
-from .descriptor import Gel, of_kind
+from .descriptor import of_kind
+from .gel_sensor import Gel
 
 # Plane of height zero, shared frame. Heights grow with y, toward the camera, so that an indentation raises them.
 HEIGHT_ZERO_Y = of_kind("digit", Gel).camera.height_zero_y

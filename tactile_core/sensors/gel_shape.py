@@ -8,7 +8,8 @@ import numpy as np
 
 from ..errors import TactileError
 from ..geometry.lattice import Lattice, grid_faces
-from .descriptor import ROUND, Dome, Gel, of_kind
+from .descriptor import of_kind
+from .gel_sensor import ROUND, Dome, Gel
 from .profiles import read_heights
 
 

@@ -18,7 +18,7 @@ from ..files.hdf5_checked import declared, open_checked
 from ..files.hdf5_writer import Disk
 from ..files.version import __version__
 from ..mechanics.electrodes.law import LAWS, SHEET
-from ..recordings.polarity import FALLS
+from ..sensors.fluid_sensor import FALLS
 
 FORMAT = "tactile-pairs-2"
 ADVICE = "Make the file again with `tactile pairs`"

@@ -9,8 +9,8 @@ import numpy as np
 import torch
 
 from ..files.version import __version__
-from ..recordings.polarity import FALLS
 from ..sensors import ELECTRODES
+from ..sensors.fluid_sensor import FALLS
 from ..translation import reference_signals
 from ..translation.network_sizes import ERROR_FEATURES, NETS, PLACE, POSTERIORS, SURFACES
 from ..translation.networks import Networks, load

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic, outside
-from ..recordings.polarity import FALLS
+from ..sensors.fluid_sensor import FALLS
 
 CARD_NAME = "card.json"
 CARD_FORMAT = "tactile-weights-4"

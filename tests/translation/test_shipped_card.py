@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tactile_core.recordings.polarity import FALLS
+from tactile_core.sensors.fluid_sensor import FALLS
 from tactile_core.translation import networks
 from tactile_core.translation.weights import read_card
 

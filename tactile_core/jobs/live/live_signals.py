@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...recordings.flags import Flag
-from ...recordings.polarity import AUTO, FALLS, POLARITIES, TOUCHING, Polarity, polarity_of
+from ...recordings.polarity import AUTO, TOUCHING, Polarity, polarity_of
 from ...recordings.rest_level import find_quiet, level, window_frames
 from ...recordings.signal_kind import detect
 from ...recordings.signals import Rest, Signals, tare_frames
 from ...sensors import ELECTRODES, SAMPLE_RATE
+from ...sensors.fluid_sensor import FALLS, POLARITIES
 
 if TYPE_CHECKING:
     from ...recordings.electrode_gains import ElectrodeGains

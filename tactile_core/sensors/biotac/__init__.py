@@ -9,7 +9,8 @@ import numpy as np
 from ...errors import TactileError
 from ...geometry.catmull_rom import catmull_rom
 from ...geometry.lattice import Lattice, cap_faces, grid_faces
-from ..descriptor import Fluid, of_kind
+from ..descriptor import of_kind
+from ..fluid_sensor import Fluid
 from ..profiles import read_radii
 
 DESCRIPTOR = of_kind("biotac", Fluid)

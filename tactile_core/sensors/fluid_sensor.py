@@ -1,0 +1,120 @@
+"""What the descriptor of a finger of skin, fluid and core says, as the BioTac's: ``Fluid`` and its tables."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from .descriptor_fields import MOST_NODES, Material, file_beside, number, one_of
+
+FALLS, RISES = POLARITIES = ("falls", "rises")
+
+
+@dataclasses.dataclass(frozen=True)
+class Frame:
+    """The maker's frame in the shared one: x = -x_maker - shift_x m, y = z_maker, z = lateral_sign y_maker."""
+
+    shift_x: float = number("mm")
+    lateral_sign: int = number(above=-2, below=2)
+
+
+@dataclasses.dataclass(frozen=True)
+class Skin:
+    """A skin round an axis along x, from a table of its radii. Lengths in m, angles in rad.
+
+    profile : table of stations x and angles, with the radii of outer skin, inner skin and core
+    axis_y : of the axis (y, z) = (axis_y, 0); tip_x, base_x : between them the skin is a cylinder
+    outer_poles, inner_poles : x where the meridians meet the axis, tip and base
+    pad_half_angle : of the part that unrolls, to either side of the lowest line
+    """
+
+    profile: str = file_beside()
+    axis_y: float = number("mm")
+    tip_x: float = number("mm")
+    base_x: float = number("mm")
+    outer_poles: tuple[float, float] = number("mm")
+    inner_poles: tuple[float, float] = number("mm")
+    pad_half_angle: float = number("deg", above=0, below=180)
+    thickness: float = number("mm", above=0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Core:
+    """The rigid core that holds the skin where it lies on it.
+
+    attached : m, inner points this close to the core are glued to it; base_cap_x : m, from where on all are
+    """
+
+    attached: float = number("mm", above=0)
+    base_cap_x: float = number("mm")
+
+
+@dataclasses.dataclass(frozen=True)
+class SkinLattice:
+    """Node intervals of the skin's surface: along a meridian, and round the axis."""
+
+    tip_rows: int = number(above=1, below=MOST_NODES)
+    trunk_rows: int = number(above=1, below=MOST_NODES)
+    base_rows: int = number(above=1, below=MOST_NODES)
+    pad_intervals: int = number(above=1, below=MOST_NODES)
+    back_intervals: int = number(above=1, below=MOST_NODES)
+
+
+@dataclasses.dataclass(frozen=True)
+class FluidFilm:
+    """The conducting fluid between core and skin.
+
+    conductivity : S/m; interface : ohm, in series with every electrode; thinnest : m, film that is still known
+    """
+
+    conductivity: float = number("s_per_m", above=0)
+    interface: float = number("ohm", above=-1)
+    thinnest: float = number("um", above=0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Electrodes:
+    """The electrodes on the core. places : table of names, places and counts at rest; radius : m"""
+
+    places: str = file_beside()
+    radius: float = number("mm", above=0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Readout:
+    """How counts come about: each electrode in a voltage divider with a load, read by a converter.
+
+    polarity : what counts do where a film thins; pressure : Pa a count of the fluid's pressure
+    """
+
+    bits: int = number(above=0, below=32)
+    rate: float = number("hz", above=0)
+    load: float = number("ohm", above=0)
+    polarity: str = one_of(POLARITIES)
+    pressure: float = number("pa_per_count", above=0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Unrolling:
+    """How the pad rolls onto the common plane. radius : m, of its cross-section; origin_x : m, where both share x"""
+
+    radius: float = number("mm", above=0)
+    origin_x: float = number("mm")
+
+
+@dataclasses.dataclass(frozen=True)
+class Fluid:
+    """A finger of skin, fluid and core with electrodes, as the BioTac. title : its name in words"""
+
+    folder: Path
+    title: str
+    sources: tuple[str, ...]
+    frame: Frame
+    skin: Skin
+    core: Core
+    lattice: SkinLattice
+    material: Material
+    fluid: FluidFilm
+    electrodes: Electrodes
+    readout: Readout
+    unrolling: Unrolling

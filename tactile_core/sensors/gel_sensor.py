@@ -1,0 +1,117 @@
+"""What the descriptor of a gel on a window says, as the DIGIT's: ``Gel`` and its tables."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+from ..errors import TactileError
+from .descriptor_fields import MOST_NODES, Material, file_beside, number, one_of
+
+ROUND, SQUARE = TIPS = ("round", "square")
+
+
+@dataclasses.dataclass(frozen=True)
+class Outline:
+    """The outline of a gel on the plane, even in z. Lengths in m.
+
+    tip : ``"round"``, a half circle of half_width, or ``"square"``; corner_radius : of the corners of square ends
+    """
+
+    half_width: float = number("mm", above=0)
+    tip_x: float = number("mm")
+    base_x: float = number("mm")
+    corner_radius: float = number("mm", above=-1e-9)
+    tip: str = one_of(TIPS)
+
+
+@dataclasses.dataclass(frozen=True)
+class Body:
+    """A gel between its surface and its flat back, which is bonded to a rigid window. Lengths in m.
+
+    thickness : at the apex; edge_drop, edge_width : of the rounded edge
+    """
+
+    back_y: float = number("mm")
+    thickness: float = number("mm", above=0)
+    edge_drop: float = number("mm", above=-1e-9)
+    edge_width: float = number("mm", above=0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Dome:
+    """The height of a gel over its back. profile : table of heights
+
+    degree_along, degree_across : of the polynomials through the table, in x, and in the square of z
+    margin : m, outer edge of the table that is left out
+    """
+
+    profile: str = file_beside()
+    degree_along: int = number(above=-1, below=30)
+    degree_across: int = number(above=-1, below=30)
+    margin: float = number("mm", above=-1e-9)
+
+
+@dataclasses.dataclass(frozen=True)
+class GelLattice:
+    """Nodes of a gel's surface: an even window, m, and how many nodes lead from its edges to the outline."""
+
+    window_x: tuple[float, float] = number("mm")
+    window_z: tuple[float, float] = number("mm")
+    window_nodes: tuple[int, int] = number(above=1, below=MOST_NODES)
+    rim_tip: int = number(above=0, below=MOST_NODES)
+    rim_base: int = number(above=0, below=MOST_NODES)
+    rim_side: int = number(above=0, below=MOST_NODES)
+
+    def __post_init__(self) -> None:
+        """Raise TactileError for an even number of rows or columns, which quadratic cells do not fill."""
+        rows = self.rim_tip + self.window_nodes[0] + self.rim_base
+        columns = self.window_nodes[1] + 2 * self.rim_side
+        if rows % 2 == 0 or columns % 2 == 0:
+            found = f"{rows} rows and {columns} columns of nodes, rims included"
+            raise TactileError("lattice, window_nodes", found, "odd numbers of both")
+
+
+@dataclasses.dataclass(frozen=True)
+class Camera:
+    """What the camera looks at. height_zero_y : m, of the plane whose height is zero in pictures
+
+    calibration : of a unit's camera and lights, see ``calibration_file``; empty where there is none
+    """
+
+    height_zero_y: float = number("mm")
+    calibration: str = file_beside(or_none=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Gel:
+    """A gel on a window that a camera looks through, as the DIGIT. title : its name in words; dome : None for flat"""
+
+    folder: Path
+    title: str
+    sources: tuple[str, ...]
+    outline: Outline
+    body: Body
+    lattice: GelLattice
+    material: Material
+    camera: Camera
+    dome: Dome | None = None
+
+    def __post_init__(self) -> None:
+        """Raise TactileError for a window that does not lie inside the outline, whose mesh would fold."""
+        outline, (low, high) = self.outline, self.lattice.window_z
+        if not outline.tip_x < self.lattice.window_x[0] < self.lattice.window_x[1] < outline.base_x:
+            expected = f"growing, between {1e3 * outline.tip_x:g} and {1e3 * outline.base_x:g} mm"
+            raise TactileError("lattice, window_x_mm", _mm(self.lattice.window_x), expected)
+        straight = outline.half_width - outline.corner_radius  # of a square end
+        if not (low == -high and 0 < high < straight):
+            expected = f"even about 0, below {1e3 * straight:g} mm, half_width_mm less corner_radius_mm"
+            raise TactileError("lattice, window_z_mm", _mm(self.lattice.window_z), expected)
+        beyond = math.hypot(outline.tip_x + outline.half_width - self.lattice.window_x[0], high)
+        if outline.tip == ROUND and beyond >= outline.half_width:
+            raise TactileError("lattice, window_x_mm", _mm(self.lattice.window_x), "corners inside the round tip")
+
+
+def _mm(lengths: tuple[float, ...]) -> str:
+    return f"[{', '.join(f'{1e3 * each:g}' for each in lengths)}]"
