@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..sensors import ELECTRODES, SAMPLE_RATE
+from ..sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
 from .flags import Flag
 from .recording import Recording, Truth
 
@@ -23,6 +24,7 @@ OTHER_RATE = 1.6  # times the usual rate, or a share of it, from which on it is 
 MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 STAMP_UNITS = ((1e17, 1e-9, "nanoseconds"), (1e14, 1e-6, "microseconds"), (1e11, 1e-3, "milliseconds"))  # of unix time
 MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory
+COUNTS = {"biotac": ELECTRODES, "biotac_sp": SP_ELECTRODES}  # of electrodes
 SHOWN = 8  # problems spelled out one by one; more are counted
 
 
@@ -41,16 +43,19 @@ class BadRows(TactileError):
     """Error for more bad rows than a recording may have."""
 
 
-def check_electrodes(path: str, count: int, source: str) -> None:
-    """Raise for any other sensor than the 19-electrode BioTac. source says where the count was seen."""
-    if count == ELECTRODES:
+def check_electrodes(path: str, count: int, source: str, sensor: str = "biotac") -> None:
+    """Raise for another number of electrodes than a sensor has. source says where the count was seen."""
+    wanted = COUNTS[sensor]
+    if count == wanted:
         return
-    if count == 24:
+    if sensor != "biotac":
+        raise TactileError(f"{path}, {source}", f"{count} electrodes", f"the {wanted} electrodes of a BioTac SP")
+    if count == SP_ELECTRODES:
         raise TactileError(
             f"{path}, {source}",
             "24 electrodes: a BioTac SP, for which no weights ship",
             "the 19 electrodes of a BioTac",
-            "Use a recording of one; `tactile info` tells what a CSV file of a BioTac SP holds",
+            "Use a recording of one; `tactile info` and `tactile adapt` take a CSV file of a BioTac SP",
         )
     raise TactileError(
         f"{path}, {source}",
@@ -74,25 +79,29 @@ def assemble(
     about: dict[str, Any] | None = None,
     names: Sequence[str] = (),
     warnings: Sequence[str] = (),
+    sensor: str = "biotac",
+    snapshots: bool = False,
     **channels: np.ndarray | None,
 ) -> Recording:
     """Check the columns and make a Recording of them.
 
     electrodes : (T, 19) float with NaN at bad cells; stamps : (T,) float as in the file, or None: 100 Hz is assumed
-    names : the 19 electrode columns' names in the file; channels : pdc, tac, tdc, pac, position, force
+    names : the electrode columns' names in the file; snapshots : whether frames do not follow each other
+    channels : pdc, tac, tdc, pac, position, force
     Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad.
     """
     frames = len(electrodes)
-    _check_size(path, electrodes)
+    _check_size(path, electrodes, sensor)
     rows = np.arange(frames) if rows is None else rows
-    names = names or [f"E{j + 1}" for j in range(ELECTRODES)]
+    names = names or [f"E{j + 1}" for j in range(electrodes.shape[1])]
     bad = ~((electrodes <= MAX_READING) & (electrodes >= -MAX_READING))  # NaN compares false
     problems = [*problems, *_unreadable(electrodes, bad, names, rows, problems)]
     if bad.any():
         electrodes = np.where(bad, np.nan, electrodes)
     notes = list(warnings)
-    if stamps is None:
+    if stamps is None and not snapshots:
         notes.append(f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed")
+    if stamps is None:
         stamps = np.arange(frames) / SAMPLE_RATE
     _check_share(path, np.any(bad, axis=1), problems, row_word)
     flags = np.where(bad.any(axis=1), Flag.REPAIRED, 0).astype(np.uint16)
@@ -108,7 +117,7 @@ def assemble(
         name=Path(path).stem,
         path=path,
         layout=layout,
-        time=seconds,
+        time=np.full(frames, np.nan) if snapshots else seconds,
         start_time=start,
         electrodes=electrodes,
         rows=rows,
@@ -117,6 +126,7 @@ def assemble(
         simulated=simulated,
         truth=truth,
         about=about or {},
+        sensor=sensor,
         **clean,
     )
 
@@ -140,7 +150,7 @@ def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
     return sentences
 
 
-def _check_size(path: str, electrodes: np.ndarray) -> None:
+def _check_size(path: str, electrodes: np.ndarray, sensor: str) -> None:
     if electrodes.ndim != 2:
         raise TactileError(f"{path}, electrodes", f"an array of shape {electrodes.shape}", "(frames, 19)")
     if len(electrodes) == 0:
@@ -149,7 +159,7 @@ def _check_size(path: str, electrodes: np.ndarray) -> None:
         )
     if len(electrodes) > MAX_FRAMES:
         raise TactileError(path, f"{len(electrodes):,} frames", f"at most {MAX_FRAMES:,}", "Split the recording")
-    check_electrodes(path, electrodes.shape[1], "electrodes")
+    check_electrodes(path, electrodes.shape[1], "electrodes", sensor)
 
 
 def _unreadable(

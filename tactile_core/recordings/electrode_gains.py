@@ -16,6 +16,7 @@ from ..errors import TactileError
 from ..files import atomic
 from ..files.text_file import read_toml_text
 from ..sensors import COUNT_MAX, ELECTRODES, divider
+from .assemble import COUNTS
 from .fingers import FINGERS
 from .recording import Recording
 from .signals import PrepareOptions, Rest, Signals, doubt_law, prepare
@@ -25,7 +26,7 @@ OLD_FORMAT = "tactile-sensor-1"  # its offsets were of counts that rise where a 
 LEAST, MOST = 0.2, 5.0  # a gain beyond is a broken channel or a match gone wrong, not a unit (assumed)
 LARGEST_OFFSET = 500.0  # counts; a raw reading's rest is never that near to a change (assumed)
 ADVICE = "Make it again with `tactile adapt`"
-Row = Annotated[list[float], Meta(min_length=ELECTRODES, max_length=ELECTRODES)]
+Row = Annotated[list[float], Meta(min_length=min(COUNTS.values()), max_length=max(COUNTS.values()))]
 
 
 class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
@@ -47,11 +48,14 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
         """Return the unit's rest in the form that `prepare` takes."""
         if self.rest_counts is None:
             return None
-        return Rest(tuple(self.rest_counts), tuple(self.rest_spread_counts or [0.0] * ELECTRODES), self.rest_pdc)
+        return Rest(tuple(self.rest_counts), tuple(self.rest_spread_counts or [0.0] * len(self.gain)), self.rest_pdc)
 
 
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
-    """Calibration of one unit, or of the units of a hand's fingers, each in its own section."""
+    """Calibration of one unit, or of the units of a hand's fingers, each in its own section.
+
+    sensor : of the units, "biotac" or "biotac_sp", which has a rest and no gains
+    """
 
     format: str
     unit: ElectrodeGains | None = None
@@ -60,14 +64,20 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     finger2: ElectrodeGains | None = None
     finger3: ElectrodeGains | None = None
     finger4: ElectrodeGains | None = None
+    sensor: str = "biotac"
 
     def sections(self) -> dict[str, ElectrodeGains]:
         """Return the sections present, by name."""
         names = ("unit", *(f"finger{number}" for number in range(FINGERS)))
         return {name: found for name in names if (found := getattr(self, name)) is not None}
 
-    def gains_for(self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike) -> ElectrodeGains:
-        """Return the unit that made a recording. Raises TactileError where the file has no section for it."""
+    def gains_for(
+        self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike, sensor: str = "biotac"
+    ) -> ElectrodeGains:
+        """Return the unit that made a sensor's recording. Raises TactileError where the file has no section for it."""
+        if self.sensor != sensor:
+            found = f"a unit of {COUNTS[self.sensor]} electrodes, {self.sensor!r}"
+            raise TactileError(where, found, f"one of {COUNTS[sensor]} electrodes, {sensor!r}, as {recording} is of")
         name = "unit" if finger is None else f"finger{finger}"
         sections = self.sections()
         if name in sections:
@@ -124,6 +134,8 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
     """Raise TactileError naming the field that is out of range."""
     if sensor.format != FORMAT:
         raise TactileError(f"{where}, format", repr(sensor.format), repr(FORMAT), ADVICE)
+    if sensor.sensor not in COUNTS:
+        raise TactileError(f"{where}, sensor", repr(sensor.sensor), " or ".join(map(repr, COUNTS)), ADVICE)
     if not sensor.sections():
         raise TactileError(where, "no section", "[unit], or [finger0], [finger1], ...", ADVICE)
     limits = {
@@ -132,7 +144,11 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
     }  # fmt: skip
     for name, section in sensor.sections().items():
         for field, (least, most) in limits.items():
-            for electrode, value in enumerate(getattr(section, field) or (), start=1):
+            held = getattr(section, field)
+            if held is not None and len(held) != COUNTS[sensor.sensor]:
+                expected = f"{COUNTS[sensor.sensor]}, the electrodes of {sensor.sensor!r}"
+                raise TactileError(f"{where}, {name}.{field}", f"{len(held)} numbers", expected, ADVICE)
+            for electrode, value in enumerate(held or (), start=1):
                 if not least <= value <= most:  # false for nan
                     place = f"{where}, {name}.{field}, E{electrode}"
                     raise TactileError(place, f"{value:g}", f"{least:g} to {most:g}", ADVICE)
@@ -147,6 +163,9 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
         "# Used by: tactile convert RECORDING --sensor THIS_FILE",
         f"format = {_quoted(sensor.format)}",
     ]
+    if sensor.sensor != "biotac":
+        lines[:2] = ["# Rest of a BioTac SP, E1 to E24. Used by: tactile info RECORDING --sensor THIS_FILE"]
+        lines.append(f"sensor = {_quoted(sensor.sensor)}")
     for name, section in sensor.sections().items():
         lines += ["", f"[{name}]", f"note = {_quoted(section.note)}"]
         lines += [f"gain = {_numbers(section.gain)}  # counts a count"]

@@ -4,28 +4,43 @@ from __future__ import annotations
 
 import os
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..sensors import ELECTRODES
-from . import biotac_sp
+from .biotac_sp import describe_sp
+from .fingers import split
 from .flags import Flag, names
-from .readers import read
+from .readers import read, sensor_of
 from .recording import Recording
 from .signals import PrepareOptions, Signals, prepare
 
+if TYPE_CHECKING:
+    from .electrode_gains import SensorFile
 
-def describe(path: str | os.PathLike[str], options: PrepareOptions | None = None) -> str:
+
+def describe(
+    path: str | os.PathLike[str], options: PrepareOptions | None = None, unit: SensorFile | None = None
+) -> str:
     """Describe sensor, channels, rate, duration, tare state, gaps and suspicious samples with their lines, as a short
     table.
 
-    A BioTac SP's, which cannot be translated, is described too. Raises TactileError where the file is no recording.
+    A BioTac SP's, which cannot be translated, is described too. unit : rest and gains, of `tactile adapt`
+    Raises TactileError where the file is no recording, or of another sensor than the unit's.
     """
     columns = None if options is None else options.columns
-    if biotac_sp.recognised(path, columns):
-        return biotac_sp.describe_sp(path)
-    recording = read(path, columns)
+    sensor = sensor_of(path, columns)
+    recording = read(path, columns, sensor)
+    finger = split(os.fspath(path))[1]
+    gains = None if unit is None else unit.gains_for(path, finger, "--sensor", sensor)
+    if sensor != "biotac":
+        return describe_sp(recording, gains)
     signals = prepare(recording, options)
+    if gains is not None:
+        from .electrode_gains import prepare_unit
+
+        signals = prepare_unit(recording, options, gains)
     lines = [os.fspath(path)]
     lines += [f"  {label:<11}{text}" for label, text in _rows(recording, signals)]
     lines.append("")

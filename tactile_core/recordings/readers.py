@@ -14,6 +14,7 @@ from ..files import outside
 from ..files.registry import modules_of
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
+from .assemble import COUNTS, check_electrodes
 from .bag import START_BYTES, fingers_of, is_bag_folder, kind_of, open_bag, read_bag
 from .column_map import ColumnMap, read_mapped, refuse_other
 from .fingers import named, split
@@ -33,20 +34,23 @@ def layouts() -> tuple[ModuleType, ...]:
     return tuple(modules_of(formats.__name__).values())
 
 
-def read(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> Recording:
-    """Read a BioTac recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
+def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = "biotac") -> Recording:
+    """Read a recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
     columns : which column of a CSV file is what, where no known layout has its names; see ``column_map.read``
+    sensor : ``"biotac"``, or ``"biotac_sp"`` for one of 24 electrodes, which no weights translate yet
 
-    Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19) counts, ``pdc``, ``pac``, ``tac``, ``tdc``
-    where the file has them, ``warnings`` for what is odd in it. Nothing is resampled, repaired or dropped.
+    Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19 or 24) counts, ``pdc``, ``pac``, ``tac``,
+    ``tdc`` where the file has them, ``warnings`` for what is odd in it. Nothing is resampled, repaired or dropped.
     Raises TactileError for a file that is missing, not a recording, of another sensor, or mostly unreadable.
 
     >>> recording = tactile.read("touch.csv")
     >>> len(recording), recording.rate, recording.electrodes.shape
     """
     path = os.fspath(path)
+    if sensor != "biotac":
+        return _read_sp(path, columns, sensor)
     with reading(path):
         container = container_of(path)
         refuse_other(path, container, columns)
@@ -62,14 +66,48 @@ def read(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> Reco
         if container == "mat":
             file, finger = split(path)
             with open_matlab(file) as store:
-                return _read_finger(layout_of(file, container, store.shapes), store, finger)
-        reader = table_reader(path, read_header(path), columns)
-        return reader(read_table(path))
+                return _read_finger(layout_of(file, container, store.shapes), store, store.shapes, finger)
+        file, finger = split(path)
+        reader = table_reader(file, read_header(file), columns)
+        found = reader(read_table(file))
+        if finger is not None:
+            raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
+        return found
 
 
-def _read_finger(layout: ModuleType, store: Store, finger: int | None) -> Recording:
+def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> str:
+    """Return the sensor of a recording, ``"biotac"`` or ``"biotac_sp"``, from the columns of a CSV file.
+
+    Raises TactileError for what is no recording.
+    """
+    path = os.fspath(path)
+    with reading(path):
+        if columns is not None or container_of(path) != "csv":
+            return "biotac"
+        file = split(path)[0]
+        return _sensor(layout_of(file, "csv", read_header(file)))
+
+
+def _sensor(layout: ModuleType) -> str:
+    return getattr(layout, "SENSOR", "biotac")
+
+
+def _read_sp(path: str, columns: ColumnMap | None, sensor: str) -> Recording:
+    """Read one finger of a BioTac SP's file. Raises TactileError for a file of another sensor."""
+    if sensor not in COUNTS:
+        raise TactileError("read, sensor", repr(sensor), " or ".join(COUNTS))
+    if sensor_of(path, columns) != sensor:
+        found = read(path, columns)
+        check_electrodes(path, found.electrodes.shape[1], "a BioTac's recording", sensor)
+    with reading(path):
+        file, finger = split(path)
+        table = read_table(file)
+        return _read_finger(layout_of(file, "csv", table.header), table, table.header, finger)
+
+
+def _read_finger(layout: ModuleType, store: Store | Table, held: Collection[str], finger: int | None) -> Recording:
     """Read one finger of a hand: the requested one, or the first; a warning names the others."""
-    known = layout.fingers(store.shapes)
+    known = layout.fingers(held)
     chosen = known[0] if finger is None else finger
     if chosen not in known:
         listed = ", ".join(map(str, known))
@@ -93,6 +131,8 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
     with reading(path):
         container = container_of(path)
         known: tuple[int, ...] = ()
+        if container == "csv":
+            known = _fingers_of_table(read_header(path))
         if container == "mat":
             with open_matlab(path) as store:
                 known = layout_of(path, container, store.shapes).fingers(store.shapes)
@@ -101,6 +141,12 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
                 known = fingers_of(bag, layout_of(path, container, bag.topics))
     alone = len(known) < 2 and (container != "mat" or known == (0,))
     return [path] if alone else [f"{path}#{finger}" for finger in known]
+
+
+def _fingers_of_table(header: tuple[str, ...]) -> tuple[int, ...]:
+    """Fingers of a BioTac SP's file; none of others, also of those whose columns a map names."""
+    known = [layout for layout in layouts() if _sensor(layout) != "biotac" and layout.score(header) >= RECOGNISED]
+    return known[0].fingers(header) if known else ()
 
 
 def names(store: Store) -> set[str]:
@@ -140,17 +186,21 @@ def container_of(path: str) -> str:
         return "bag"
     if start.startswith((START, START_OF_HDF5)):
         return "mat"
-    if finger is not None:
+    arrays = start.startswith(b"\x89HDF\r\n\x1a\n"), start.startswith(ZIP_STARTS)
+    if finger is not None and any(arrays):
         raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
-    if start.startswith(b"\x89HDF\r\n\x1a\n"):
-        return "hdf5"
-    return "npz" if start.startswith(ZIP_STARTS) else "csv"
+    return "hdf5" if arrays[0] else "npz" if arrays[1] else "csv"
 
 
 def table_reader(path: str, header: Collection[str], columns: ColumnMap | None) -> Callable[[Table], Recording]:
-    """Return what makes a recording of a CSV file's table: the map, or the layout that knows its header."""
+    """Return what makes a BioTac's recording of a CSV file's table: the map, or the layout that knows its header.
+
+    Raises TactileError for a BioTac SP's file.
+    """
     if columns is None:
-        return layout_of(path, "csv", header).read
+        layout = layout_of(path, "csv", header)
+        check_electrodes(path, COUNTS[_sensor(layout)], "line 1")
+        return layout.read
     return partial(read_mapped, columns=columns)
 
 

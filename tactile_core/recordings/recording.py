@@ -43,17 +43,20 @@ class Recording:
     """Content of a recording's file, unchanged: one frame a data row, in file order, nothing resampled or dropped.
 
     name : file name without its extension
+    sensor : "biotac" or "biotac_sp"
     layout : which layout the file has, in words
-    time : (T,) float, s from the first frame; may go back where the file's stamps do
+    time : (T,) float, s from the first frame; may go back where the file's stamps do; NaN of snapshots, which do not
+        follow each other
     start_time : unix time of the first frame, s; 0.0 if unknown
-    electrodes : (T, 19) float, counts (or the file's own unit), E1..E19; NaN where the file is unreadable
+    electrodes : (T, 19) float, counts (or the file's own unit), E1..E19, (T, 24) of a BioTac SP; NaN where the file is
+        unreadable
     rows : (T,) int, line of each frame in a text file (the header is line 1); index of the frame in others
     flags : (T,) uint16, bits of :class:`tactile_core.recordings.flags.Flag`
     pdc, tac, tdc : (T,) float or None, counts
     pac : (T, P) float or None, counts; P = 22 at 2,200 Hz, or what the file holds
     position, force : (T, 3) float or None, in the file's own frame and unit
     warnings : sentences for the user
-    about : other information in the file (simulated: sensor, scene, seed, made_by, note)
+    about : other information in the file (simulated: sensor, scene, seed, made_by, note; BioTac SP: finger, labels)
     """
 
     name: str
@@ -74,6 +77,7 @@ class Recording:
     simulated: bool = False
     truth: Truth | None = None
     about: dict[str, Any] = field(default_factory=dict)
+    sensor: str = "biotac"
 
     def __len__(self) -> int:
         return len(self.electrodes)

@@ -12,6 +12,7 @@ from ..errors import TactileError
 from ..sensors import divider
 from ..sensors.fluid_sensor import FALLS, POLARITIES
 from . import contact_law
+from .assemble import check_electrodes
 from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
@@ -134,6 +135,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet."""
     options = options or PrepareOptions()
     options.check()
+    check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes")
     flags, warnings = recording.flags.copy(), list(recording.warnings)
     readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = _kind(recording, readings, options)

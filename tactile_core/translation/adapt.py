@@ -6,6 +6,7 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -14,11 +15,11 @@ from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit
 from ..recordings.fingers import split
-from ..recordings.readers import each_finger
+from ..recordings.readers import each_finger, sensor_of
 from . import reference_signals
 from .gain_matching import PRIOR, Match, match
 from .reference_signals import ReferenceSignals
-from .unit_rest import UnitRest, find_rest
+from .unit_rest import UnitRest, find_rest, find_rest_sp
 
 FEWEST_FRAMES = 50  # in contact, half a second: less holds no contact worth the name (assumed)
 MOST_FRAMES = 3_000  # looked at, evenly spread; neighbours at 100 Hz say the same
@@ -86,6 +87,25 @@ def adapt_hand(
 
     Raises TactileError like `adapt`, and for files of hands and of single fingers together.
     """
+    columns = None if options is None else options.columns
+    found = {sensor_of(path, columns) for path in paths}
+    if len(found) > 1:
+        raise TactileError(paths[0], f"recordings of {' and '.join(sorted(found))} together", "one sensor")
+    units = _units(paths)
+    if found == {"biotac_sp"}:
+        return _rests_sp(units), ("no gains: networks of this sensor, which they need, do not ship",)
+    sections: dict[str, Any] = {}
+    warnings: list[str] = []
+    for finger, files in sorted(units.items(), key=lambda unit: unit[0] or 0):
+        done = adapt(files, typical, options)
+        name = "unit" if finger is None else f"finger{finger}"
+        sections[name] = done.sensor
+        warnings += [text if finger is None else f"{name}: {text}" for text in done.warnings]
+    return SensorFile(FORMAT, **sections), tuple(warnings)
+
+
+def _units(paths: Sequence[str | os.PathLike]) -> dict[int | None, list[str]]:
+    """Recordings by finger, None for files of one. Raises TactileError for both together."""
     units: dict[int | None, list[str]] = {}
     for path in paths:
         for one in each_finger(path):
@@ -93,13 +113,17 @@ def adapt_hand(
     if len(units) > 1 and None in units:
         found = "files of several fingers, and of one"
         raise TactileError(paths[0], found, "one kind", "Adapt to each by itself")
-    sections, warnings = {}, []
+    return units
+
+
+def _rests_sp(units: dict[int | None, list[str]]) -> SensorFile:
+    """Rest of each unit, without gains."""
+    sections: dict[str, Any] = {}
     for finger, files in sorted(units.items(), key=lambda unit: unit[0] or 0):
-        done = adapt(files, typical, options)
-        name = "unit" if finger is None else f"finger{finger}"
-        sections[name] = done.sensor
-        warnings += [text if finger is None else f"{name}: {text}" for text in done.warnings]
-    return SensorFile(FORMAT, **sections), tuple(warnings)
+        rest = find_rest_sp([read(path, sensor="biotac_sp") for path in files])
+        note = f"median of each electrode's least loaded tenth, {rest.recordings} contacts"
+        sections["unit" if finger is None else f"finger{finger}"] = _rest_alone(rest, note)
+    return SensorFile(FORMAT, **sections, sensor="biotac_sp")
 
 
 def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
@@ -114,8 +138,11 @@ def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
     """Return a unit with a known rest alone."""
     if rest is None:
         return None
+    return _rest_alone(rest, f"rest from the {rest.recordings} least pressed recordings")
+
+
+def _rest_alone(rest: UnitRest, note: str) -> ElectrodeGains:
     counts, spread = ([round(value, 4) for value in each.tolist()] for each in (rest.counts, rest.spread))
-    note = f"rest from the {rest.recordings} least pressed recordings"
     ones, zeros = [1.0] * len(counts), [0.0] * len(counts)
     return ElectrodeGains(note, ones, zeros, counts, spread, None if rest.pdc is None else round(rest.pdc, 4))
 

@@ -15,6 +15,7 @@ from ..recordings.signal_kind import detect
 
 FEWEST = 3  # recordings: of fewer nothing says how far a grip is from rest (assumed)
 LEAST_PRESSED = 0.25  # share of the recordings, those of the lowest pressure, whose mean is taken for rest
+LEAST_LOADED = 0.1  # share of a BioTac SP's readings of an electrode whose median is taken for rest (assumed)
 SPREAD_OVER = 0.5  # share of the recordings whose range estimates the error of rest
 
 
@@ -57,6 +58,22 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
     tared = any(np.median(one.pdc) < TARED_PDC for one in recordings)  # each to a zero of its own
     pdc = None if tared else float(pressed[:few].mean())
     return UnitRest(levels[:few].mean(axis=0), np.ptp(half, axis=0) / 2, pdc, few)
+
+
+def find_rest_sp(recordings: Sequence[Recording]) -> UnitRest:
+    """Find the rest of a BioTac SP's unit in recordings that have no PDC and all begin in contact.
+
+    Counts fall under load: of all frames together, each electrode's median over the tenth in which it reads highest.
+    Where it bulged that often, its rest comes out too high; ``spread`` is half of what that tenth spans, its ends left
+    out. Raises TactileError for fewer than three recordings or snapshots, and for recordings that are not raw.
+    """
+    contacts = sum(len(one) if np.isnan(one.time).all() else 1 for one in recordings)
+    if contacts < FEWEST:
+        advice = "Give more recordings of the unit, among them softly touched ones"
+        raise TactileError("rest of the unit", f"{contacts} recordings", f"at least {FEWEST}", advice)
+    readings = np.concatenate([_raw(one) for one in recordings])
+    low, middle, high = np.quantile(readings, 1 - LEAST_LOADED * np.array([0.9, 0.5, 0.1]), axis=0)
+    return UnitRest(middle, (high - low) / 2, None, contacts)
 
 
 def _least_pressed(recording: Recording) -> tuple[np.ndarray, float]:

@@ -41,6 +41,7 @@ CASES = {
     ("watch", "--columns"): ["watch {csv} --play --speed 0 --out {out} --columns {x.toml}"],
     ("watch", "--sensor"): ["watch {csv} --play --speed 0 --out {out} --sensor {x.toml}"],
     ("watch", "--camera"): ["watch {csv} --play --speed 0 --out {out} --camera {x.mp4}"],
+    ("info", "--sensor"): ["info {csv} --sensor {x.toml}"],
     ("info", "--columns"): ["info {csv} --columns {x.toml}"],
     ("adapt", "--columns"): ["adapt {csv} --out {out} --columns {x.toml}"],
     ("export", "job"): ["export {job} --to npz --out {out}", "export {x} --to npz --out {out}"],

@@ -1,4 +1,4 @@
-"""Recordings of a BioTac SP: described, never taken for those of a BioTac."""
+"""Recordings of a BioTac SP: read and described, never taken for those of a BioTac, nor the reverse."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,10 @@ import pytest
 from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.recordings import PrepareOptions, info
-from tactile_core.recordings.biotac_sp import read_sp
+from tactile_core.recordings import PrepareOptions, electrode_gains, info
 from tactile_core.recordings.column_map import ColumnMap
+from tactile_core.recordings.readers import each_finger, sensor_of
+from tactile_core.translation.unit_rest import find_rest_sp
 
 SLIP = [f"ff_e{number}" for number in range(1, 25)]
 GRASP = [
@@ -27,36 +28,54 @@ def written(write, header, rows):
     return write([",".join(header), *(",".join(map(str, row)) for row in rows)])
 
 
+def read_sp(path):
+    return recordings.read(path, sensor="biotac_sp")
+
+
 def test_a_slip_recording_is_told_and_not_translated(counts, write, capsys):
     path = written(write, SLIP, counts)
-    np.testing.assert_array_equal(read_sp(path).fingers["ff"], counts)
+    assert sensor_of(path) == "biotac_sp" and each_finger(path) == [path]
+    recording = read_sp(path)
+    np.testing.assert_array_equal(recording.electrodes, counts)
+    assert (
+        recording.sensor == "biotac_sp"
+        and recording.rate == pytest.approx(100)
+        and recording.duration == pytest.approx(0.29)
+    )
+    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP"):
+        recordings.prepare(recording)
     assert main(["info", path]) == 0
     text = capsys.readouterr().out
     for part in (
-        "BioTac SP, 24 electrodes a finger: first finger (ff)", "30 in lines 2 to 31", "0.30 s", "100 Hz (assumed)",
-        "raw: whole numbers", "none are of a BioTac SP",
+        "BioTac SP, 24 electrodes, first finger (ff)", "30 in lines 2 to 31", "0.30 s", "100 Hz (assumed)",
+        "raw: whole numbers", "none are of a BioTac SP", "rest       not known",
     ):  # fmt: skip
         assert part in text, part
     largest = next(line for line in text.splitlines() if "largest" in line).split()[1:]
     assert largest == [str(value) for value in counts.max(axis=0)]
 
 
-def test_snapshots_of_a_grasp_name_their_fingers_and_labels(counts, write):
-    path = written(write, GRASP, [["ball", 1, *row, *row, *row] for row in counts])
-    text = info.describe(path)
-    assert "thumb (th)" in text and "snapshots, one a line, labelled: object, slipped" in text
-    assert "warnings" not in text and text.count("largest") == 3
+def test_snapshots_of_a_grasp_are_a_recording_a_finger(counts, write):
+    path = written(write, GRASP, [["ball", 1, *row, *row, *(row - 100)] for row in counts])
+    assert each_finger(path) == [f"{path}#{finger}" for finger in (0, 1, 4)]
+    thumb = read_sp(f"{path}#4")
+    np.testing.assert_array_equal(thumb.electrodes, counts - 100)
+    assert np.isnan(thumb.time).all() and thumb.about["labels"] == ["object", "slipped"] and not thumb.warnings
+    text = info.describe(f"{path}#4")
+    assert "thumb (th)" in text and "snapshots, one a line" in text and "electrodes, object, slipped" in text
+    with pytest.raises(TactileError, match="finger 2; expected one that it holds: 0, 1, 4"):
+        read_sp(f"{path}#2")
 
 
 def test_a_lost_cell_is_told_and_a_lost_column_refused(counts, write):
     rows = [[*map(str, row)] for row in counts]
     rows[4][7] = "?"
     path = written(write, SLIP, rows)
-    assert np.isnan(read_sp(path).fingers["ff"][4, 7]) and "line 6, ff_e8" in info.describe(path)
+    assert np.isnan(read_sp(path).electrodes[4, 7]) and "line 6, ff_e8" in info.describe(path)
     with pytest.raises(TactileError, match="'ff_e24' is missing"):
         read_sp(written(write, SLIP[:23], [row[:23] for row in rows]))
     dead = [[*row[:7], "", *row[8:]] for row in rows]
-    with pytest.raises(TactileError, match="ff_e8: no reading in any line"):
+    with pytest.raises(TactileError, match=r"ff_e8: .*rows are bad"):
         read_sp(written(write, SLIP, dead))
 
 
@@ -71,9 +90,59 @@ def test_nineteen_of_its_columns_are_no_biotac(stem, counts, write):
         info.describe(path, PrepareOptions(columns=columns))
 
 
+def test_a_biotac_is_no_biotac_sp(press, in_layout):
+    for layout in ("csv_slide", "npz"):
+        with pytest.raises(TactileError, match="19 electrodes; expected the 24 electrodes of a BioTac SP"):
+            read_sp(in_layout(layout, press))
+    with pytest.raises(TactileError, match="read, sensor: 'digit'; expected biotac or biotac_sp"):
+        recordings.read(in_layout("npz", press), sensor="digit")
+
+
+def test_rest_is_found_in_recordings_that_begin_in_contact(counts, write, tmp_path, capsys):
+    rest, random = 3300 + 10 * np.arange(24), np.random.default_rng(1)
+    for number in range(6):  # each leaves a third of the electrodes unloaded for a third of the time
+        loaded = random.uniform(60, 600, (90, 24)) * ~(
+            (np.arange(24) % 3 == number % 3) & (np.arange(90) > 59)[:, None]
+        )
+        noisy = np.round(rest - loaded + random.normal(0, 1, (90, 24))).astype(int)
+        (tmp_path / f"{number}.csv").write_text(
+            "\n".join([",".join(SLIP), *(",".join(map(str, row)) for row in noisy)])
+        )
+    paths, out = [str(tmp_path / f"{number}.csv") for number in range(6)], str(tmp_path / "rest.toml")
+    assert main(["adapt", *paths, "--out", out]) == 0
+    unit = electrode_gains.read(out)
+    assert unit.sensor == "biotac_sp" and unit.unit is not None
+    np.testing.assert_allclose(unit.unit.rest_counts, rest, atol=3)  # the upper end of 1 count's noise
+    capsys.readouterr()
+    assert main(["info", paths[0], "--sensor", out]) == 0
+    table = {line.split()[0]: line.split()[1:] for line in capsys.readouterr().out.splitlines() if line.split()}
+    assert [int(value) for value in table["least"]] == pytest.approx(
+        (read_sp(paths[0]).electrodes - np.array(unit.unit.rest_counts)).min(axis=0), abs=0.5
+    )
+    with pytest.raises(TactileError, match="2 recordings; expected at least 3"):
+        find_rest_sp([read_sp(path) for path in paths[:2]])
+    assert len(find_rest_sp([read_sp(path) for path in paths[:3]]).counts) == 24
+
+
+def test_a_rest_serves_its_own_sensor_alone(counts, write, tmp_path, press, in_layout, capsys):
+    path, out = written(write, GRASP, [["ball", 1, *row, *row, *row] for row in counts]), str(tmp_path / "rest.toml")
+    assert main(["adapt", path, "--out", out]) == 0
+    assert list(electrode_gains.read(out).sections()) == ["finger0", "finger1", "finger4"]
+    touch = in_layout("npz", press)
+    assert main(["convert", touch, "--out", str(tmp_path / "o"), "--sensor", out]) == 2
+    assert "24 electrodes, 'biotac_sp'; expected one of 19" in capsys.readouterr().err
+    assert main(["adapt", path, touch, "--out", str(tmp_path / "both.toml")]) == 2
+    assert "biotac and biotac_sp together" in capsys.readouterr().err
+    text = (tmp_path / "rest.toml").read_text()
+    (tmp_path / "other.toml").write_text(text.replace('sensor = "biotac_sp"\n', ""))
+    with pytest.raises(TactileError, match=r"finger0\.gain: 24 numbers; expected 19"):
+        electrode_gains.read(tmp_path / "other.toml")
+
+
 def test_public_recordings_are_described(outside_data):
     paths = sorted(outside_data("biotac_sp").glob("*/**/*.csv"))
     assert len(paths) > 30
     for path in paths:
-        text = info.describe(path)
-        assert "raw: whole numbers" in text and "none are of a BioTac SP" in text
+        for finger in each_finger(path):
+            text = info.describe(finger)
+            assert "raw: whole numbers" in text and "none are of a BioTac SP" in text

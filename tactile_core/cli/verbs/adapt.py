@@ -18,7 +18,8 @@ five different contacts give none.
 Three raw recordings or more also give the unit's rest, from those of the lowest fluid pressure (of the least squeezed
 electrodes where there is no PDC), with how far each electrode may be off: `tactile convert --sensor` takes it for
 recordings that begin and end in contact. Files of several fingers give a section a finger: these are units of their
-own."""
+own. Recordings of a BioTac SP, which all begin in contact and have no PDC, give their rest alone: each electrode's
+median over the tenth of all frames in which it is least loaded."""
 EPILOG = """\
 example:
   tactile adapt day1/*.csv --out sensor.toml

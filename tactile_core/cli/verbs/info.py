@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import argparse
 import os
+from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ..terminal import complain, say, tell
 from .common import NOTHING, columns_of, polarity_argument
 
+if TYPE_CHECKING:
+    from ...recordings.electrode_gains import SensorFile
+
 BRIEF = "what a recording holds"
 TEXT = """\
 Say what recordings hold: sensor, channels, rate, duration, polarity, tare, gaps, bad samples. Of a BioTac SP's CSV,
-which no weights translate: fingers, lines, labels and the counts of its 24 electrodes.
+which no weights translate: finger, lines, labels and the counts of its 24 electrodes; changes against the unit's rest
+with --sensor, since recordings that begin in contact do not tell it.
 
 A CSV file whose column names are of no known layout needs a map: --columns map.toml writes one, guessed from the
 names of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch."""
 EPILOG = """\
 examples:
   tactile info results/*.csv
-  tactile info own.csv --columns map.toml"""
+  tactile info own.csv --columns map.toml
+  tactile info slip.csv --sensor rest.toml"""
 LEAVES = NOTHING
 
 
@@ -27,6 +33,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="+", metavar="FILE")
     polarity_argument(verb)
+    verb.add_argument("--sensor", metavar="FILE", help="rest and gains of the unit, as `tactile adapt` writes them")
     verb.add_argument(
         "--columns", metavar="MAP.toml", help="which column is what; where there is no such file, it is written"
     )
@@ -39,15 +46,22 @@ def run(options: argparse.Namespace) -> int:
 
     if options.columns is not None and not os.path.lexists(options.columns):
         _write_columns(options)
+    unit = None if options.sensor is None else _unit(options.sensor)
     prepare, failed = PrepareOptions(polarity=options.polarity, columns=columns_of(options)), 0
     for path in options.recordings:
         try:
             for finger in each_finger(path):
-                tell(info.describe(finger, prepare))
+                tell(info.describe(finger, prepare, unit))
         except TactileError as error:
             complain(str(error))
             failed += 1
     return 2 if failed else 0
+
+
+def _unit(path: str) -> SensorFile:
+    from ...recordings import electrode_gains
+
+    return electrode_gains.read(path)
 
 
 def _write_columns(options: argparse.Namespace) -> None:

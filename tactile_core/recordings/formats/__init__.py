@@ -6,7 +6,7 @@
 Recording``  source is a ``table.Table`` for CSV, a ``array_store.Store`` for HDF5 and NPZ; it picks its columns and
 hands them to ``assemble.assemble``, which checks them.
 Those of bags have no ``read``, but the message they know: see ``bag_biotac_hand``; those of MATLAB also have
-``fingers(keys)``, and ``read(store, finger)``. Those of HDF5 have
+``fingers(keys)``, and ``read(store, finger)``, as those of a BioTac SP, whose ``SENSOR`` names it. Those of HDF5 have
 ``ELECTRODES_NAME`` too, the array whose length is the number of frames: see ``chunks``.
 """
 
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...sensors import ELECTRODES
+from ...sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
 from ..array_store import Store
 from ..assemble import assemble, check_electrodes
 from ..recording import Recording
@@ -50,6 +51,55 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
         tdc=table.column("tdc"),
         **columns,
     )
+
+
+HAND = (
+    "ff",
+    "mf",
+    "rf",
+    "lf",
+    "th",
+)  # a hand's fingers in the order of their numbers: first, middle, ring, little, thumb
+
+
+def share_of_fingers(keys: Collection[str], style: str) -> float:
+    """Return the share of a BioTac SP's columns that a file has of the finger of which it has most.
+
+    style : of the columns' names, from finger and number
+    """
+    return max(share(keys, _of_finger(style, number)) for number in range(len(HAND)))
+
+
+def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
+    """Return the numbers of the fingers of which a file has columns."""
+    return tuple(number for number in range(len(HAND)) if share(keys, _of_finger(style, number)))
+
+
+def of_finger(table: Table, layout: str, style: str, finger: int, *, snapshots: bool) -> Recording:
+    """Build a finger's recording of a BioTac SP's table; its other columns are named in ``about``.
+
+    Raises TactileError for a missing column, and the errors of ``assemble``.
+    """
+    names = _of_finger(style, finger)
+    electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
+    return assemble(
+        table.path,
+        layout,
+        electrodes=table.columns(names),
+        stamps=None,
+        rows=table.lines,
+        problems=[problem for problem in table.essential(names) if problem.essential],
+        row_word="line",
+        about={"finger": HAND[finger], "labels": [name for name in table.header if name not in electrodes]},
+        warnings=table.warnings,
+        names=names,
+        sensor="biotac_sp",
+        snapshots=snapshots,
+    )
+
+
+def _of_finger(style: str, finger: int) -> list[str]:
+    return [style.format(HAND[finger], number) for number in range(1, SP_ELECTRODES + 1)]
 
 
 def electrodes_of(store: Store, name: str) -> np.ndarray:
