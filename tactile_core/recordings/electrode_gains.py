@@ -18,7 +18,7 @@ from ..files.text_file import read_toml_text
 from ..sensors import COUNT_MAX, ELECTRODES, divider
 from .assemble import COUNTS
 from .fingers import FINGERS
-from .recording import Recording
+from .recording import TRANSLATED, Recording
 from .signals import PrepareOptions, Rest, Signals, doubt_law, prepare
 
 FORMAT = "tactile-sensor-2"
@@ -64,7 +64,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     finger2: ElectrodeGains | None = None
     finger3: ElectrodeGains | None = None
     finger4: ElectrodeGains | None = None
-    sensor: str = "biotac"
+    sensor: str = TRANSLATED
 
     def sections(self) -> dict[str, ElectrodeGains]:
         """Return the sections present, by name."""
@@ -72,7 +72,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
         return {name: found for name in names if (found := getattr(self, name)) is not None}
 
     def gains_for(
-        self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike, sensor: str = "biotac"
+        self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike, sensor: str = TRANSLATED
     ) -> ElectrodeGains:
         """Return the unit that made a sensor's recording. Raises TactileError where the file has no section for it."""
         if self.sensor != sensor:
@@ -163,7 +163,7 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
         "# Used by: tactile convert RECORDING --sensor THIS_FILE",
         f"format = {_quoted(sensor.format)}",
     ]
-    if sensor.sensor != "biotac":
+    if sensor.sensor != TRANSLATED:
         lines[:2] = ["# Rest of a BioTac SP, E1 to E24. Used by: tactile info RECORDING --sensor THIS_FILE"]
         lines.append(f"sensor = {_quoted(sensor.sensor)}")
     for name, section in sensor.sections().items():

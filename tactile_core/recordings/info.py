@@ -13,7 +13,7 @@ from .biotac_sp import describe_sp
 from .fingers import split
 from .flags import Flag, names
 from .readers import read, sensor_of
-from .recording import Recording
+from .recording import TRANSLATED, Recording
 from .signals import PrepareOptions, Signals, prepare
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def describe(
     recording = read(path, columns, sensor)
     finger = split(os.fspath(path))[1]
     gains = None if unit is None else unit.gains_for(path, finger, "--sensor", sensor)
-    if sensor != "biotac":
+    if sensor != TRANSLATED:
         return describe_sp(recording, gains)
     signals = prepare(recording, options)
     if gains is not None:

@@ -19,7 +19,7 @@ from .bag import START_BYTES, fingers_of, is_bag_folder, kind_of, open_bag, read
 from .column_map import ColumnMap, read_mapped, refuse_other
 from .fingers import named, split
 from .matlab import START, START_OF_HDF5, open_matlab
-from .recording import Recording
+from .recording import TRANSLATED, Recording
 from .table import Table, read_header, read_table
 from .truncated_cell import shown
 
@@ -34,7 +34,7 @@ def layouts() -> tuple[ModuleType, ...]:
     return tuple(modules_of(formats.__name__).values())
 
 
-def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = "biotac") -> Recording:
+def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = TRANSLATED) -> Recording:
     """Read a recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
@@ -49,7 +49,7 @@ def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor:
     >>> len(recording), recording.rate, recording.electrodes.shape
     """
     path = os.fspath(path)
-    if sensor != "biotac":
+    if sensor != TRANSLATED:
         return _read_sp(path, columns, sensor)
     with reading(path):
         container = container_of(path)
@@ -83,13 +83,13 @@ def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) ->
     path = os.fspath(path)
     with reading(path):
         if columns is not None or container_of(path) != "csv":
-            return "biotac"
+            return TRANSLATED
         file = split(path)[0]
         return _sensor(layout_of(file, "csv", read_header(file)))
 
 
 def _sensor(layout: ModuleType) -> str:
-    return getattr(layout, "SENSOR", "biotac")
+    return getattr(layout, "SENSOR", TRANSLATED)
 
 
 def _read_sp(path: str, columns: ColumnMap | None, sensor: str) -> Recording:
@@ -145,7 +145,7 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
 
 def _fingers_of_table(header: tuple[str, ...]) -> tuple[int, ...]:
     """Fingers of a BioTac SP's file; none of others, also of those whose columns a map names."""
-    known = [layout for layout in layouts() if _sensor(layout) != "biotac" and layout.score(header) >= RECOGNISED]
+    known = [layout for layout in layouts() if _sensor(layout) != TRANSLATED and layout.score(header) >= RECOGNISED]
     return known[0].fingers(header) if known else ()
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..sensors import SAMPLE_RATE
 
+TRANSLATED = "biotac"  # the sensor whose recordings weights translate, and that a file is of where nothing else is said
 LEAST_STEP = 1e-6  # s between stamps; less is no time (assumed), and its inverse no number
 
 
@@ -77,7 +78,7 @@ class Recording:
     simulated: bool = False
     truth: Truth | None = None
     about: dict[str, Any] = field(default_factory=dict)
-    sensor: str = "biotac"
+    sensor: str = TRANSLATED
 
     def __len__(self) -> int:
         return len(self.electrodes)

@@ -16,6 +16,7 @@ from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit
 from ..recordings.fingers import split
 from ..recordings.readers import each_finger, sensor_of
+from ..recordings.recording import TRANSLATED
 from . import reference_signals
 from .gain_matching import PRIOR, Match, match
 from .reference_signals import ReferenceSignals
@@ -92,7 +93,7 @@ def adapt_hand(
     if len(found) > 1:
         raise TactileError(paths[0], f"recordings of {' and '.join(sorted(found))} together", "one sensor")
     units = _units(paths)
-    if found == {"biotac_sp"}:
+    if found != {TRANSLATED}:
         return _rests_sp(units), ("no gains: networks of this sensor, which they need, do not ship",)
     sections: dict[str, Any] = {}
     warnings: list[str] = []
