@@ -43,6 +43,7 @@ REMARKABLE = {
     "beyond_picture": "the contact lies on the gel beside its picture",
     "undecided_place": "by its own signals the contact may as well lie elsewhere",
     "two_contacts": "the signals look like two contacts at once; the translation shows one",
+    "unexplained": "the signals resemble no contact's: rest was perhaps taken under load (--tare, --sensor)",
     "gel_not_solved": "no contact was solved on the gel, which is the networks' there",
 }
 

@@ -24,7 +24,7 @@ from .lost_signs import recovered
 from .network_sizes import PLACE, SURFACES
 from .networks import Networks
 from .posterior import Posterior, touches
-from .two_contacts import two_contacts
+from .simulated_likeness import left_over, two_contacts, unlike
 from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
@@ -52,7 +52,7 @@ class Translation:
     expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
         below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
-        BEYOND_DIGIT, TWO_CONTACTS and UNDECIDED_PLACE
+        BEYOND_DIGIT, TWO_CONTACTS, UNDECIDED_PLACE and UNEXPLAINED
     """
 
     latent_signal: np.ndarray
@@ -158,9 +158,11 @@ class Translator:
         silent = np.isnan(center[:, 0])
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
+        shares = left_over(change, rectified)
+        flags[unlike(shares)] |= np.uint16(Flag.UNEXPLAINED)
         confidence = self._confidence(change, flags, rectified)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
-        flags[two_contacts(change, rectified)] |= np.uint16(Flag.TWO_CONTACTS)
+        flags[two_contacts(shares)] |= np.uint16(Flag.TWO_CONTACTS)
         undecided = touched & (elsewhere(posterior, state, nets.frames["MVD"]) > UNDECIDED)
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(
@@ -204,7 +206,12 @@ class Translator:
         usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))
         confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         untrained = flags & np.uint16(
-            Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL | Flag.LAW_DOUBTED | Flag.OUT_OF_RANGE
+            Flag.NO_QUIET_PART
+            | Flag.SATURATED
+            | Flag.DEAD_CHANNEL
+            | Flag.LAW_DOUBTED
+            | Flag.OUT_OF_RANGE
+            | Flag.UNEXPLAINED
         )
         confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
         return confidence.astype(np.float32)

@@ -18,11 +18,12 @@ from tactile_core.recordings import Recording
 from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile, prepare_unit
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.readers import each_finger
-from tactile_core.recordings.signals import FRAMEWISE
+from tactile_core.recordings.signals import FRAMEWISE, Signals
 from tactile_core.sensors import digit, digit_surface, electrodes
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation import adapt, networks, reference_signals
 from tactile_core.translation.contact_track import track
+from tactile_core.translation.simulated_likeness import left_over, unlike
 from tactile_core.translation.translate import Translator, contact_center
 from tactile_core.translation.unit_rest import find_rest
 
@@ -77,7 +78,22 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
              if _trial(path) in REPORTING for finger, one in enumerate(each_finger(path))]  # fmt: skip
     found = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
     found += prints.rows("grip", prepared, network)
-    return [*found, fluid_pressure.grip_row(every, network), *_rest_rows(files)]
+    return [*found, fluid_pressure.grip_row(every, network), _unexplained_row(held, prepared), *_rest_rows(files)]
+
+
+def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
+    """Measure how many changes of a grip are called unexplained where rest was taken in the grip; baseline: with the
+    unit's own rest, where none should be.
+    """
+    loaded = [prepare_unit(recordings.read(one), None, None) for one, _ in held]
+    of = f"{len(held)} grips of hard flat objects, rest taken during the grip; baseline: with the unit's rest"
+    return row("grip_unexplained", unexplained(loaded), "1", 0.9, null=unexplained(known), of=of, at_least=True)
+
+
+def unexplained(several: list[Signals]) -> float:
+    """Share of all recordings' frames with a change that are called unexplained."""
+    shares = np.concatenate([left_over(each.typical, np.zeros(len(each.change), bool)) for each in several])
+    return float(unlike(shares[np.isfinite(shares[:, 0])]).mean())
 
 
 def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> list[Row]:

@@ -24,8 +24,10 @@ import numpy as np  # noqa: E402
 from tactile_core.accuracy import HEADER, Row, line, row  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
 from tactile_core.recordings import contact_law  # noqa: E402
+from tactile_core.translation.simulated_likeness import left_over, unlike  # noqa: E402
 
 CONTACTS = 5, 10, 20, 40, 100
+FRAMES = 20  # of each recording whose frames are judged one by one
 UNITS = 400  # recordings a law and number of contacts
 GAIN, NOISE = 0.1, 1.5  # of a channel; counts (docs/sources.md, BioTac read-out)
 TARGET, ALARMS, FROM = 0.9, 0.05, 100  # shares of recordings; contacts from which on they are asked for
@@ -113,8 +115,13 @@ def fit() -> tuple[float, float]:
 
 
 def measured() -> list[Row]:
-    """Shares of recordings that are doubted, by law and number of contacts."""
+    """Shares of frames that are unexplained, by law, and of recordings that are doubted, by number of contacts too."""
     rows = []
+    for name, law in ({"right": right} | WRONG).items():
+        seen = np.concatenate(recordings(signals(odd=True), FRAMES, law, seed=3))
+        share = unlike(left_over(seen, np.zeros(len(seen), bool))).mean()
+        of = f"{len(seen)} frames, each judged alone"
+        rows.append(row(f"unexplained_{name}", 100 * float(share), "%", of=of))
     for contacts in CONTACTS:
         asked, of = contacts >= FROM, f"{UNITS} recordings of {contacts} contacts"
         for name, law in ({"right": right} | WRONG).items():

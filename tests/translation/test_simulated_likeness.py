@@ -1,0 +1,76 @@
+"""Signals of two contacts at once are distinguished from those of one, and from those of none."""
+
+import numpy as np
+import pytest
+from benchmarks.translation import grips, two_contact_rows
+
+from tactile_core import recordings
+from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.readers import each_finger
+from tactile_core.simulation.pairs_file import read_pairs
+from tactile_core.translation import simulated_likeness as module
+from tactile_core.translation.simulated_likeness import left, left_over, two_contacts, unlike
+from tactile_core.translation.translate import UNTRAINED_CONFIDENCE, load_translator
+
+
+@pytest.fixture(scope="module")
+def pairs(request):
+    return read_pairs(request.config.rootpath / "scenes" / "training" / "test_contacts.h5")
+
+
+def signed(count):
+    return np.zeros(count, bool)
+
+
+def test_two_patterns_are_two_and_each_alone_is_one():
+    patterns, alike = module._patterns()
+    first = 0
+    second = int(alike[first].argmin())
+    change = 100 * np.stack([patterns[first], patterns[second], patterns[first] + 0.7 * patterns[second]])
+    assert two_contacts(left_over(change, signed(3))).tolist() == [False, False, True]
+    one, two = left(change[2:] / np.linalg.norm(change[2]))
+    assert two[0] == pytest.approx(0, abs=1e-6) and one[0] > module.MORE_BY_ONE
+
+
+def test_what_is_not_judged_is_not_marked():
+    patterns, alike = module._patterns()
+    both = patterns[0] + patterns[int(alike[0].argmin())]
+    light = both * (0.9 * module.TOUCHING / np.linalg.norm(both))
+    assert not two_contacts(left_over(np.stack([light, 100 * both]), np.array([False, True]))).any()
+    assert not unlike(left_over(np.stack([-light, -100 * both]), np.array([False, True]))).any()
+    assert two_contacts(left_over(np.empty((0, 19)), signed(0))).shape == (0,)
+    # A unit that resembles no simulated one: noise as large as the signal.
+    random = np.random.default_rng(0).standard_normal((50, 19))
+    assert not two_contacts(left_over(100 * random, signed(50))).any()
+    assert unlike(left_over(100 * random, signed(50))).all()
+
+
+def test_far_contacts_are_found_and_single_ones_seldom_mistaken(pairs):
+    found = two_contact_rows.rows(pairs)
+    total, far = found[0], found[-1]
+    # The patterns are made anew with the weights: bounds, not the figures measured.
+    assert total["null"] < 0.06 < 0.2 < total["value"] < far["value"]
+
+
+def test_a_translation_flags_them_and_hardly_any_of_one_contact(request):
+    recording = recordings.read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
+    signals = recordings.prepare(recording)
+    flags = load_translator()(signals).flags
+    assert (flags & Flag.TWO_CONTACTS > 0).mean() < 0.02  # patterns go with the weights: none with those of now
+
+
+def test_what_changes_under_a_rest_taken_in_contact_is_unexplained(request):
+    recording = recordings.read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
+    translator = load_translator()
+    assert not (translator(recordings.prepare(recording)).flags & Flag.UNEXPLAINED).any()
+    loaded = recordings.prepare(recording, recordings.PrepareOptions(tare=slice(78, 83)))  # the firmest of a press
+    away = np.r_[0:50, 340:360]  # frames without contact, whose changes are that press's, inverted
+    wrong = translator(loaded)
+    assert (wrong.flags[away] & Flag.UNEXPLAINED > 0).mean() > 0.9
+    assert (wrong.confidence[away] <= UNTRAINED_CONFIDENCE).all()
+
+
+def test_real_grips_are_unexplained_where_rest_was_taken_during_the_grip(outside_data):
+    files = grips.hard_to_report(grips.find(outside_data("biotac_phac")))
+    loaded = [recordings.prepare(recordings.read(one)) for path in files for one in each_finger(path)]
+    assert len(loaded) == 8 and grips.unexplained(loaded) > 0.95
