@@ -107,6 +107,7 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
     found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network)]
     found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
+    found += sequence_rows.full_rows(network, pairs)
     found += [*two_contact_rows.rows(pairs), *test_set.speed_rows(network, pairs)]
     apart = [translate.load_translator(folder) for folder in options.kept_apart]
     for unaware in apart:

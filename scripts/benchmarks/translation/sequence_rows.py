@@ -1,7 +1,8 @@
-"""Rows of followed contacts on the test set of sequences: presses, rolls and slides, each read by a unit of its own.
+"""Rows of followed contacts on sequences of 0.4 s, each read by a unit of its own.
 
-Truth is the fast tier's (``benchmarks/make/make_sequences.py`` says how far that is off). The baseline of each row is
-the same networks, each frame alone.
+Presses, rolls and slides of the test set, whose truth is the fast tier's (``benchmarks/make/make_sequences.py`` says
+how far that is off), as read right after a tare and with the rest some counts off; and presses of the full tier
+(``full_sequences``). The baseline of each row is the same networks, each frame alone.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from benchmarks.table.translation import plain_signals
 from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.sensors import SAMPLE_RATE
+from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import LEAST_PATCH
 from tactile_core.translation.contact_patch import contact_patch
 from tactile_core.translation.translate import Translation, Translator
 
+from . import full_sequences
 from .followed_rows import FORCE, PEAK, PLACE, TOUCHED
 from .noise import GAIN, NOISE
 
@@ -25,7 +28,8 @@ FILE = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_seque
 MOTIONS = "presses", "rolls", "slides"
 UNITS = {"place": "mm", "force": "%", "peak": "%", "iou": "1"}
 TARGETS = {"place": PLACE, "force": FORCE, "peak": PEAK, "iou": 0.55}  # docs/sources.md, Targets
-SEED = 11  # of gains and noise
+SEED = 11  # of gains, noise and rest
+REST_OFF = 3.0  # counts: what an electrode drifts by in two minutes since the tare, at most (`readout.Wiring.drift`)
 
 Truth = dict[str, np.ndarray]
 Errors = dict[str, np.ndarray]  # by UNITS, a number a judged frame
@@ -37,23 +41,40 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
     every : of as many sequences one is judged
     """
     truth = {name: values[::every] for name, values in read(file).items()}
+    number = len(truth["motion"])
+    followed, alone = both = measured(network, truth)
+    kind = np.repeat(truth["motion"], (truth["force"] > TOUCHED).sum(axis=1))
+    found = []
+    for figure, unit in UNITS.items():
+        of = f"{len(kind)} frames of {number} sequences; baseline: each frame alone"
+        found.append(_row(f"sequence_{figure}", figure, both, slice(None), of, unit, TARGETS[figure]))
+        for which, name in enumerate(MOTIONS):
+            found.append(_row(f"sequence_{figure}", figure, both, kind == which, name, unit))
+    value, null = (_quantile(each["place"], 90) for each in (followed, alone))
+    found.append(row("sequence_place_90", value, "mm", null=null, of=f"{len(kind)} frames"))
+    of = f"{number} sequences, rest up to {REST_OFF:g} counts off; baseline: each frame alone"
+    return [*found, *_rows_of("sequence_rest_off", measured(network, truth, REST_OFF), of)]
+
+
+def full_rows(network: Translator, pairs: Pairs) -> list[Row]:
+    """Medians over frames from 0.1 N on of the test contacts' presses, with and without the rest some counts off."""
+    truth = full_sequences.sequences(pairs)
+    of = f"{len(truth['force'])} presses of the full tier"
+    found = _rows_of("sequence_full", measured(network, truth), f"{of}; baseline: each frame alone", TARGETS)
+    of += f", rest up to {REST_OFF:g} counts off; baseline: each frame alone"
+    return found + _rows_of("sequence_full_rest_off", measured(network, truth, REST_OFF), of, TARGETS)
+
+
+def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[Errors, Errors]:
+    """Errors of all sequences' judged frames, followed and each frame alone; rest_off : counts, of `read_by_a_unit`."""
     time = np.arange(truth["force"].shape[1]) / SAMPLE_RATE
-    followed, alone, motion = [], [], []
+    followed, alone = [], []
     for number, signal in enumerate(truth["signal"]):
-        signals = plain_signals(read_by_a_unit(signal, np.random.default_rng([SEED, number])))
+        signals = plain_signals(read_by_a_unit(signal, np.random.default_rng([SEED, number]), rest_off))
         one = {name: values[number] for name, values in truth.items()}
         followed.append(judged(network.followed(signals, time), one))
         alone.append(judged(network(signals), one))
-        motion.append(np.full(len(followed[-1]["force"]), truth["motion"][number]))
-    both, kind = (_joined(followed), _joined(alone)), np.concatenate(motion)
-    found = []
-    for figure, unit in UNITS.items():
-        of = f"{len(kind)} frames of {len(truth['signal'])} sequences; baseline: each frame alone"
-        found.append(_row(f"sequence_{figure}", figure, both, slice(None), of, unit, TARGETS[figure]))
-        for number, name in enumerate(MOTIONS):
-            found.append(_row(f"sequence_{figure}", figure, both, kind == number, name, unit))
-    value, null = (_quantile(each["place"], 90) for each in both)
-    return [*found, row("sequence_place_90", value, "mm", null=null, of=f"{len(kind)} frames")]
+    return _joined(followed), _joined(alone)
 
 
 def read(file: Path = FILE) -> Truth:
@@ -62,10 +83,13 @@ def read(file: Path = FILE) -> Truth:
         return {name: found[name] for name in found.files}
 
 
-def read_by_a_unit(signal: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """True changes (T, 19) counts as read by a unit whose gains stay, float32."""
+def read_by_a_unit(signal: np.ndarray, random: np.random.Generator, rest_off: float = 0.0) -> np.ndarray:
+    """True changes (T, 19) counts as read by a unit whose gains and rest stay, the latter up to rest_off counts off,
+    float32.
+    """
     gain = 1 + GAIN * random.standard_normal(signal.shape[1])
-    return (gain * signal + NOISE * random.standard_normal(signal.shape)).astype(np.float32)
+    found = gain * signal + NOISE * random.standard_normal(signal.shape)
+    return (found + random.uniform(-rest_off, rest_off, signal.shape[1])).astype(np.float32)
 
 
 def judged(found: Translation, truth: Truth) -> Errors:
@@ -87,6 +111,15 @@ def judged(found: Translation, truth: Truth) -> Errors:
 
 def _joined(parts: list[Errors]) -> Errors:
     return {name: np.concatenate([part[name] for part in parts]) for name in UNITS}
+
+
+def _rows_of(name: str, both: tuple[Errors, Errors], of: str, targets: dict[str, float] | None = None) -> list[Row]:
+    """A row of each figure, over all judged frames."""
+    targets = targets or {}
+    return [
+        _row(f"{name}_{figure}", figure, both, slice(None), of, unit, targets.get(figure))
+        for figure, unit in UNITS.items()
+    ]
 
 
 def _row(

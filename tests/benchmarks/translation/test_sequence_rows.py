@@ -49,9 +49,19 @@ def test_a_lost_contact_is_far(truth):
 
 def test_rows_are_of_some_sequences_or_all():
     found = sequence_rows.rows(load_translator(), every=10)
-    whole = {row["name"]: row for row in found if "of 6 sequences" in row["set"]}
-    assert set(whole) == {f"sequence_{figure}" for figure in sequence_rows.UNITS}
+    whole = {row["name"]: row for row in found if "6 sequences" in row["set"]}
+    names = {f"sequence_{rest}{figure}" for figure in sequence_rows.UNITS for rest in ("", "rest_off_")}
+    assert set(whole) == names
     assert all(whole[name]["value"] > 0 for name in whole)
+
+
+def test_a_unit_whose_rest_is_off_keeps_its_gains_and_noise(truth):
+    right, off = (
+        sequence_rows.read_by_a_unit(truth["signal"][0], np.random.default_rng(1), counts) for counts in (0.0, 3.0)
+    )
+    apart = off - right
+    np.testing.assert_allclose(apart, np.broadcast_to(apart[0], apart.shape), atol=1e-4)
+    assert 1.0 < np.abs(apart[0]).max() <= 3.0
 
 
 def test_lost_contacts_have_no_median():
