@@ -110,26 +110,28 @@ def row(
     unit: str,
     target: float | None = None,
     *,
-    null: float | None = None,
+    baseline: float | None = None,
     of: str = "",
     at_least: bool = False,
 ) -> Row:
     """Make a report row of one value, rounded to four digits; ``of`` names the data it was measured on.
 
-    null : the baseline's value: of doing nothing, or of the strongest simple answer
+    baseline : the value of doing nothing, or of the strongest simple answer
     ok : |value| <= target, or value >= target for ``at_least``; None where there is no target
     """
     ok = None
     if target is not None:
         ok = value is not None and bool(value >= target if at_least else abs(value) <= target)
-    value, target, null = (None if number is None else float(f"{number:.4g}") for number in (value, target, null))
-    return {"name": name, "value": value, "unit": unit, "target": target, "ok": ok, "null": null, "set": of}
+    value, target, baseline = (
+        None if number is None else float(f"{number:.4g}") for number in (value, target, baseline)
+    )
+    return {"name": name, "value": value, "unit": unit, "target": target, "ok": ok, "baseline": baseline, "set": of}
 
 
 def line(row: Row) -> str:
     """Format a row as a line of the table."""
     mark = {None: "", True: "ok", False: "MISSED"}[row["ok"]]
-    cells = [row["name"], row["value"], row["unit"], row["target"], row["null"], row["set"], mark]
+    cells = [row["name"], row["value"], row["unit"], row["target"], row["baseline"], row["set"], mark]
     return "| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |"
 
 

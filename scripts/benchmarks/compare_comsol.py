@@ -30,7 +30,7 @@ def main() -> int:
     try:
         for found in comsol(options.folder):
             rows.append(found)
-            cells = [found[key] for key in ("name", "value", "unit", "target", "null", "set", "ok")]
+            cells = [found[key] for key in ("name", "value", "unit", "target", "baseline", "set", "ok")]
             print("| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |", flush=True)
     except TactileError as error:
         print(error, file=sys.stderr)

@@ -115,7 +115,7 @@ def on_photographs(
             value = float(np.mean([one[figure] for one in each]))
             null = float(np.mean([one[figure] for one in found[where, "null_background"]]))
             of = f"{len(each)} photographs {'not fitted' if where == 'apart' else 'of another day, deeper'}"
-            yield row(f"{where}_{name}_{figure}", value, unit_, null=null, of=of)
+            yield row(f"{where}_{name}_{figure}", value, unit_, baseline=null, of=of)
 
 
 def one_fit(

@@ -3,9 +3,9 @@
     python scripts/fault_test.py --quick --json FILE     about two minutes on one core
     python scripts/fault_test.py                         more recordings, more blows, an hour
 
-Prints a row for each fault: shards that differ from the undisturbed run, are missing or half-written (target 0; null:
-shards of the job). Exits 1 when a row misses its target. The Dask row needs the extra [batch], that of the small disk
-the right to mount one (root), and says so without it. Linux alone.
+Prints a row for each fault: shards that differ from the undisturbed run, are missing or half-written (target 0;
+baseline: shards of the job). Exits 1 when a row misses its target. The Dask row needs the extra [batch], that of the
+small disk the right to mount one (root), and says so without it. Linux alone.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def tried(name: str, fault: Callable[[Bench], Lost | None], bench: Bench, count:
     if found is not None and not blows:
         lost = count
     of = f"not tried: {ABSENT[name]}" if lost is None else f"{blows} blows, {time.monotonic() - began:.0f} s{trouble}"
-    return row(f"fault_{name}_files_lost", lost, "files", None if lost is None else 0, null=count, of=of)
+    return row(f"fault_{name}_files_lost", lost, "files", None if lost is None else 0, baseline=count, of=of)
 
 
 def late(*words: object) -> None:

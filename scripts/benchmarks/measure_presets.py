@@ -161,11 +161,11 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
     )
     for name, change in changes.items():
         yield row(f"{name}_error_direct", rms(change, converged), "levels", DIRECT_TARGET.get(name),
-                  null=rms(converged), of=of)  # fmt: skip
-        yield row(f"{name}_error", rms(change, full), "levels", FULL_TARGET.get(name), null=rms(full), of=of)
+                  baseline=rms(converged), of=of)  # fmt: skip
+        yield row(f"{name}_error", rms(change, full), "levels", FULL_TARGET.get(name), baseline=rms(full), of=of)
     paths = Renderer(unit, REFERENCE.name, variant)
     drawn = [levels(paths.radiance(height) - paths.rest_radiance) for height in heights[:2]]
-    yield row(f"{REFERENCE.name}_error", rms(drawn, full[:2]), "levels", null=rms(full[:2]),
+    yield row(f"{REFERENCE.name}_error", rms(drawn, full[:2]), "levels", baseline=rms(full[:2]),
               of="2 fields, by LLVM the noise of its 256 paths a pixel and what they differ by")  # fmt: skip
 
 
@@ -212,7 +212,7 @@ def against_paths(unit: Calibration) -> Iterator[Row]:
             for preset, pictures in zip(ours, drawn, strict=True):
                 error = float(np.sqrt(max(np.mean(np.square(pictures[k] - paths)) - noise, 0)))
                 name = f"{preset.name}_{coating.bsdf}_{1e3 * depth:g}mm_from_paths"
-                yield row(name, error, "levels", targets[preset.name], null=rms([paths]), of=of)
+                yield row(name, error, "levels", targets[preset.name], baseline=rms([paths]), of=of)
 
 
 def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:

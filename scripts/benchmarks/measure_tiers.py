@@ -138,10 +138,10 @@ def validated(sensor: Sensor) -> Iterator[Miss]:
     for name, line in rows.items():
         depth = re.fullmatch(r"([\d.]+)mm(\S*)_shape_rms", name)
         if depth:
-            value, _, _, null = (cell.strip() for cell in line.split("|"))
+            value, _, _, baseline = (cell.strip() for cell in line.split("|"))
             force = float(rows[f"{depth[1]}mm{depth[2]}_force_error"].split("|")[0]) / 100
             share = 1e-3 * float(depth[1]) / tiers.thickness_of(sensor)
-            yield Miss(-100, share, 1e-6 * float(value), abs(force), 1e-6 * float(null))
+            yield Miss(-100, share, 1e-6 * float(value), abs(force), 1e-6 * float(baseline))
 
 
 def share_of(full: dict) -> dict:

@@ -156,7 +156,7 @@ def memory(folder: Path, most: int) -> list[Row]:
     process.wait()
     first, last = np.median(sizes[: max(1, len(sizes) // 10)]), np.median(sizes[-max(1, len(sizes) // 10) :])
     of = f"{len(shards) * job.recipe.shard_frames} frames through one worker; baseline: after its first tenth"
-    return [row("batch_worker_memory", last, "MB", null=first, of=of)]
+    return [row("batch_worker_memory", last, "MB", baseline=first, of=of)]
 
 
 def resident(process: int) -> float:

@@ -202,5 +202,5 @@ def weights_entry(tools: Tools) -> dict:
     from ..translation.card_errors import chain_error
 
     found = chain_error(tools.card)
-    errors = {} if found is None else {"kept_apart_rms_um": found[0], "null_rms_um": found[1]}
+    errors = {} if found is None else {"kept_apart_rms_um": found[0], "baseline_rms_um": found[1]}
     return {"sha256": tools.sha256, **errors}

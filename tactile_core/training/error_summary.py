@@ -13,7 +13,7 @@ from .step_errors import Columns
 BINS = (0.1e-3, 0.3e-3, 0.6e-3, 0.9e-3, 1.2e-3)  # m, of depth on the BioTac, the sensor that is read (assumed)
 
 MEDIANS = ("position_mm", "percent")
-NULLS = {"MVB": "null_biotac", "S2MPN": "null_biotac", "D2B": "null_biotac"}
+BASELINES = {"MVB": "baseline_biotac", "S2MPN": "baseline_biotac", "D2B": "baseline_biotac"}
 
 
 def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median: bool = False) -> float | None:
@@ -36,11 +36,11 @@ def figure_rows(
     depth, indenter = pairs.depth_biotac[rows], pairs.indenter[rows]
     found = []
     for name, values in columns.items():
-        if not name.startswith("null_"):
+        if not name.startswith("baseline_"):
             at = np.where(still, values, np.nan)
             value = in_bins(at, depth, indenter, is_median(name))
-            null = in_bins(np.where(still, _null(columns, name), np.nan), depth, indenter, is_median(name))
-            found.append(figure_row(name, value, null, targets.get(name), set_name))
+            baseline = in_bins(np.where(still, _baseline(columns, name), np.nan), depth, indenter, is_median(name))
+            found.append(figure_row(name, value, baseline, targets.get(name), set_name))
     return found
 
 
@@ -49,17 +49,19 @@ def is_median(name: str) -> bool:
     return name.endswith(MEDIANS)
 
 
-def _null(columns: Columns, name: str) -> np.ndarray:
+def _baseline(columns: Columns, name: str) -> np.ndarray:
     step, figure = name.split("_", 1)
-    nothing = columns.get("null_counts" if figure == "counts" else f"{NULLS.get(step, 'null_digit')}_{figure}")
+    nothing = columns.get(
+        "baseline_counts" if figure == "counts" else f"{BASELINES.get(step, 'baseline_digit')}_{figure}"
+    )
     return np.full(len(columns[name]), np.nan) if nothing is None else nothing
 
 
-def figure_row(name: str, value: float | None, null: float | None, target: float | None, set_name: str) -> Row:
+def figure_row(name: str, value: float | None, baseline: float | None, target: float | None, set_name: str) -> Row:
     """Make one row of a report; the unit is the name's last word. Larger is better for an intersection over union."""
     unit = name.rsplit("_", 1)[1].replace("percent", "%").replace("iou", "1")
     target = None if value is None else target
-    return row(name, value, unit, target, null=null, of=set_name, at_least=name.endswith("iou"))
+    return row(name, value, unit, target, baseline=baseline, of=set_name, at_least=name.endswith("iou"))
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:

@@ -144,14 +144,14 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
     latent = nets.encode_signal(data.change[test], data.rectified)
     state = nets.contact(latent, data.rectified)
     true, middle = on_gel(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
-    miss, null = (accuracy.lengths(on_gel(frame, each) - true) for each in (state[:, :PLACE], middle))
+    miss, baseline = (accuracy.lengths(on_gel(frame, each) - true) for each in (state[:, :PLACE], middle))
     estimated = nets.force_in(state, nets.given(latent, state, data.rectified))
     load, usual = accuracy.lengths(estimated), np.median(data.force[train])
     share, nothing = (100 * np.abs(each - data.force[test]) / data.force[test] for each in (load, usual))
     of = f"kept presses, {when}"
     return [
-        row("real_position_mm", 1e3 * float(np.median(miss)), "mm", null=1e3 * float(np.median(null)), of=of),
-        row("real_force_percent", float(np.median(share)), "%", null=float(np.median(nothing)), of=of),
+        row("real_position_mm", 1e3 * float(np.median(miss)), "mm", baseline=1e3 * float(np.median(baseline)), of=of),
+        row("real_force_percent", float(np.median(share)), "%", baseline=float(np.median(nothing)), of=of),
     ]
 
 

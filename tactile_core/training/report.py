@@ -83,8 +83,8 @@ def signal_rows(measure: Measure) -> list[Row]:
     """SVB: rms over electrodes of the reconstruction against the signal as read, averaged over contacts."""
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
-    value, null = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
-    return [figure_row("SVB_rms_counts", value, null, None, "test presses")]
+    value, baseline = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
+    return [figure_row("SVB_rms_counts", value, baseline, None, "test presses")]
 
 
 def silence(measure: Measure) -> dict[str, np.ndarray]:

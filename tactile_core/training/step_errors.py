@@ -46,7 +46,7 @@ def translation_figures(nets: Networks, pairs: Pairs, rows: np.ndarray, change: 
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
     (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); the other way ``D2B`` (DIGIT mesh to BioTac mesh), and
-    ``B2S``, ``D2S`` (meshes to signal). Figures: see `mesh_columns`; ``null_*`` are those of no displacement.
+    ``B2S``, ``D2S`` (meshes to signal). Figures: see `mesh_columns`; ``baseline_*`` are those of no displacement.
     """
     return joined(_part(nets, pairs, rows[part], change[part], bodies) for part in parts(len(rows)))
 
@@ -73,8 +73,8 @@ def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bo
     state = nets.contact(read)
     signal, chained = nets.latents(read, state)
     found = {
-        **mesh_columns("null_biotac", np.zeros_like(skin), skin, accuracy.lengths),
-        **mesh_columns("null_digit", np.zeros_like(gel), gel),
+        **mesh_columns("baseline_biotac", np.zeros_like(skin), skin, accuracy.lengths),
+        **mesh_columns("baseline_digit", np.zeros_like(gel), gel),
         **mesh_columns("MVB", nets.decode_biotac(mesh), skin, accuracy.lengths),
         **mesh_columns("MVD", nets.decode_digit(nets.encode_digit(gel)), gel),
         **mesh_columns("S2MPN", nets.decode_biotac(signal), skin, accuracy.lengths),
@@ -87,7 +87,7 @@ def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bo
     found |= mesh_columns("D2B", nets.decode_biotac(back), skin, accuracy.lengths)
     for name, latent in (("B2S", mesh), ("D2S", back)):
         found[f"{name}_counts"] = _rms(nets.decode_signal(nets.m2s(latent)) - pairs.signal[rows])
-    found["null_counts"] = _rms(pairs.signal[rows])
+    found["baseline_counts"] = _rms(pairs.signal[rows])
     found |= digit_columns("true_mesh", gel, patch, bodies)
     for name, force in (("force_from_mesh", nets.force(mesh)), ("force", nets.force_in(state, signal))):
         load = accuracy.lengths(pairs.force[rows])

@@ -28,7 +28,7 @@ class SurfaceCodec:
     wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
     place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) nodes that move, at least FEWEST
-    null : m, loss of no displacement, mean over training contacts
+    baseline : m, loss of no displacement, mean over training contacts
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class SurfaceCodec:
         self.scale = spread.clamp(min=max(SMALLEST_SCALE * float(spread.max()), 1e-9))
         self.modes = metres.div_(self.scale)
         self.total, self.moving = _in_parts(self._sizes, every).T
-        self.null = max(float((self.total[rows] / self.moving[rows]).sqrt().mean()), 1e-9)
+        self.baseline = max(float((self.total[rows] / self.moving[rows]).sqrt().mean()), 1e-9)
 
     @property
     def nodes(self) -> int:
@@ -126,7 +126,7 @@ class SurfaceCodec:
             true = self._at_cells(at, cell) * touched
             beyond = (self.total[at] - true.square().sum(-1)).clamp(min=0.0) * touched[:, 0]
         squares = (modes * self.scale.to(device) - true.to(device)).square().sum(-1) + beyond.to(device)
-        return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.null
+        return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.baseline
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
         """Coefficients (B, K + K') round cells (B, 2) -> displacement (B, n, 3) m in the nodes' own frames, in the

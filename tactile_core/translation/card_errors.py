@@ -14,9 +14,9 @@ def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
     rows = card.get("errors")
     for row in rows if isinstance(rows, list) else []:
         if isinstance(row, dict) and (row.get("name"), row.get("set")) == (ROW, SET):
-            value, null = row.get("value"), row.get("null")
-            if isinstance(value, int | float) and isinstance(null, int | float):
-                return float(value), float(null)
+            value, baseline = row.get("value"), row.get("baseline")
+            if isinstance(value, int | float) and isinstance(baseline, int | float):
+                return float(value), float(baseline)
     return None
 
 

@@ -29,7 +29,7 @@ def test_a_stage_runs_and_its_rows_can_be_read(script, tmp_path, capsys):
     for method in ("translation_numpy_1", "mechanics_digit_fast"):
         error = rows[f"{method}_error"]
         assert rows[f"{method}_ms"]["value"] > 0 and rows[f"{method}_MB"]["value"] > 20
-        assert 0 < error["value"] < error["null"] and error["unit"] == "um" and error["set"]
+        assert 0 < error["value"] < error["baseline"] and error["unit"] == "um" and error["set"]
     assert "photographs, no PRESSES given" in capsys.readouterr().err
 
 

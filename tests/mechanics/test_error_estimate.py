@@ -18,7 +18,7 @@ def test_the_table_knows_every_tier_at_every_depth(tier, sensor):
     ends = [each["depth_share_to"] for each in entry["bins"]]
     assert entry["ms"] > 0 and ends == sorted(ends) and ends[-1] == DEPTH_LIMIT
     for each in entry["bins"]:
-        assert each["contacts"] > 0 and 0 < each["shape_um"] <= each["shape_95_um"] < each["null_um"]
+        assert each["contacts"] > 0 and 0 < each["shape_um"] <= each["shape_95_um"] < each["baseline_um"]
         assert 0 < each["force"] <= each["force_95"]
 
 

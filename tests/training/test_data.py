@@ -144,7 +144,7 @@ def test_loss_is_that_of_the_nodes(contacts, name):
         there = (cell + shift).clamp(max=6)
         answer = 0.8 * modes
         squares = (surface.field(answer, there) - surface.true(rows)).square().sum((-1, -2))
-        expected = (squares / surface.moving[rows] + 1e-12).sqrt().mean() / surface.null
+        expected = (squares / surface.moving[rows] + 1e-12).sqrt().mean() / surface.baseline
         assert float(surface.loss(answer, there, rows)) == pytest.approx(float(expected), rel=tolerance)
 
 
@@ -174,4 +174,4 @@ def test_statistics_come_from_the_training_presses_alone(contacts):
     again = Contacts(other, contacts.split, OPTIONS, FRAMES, generator())
     for what in ("wide", "near", "scale"):
         torch.testing.assert_close(getattr(again.digit, what), getattr(contacts.digit, what), rtol=0, atol=0)
-    assert again.digit.null == contacts.digit.null
+    assert again.digit.baseline == contacts.digit.baseline

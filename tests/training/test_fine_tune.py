@@ -32,7 +32,7 @@ def test_it_learns_the_sensor(arrays, tmp_path, capsys):
     # Measured: places 1.8 -> 1.1 mm; forty contacts are kept to tell.
     for name, share in (("real_position_mm", 0.75), ("real_force_percent", 1.0)):
         assert rows[name, "after"]["value"] < share * rows[name, "before"]["value"]
-        assert rows[name, "after"]["value"] < 0.6 * rows[name, "after"]["null"]
+        assert rows[name, "after"]["value"] < 0.6 * rows[name, "after"]["baseline"]
     assert after.card["fine_tuned"]["weights_sha256"] == before.sha256
     for net in (net for net in networks.NETS if net != "S2MPN"):
         for name, tensor in before.tensors[net].items():

@@ -50,12 +50,12 @@ def files(out):
 def test_it_learns(pairs, tmp_path):
     card = train(pairs, tmp_path, 0, Options(**SMALL), **SURFACES)
     rows = {row["name"]: row for row in card["errors"]}
-    share = {name: row["value"] / row["null"] for name, row in rows.items() if row["null"]}
+    share = {name: row["value"] / row["baseline"] for name, row in rows.items() if row["baseline"]}
     # Few contacts, few steps, so that another processor's rounding leads elsewhere: .41 to .68 on an EPYC, .46 to
     # .69 on a Xeon. A net that is wired wrong gives 1.
     nets = ("MVB", "MVD", "S2MPN", "M2MPN", "chain", "D2B", "direct")
     assert not {name: share[f"{name}_rms_um"] for name in nets if share[f"{name}_rms_um"] >= 0.85}
-    assert rows["silence_digit_max_um"]["value"] < 0.25 * rows["chain_max_um"]["null"]
+    assert rows["silence_digit_max_um"]["value"] < 0.25 * rows["chain_max_um"]["baseline"]
 
 
 def test_result_is_complete_and_loads(quick, pairs):
@@ -66,7 +66,7 @@ def test_result_is_complete_and_loads(quick, pairs):
     assert card["seed"] == 3
     assert len(card["pairs"]["sha256"]) == 64
     assert card["pairs"]["contacts"] == {"train": 256, "validation": 32, "test": 32}
-    assert all(row["null"] is not None for row in card["errors"] if row["name"].endswith(("um", "counts", "_N")))
+    assert all(row["baseline"] is not None for row in card["errors"] if row["name"].endswith(("um", "counts", "_N")))
     error_bounds.check(card, "card.json")
     for net, entry in card["nets"].items():
         shapes = {name: list(array.shape) for name, array in loaded.tensors[net].items()}

@@ -71,8 +71,8 @@ def test_gains_are_found_to_half_their_scatter(typical, rectified, sigma):
         gain = np.exp(sigma * np.random.default_rng(unit).standard_normal(19))
         read = readings(truth, gain, np.zeros(19), rectified, seed=unit)
         found = adapt.fit(read[reference_signals.touching(read)], rectified, typical, "test")
-        null = rms(np.log(gain) - np.log(gain).mean())
-        assert error(found, gain) < 0.5 * null
+        baseline = rms(np.log(gain) - np.log(gain).mean())
+        assert error(found, gain) < 0.5 * baseline
         assert found.fitted.all() and found.warnings == ()
 
 

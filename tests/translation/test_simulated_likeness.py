@@ -49,7 +49,7 @@ def test_far_contacts_are_found_and_single_ones_seldom_mistaken(pairs):
     found = two_contact_rows.rows(pairs)
     total, far = found[0], found[-1]
     # The patterns are made anew with the weights: bounds, not the figures measured.
-    assert total["null"] < 0.06 < 0.2 < total["value"] < far["value"]
+    assert total["baseline"] < 0.06 < 0.2 < total["value"] < far["value"]
 
 
 def test_a_translation_flags_them_and_hardly_any_of_one_contact(request):

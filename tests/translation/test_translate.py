@@ -56,8 +56,8 @@ def test_shapes_units_and_finite(shipped, translation):
 
 
 @pytest.mark.parametrize(
-    # The share of the null answer that is left, on a recording the training never saw. Loose: what is tested is that
-    # networks, surfaces and recording belong together; the figures themselves stand in the card.
+    # The share of the baseline's error that is left, on a recording the training never saw. Loose: what is tested is
+    # that networks, surfaces and recording belong together; the errors themselves stand in the card.
     ("field", "share"),
     [("displacement_biotac", 0.35), ("displacement_digit", 0.75)],
 )
@@ -65,8 +65,8 @@ def test_displacements_are_much_nearer_the_truth_than_nothing(shipped, translati
     here = touched(shipped)
     true = getattr(shipped.truth, field)[here]
     error = np.nanmean(accuracy.rms_in_contact(getattr(translation, field)[here], true))
-    null = np.nanmean(accuracy.rms_in_contact(np.zeros_like(true), true))
-    assert error < share * null
+    baseline = np.nanmean(accuracy.rms_in_contact(np.zeros_like(true), true))
+    assert error < share * baseline
 
 
 def test_force_and_place_follow_the_truth(shipped, translation):

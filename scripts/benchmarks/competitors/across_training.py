@@ -177,7 +177,9 @@ def error_columns(
             "MVD": model.MVD.decode(own), "M2MPN": model.MVD.decode(model.M2MPN(mesh)),
             "chain": model.MVD.decode(model.M2MPN(signal)),
         }  # fmt: skip
-    found = mesh_columns("null_biotac", 0 * skin, skin, accuracy.lengths) | mesh_columns("null_digit", 0 * gel, gel)
+    found = mesh_columns("baseline_biotac", 0 * skin, skin, accuracy.lengths) | mesh_columns(
+        "baseline_digit", 0 * gel, gel
+    )
     for name, moved in on_skin.items():
         found |= mesh_columns(name, skin_scale * moved.numpy(), skin, accuracy.lengths)
     for name, moved in on_gel.items():

@@ -204,10 +204,10 @@ def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -
     measures = ("shape_rms", 0, 3, 1e6, "um"), ("shape_max", 1, 4, 1e6, "um"), ("force_error", 2, 5, 100, "percent")
     for low, high, here in _bins(depth):
         for what, after, before, scale, unit in measures:
-            value, null = (float(np.median(np.abs(errors[here, k])) * scale) for k in (after, before))
+            value, baseline = (float(np.median(np.abs(errors[here, k])) * scale) for k in (after, before))
             name = f"{sensor}_friction_{friction:g}_corrected_{low:g}_to_{high:g}_{what}"
             of = f"{here.sum()} contacts of presses kept apart, median; baseline: uncorrected"
-            yield row(name, value, unit, null=null, of=of)
+            yield row(name, value, unit, baseline=baseline, of=of)
 
 
 _LEAST = 8  # contacts, below which a bin says nothing

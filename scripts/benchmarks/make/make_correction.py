@@ -102,7 +102,7 @@ def main() -> int:
             print(f"{done}/{len(jobs)} {line}", flush=True)
     rows = learn_all(arguments)
     for row in rows:
-        print(f"{row['name']}: {row['value']:.3g} {row['unit']} (uncorrected {row['null']:.3g}), {row['set']}")
+        print(f"{row['name']}: {row['value']:.3g} {row['unit']} (uncorrected {row['baseline']:.3g}), {row['set']}")
     if arguments.json:
         atomic.write_json(arguments.json, rows)
     return 0

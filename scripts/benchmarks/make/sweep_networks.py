@@ -47,7 +47,7 @@ SETTINGS: dict[str, dict[str, float]] = {
     "published": {"latent_signal": 8, "latent_biotac": 128, "latent_digit": 128, "beta": 0.005},
 }
 FIGURES = ("MVB_rms_um", "MVD_rms_um", "M2MPN_rms_um", "S2MPN_rms_um", "chain_rms_um", "force_percent")
-NULLS = ("null_biotac_rms_um", "null_digit_rms_um")
+BASELINES = ("baseline_biotac_rms_um", "baseline_digit_rms_um")
 DIRECT_SEEDS = (0, 1, 2)
 NOT_COMPARED = ("back", "error")
 
@@ -83,7 +83,7 @@ def setting_rows(name: str, options: argparse.Namespace, test: Pairs) -> list[Ro
     folder = trained(name, 0, SETTINGS[name], ("direct", *NOT_COMPARED), options)
     nets, rows = translate.load_translator(folder / "weights").nets, np.arange(len(test.press))
     columns = translation_figures(nets, test, rows, as_read(test.signal, SEED), our_bodies())
-    return figure_rows({figure: columns[figure] for figure in (*FIGURES, *NULLS)}, test, rows, name, {})
+    return figure_rows({figure: columns[figure] for figure in (*FIGURES, *BASELINES)}, test, rows, name, {})
 
 
 def direct_rows(options: argparse.Namespace) -> list[Row]:
@@ -93,9 +93,9 @@ def direct_rows(options: argparse.Namespace) -> list[Row]:
     for figure in ("direct_rms_um", "chain_rms_um"):
         each = [own_error(folder, figure) for folder in folders]
         for seed, row in zip(DIRECT_SEEDS, each, strict=True):
-            found.append(figure_row(figure, row["value"], row["null"], None, f"seed {seed}"))
-        mean, null = (float(np.mean([row[key] for row in each])) for key in ("value", "null"))
-        found.append(figure_row(figure, mean, null, None, "mean of seeds"))
+            found.append(figure_row(figure, row["value"], row["baseline"], None, f"seed {seed}"))
+        mean, baseline = (float(np.mean([row[key] for row in each])) for key in ("value", "baseline"))
+        found.append(figure_row(figure, mean, baseline, None, "mean of seeds"))
     return found
 
 

@@ -35,8 +35,10 @@ def published_volume(intervals: tuple[int, int, int] = INTERVALS) -> Row:
     point = np.array([0.0, 0.0, -2 * biotac_sp.PUBLISHED_OUTER[2]])
     press = SpPress(point, np.array([0.0, 0.0, 1.0]), intervals, biotac_sp.PUBLISHED_OUTER)
     flat = 2 / 3 * np.pi * float(np.prod(biotac_sp.PUBLISHED_OUTER - biotac_sp.THICKNESS))
-    off, null = (100 * (found / biotac_sp.PUBLISHED_VOLUME - 1) for found in (press.fluid_volume, flat))
-    return row("comsol_published_volume", off, "percent", VOLUME, null=null, of="1,750 Pa in the model of July 2020")
+    off, baseline = (100 * (found / biotac_sp.PUBLISHED_VOLUME - 1) for found in (press.fluid_volume, flat))
+    return row(
+        "comsol_published_volume", off, "percent", VOLUME, baseline=baseline, of="1,750 Pa in the model of July 2020"
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,20 +125,20 @@ def compare(press: Press, steps: list[Pressed]) -> Iterator[Row]:
     none = np.linalg.norm(_cut(press, press.electrodes[0]), axis=-1) - np.linalg.norm(press.electrodes[0], axis=-1)
     of = f"COMSOL press {press.name}, {len(steps)} steps"
     name = f"comsol_{press.name}"
-    yield row(f"{name}_gap_rms", _rms(changes - expected), "mm", GAP, null=_rms(none * 1e3 - expected), of=of)
+    yield row(f"{name}_gap_rms", _rms(changes - expected), "mm", GAP, baseline=_rms(none * 1e3 - expected), of=of)
     yield row(f"{name}_gap_rms_at_the_end", _rms((changes - expected)[-1]), "mm", of=of)
     most = int(expected[-1].argmin())
     behind = float(changes[-1, most] - changes[-1].min())
     yield row(f"{name}_gap_most_squeezed_behind", behind, "mm", SQUEEZED, of=f"E{most + 1} in COMSOL, at the end")
     volume, theirs, cut = volumes(press, steps)
-    off, null = (float(100 * np.abs(found / theirs - 1).max()) for found in (volume, cut))
-    yield row(f"{name}_enclosed_volume", off, "percent", VOLUME, null=null, of=of)
+    off, baseline = (float(100 * np.abs(found / theirs - 1).max()) for found in (volume, cut))
+    yield row(f"{name}_enclosed_volume", off, "percent", VOLUME, baseline=baseline, of=of)
     fluid = np.array([step.volume for step in steps])
     yield row(f"{name}_fluid_volume_change", float(100 * np.abs(fluid / fluid[0] - 1).max()), "percent", VOLUME, of=of)
     ratio = force_ratios(press, steps)
     error = 100 * float(np.abs(ratio - 1).mean())
     fitted = press.name == FITTED
-    yield row(f"{name}_force_error", error, "percent", None if fitted else FORCE, null=100.0, of=of)
+    yield row(f"{name}_force_error", error, "percent", None if fitted else FORCE, baseline=100.0, of=of)
     yield row(f"{name}_force_bias", 100 * float(ratio.mean() - 1), "percent", of="fitted here" if fitted else of)
     # the COMSOL model knows no contact with the core, nor does ours: below zero both would be wrong
     yield row(f"{name}_core_gap", 1e3 * min(step.core_gap for step in steps), "mm", of=of)

@@ -30,20 +30,22 @@ class Miss:
     """Error of one contact against the truth at the same depth.
 
     press : of contacts that follow each other, none in two; share : depth from first touch over the thickness there
-    shape : rms m over nodes that truly move more than 10 um; force : relative; null : rms m of no displacement
+    shape : rms m over nodes that truly move more than 10 um; force : relative; baseline : rms m of no displacement
     """
 
     press: int
     share: float
     shape: float
     force: float
-    null: float
+    baseline: float
 
 
 def miss(press: int, share: float, found: np.ndarray, force: float, true: np.ndarray, true_force: float) -> Miss:
     """Compute the error from displacements (n, 3) m and forces N."""
-    error, null = (float(accuracy.rms_in_contact(moved[None], true[None])[0]) for moved in (found, np.zeros_like(true)))
-    return Miss(press, share, error, abs(force / true_force - 1), null)
+    error, baseline = (
+        float(accuracy.rms_in_contact(moved[None], true[None])[0]) for moved in (found, np.zeros_like(true))
+    )
+    return Miss(press, share, error, abs(force / true_force - 1), baseline)
 
 
 def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
@@ -97,7 +99,7 @@ def by_depth(misses: Iterable[Miss], edges: Sequence[float]) -> list[Bin]:
                 "depth_share_to": high, "contacts": len(here),
                 "shape_um": _digits(1e6 * np.median(shape)), "shape_95_um": _digits(1e6 * np.quantile(shape, 0.95)),
                 "force": _digits(np.median(force)), "force_95": _digits(np.quantile(force, 0.95)),
-                "null_um": _digits(1e6 * np.median([each.null for each in here])),
+                "baseline_um": _digits(1e6 * np.median([each.baseline for each in here])),
             })  # fmt: skip
     return found
 

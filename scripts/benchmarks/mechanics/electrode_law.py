@@ -38,11 +38,11 @@ _RIM_MARGIN, _TILT = 1.0e-3, np.radians(20)  # m and rad: places and angles as `
 
 
 def electrode_rows(contacts: int = 240, *, each: bool = True) -> Iterator[Row]:
-    """Rows {name, value, unit, target, ok, null, set}; each : whether those of the single electrodes come too.
+    """Rows {name, value, unit, target, ok, baseline, set}; each : whether those of the single electrodes come too.
 
-    null is the rms of the sheet's own change: the error of a law that answers no change at all. The scale of the sheet
-    in counts is the one that makes the best single constant of the law ``FILM_CONSTANT``. No row has a target: the law
-    is assumed, and so is its scale in counts.
+    The baseline is the rms of the sheet's own change: the error of a law that answers no change at all. The scale of
+    the sheet in counts is the one that makes the best single constant of the law ``FILM_CONSTANT``. No row has a
+    target: the law is assumed, and so is its scale in counts.
     """
     inner_skin = _inner_skin()
     touches = _contacts(contacts)
@@ -59,8 +59,8 @@ def electrode_rows(contacts: int = 240, *, each: bool = True) -> Iterator[Row]:
         for depth, moved in zip(E18_DEPTHS, over_e18, strict=True):
             change = 100 * (sheet.resistances(sheet.films(moved)) / rest - 1)
             name = f"sheet_over_E18_{depth * 1e3:.1f}mm"
-            yield row(f"{name}_E18", change[17], "percent", null=0.0, of=f"7 mm ball, {of}")
-            yield row(f"{name}_largest_fall", change.min(), "percent", null=0.0, of=f"7 mm ball, {of}")
+            yield row(f"{name}_E18", change[17], "percent", baseline=0.0, of=f"7 mm ball, {of}")
+            yield row(f"{name}_largest_fall", change.min(), "percent", baseline=0.0, of=f"7 mm ball, {of}")
         found = np.stack([sheet.resistances(sheet.films(moved)) for moved in skin])
         yield from _law_rows(found - rest, gaps, of, each=each)
         divided = divider.reading(growth(found, rest), sensors.REST_COUNTS) - sensors.REST_COUNTS
@@ -73,13 +73,15 @@ def _law_rows(change: np.ndarray, gaps: np.ndarray, of: str, *, each: bool) -> I
     counts = change * (law**2).sum() / (law * change).sum()  # the single constant that fits best becomes the law's own
     own = (law * counts).sum(0) / (law**2).sum(0)  # of each electrode, as a share of the law's
     of = f"{len(change)} contacts, {of}"
-    yield row("gap_law_difference", _rms(counts - law), "counts rms", null=_rms(counts), of=of)
-    yield row("gap_law_difference_own_constants", _rms(counts - own * law), "counts rms", null=_rms(counts), of=of)
-    yield row("gap_law_correlation", np.corrcoef(counts.ravel(), law.ravel())[0, 1], "1", null=0.0, of=of)
+    yield row("gap_law_difference", _rms(counts - law), "counts rms", baseline=_rms(counts), of=of)
+    yield row("gap_law_difference_own_constants", _rms(counts - own * law), "counts rms", baseline=_rms(counts), of=of)
+    yield row("gap_law_correlation", np.corrcoef(counts.ravel(), law.ravel())[0, 1], "1", baseline=0.0, of=of)
     for e in range(19) if each else ():
         name = f"gap_law_E{e + 1:02d}"
-        yield row(f"{name}_difference", _rms(counts[:, e] - law[:, e]), "counts rms", null=_rms(counts[:, e]), of=of)
-        yield row(f"{name}_correlation", np.corrcoef(counts[:, e], law[:, e])[0, 1], "1", null=0.0, of=of)
+        yield row(
+            f"{name}_difference", _rms(counts[:, e] - law[:, e]), "counts rms", baseline=_rms(counts[:, e]), of=of
+        )
+        yield row(f"{name}_correlation", np.corrcoef(counts[:, e], law[:, e])[0, 1], "1", baseline=0.0, of=of)
         yield row(f"{name}_own_constant", FILM_CONSTANT * own[e], "counts m", of=of)
 
 
@@ -96,7 +98,7 @@ def _grid_rows(sheet: BiotacSheet, skin: list[np.ndarray]) -> Iterator[Row]:
     coarse = changes(sheet.resistances)
     yield row("sheet_solve_time", 1e3 * (time.perf_counter() - started) / (len(skin) + 1), "ms", of="19 electrodes")
     of = f"{len(skin)} contacts, against a grid 8 times as fine"
-    yield row("sheet_grid_error", _rms(coarse - exact), "percent of rest", null=_rms(exact), of=of)
+    yield row("sheet_grid_error", _rms(coarse - exact), "percent of rest", baseline=_rms(exact), of=of)
 
 
 def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) -> Iterator[Row]:
@@ -110,13 +112,13 @@ def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) 
     ended = time.perf_counter()
     rest, of = sheet.resistances(sheet.film), f"{len(films)} contacts, against the whole sheet"
     yield row("reduced_sheet_time", 1e3 * (ended - between) / len(films), "ms", 3.0, of=of)
-    yield row("reduced_sheet_time_ratio", (ended - between) / (between - started), "1", null=1.0, of=of)
+    yield row("reduced_sheet_time_ratio", (ended - between) / (between - started), "1", baseline=1.0, of=of)
     change = 100 * (exact / rest - 1)
     for name, answer in (
         ("reduced_sheet_error", found),
         ("reduced_sheet_error_of_watched_films", np.stack([reduced.resistances(each) for each in watched])),
     ):
-        yield row(name, _rms(100 * (answer / rest - 1) - change), "percent of rest", null=_rms(change), of=of)
+        yield row(name, _rms(100 * (answer / rest - 1) - change), "percent of rest", baseline=_rms(change), of=of)
 
 
 def _inner_skin() -> Callable[[Contact], np.ndarray]:

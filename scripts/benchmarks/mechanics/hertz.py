@@ -46,7 +46,7 @@ def rows(quick: bool) -> Iterator[Row]:
             of = f"nu {poisson:g}, contact radius {slope:g} of the ball, {1 / _BLOCK:g} of the block"
             name = f"hertz_{poisson:g}_{slope:g}"
             ratio = touch.force[1] / force(touch.depth, BALL, YOUNGS, poisson)
-            yield row(f"{name}_force_error", 100 * (ratio - 1), "percent", TARGET, null=-100.0, of=of)
+            yield row(f"{name}_force_error", 100 * (ratio - 1), "percent", TARGET, baseline=-100.0, of=of)
             edge = contact_radius(contact, touch) / radius
-            yield row(f"{name}_radius_error", 100 * (edge - 1), "percent", TARGET, null=-100.0, of=of)
+            yield row(f"{name}_radius_error", 100 * (edge - 1), "percent", TARGET, baseline=-100.0, of=of)
             yield row(f"{name}_time", time.perf_counter() - started, "s", of=of)

@@ -15,7 +15,7 @@ from .bonded_layer import GOLDEN_FORCE
 
 _INTRODUCTION = """# Contact mechanics against known answers
 
-Made by `python scripts/validate_mechanics.py`. *Baseline* is the error of doing nothing (`null` in
+Made by `python scripts/validate_mechanics.py`. *Baseline* is the error of doing nothing (`baseline` in
 the rows of `--json`); shape errors are vector rms over surface nodes that move more than 10 um, and the maximum. Times
 are from one shared 2-core machine.
 

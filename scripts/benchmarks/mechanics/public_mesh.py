@@ -98,13 +98,15 @@ def _dry(body: Body, pose: Pose, depth: float, material: Material) -> Answer:
 def _against(name: str, found: Answer, own: Answer, pairs: Pairs, of: str) -> Iterator[Row]:
     """Force and shape of the tetrahedra against ours, at their own nodes near the touched place."""
     ratio = np.linalg.norm(found[1]) / np.linalg.norm(own[1])
-    yield row(f"{name}_force_error", 100 * (ratio - 1), "percent", null=-100.0, of=of)
+    yield row(f"{name}_force_error", 100 * (ratio - 1), "percent", baseline=-100.0, of=of)
     expected = pairs.expected(own[0])
     moved = np.linalg.norm(expected, axis=1) > _MOVES
     off = np.linalg.norm(found[0][pairs.nodes] - expected, axis=1)[moved]
-    null = np.linalg.norm(expected, axis=1)[moved]
-    yield row(f"{name}_shape_rms", 1e6 * np.sqrt((off**2).mean()), "um", null=1e6 * np.sqrt((null**2).mean()), of=of)
-    yield row(f"{name}_shape_max", 1e6 * off.max(), "um", null=1e6 * null.max(), of=of)
+    baseline = np.linalg.norm(expected, axis=1)[moved]
+    yield row(
+        f"{name}_shape_rms", 1e6 * np.sqrt((off**2).mean()), "um", baseline=1e6 * np.sqrt((baseline**2).mean()), of=of
+    )
+    yield row(f"{name}_shape_max", 1e6 * off.max(), "um", baseline=1e6 * baseline.max(), of=of)
 
 
 class Pairs:

@@ -73,12 +73,12 @@ def rows(quick: bool) -> Iterator[Row]:
             of, name = f"nu {poisson:g}, sqrt(R d) / h = {ratio:g}, R / h = {_BALL}", f"layer_{poisson:g}_{ratio:g}"
             if ratio in _DIMITRIADIS:
                 error = 100 * (found / dimitriadis(depth, ball, THICKNESS, YOUNGS, poisson) - 1)
-                yield row(f"{name}_dimitriadis_error", error, "percent", TARGET, null=-100.0, of=of)
+                yield row(f"{name}_dimitriadis_error", error, "percent", TARGET, baseline=-100.0, of=of)
             error = 100 * (found / exact_layer(depth, ball, THICKNESS, YOUNGS, poisson)[2] - 1)
-            yield row(f"{name}_exact_error", error, "percent", TARGET, null=-100.0, of=of)
+            yield row(f"{name}_exact_error", error, "percent", TARGET, baseline=-100.0, of=of)
             yield row(f"{name}_time", time.perf_counter() - started, "s", of=of)
     for ratio in (40,) if quick else (14, 28, 40, 60):
         error = 100 * (thin_limit(ratio) - 1)
         target = THIN_TARGET if ratio >= 28 else None
         of = f"contact radius of {ratio} thicknesses"
-        yield row(f"thin_layer_{ratio}_error", error, "percent", target, null=-100.0, of=of)
+        yield row(f"thin_layer_{ratio}_error", error, "percent", target, baseline=-100.0, of=of)

@@ -97,22 +97,22 @@ def _normal_error(where: str, found: Solution, exact: Solution) -> Iterator[Row]
         np.degrees(np.arccos(np.clip(np.einsum("ni,ni->n", gel_normals(moved)[fine], theirs), -1, 1)))
         for moved in (found.displacement, np.zeros_like(found.displacement))
     ]
-    null_mean, null_max = float(angles[1].mean()), float(angles[1].max())
+    baseline_mean, baseline_max = float(angles[1].mean()), float(angles[1].max())
     of = "gel inside the contact, 7 mm ball"
-    yield row(f"{where}_normals_mean", float(angles[0].mean()), "degree", NORMAL_TARGET, null=null_mean, of=of)
-    yield row(f"{where}_normals_max", float(angles[0].max()), "degree", null=null_max, of=of)
+    yield row(f"{where}_normals_mean", float(angles[0].mean()), "degree", NORMAL_TARGET, baseline=baseline_mean, of=of)
+    yield row(f"{where}_normals_max", float(angles[0].max()), "degree", baseline=baseline_max, of=of)
 
 
 def _compare(where: str, tier: Tier, found: Solution, exact: Solution, share: float) -> Iterator[Row]:
-    error, null = (
+    error, baseline = (
         1e6 * float(accuracy.rms_in_contact(moved[None], exact.displacement[None])[0])
         for moved in (found.displacement, np.zeros_like(exact.displacement))
     )
     largest = 1e6 * float(accuracy.max_error(found.displacement[None], exact.displacement[None])[0])
     of = f"7 mm ball, one place, against the {exact.tier} tier"
     wanted = SHAPE_TARGET if tier == "full" or share <= 0.2 else None
-    yield row(f"{where}_shape_rms", error, "um", wanted, null=null, of=of)
+    yield row(f"{where}_shape_rms", error, "um", wanted, baseline=baseline, of=of)
     yield row(f"{where}_shape_max", largest, "um", of=of)
     off = 100 * (np.linalg.norm(found.force) / np.linalg.norm(exact.force) - 1)
     wanted = FULL_FORCE_TARGET if tier == "full" else FAST_FORCE_TARGET if share <= 0.4 else None
-    yield row(f"{where}_force_error", float(off), "percent", wanted, null=-100.0, of=of)
+    yield row(f"{where}_force_error", float(off), "percent", wanted, baseline=-100.0, of=of)

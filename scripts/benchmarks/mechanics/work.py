@@ -41,4 +41,4 @@ def rows(quick: bool) -> Iterator[Row]:
         yield row(f"work_over_energy_{steps}_steps", 100 * gap, "percent", of=of)
     slope = order([1 / steps for steps in counts], [abs(gap) for gap in gaps])
     yield row("work_order", slope, "1", ORDER, of=of, at_least=True)
-    yield row("unloaded_displacement", left_after(contact, _DEPTH, 0.2e-3), "1", REST, null=1.0, of=of)
+    yield row("unloaded_displacement", left_after(contact, _DEPTH, 0.2e-3), "1", REST, baseline=1.0, of=of)

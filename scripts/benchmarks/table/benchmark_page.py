@@ -66,7 +66,7 @@ def write_report(
 def as_line(method: Method) -> str:
     """A method as a line of the table; the fastest with the least error of its stage stand in the plot."""
     cells = [f"`{method.name}`", *map(short, (method.ms, method.mb))]
-    cells += [f"{short(method.error)} {method.unit}", f"{short(method.null)} {method.unit}", method.of]
+    cells += [f"{short(method.error)} {method.unit}", f"{short(method.baseline)} {method.unit}", method.of]
     return "| " + " | ".join(cells) + " |"
 
 
@@ -81,7 +81,7 @@ def same_pairs() -> str:
     ours, across = ({each["name"]: each for each in record[name]} for name in ("ours", "across"))
     lines = [
         f"| {name.removesuffix('_rms_um')} | {short(found['value'])} um | {short(ours[name]['value'])} um"
-        f" | {short(found['null'])} um |"
+        f" | {short(found['baseline'])} um |"
         for name, found in across.items() if name.endswith("_rms_um")
     ]  # fmt: skip
     spent = [f"{short(each['training_s']['value'])} s ({each['training_s']['set']})" for each in (across, ours)]
@@ -120,8 +120,8 @@ def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
     """Draw one panel."""
     front = pareto([(each.ms, each.error) for each in methods])
     axes.plot(*zip(*steps(front), strict=True), color="tab:orange", linewidth=1, zorder=1, label="Pareto front")
-    nulls = {each.null for each in methods if each.null}
-    axes.axhline(max(nulls), color="grey", linestyle="--", linewidth=1, label="doing nothing")
+    baselines = {each.baseline for each in methods if each.baseline}
+    axes.axhline(max(baselines), color="grey", linestyle="--", linewidth=1, label="doing nothing")
     for number, each in enumerate(sorted(methods, key=lambda one: one.ms)):
         best = (each.ms, each.error) in front
         axes.plot(each.ms, each.error, "o", color="tab:orange" if best else "tab:blue", zorder=2)
@@ -132,7 +132,7 @@ def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
              ylabel=f"error, {methods[0].unit}")  # fmt: skip
     axes.xaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_major_formatter("{x:g}")
-    if max(nulls) < 10 * min(each.error for each in methods):  # fewer than two powers of ten to read
+    if max(baselines) < 10 * min(each.error for each in methods):  # fewer than two powers of ten to read
         axes.yaxis.set_minor_formatter("{x:g}")
     axes.margins(x=0.3, y=0.45)
     axes.legend(fontsize=8)

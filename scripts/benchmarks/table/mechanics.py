@@ -41,16 +41,18 @@ def measure(name: str, quick: bool) -> Method:
     for truth, solution in found:
         pair = solution.displacement, float(np.linalg.norm(solution.force)), truth.displacement, truth.force
         misses.append(miss(truth.number, truth.share, *pair))
-    shape, force, null = (np.median([getattr(each, of) for each in misses]) for of in ("shape", "force", "null"))
+    shape, force, baseline = (
+        np.median([getattr(each, of) for each in misses]) for of in ("shape", "force", "baseline")
+    )
     of = f"{len(misses)} random contacts, without friction, against the reference tier"
-    more = [row(f"mechanics_{name}_force_error", 100 * force, "percent", null=100, of=of)]
+    more = [row(f"mechanics_{name}_force_error", 100 * force, "percent", baseline=100, of=of)]
     took = float(np.median(ms))
     if tier == "fast":
         more += _on_test_contacts(sensor, quick)
         loop = _in_the_loop(sensor, quick)
         took = next((each["value"] for each in loop if each["name"].endswith("alone_compiled_cpu")), took)
         more += loop
-    return Method("mechanics", name, took, mb, 1e6 * shape, "um", 1e6 * null, of, tuple(more))
+    return Method("mechanics", name, took, mb, 1e6 * shape, "um", 1e6 * baseline, of, tuple(more))
 
 
 def _solved(sensor, contact, tier):  # noqa: ANN001, ANN202 (as `solved`)
@@ -72,7 +74,7 @@ def _reference(sensor: str, quick: bool) -> Method:
     ms, error = 1e3 * np.median([truth.seconds for truth in truths]), REFERENCE_SHARE * full["shape_um"]
     of = f"{len(truths)} random contacts, by measure_tiers.py: a third of the full tier's error (assumed)"
     mb = None if quick else peak_mb()
-    return Method("mechanics", f"{sensor}_reference", float(ms), mb, error, "um", full["null_um"], of)
+    return Method("mechanics", f"{sensor}_reference", float(ms), mb, error, "um", full["baseline_um"], of)
 
 
 def _in_the_loop(sensor: str, quick: bool) -> list[Row]:
@@ -94,10 +96,12 @@ def _on_test_contacts(sensor: str, quick: bool) -> list[Row]:
     if quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
     found = list(fast_misses(sensor, pairs, scene))
-    shape, force, null = (np.median([getattr(each, name) for each in found]) for name in ("shape", "force", "null"))
+    shape, force, baseline = (
+        np.median([getattr(each, name) for each in found]) for name in ("shape", "force", "baseline")
+    )
     of = f"{len(found)} test contacts with friction, against the full tier"
     name = f"mechanics_{sensor}_fast_from_full"
     return [
-        row(f"{name}_error", 1e6 * shape, "um", null=1e6 * null, of=of),
-        row(f"{name}_force_error", 100 * force, "percent", null=100, of=of),
+        row(f"{name}_error", 1e6 * shape, "um", baseline=1e6 * baseline, of=of),
+        row(f"{name}_force_error", 100 * force, "percent", baseline=100, of=of),
     ]

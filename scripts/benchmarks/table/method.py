@@ -20,7 +20,7 @@ class Method:
     """Method of a stage.
 
     ms : CPU a frame on one core; mb : peak memory of a process that does this alone, without what measures the error
-    error, null : in ``unit``, of this method and of doing nothing; of : on what set the error was measured
+    error, baseline : in ``unit``, of this method and of doing nothing; of : on what set the error was measured
     more : further rows
     """
 
@@ -30,7 +30,7 @@ class Method:
     mb: float | None
     error: float | None
     unit: str
-    null: float | None
+    baseline: float | None
     of: str
     more: tuple[Row, ...] = ()
 
@@ -38,7 +38,7 @@ class Method:
         """Time, memory and error as rows."""
         name = f"{self.stage}_{self.name}"
         found = [row(f"{name}_ms", self.ms, "ms", of="one core, CPU"), row(f"{name}_MB", self.mb, "MB", of="peak")]
-        return [*found, row(f"{name}_error", self.error, self.unit, null=self.null, of=self.of), *self.more]
+        return [*found, row(f"{name}_error", self.error, self.unit, baseline=self.baseline, of=self.of), *self.more]
 
 
 def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 0.5, most: int = 50) -> float:

@@ -39,7 +39,7 @@ def measure(name: str, quick: bool, presses: str) -> Method:
     fitted = [press.name for press in photographs.presses if press.name in unit.fit.photographs]
     test = chosen(photographs, [press.name for press in photographs.presses if press.name not in fitted])
     tried = evaluate_unit(unit, test, BALL, search_radius=False)
-    null, of = mean_figures(tried)[1], f"{len(test.presses)} photographs kept apart"
+    baseline, of = mean_figures(tried)[1], f"{len(test.presses)} photographs kept apart"
     label = name
     if name == TABLE:
         table = fit_table(unit, chosen(photographs, fitted), BALL)
@@ -57,13 +57,20 @@ def measure(name: str, quick: bool, presses: str) -> Method:
         ]
     values = _means(each)
     more = [
-        row(f"photographs_{label}_{what}", values[what], unit_, null=null[what], of=of) for what, unit_ in UNITS.items()
+        row(f"photographs_{label}_{what}", values[what], unit_, baseline=baseline[what], of=of)
+        for what, unit_ in UNITS.items()
     ]
     more += [
-        row(f"photographs_{label}_of_{one.press.name}", found["roi_l1"], "levels", null=one.null["roi_l1"], of="region")
+        row(
+            f"photographs_{label}_of_{one.press.name}",
+            found["roi_l1"],
+            "levels",
+            baseline=one.baseline["roi_l1"],
+            of="region",
+        )
         for found, one in zip(each, tried, strict=True)
     ]
-    error = values["roi_l1"], "levels", null["roi_l1"]
+    error = values["roi_l1"], "levels", baseline["roi_l1"]
     return Method("photographs", label, ms, peak_mb(), *error, f"{of}, mean error in the region", tuple(more))
 
 

@@ -40,7 +40,7 @@ def measure(name: str, quick: bool, truth: str) -> Method:
     levels = [renderer.in_levels(renderer.radiance(height) - renderer.rest_radiance) for height in heights]
     label = name if name == FAST else f"{name}_{renderer.variant}"
     more = [
-        row(f"pictures_{label}_field_{number}", rms([found], [each]), "levels", null=rms([each]), of="one field")
+        row(f"pictures_{label}_field_{number}", rms([found], [each]), "levels", baseline=rms([each]), of="one field")
         for number, (found, each) in enumerate(zip(levels, true, strict=True), 1)
     ]
     return Method("pictures", label, ms, mb, rms(levels, list(true)), "levels", rms(list(true)), of, tuple(more))

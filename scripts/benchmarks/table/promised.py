@@ -159,7 +159,7 @@ def of_photographs(rows: Sequence[Row]) -> Iterator[str]:
     for each in rows:
         match = re.fullmatch(r"photographs_fast_of_(.+)", each["name"])
         if match:
-            yield f"| {match[1]} | {promised_:.1f} | {each['value']:.1f} | {each['null']:.1f} |"
+            yield f"| {match[1]} | {promised_:.1f} | {each['value']:.1f} | {each['baseline']:.1f} |"
 
 
 def scene_rows(translator: Translator, name: str) -> tuple[list[Row], str]:

@@ -48,7 +48,10 @@ def table(methods: Sequence[Method]) -> str:
         found = [each for name in names for each in methods if named(each, name)]
         if len(found) == len(names):
             cells = [joined(found, lambda one: one.ms), joined(found, lambda one: one.mb)]
-            cells += [f"{joined(found, lambda one: one.error)} {unit(found)}", f"{short(found[0].null)} {unit(found)}"]
+            cells += [
+                f"{joined(found, lambda one: one.error)} {unit(found)}",
+                f"{short(found[0].baseline)} {unit(found)}",
+            ]
             lines.append("| " + " | ".join([stage, label, *cells]) + " |")
     return "\n".join(lines) + "\n"
 

@@ -55,9 +55,13 @@ def measure(name: str, quick: bool) -> Method:
         of = f"{len(pairs.press)} test contacts, signal to DIGIT"
     chain, skin = found["chain_rms_um"], found["S2MPN_rms_um"]
     more = row(
-        f"translation_{name}_biotac_error", skin["value"], "um", null=skin["null"], of=of.replace("DIGIT", "BioTac")
+        f"translation_{name}_biotac_error",
+        skin["value"],
+        "um",
+        baseline=skin["baseline"],
+        of=of.replace("DIGIT", "BioTac"),
     )
-    return Method("translation", name, ms, mb, chain["value"], "um", chain["null"], of, (more,))
+    return Method("translation", name, ms, mb, chain["value"], "um", chain["baseline"], of, (more,))
 
 
 def _numpy() -> Surfaces:
@@ -137,6 +141,7 @@ def _columns(work: Surfaces, pairs: Pairs, change: Change, part: slice) -> dict[
     skin, gel = (true_displacement(pairs, sensor, rows) for sensor in ("biotac", "digit"))
     on_skin, on_gel = work(change[part])
     return {
-        **mesh_columns("null_biotac", 0 * skin, skin, accuracy.lengths), **mesh_columns("null_digit", 0 * gel, gel),
+        **mesh_columns("baseline_biotac", 0 * skin, skin, accuracy.lengths),
+        **mesh_columns("baseline_digit", 0 * gel, gel),
         **mesh_columns("S2MPN", on_skin, skin, accuracy.lengths), **mesh_columns("chain", on_gel, gel),
     }  # fmt: skip

@@ -2,8 +2,8 @@
 
 Medians a blurred answer cannot win: place, force, depth of the deepest node, overlap of the patches. Beside the most
 plausible contact stand the mean of the posterior, the same contact solved on the DIGIT (``convert --gel solved``), and
-as null the nearest example: what the contact of another press of the test set with the most similar signals, each less
-its size, did, as strong as this signal says.
+as baseline the nearest example: what the contact of another press of the test set with the most similar signals, each
+less its size, did, as strong as this signal says.
 """
 
 from __future__ import annotations
@@ -47,17 +47,17 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
     for name, (least, most, targets) in SETS.items():
         inside = still & (pairs.depth_biotac >= least) & (pairs.depth_biotac < most)
         for figure in ("place_mm", "force_size_percent", "peak_percent", "iou"):
-            likely, mean, solved, null = (
+            likely, mean, solved, baseline = (
                 _median(answers[f"{who}_{figure}"][inside]) for who in ("likely", "mean", "solved", "nearest")
             )
             unit, at_least = figure.rsplit("_", 1)[-1].replace("percent", "%").replace("iou", "1"), figure == "iou"
             of = f"{inside.sum()} contacts {name}; baseline: the nearest example"
             found.append(
-                row(f"likely_{figure}", likely, unit, targets.get(figure), null=null, of=of, at_least=at_least)
+                row(f"likely_{figure}", likely, unit, targets.get(figure), baseline=baseline, of=of, at_least=at_least)
             )
-            found.append(row(f"mean_{figure}", mean, unit, null=null, of=of))
+            found.append(row(f"mean_{figure}", mean, unit, baseline=baseline, of=of))
             if figure != "force_size_percent":  # which solving takes as it is
-                found.append(row(f"solved_{figure}", solved, unit, null=null, of=of))
+                found.append(row(f"solved_{figure}", solved, unit, baseline=baseline, of=of))
     return found
 
 
@@ -82,8 +82,8 @@ def gel_force_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
     for word, quantile in (("median", 50), ("90", 90)):
         ceiling = float(np.percentile(off["gel_force_ceiling"], quantile))
         value = float(np.percentile(off["gel_force"], quantile))
-        found.append(row(f"gel_force_{word}_percent", value, "%", ABOVE_CEILING * ceiling, null=100.0, of=of))
-        found.append(row(f"gel_force_ceiling_{word}_percent", ceiling, "%", null=100.0, of=of))
+        found.append(row(f"gel_force_{word}_percent", value, "%", ABOVE_CEILING * ceiling, baseline=100.0, of=of))
+        found.append(row(f"gel_force_ceiling_{word}_percent", ceiling, "%", baseline=100.0, of=of))
     return found
 
 
@@ -110,8 +110,8 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
     deep, place_mm = float(np.median(peak)), _median(place)
     truth = float(np.median(true))
     return [
-        row("rectified_peak_um", deep, "um", RECTIFIED_PEAK * truth, null=truth, of=f"{of}; baseline: the true depth",
-            at_least=True),
+        row("rectified_peak_um", deep, "um", RECTIFIED_PEAK * truth, baseline=truth,
+            of=f"{of}; baseline: the true depth", at_least=True),
         row("rectified_place_mm", place_mm, "mm", RECTIFIED_PLACE, of=of),
         row("rectified_silent", float(silent.mean()), "1", RECTIFIED_SILENT, of=of),
     ]  # fmt: skip
@@ -134,12 +134,12 @@ def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
     half = DRAWS // 2
     score = accuracy.lengths(points - truth).mean(0) - 0.5 * accuracy.lengths(points[:half] - points[half:]).mean(0)
     others = accuracy.lengths(truth[:, None] - truth).mean(0)
-    null = float((others - 0.5 * others.mean()).mean())
+    baseline = float((others - 0.5 * others.mean()).mean())
     likely = 1e3 * on_gel(frame, posterior.likely[:, :PLACE])
     of = "all test contacts; baseline: all their places alike"
-    found.append(row("place_energy_score", float(score.mean()), "mm", null=null, of=of))
+    found.append(row("place_energy_score", float(score.mean()), "mm", baseline=baseline, of=of))
     alone = float(accuracy.lengths(likely - truth).mean())
-    found.append(row("place_energy_score_of_one_answer", alone, "mm", null=null, of=of))
+    found.append(row("place_energy_score_of_one_answer", alone, "mm", baseline=baseline, of=of))
     return found
 
 

@@ -35,12 +35,22 @@ def slide_rows(folder: Path, network: Translator, most: int | None, sensor: Elec
     estimated, seen = (np.concatenate([_frames(path, network, sensor) for path in paths]) for paths in (report, choose))
     of = f"{len(estimated)} frames above {CONTACT:g} Pa, {len(report)} recordings"
     constant = np.median(seen[:, 0])
-    value, null = _error(estimated[:, 1], estimated[:, 0]), _error(np.full(len(estimated), constant), estimated[:, 0])
-    yield row("pressure_error", value, "%", AS_IT_COMES, null=null, of=f"{of}; baseline: a constant, {constant:.0f} Pa")
+    value, baseline = (
+        _error(estimated[:, 1], estimated[:, 0]),
+        _error(np.full(len(estimated), constant), estimated[:, 0]),
+    )
+    yield row(
+        "pressure_error",
+        value,
+        "%",
+        AS_IT_COMES,
+        baseline=baseline,
+        of=f"{of}; baseline: a constant, {constant:.0f} Pa",
+    )
     scale = [np.median(seen[:, 0] / seen[:, k]) for k in (1, 2)]
-    value, null = (_error(scale[k - 1] * estimated[:, k], estimated[:, 0]) for k in (1, 2))
+    value, baseline = (_error(scale[k - 1] * estimated[:, k], estimated[:, 0]) for k in (1, 2))
     whole_set = f"{of}; scale {scale[0]:.3f} from sample {slide_set.CHOOSING}; baseline: sum of electrodes, scaled too"
-    yield row("pressure_error_scaled", value, "%", SCALED, null=null, of=whole_set)
+    yield row("pressure_error_scaled", value, "%", SCALED, baseline=baseline, of=whole_set)
     largest = network.card["pairs"]["largest_pressure_Pa"]
     above = float((estimated[:, 0] > largest).mean())
     yield row("pressure_above_training", above, "1", ABOVE, of=f"{of}; {largest:.0f} Pa")
@@ -54,9 +64,9 @@ def grip_row(prepared: Iterable[Signals], network: Translator) -> Row:
         if np.subtract(*np.percentile(measured, [95, 5])) > SWING:
             ranks.append(rank_correlation(network(signals).pressure, measured))
             sums.append(rank_correlation(np.abs(signals.change).sum(axis=1), measured))
-    value, null = (float(np.median(each)) if each else None for each in (ranks, sums))
+    value, baseline = (float(np.median(each)) if each else None for each in (ranks, sums))
     of = f"{len(ranks)} grips whose pressure changes by {SWING:g} Pa; baseline: sum of electrodes"
-    return row("grip_pressure_rank", value, "1", null=null, of=of, at_least=True)
+    return row("grip_pressure_rank", value, "1", baseline=baseline, of=of, at_least=True)
 
 
 def _frames(path: Path, network: Translator, sensor: ElectrodeGains | None) -> np.ndarray:

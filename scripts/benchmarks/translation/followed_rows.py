@@ -38,7 +38,7 @@ def rows(network: Translator, file: Path = SHIPPED) -> list[Row]:
         ("followed_touch_wrong", "wrong", None, "1", None),
     ]  # fmt: skip
     return [
-        row(name, _over(followed[kind], level), unit, target, null=_over(alone[kind], level), of=of)
+        row(name, _over(followed[kind], level), unit, target, baseline=_over(alone[kind], level), of=of)
         for name, kind, level, unit, target in figures
     ]
 

@@ -87,7 +87,7 @@ def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
     """
     loaded = [prepare_unit(recordings.read(one), None, None) for one, _ in held]
     of = f"{len(held)} grips of hard flat objects, rest taken during the grip; baseline: with the unit's rest"
-    return row("grip_unexplained", unexplained(loaded), "1", 0.9, null=unexplained(known), of=of, at_least=True)
+    return row("grip_unexplained", unexplained(loaded), "1", 0.9, baseline=unexplained(known), of=of, at_least=True)
 
 
 def unexplained(several: list[Signals]) -> float:
@@ -98,19 +98,19 @@ def unexplained(several: list[Signals]) -> float:
 
 def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> list[Row]:
     shuffle = np.random.default_rng(0).permutation(len(electrodes()))
-    results, null = [], []
+    results, baseline = [], []
     for path in hard:
         for finger, one in enumerate(each_finger(path)):
             unit = sensor.gains_for(one, finger, SOFT)
             results.append(_judged(recordings.read(one), unit, network))
-            null.append(_judged(recordings.read(one), unit, network, shuffle))
+            baseline.append(_judged(recordings.read(one), unit, network, shuffle))
     of = f"{len(results)} grips of hard flat objects, trials 04 and 05; baseline: electrodes shuffled"
     figures = [np.array([one[k] for one in results]) for k in range(3)]
-    shuffled = [np.array([one[k] for one in null]) for k in range(3)]
+    shuffled = [np.array([one[k] for one in baseline]) for k in range(3)]
     return [
-        row("grip_place_in_box", figures[0].mean(), "1", 0.95, null=shuffled[0].mean(), of=of, at_least=True),
-        row("grip_place_found", figures[1].mean(), "1", 0.9, null=shuffled[1].mean(), of=of, at_least=True),
-        row("grip_out_of_range", figures[2].mean(), "1", 0.2, null=shuffled[2].mean(), of=of),
+        row("grip_place_in_box", figures[0].mean(), "1", 0.95, baseline=shuffled[0].mean(), of=of, at_least=True),
+        row("grip_place_found", figures[1].mean(), "1", 0.9, baseline=shuffled[1].mean(), of=of, at_least=True),
+        row("grip_out_of_range", figures[2].mean(), "1", 0.2, baseline=shuffled[2].mean(), of=of),
     ]
 
 
@@ -126,7 +126,7 @@ def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
     lost = np.isnan(away).sum()
     of = f"{deep.sum()} test contacts deeper than {1e3 * DEEP:g} mm, {lost} lost; baseline: their middle"
     away[np.isnan(away)] = np.inf  # a contact that is not found is not near
-    return row("simulated_place_error", float(np.median(away)), "mm", 0.6, null=float(np.median(nothing)), of=of)
+    return row("simulated_place_error", float(np.median(away)), "mm", 0.6, baseline=float(np.median(nothing)), of=of)
 
 
 def _judged(

@@ -38,7 +38,7 @@ def rows(name: str, prepared: Iterable[Signals], network: Translator) -> list[Ro
     contact, lost = pressure > CONTACT, pressure < LOST
     inside = contact & (seen > 0)
     of = f"{inside.sum()} of {contact.sum()} frames above {CONTACT:g} Pa have their contact in the picture"
-    null = f"; baseline: {lost.sum()} frames below {LOST:g} Pa"
+    baseline = f"; baseline: {lost.sum()} frames below {LOST:g} Pa"
 
     found = [row(f"{name}_contact_in_picture", _over(np.mean, seen[contact]), "1", of=f"{contact.sum()} frames")]
     if inside.any():
@@ -47,7 +47,9 @@ def rows(name: str, prepared: Iterable[Signals], network: Translator) -> list[Ro
             ("level", level, "levels rms", np.median),
         ):
             nothing = _over(over, values[lost])
-            found.append(row(f"{name}_print_{figure}", _over(over, values[inside]), unit, null=nothing, of=of + null))
+            found.append(
+                row(f"{name}_print_{figure}", _over(over, values[inside]), unit, baseline=nothing, of=of + baseline)
+            )
     return found
 
 

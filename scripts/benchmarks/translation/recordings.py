@@ -64,7 +64,7 @@ def translate(
     """Translate one recording as `tactile convert` does. Raises TactileError for a file that cannot be read."""
     recording = read(path)
     signals = prepare_unit(recording, options, sensor)
-    tracked = isinstance(network, Translator)  # a null answers by itself
+    tracked = isinstance(network, Translator)  # a baseline answers by itself
     state = track(network.posterior(signals), recording.time) if tracked else [None] * len(recording)
     parts = [_translate(_part(signals, rows), network, state[rows]) for rows in _chunks(len(recording))]
     force, volume, centre, latent = (np.concatenate([part[k] for part in parts]) for k in range(4))
@@ -156,7 +156,9 @@ def rows(
     most: int | None = None,
     sensor: ElectrodeGains | None = None,
 ) -> list[Row]:
-    """Translate and judge a folder's recordings kept for reporting, the first `most` or all; ``null``: electrodes' sum.
+    """Translate and judge a folder's recordings kept for reporting, the first `most` or all.
+
+    The baseline is the electrodes' sum.
 
     out : folder for the translations, in the form that the judging tool beside the recordings reads
     sensor : gains and offsets of the sensor that made them, as `tactile adapt` finds them
@@ -181,12 +183,12 @@ def rows_of(judged: list[Judged]) -> list[Row]:
     for name in ("electrode_1", "electrode_sum", "electrode_rms"):
         table.append(_row(f"{name}_rank_median", [one.ranks[name] for one in whole], "1", None, of=of))
     for axis, word in enumerate(("along", "across")):
-        value, null = ([one.spreads[key][axis] for one in whole] for key in ("centre", "electrodes"))
-        table.append(_row(f"centre_spread_{word}", value, "mm", SPREAD_MM, null=null, of=of))
-    table.append(_row("contact_missed", [one.missed for one in judged], "1", None, null=[1.0], of=of))
+        value, baseline = ([one.spreads[key][axis] for one in whole] for key in ("centre", "electrodes"))
+        table.append(_row(f"centre_spread_{word}", value, "mm", SPREAD_MM, baseline=baseline, of=of))
+    table.append(_row("contact_missed", [one.missed for one in judged], "1", None, baseline=[1.0], of=of))
     step, unrepaired = ([getattr(one, name) for one in judged] for name in ("step", "step_unrepaired"))
     bad = f"worst of {np.isfinite(step).sum()} recordings with bad samples; baseline: not repaired"
-    table.append(_row("step_at_repaired", step, "1", NO_LARGER, null=unrepaired, of=bad, over=np.max))
+    table.append(_row("step_at_repaired", step, "1", NO_LARGER, baseline=unrepaired, of=bad, over=np.max))
     numbers = [one.not_finite for one in judged]
     table.append(_row("not_finite", numbers, "numbers", 0, of=f"all frames of {len(judged)} recordings", over=np.sum))
     return [row for rows in table for row in rows]
@@ -194,8 +196,8 @@ def rows_of(judged: list[Judged]) -> list[Row]:
 
 def _strength_rows(whole: list[Figures], name: str, of: str, aimed: bool) -> list[list[Row]]:
     def pick(figure: str) -> dict[str, list[float]]:
-        value, null = ([getattr(one, figure)[key] for one in whole] for key in (name, "electrode_sum"))
-        return {"values": value, "null": null}
+        value, baseline = ([getattr(one, figure)[key] for one in whole] for key in (name, "electrode_sum"))
+        return {"values": value, "baseline": baseline}
 
     ranks, still, rough = pick("ranks"), pick("silences"), pick("roughs")
     lost = f"{np.isfinite(still['values']).sum()} recordings that lose contact"
@@ -215,18 +217,18 @@ def _row(
     target: float | None,
     *,
     of: str,
-    null: Sequence[float] = (),
+    baseline: Sequence[float] = (),
     at_least: bool = False,
     over: Callable[[np.ndarray], float] = np.median,
 ) -> list[Row]:
     """Make one row, `over` the recordings that have the metric; none where no recording has it."""
     value, nothing = (
         float(over(numbers[np.isfinite(numbers)])) if np.isfinite(numbers).any() else None
-        for numbers in (np.asarray(values, float), np.asarray(null, float))
+        for numbers in (np.asarray(values, float), np.asarray(baseline, float))
     )
     if value is None:
         return []
-    return [row(f"recordings_{name}", value, unit, target, null=nothing, of=of, at_least=at_least)]
+    return [row(f"recordings_{name}", value, unit, target, baseline=nothing, of=of, at_least=at_least)]
 
 
 def _quartile(values: np.ndarray) -> float:

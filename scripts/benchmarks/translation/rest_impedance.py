@@ -38,10 +38,10 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
         "sheet": sheet[:, None],
         "sheet_and_interface": np.column_stack([sheet, ones]),
     }
-    null = _cross_error(units, ones[:, None])
+    baseline = _cross_error(units, ones[:, None])
     for name, terms in models.items():
         of = f"fitted on the other finger; {_constants(units, terms)}"
-        yield row(f"rest_impedance_{name}", _cross_error(units, terms), "percent rms", null=null, of=of)
+        yield row(f"rest_impedance_{name}", _cross_error(units, terms), "percent rms", baseline=baseline, of=of)
 
 
 def impedance_at_rest(paths: list[Path], finger: int) -> np.ndarray:

@@ -50,8 +50,8 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
         found.append(_row(f"sequence_{figure}", figure, both, slice(None), of, unit, TARGETS[figure]))
         for which, name in enumerate(MOTIONS):
             found.append(_row(f"sequence_{figure}", figure, both, kind == which, name, unit))
-    value, null = (_quantile(each["place"], 90) for each in (followed, alone))
-    found.append(row("sequence_place_90", value, "mm", null=null, of=f"{len(kind)} frames"))
+    value, baseline = (_quantile(each["place"], 90) for each in (followed, alone))
+    found.append(row("sequence_place_90", value, "mm", baseline=baseline, of=f"{len(kind)} frames"))
     of = f"{number} sequences, rest up to {REST_OFF:g} counts off; baseline: each frame alone"
     return [*found, *_rows_of("sequence_rest_off", measured(network, truth, REST_OFF), of)]
 
@@ -126,8 +126,8 @@ def _row(
     name: str, figure: str, both: tuple[Errors, Errors], some: np.ndarray | slice, of: str, unit: str,
     target: float | None = None,
 ) -> Row:  # fmt: skip
-    value, null = (_quantile(each[figure][some], 50) for each in both)
-    return row(name, value, unit, target, null=null, of=of, at_least=figure == "iou")
+    value, baseline = (_quantile(each[figure][some], 50) for each in both)
+    return row(name, value, unit, target, baseline=baseline, of=of, at_least=figure == "iou")
 
 
 def _quantile(values: np.ndarray, level: int) -> float | None:

@@ -72,11 +72,11 @@ def _cosines(
     shuffle = np.random.default_rng(0).permutation(real.shape[1])
     for word, law in laws.items():
         results = [nearest(change, law(at_rest)) for change, at_rest in zip(real, rest, strict=True)]
-        null = [nearest(change[shuffle], law(at_rest)) for change, at_rest in zip(real, rest, strict=True)]
+        baseline = [nearest(change[shuffle], law(at_rest)) for change, at_rest in zip(real, rest, strict=True)]
         for k, held in enumerate(("free", "size_held")):
-            value, nothing = (float(np.median([one[k] for one in each])) for each in (results, null))
+            value, nothing = (float(np.median([one[k] for one in each])) for each in (results, baseline))
             target = targets[k] if word == "sheet" else None
-            yield row(f"{name}_cosine_{word}_{held}", value, "1", target, null=nothing, of=of, at_least=True)
+            yield row(f"{name}_cosine_{word}_{held}", value, "1", target, baseline=nothing, of=of, at_least=True)
 
 
 def nearest(change: np.ndarray, simulated: np.ndarray) -> tuple[float, float]:

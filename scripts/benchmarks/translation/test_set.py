@@ -26,7 +26,7 @@ TARGETS = {
 }  # fmt: skip
 UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter that was kept from the training
 EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
-NULL_FIGURES = ("null_biotac_rms_um", "null_digit_rms_um", "null_digit_core_height_um")
+BASELINE_FIGURES = ("baseline_biotac_rms_um", "baseline_digit_rms_um", "baseline_digit_core_height_um")
 FROM_SIGNALS = ("S2MPN_rms_um", "S2MPN_position_mm", "force_percent", "chain_rms_um")
 WINDOW, RATE = 3, 100.0  # frames; Hz, of the electrodes (docs/sources.md, BioTac read-out)
 BATCHES = {1: 0.8, 500: 0.25}  # frames a call -> target, ms a frame
@@ -45,15 +45,15 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
     found += figure_rows(columns, pairs, rows, "seen indenters", TARGETS)
     for name, mask in slices(pairs, rows):
         for step, body in (("S2MPN", "biotac"), ("M2MPN", "digit"), ("chain", "digit")):
-            value, null = (accuracy.mean(columns[f"{each}_rms_um"][mask]) for each in (step, f"null_{body}"))
-            found.append(figure_row(f"{step}_rms_um", value, null, None, name))
+            value, baseline = (accuracy.mean(columns[f"{each}_rms_um"][mask]) for each in (step, f"baseline_{body}"))
+            found.append(figure_row(f"{step}_rms_um", value, baseline, None, name))
         for figure in ("S2MPN_position_mm", "force_percent"):
             known = columns[figure][mask & np.isfinite(columns[figure])]
             if known.size:
                 found.append(figure_row(figure, float(np.median(known)), None, None, name))
     for number, name in enumerate(pairs.indenter_names):
         at = pairs.indenter == number
-        each = {figure: np.where(at, columns[figure], np.nan) for figure in (*EACH_INDENTER, *NULL_FIGURES)}
+        each = {figure: np.where(at, columns[figure], np.nan) for figure in (*EACH_INDENTER, *BASELINE_FIGURES)}
         found += [one for one in figure_rows(each, pairs, rows, name, {}) if one["value"] is not None]
     found += window_rows(translator, pairs, bodies)
     return [*found, *expected_error_rows(translator, pairs, rows, change, bodies, "seen indenters")]
@@ -63,7 +63,9 @@ def window_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Ro
     """Measure what a short causal window gains over single frames, and how much later its result comes."""
     rows, name = np.arange(len(pairs.press)), f"causal mean over {WINDOW} frames"
     columns = translation_figures(translator.nets, pairs, rows, as_read(pairs.signal, SEED, WINDOW), bodies)
-    found = figure_rows({figure: columns[figure] for figure in (*FROM_SIGNALS, *NULL_FIGURES)}, pairs, rows, name, {})
+    found = figure_rows(
+        {figure: columns[figure] for figure in (*FROM_SIGNALS, *BASELINE_FIGURES)}, pairs, rows, name, {}
+    )
     return [*found, row("window_delay_ms", 1e3 * (WINDOW - 1) / 2 / RATE, "ms", of=name)]
 
 

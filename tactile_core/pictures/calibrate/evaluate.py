@@ -34,7 +34,7 @@ class Evaluation:
     """Result of a calibration on one photograph.
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
-    picture : (H, W, 3) uint8, rendered; figures, null : by the names of FIGURES; flags : in words
+    picture : (H, W, 3) uint8, rendered; figures, baseline : by the names of FIGURES; flags : in words
     through : (3,) levels of light that comes through the coating where the ball touches it. Figures of that name are of
         another picture, in which it is fitted as well; all others know nothing of it.
     """
@@ -45,7 +45,7 @@ class Evaluation:
     picture: np.ndarray
     through: np.ndarray
     figures: dict[str, float]
-    null: dict[str, float]
+    baseline: dict[str, float]
     flags: tuple[str, ...]
 
 
@@ -98,19 +98,19 @@ def _try_press(
     picture, ours = compared(whole.change(ball.numbers))
     through, lit = _with_light(whole, fit_ball(working, sight, radius, opaque=False)[0], press)
     _, with_light = compared(lit)
-    _, null = compared(0.0)
+    _, baseline = compared(0.0)
     ours |= {"through_l1": with_light["roi_l1"], "through_psnr": with_light["roi_psnr"]}
-    null |= {"through_l1": null["roi_l1"], "through_psnr": null["roi_psnr"]}
+    baseline |= {"through_l1": baseline["roi_l1"], "through_psnr": baseline["roi_psnr"]}
     free = float("nan")
     if search_radius:
         ends = [fit_ball(working, sight, start, free_radius=True) for start in RADIUS_STARTS]
         free = min(ends, key=lambda end: end[1])[0].radius
         ours["ball_radius_error"] = abs(free - radius) / radius
-        null["ball_radius_error"] = float(np.mean([abs(start - radius) / radius for start in RADIUS_STARTS]))
+        baseline["ball_radius_error"] = float(np.mean([abs(start - radius) / radius for start in RADIUS_STARTS]))
     flags = _flags(press, ball, whole)
     if through.max() > BRIGHT:
         flags += (f"{through.max():.0f} levels of light through the coating, where the ball touches it",)
-    return Evaluation(press, ball, free, picture, through, ours, null, flags)
+    return Evaluation(press, ball, free, picture, through, ours, baseline, flags)
 
 
 def _with_light(bench: BallPictures, ball: Ball, press: Press) -> tuple[np.ndarray, np.ndarray]:
@@ -133,7 +133,7 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
 def mean_figures(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
     """Means over presses of the metrics and of the baseline's; NaN ones left out, NaN where all are."""
     means = []
-    for which in ("figures", "null"):
+    for which in ("figures", "baseline"):
         rows = [getattr(each, which) for each in tried]
         values = {name: np.array([row[name] for row in rows if name in row]) for name in FIGURES}
         means.append({name: _mean(value) for name, value in values.items()})

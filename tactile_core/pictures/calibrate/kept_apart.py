@@ -74,8 +74,10 @@ def tried_apart(
 
 def check_worth(tried: list[Evaluation]) -> None:
     """Raise TactileError for a calibration that explains its presses no better than the background."""
-    ours, null = mean_figures(tried)
-    if not ours["roi_l1"] <= WORTH * null["roi_l1"]:
-        found = f"{ours['roi_l1']:.1f} levels off in the region of the press, the background alone {null['roi_l1']:.1f}"
+    ours, baseline = mean_figures(tried)
+    if not ours["roi_l1"] <= WORTH * baseline["roi_l1"]:
+        found = (
+            f"{ours['roi_l1']:.1f} levels off in the region of the press, the background alone {baseline['roi_l1']:.1f}"
+        )
         advice = "Check --ball-diameter, --background, the light, and that the pictures lie fingertip up"
         raise TactileError("calibration, tried on presses kept apart", found, f"at most {WORTH:g} of that", advice)

@@ -18,7 +18,7 @@ def test_a_miss_is_told_in_metres_and_shares():
     found = true + np.array([0.0, 3e-6, 4e-6])
     told = miss(7, 0.2, found, 1.1, true, 1.0)
     assert (told.press, told.share) == (7, 0.2)
-    assert told.shape == pytest.approx(5e-6) and told.null == pytest.approx(100e-6)
+    assert told.shape == pytest.approx(5e-6) and told.baseline == pytest.approx(100e-6)
     assert told.force == pytest.approx(0.1)
 
 
@@ -38,7 +38,7 @@ def test_the_fast_tier_is_near_the_full_one_on_test_contacts(sensor):
     found = list(fast_misses(sensor, pairs, scene))
     assert len(found) == len(pairs.press)
     # A wrong pose, depth or order of the contacts would leave errors like those of no contact at all.
-    assert np.median([each.shape / each.null for each in found]) < 0.25
+    assert np.median([each.shape / each.baseline for each in found]) < 0.25
     assert max(each.share for each in found) <= 0.6
 
 

@@ -16,7 +16,7 @@ def rows(change: np.ndarray, *, each: bool = False) -> dict[str, dict]:
 
 def test_a_sheet_that_obeys_the_law_differs_in_nothing_but_its_scale():
     found = rows(7.3 * signal_of_gaps(GAPS))
-    assert found["gap_law_difference"]["value"] < 1e-9 and found["gap_law_difference"]["null"] > 10
+    assert found["gap_law_difference"]["value"] < 1e-9 and found["gap_law_difference"]["baseline"] > 10
     assert found["gap_law_correlation"]["value"] == pytest.approx(1)
 
 

@@ -228,12 +228,12 @@ def test_our_rows_are_the_numbers_that_the_tool_prints(judged):
         assert rows[f"{name}_silence"]["value"] == pytest.approx(numbers(silences, label)[0], abs=6e-4)
     for label, name in (("electrode 1", "electrode_1"), ("sum |E|", "electrode_sum"), ("rms E", "electrode_rms")):
         assert rows[f"{name}_rank_median"]["value"] == pytest.approx(numbers(ranks, label)[3], abs=6e-4)
-    assert rows["force_roughness"]["null"] == pytest.approx(numbers(roughs, "sum |E|")[0], abs=6e-4)
+    assert rows["force_roughness"]["baseline"] == pytest.approx(numbers(roughs, "sum |E|")[0], abs=6e-4)
     within = [float(x) for x in re.search(r"translated centre.*within \[([^\]]*)\]", printed)[1].split()]
     found = [rows[f"centre_spread_{word}"]["value"] for word in ("along", "across")]
     assert found == pytest.approx(within, abs=6e-3)  # printed with two decimals
     raw = [float(x) for x in re.search(r"squared centroid.*within \[([^\]]*)\]", printed)[1].split()][:2]
-    assert [rows[f"centre_spread_{word}"]["null"] for word in ("along", "across")] == pytest.approx(raw, abs=6e-3)
+    assert [rows[f"centre_spread_{word}"]["baseline"] for word in ("along", "across")] == pytest.approx(raw, abs=6e-3)
 
 
 def test_the_script_prints_its_rows_and_tells_bad_input(tmp_path, monkeypatch, capsys):

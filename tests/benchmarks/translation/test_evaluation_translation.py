@@ -1,4 +1,4 @@
-"""Figures of the translation on paired contacts: zero for the truth, the null answer for nothing, fair averages."""
+"""Figures of the translation on paired contacts: zero for the truth, the baseline answer for nothing, fair averages."""
 
 from __future__ import annotations
 
@@ -85,20 +85,20 @@ def test_the_truth_has_no_error(pairs):
     np.testing.assert_array_equal(found["chain_iou"], found["true_mesh_iou"])
 
 
-def test_nothing_has_the_null_error(pairs):
+def test_nothing_has_the_error_of_the_baseline(pairs):
     found = figures(pairs, 0.0)
     for step in STEPS:
-        null = error_summary.NULLS.get(step, "null_digit")
-        np.testing.assert_array_equal(found[f"{step}_rms_um"], found[f"{null}_rms_um"])
+        baseline = error_summary.BASELINES.get(step, "baseline_digit")
+        np.testing.assert_array_equal(found[f"{step}_rms_um"], found[f"{baseline}_rms_um"])
     loaded = np.isfinite(found["force_percent"])
     np.testing.assert_allclose(found["force_percent"][loaded], 100)
     np.testing.assert_array_equal(loaded, np.linalg.norm(pairs.force, axis=1) > 0.2)
-    np.testing.assert_allclose(found["B2S_counts"], found["null_counts"])
+    np.testing.assert_allclose(found["B2S_counts"], found["baseline_counts"])
 
 
 def test_half_of_it_is_half_an_error(pairs):
     found = figures(pairs, 0.5)
-    np.testing.assert_allclose(found["M2MPN_rms_um"], 0.5 * found["null_digit_rms_um"], rtol=1e-5)
+    np.testing.assert_allclose(found["M2MPN_rms_um"], 0.5 * found["baseline_digit_rms_um"], rtol=1e-5)
     peaks = found["M2MPN_peak_depth_percent"]
     np.testing.assert_allclose(peaks[np.isfinite(peaks)], 50, rtol=1e-5)
     errors = error_columns(Answers(pairs, 0.5), pairs, np.arange(len(pairs.press)), pairs.signal, bodies(), 0.0)
@@ -117,7 +117,7 @@ def test_bins_and_indenters_count_alike():
 def test_rows_say_what_they_met():
     assert error_summary.figure_row("a_rms_um", 3.0, 9.0, 4.0, "s")["ok"] is True
     patch = error_summary.figure_row("a_iou", 0.8, None, 0.85, "s")
-    assert (patch["unit"], patch["ok"], patch["null"], patch["set"]) == ("1", False, None, "s")
+    assert (patch["unit"], patch["ok"], patch["baseline"], patch["set"]) == ("1", False, None, "s")
     assert error_summary.figure_row("a_rms_um", 3.0, None, None, "s")["ok"] is None
 
 
@@ -164,7 +164,7 @@ def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(reques
     found = {row["name"]: row for row in rows if row["set"] == "seen indenters"}
     assert set(test_set.TARGETS) <= set(found)
     for step, share in {"MVB": 0.2, "MVD": 0.3, "M2MPN": 0.6, "S2MPN": 0.5, "D2B": 0.5}.items():
-        assert found[f"{step}_rms_um"]["value"] < share * found[f"{step}_rms_um"]["null"]
+        assert found[f"{step}_rms_um"]["value"] < share * found[f"{step}_rms_um"]["baseline"]
     card = (tmp_path / "card.md").read_text(encoding="utf-8")
     assert "| M2MPN_rms_um |" in card and (tmp_path / "translation_cases.png").exists()
 

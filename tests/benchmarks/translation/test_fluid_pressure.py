@@ -28,8 +28,8 @@ def pressure_rows(monkeypatch, tmp_path):
 
 def test_the_truth_has_no_error_and_a_constant_has(pressure_rows):
     found = pressure_rows(1.0)
-    assert found["pressure_error"]["value"] == 0 and found["pressure_error"]["null"] > 20
-    assert found["pressure_error_scaled"]["value"] == 0 and found["pressure_error_scaled"]["null"] > 5
+    assert found["pressure_error"]["value"] == 0 and found["pressure_error"]["baseline"] > 20
+    assert found["pressure_error_scaled"]["value"] == 0 and found["pressure_error_scaled"]["baseline"] > 5
     assert found["pressure_above_training"]["value"] == pytest.approx(np.mean(PRESSURE > 3000))
 
 

@@ -8,12 +8,12 @@ from tactile_core.translation.translate import load_translator
 def test_following_is_worth_more_than_frames_alone():
     rows = {row["name"]: row for row in followed_rows.rows(load_translator())}
     for name in ("followed_place", "followed_place_90", "followed_step", "followed_force_90", "followed_touch_wrong"):
-        assert rows[name]["value"] < rows[name]["null"], name
-    assert rows["followed_step"]["value"] < 0.5 * rows["followed_step"]["null"]
+        assert rows[name]["value"] < rows[name]["baseline"], name
+    assert rows["followed_step"]["value"] < 0.5 * rows["followed_step"]["baseline"]
     assert rows["followed_touch_wrong"]["value"] < 0.005
 
 
-def test_frames_that_are_not_followed_are_their_own_null(monkeypatch):
+def test_frames_that_are_not_followed_are_their_own_baseline(monkeypatch):
     network = load_translator()
     monkeypatch.setattr(network, "followed", lambda signals, time: network(signals))
-    assert all(row["value"] == row["null"] for row in followed_rows.rows(network))
+    assert all(row["value"] == row["baseline"] for row in followed_rows.rows(network))

@@ -69,7 +69,7 @@ def test_places_and_depths_are_found_again(found: Calibrated) -> None:
         assert each.ball.down == pytest.approx(1e-3 * down, abs=0.08e-3)
         assert each.ball.depth == pytest.approx(1e-3 * depth, abs=0.05e-3)
         assert each.figures["roi_l1"] < 2  # levels, of which the noise makes 0.9
-        assert each.null["roi_l1"] > 10
+        assert each.baseline["roi_l1"] > 10
 
 
 def test_file_says_what_was_fitted_and_what_was_not(found: Calibrated) -> None:
@@ -126,7 +126,7 @@ def test_larger_photographs_are_the_same_view(tmp_path: Path) -> None:
     assert tried.picture.shape == (640, 480, 3)
     assert tried.ball.right == pytest.approx(1.5e-3, abs=0.03e-3)
     assert tried.ball.depth == pytest.approx(0.9e-3, abs=0.03e-3)
-    assert tried.figures["roi_l1"] < 2 < tried.null["roi_l1"]  # levels, of which the noise makes 0.9
+    assert tried.figures["roi_l1"] < 2 < tried.baseline["roi_l1"]  # levels, of which the noise makes 0.9
 
 
 def test_lying_photographs_are_refused(tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     assert main(words) == 0
     written = {row["name"]: row for row in json.loads(rows.read_text()) if row["set"] == folder.name}
     assert set(written) == set(FIGURES)
-    assert written["roi_l1"]["value"] < 2 < written["roi_l1"]["null"]
+    assert written["roi_l1"]["value"] < 2 < written["roi_l1"]["baseline"]
     assert written["ball_radius_error"]["value"] < 0.03
     assert sheet.exists()
 
@@ -181,9 +181,9 @@ def test_verb_refuses(words: list, where: str, folder: Path, capsys: pytest.Capt
 def test_shipped_calibration_meets_real_presses_that_it_has_not_seen(outside_data: Callable[[str], Path]) -> None:
     photographs = chosen(read_photographs(outside_data("digit_real") / "presses"), KEPT_APART)
     assert not set(KEPT_APART) & set(load_calibration().fit.photographs)
-    ours, null = mean_figures(evaluate_unit(load_calibration(), photographs, BALL))
+    ours, baseline = mean_figures(evaluate_unit(load_calibration(), photographs, BALL))
     # Targets (docs/sources.md, Targets); measured: 30.6 dB, 5.7 levels, 0.80 and 3 %.
-    assert ours["roi_psnr"] > 26 > null["roi_psnr"] + 5
-    assert ours["roi_l1"] < 8 < null["roi_l1"]
+    assert ours["roi_psnr"] > 26 > baseline["roi_psnr"] + 5
+    assert ours["roi_l1"] < 8 < baseline["roi_l1"]
     assert ours["lobe_iou"] > 0.6
     assert ours["ball_radius_error"] < 0.1
