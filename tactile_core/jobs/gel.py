@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+import logging
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -35,8 +36,10 @@ from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import load_calibration
 
+_log = logging.getLogger(__name__)
 PUSH = np.array([0.0, 1.0, 0.0])  # into the gel: along +y of the sensors' frame
 FLAGS = {
+    "refused": "in follow: what was given is no pose or force; the values are those of the contact before",
     "unsolved": "no equilibrium was found; the values are those of the contact before",
     "too deep": "the pose lies deeper than 60 % of the thickness; the values are those at that depth",
     "force not reached": "no depth bears the force; the values are those of the nearest contact that was solved",
@@ -131,9 +134,10 @@ class Gel:
         Raises TactileError for what is no pose or force; the contact before then stays. Whatever else happens is
         said in ``flags``.
         """
-        if force is not None:
-            force = _not_negative(force, "Gel, force", "newtons, zero or more, and finite")
-        here = Pose(*rigid_pose(pose), PUSH)
+        return self._step(*_given(pose, force))
+
+    def _step(self, here: Pose, force: float | None) -> GelContact:
+        """Do as ``press`` does, to a pose and force that were checked."""
         flags: list[str] = []
         jumps = self._press is not None and self._touches and self._too_far(here)
         if jumps:
@@ -155,17 +159,26 @@ class Gel:
     def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
         """The contact at each of many poses, one after the other; forces : N, as in ``press``, one a pose.
 
-        Raises TactileError as ``press`` does, and where poses or forces end before the others.
+        What is no pose or force is passed over: the contact before comes again, flagged ``refused``, and the reason is
+        logged. Raises TactileError where poses or forces end before the others.
         """
         if forces is None:
-            for pose in poses:
-                yield self.press(pose)
+            yield from map(self._press_or_keep, poses)
             return
         for pose, force in itertools.zip_longest(poses, forces, fillvalue=_ENDED):
             if pose is _ENDED or force is _ENDED:
                 found = f"{'poses' if pose is _ENDED else 'forces'} end before the others"
                 raise TactileError("Gel, follow", found, "a force for each pose, or None", "Give as many of both")
-            yield self.press(pose, force)
+            yield self._press_or_keep(pose, force)
+
+    def _press_or_keep(self, pose: Any, force: float | None = None) -> GelContact:
+        """The contact at a pose, or the one before, flagged, where that is no pose or force."""
+        try:
+            given = _given(pose, force)
+        except TactileError as error:
+            _log.warning("%s", error)
+            return dataclasses.replace(self._contact, flags=("refused",))
+        return self._step(*given)
 
     @property
     def contact(self) -> GelContact:
@@ -328,6 +341,13 @@ class Gel:
 def _presses(indenter: Any) -> bool:
     """Return true for one of ``geometry.indenters``; a class of them is none."""
     return hasattr(indenter, "curvature") and not isinstance(indenter, type)
+
+
+def _given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
+    """Return where an indenter is to stand, and with which force, N. Raises TactileError for no pose or force."""
+    if force is not None:
+        force = _not_negative(force, "Gel, force", "newtons, zero or more, and finite")
+    return Pose(*rigid_pose(pose), PUSH), force
 
 
 def _not_negative(value: Any, where: str, expected: str) -> float:

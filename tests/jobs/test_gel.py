@@ -207,6 +207,16 @@ def test_poses_and_forces_of_other_numbers_are_refused_after_those_that_go_toget
             next(steps)
 
 
+def test_what_is_no_pose_or_force_is_passed_over_in_a_loop(caplog):
+    gel, other = Gel("digit", BALL), Gel("digit", BALL)
+    poses = [gel.touching(-8e-3, 0.0, depth) for depth in (0.02e-3, 0.04e-3)]
+    first, lost, last = gel.follow([poses[0], np.full((4, 4), np.nan), poses[1]])
+    assert lost.flags == ("refused",) and lost.force is first.force and "finite" in caplog.text
+    np.testing.assert_array_equal(last.displacement, [*other.follow(poses)][-1].displacement)
+    assert [contact.flags for contact in gel.follow(poses, [np.nan, 0.1])] == [("refused",), ()]
+    assert "refused" in FLAGS
+
+
 @pytest.mark.parametrize("sensor", ["digit", "biotac"])
 @pytest.mark.parametrize("friction", [0.78, 0.0])
 def test_drawn_out_in_one_step_the_contact_is_that_of_many(sensor, friction):
