@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from .results import Gel
 
 GROWS = False
+# kB a frame of a shard, of the shipped recording: what is always there, and each word of --keep beyond it.
+ALWAYS_KB = 0.8
+KEEP_KB = {"latent": 0.5, "displacement": 78, "height": 199, "image": 101, "traction": 0.2, "marker_motion": 0.5}
 
 
 def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
@@ -41,7 +44,8 @@ def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
         about = prepared_signals.Prepared(file).about()
     except TactileError:  # none yet, or a damaged one, which the next run makes again
         return None
-    return InputFacts(frame_shard.count(about["frames"], job), about["frames"], tuple(about["warnings"]))
+    frames, kb = about["frames"], ALWAYS_KB + sum(KEEP_KB[word] for word in job.recipe.keep)
+    return InputFacts(frame_shard.count(frames, job), frames, tuple(about["warnings"]), int(1e3 * kb * frames))
 
 
 @functools.lru_cache(maxsize=2)

@@ -29,11 +29,15 @@ MODULES = {
 
 @dataclasses.dataclass(frozen=True)
 class InputFacts:
-    """Facts known of an input. shards : their number; frames : of a recording; warnings : to report"""
+    """Facts known of an input. shards : their number; frames : of a recording; warnings : to report
+
+    bytes : about, of all its shards; 0 where that is not known before they are there
+    """
 
     shards: int
     frames: int = 0
     warnings: tuple[str, ...] = ()
+    bytes: int = 0
 
 
 def module_for(job: Job) -> ModuleType:

@@ -26,7 +26,8 @@ class Status:
 
     recordings, prepared : numbers of them; shards : of the prepared recordings, of which `there` exist
 
-    frames : of the prepared recordings; aside : task -> why it could not be done
+    frames : of the prepared recordings; bytes : about those of their shards, 0 if not known
+    aside : task -> why it could not be done
     """
 
     recordings: int
@@ -34,6 +35,7 @@ class Status:
     shards: int = 0
     there: int = 0
     frames: int = 0
+    bytes: int = 0
     aside: dict[str, str] = dataclasses.field(default_factory=dict)
 
     @property
@@ -53,6 +55,7 @@ def status(folder: Path, job: Job) -> Status:
         names = [jobs.shard_file(folder, one.name, number).name for number in range(seen.shards)]
         found.prepared += 1
         found.frames += seen.frames
+        found.bytes += seen.bytes
         found.shards += len(names)
         found.there += sum(name in there for name in names)
     return found

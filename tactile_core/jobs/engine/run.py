@@ -11,8 +11,8 @@ from typing import Protocol, Self
 
 from ...errors import TactileError
 from ...files import atomic, lock
+from . import disk_room, kinds, manifest, tasks
 from . import job as jobs
-from . import kinds, manifest, tasks
 from .job import Job
 from .tasks import Reply, Task
 
@@ -91,8 +91,7 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
     try:
         return _run(folder, job, place, part, progress)
     except OSError as error:
-        where, found = error.filename2 or error.filename or folder, f"cannot be written ({error.strerror or error})"
-        raise TactileError(where, found, "a job folder of ours that can be written") from error
+        raise disk_room.refused(folder, job, error) from error
 
 
 def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:

@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 
 from ...errors import TactileError
+from . import disk_room, kinds
 from . import job as jobs
-from . import kinds
 
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -51,6 +51,9 @@ def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
 def _run(folder: Path, task: Task) -> Reply:
     try:
         job = _job(str(folder), _stamp(folder))
+    except (TactileError, OSError) as error:
+        return Reply(error=str(error), stop=isinstance(error, OSError))
+    try:
         kind = kinds.module_for(job)
         if task.shard is None:
             shards, made = kind.prepare_input(folder, job, task.recording)
@@ -58,11 +61,12 @@ def _run(folder: Path, task: Task) -> Reply:
         return Reply(made=kind.make(folder, job, task.recording, task.shard))
     except TactileError as error:
         return Reply(error=str(error))
-    except (OSError, MemoryError) as error:
-        where = getattr(error, "filename", None) or folder
-        reason = getattr(error, "strerror", None) or str(error) or "no memory left"
-        sentence = f"{where}: cannot be written ({reason}). Make room and give the same command again"
-        return Reply(error=sentence, stop=isinstance(error, OSError))
+    except OSError as error:
+        return Reply(error=str(disk_room.refused(folder, job, error)), stop=True)
+    except MemoryError as error:
+        return Reply(
+            error=f"{name(job, task)}: {str(error) or 'no memory left'}. Give the same command with fewer workers"
+        )
 
 
 def _stamp(folder: Path) -> tuple[int, int]:

@@ -155,8 +155,13 @@ def test_a_killed_client_leaves_nothing_half_and_the_same_command_goes_on(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on the size of a process's files")
-@pytest.mark.parametrize("limit", [30_000, 120_000])  # below a prepared file (40 kB) and between it and a shard
-def test_a_full_disk_stops_the_job_in_words_and_the_same_command_goes_on(limit, recordings, tmp_path, command_process):
+@pytest.mark.parametrize(
+    ("limit", "needed"),  # below a prepared file (0.3 MB), and between it and a shard of 50 frames (3.9 MB)
+    [(30_000, "room for 2 of 2 inputs that were not begun"), (1_000_000, "some 15.8 MB for the 5 shards")],
+)
+def test_a_full_disk_stops_the_job_in_words_and_the_same_command_goes_on(
+    limit, needed, recordings, tmp_path, command_process
+):
     import resource
 
     folder = tmp_path / "full"
@@ -167,6 +172,8 @@ def test_a_full_disk_stops_the_job_in_words_and_the_same_command_goes_on(limit, 
         done = command_process(*words[1:])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert done.returncode == 2 and "File too large" in done.stderr and "Make room" in done.stderr
+    assert done.returncode == 2 and done.stderr.startswith(f"tactile: error: --out {folder}: cannot be written")
+    assert "File too large; " in done.stderr and " MB free" in done.stderr and "Make room" in done.stderr
+    assert needed in done.stderr and "tactile-partial" not in done.stderr
     assert not list(folder.rglob(".*.tactile-partial")) and "Traceback" not in done.stderr
     assert command_process(*words[1:]).returncode == 0
