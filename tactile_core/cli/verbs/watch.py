@@ -130,7 +130,7 @@ def _follow(source: Rows, view: View, camera: DigitCamera | None, outputs: list[
                 say("the camera gives no more pictures; watching goes on without it")
             if time.perf_counter() - reported >= TOLD:
                 reported = time.perf_counter()
-                say(view.describe_latency() + (f"; force {shown.force:.2f} N" if shown else ""))
+                say(view.describe_latency() + (f"; force {shown.newtons:.2f} N" if shown else ""))
     except TactileError:
         failed = not view.frames
         raise

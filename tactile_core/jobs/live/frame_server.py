@@ -62,7 +62,7 @@ def message(shown: Shown, arrays: dict[str, np.ndarray]) -> bytes:
     header = {
         "format": FORMAT,
         "frame": shown.frame,
-        "force_n": shown.force if math.isfinite(shown.force) else None,  # JSON has no NaN
+        "force_n": shown.newtons if math.isfinite(shown.newtons) else None,  # JSON has no NaN
         "latency_s": shown.latency,
         "arrays": [[name, array.dtype.str, array.shape] for name, array in arrays.items()],
     }

@@ -29,14 +29,20 @@ REMEMBERED = 1000  # latencies that figures are taken over
 class Shown:
     """Picture on display.
 
-    frame : its index; picture : (H, W, 3) uint8; force : N; latency : s from rows to picture; work : s of them
+    frame : its index; picture : (H, W, 3) uint8; force : (3,) N, of the object on the sensor
+    latency : s from rows to picture; work : s of them
     """
 
     frame: int
     picture: np.ndarray
-    force: float
+    force: np.ndarray
     latency: float
     work: float
+
+    @property
+    def newtons(self) -> float:
+        """Size of the force, N."""
+        return float(np.linalg.norm(self.force))
 
 
 class View:
@@ -77,9 +83,8 @@ class View:
         with folds_counted():  # a line for each such picture would hide the latencies
             heights = self._tools.height_map(translation.displacement_digit)
         picture = self._tools.shade(heights[0])
-        force = float(np.linalg.norm(translation.force[0]))
         latency, work = time.perf_counter() - came, time.thread_time() - began
-        shown = Shown(self.frames - 1, picture, force, latency, work)
+        shown = Shown(self.frames - 1, picture, translation.force[0], latency, work)
         self.latencies.append((latency, work))
         return shown
 

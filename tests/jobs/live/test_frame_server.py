@@ -23,7 +23,7 @@ PICTURE = np.arange(4 * 3 * 3, dtype=np.uint8).reshape(4, 3, 3)
 
 
 def shown(frame: int = 7, force: float = 1.5) -> Shown:
-    return Shown(frame, PICTURE, force, 0.01, 0.008)
+    return Shown(frame, PICTURE, np.array([0.0, force, 0.0]), 0.01, 0.008)
 
 
 @pytest.fixture
