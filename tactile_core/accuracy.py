@@ -27,12 +27,12 @@ EXPECTED = "a number and its unit, such as 5um or 0.6levels, or both: 5um,0.6lev
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """Euclidean length over the last axis, in float64."""
+    """Return the Euclidean length over the last axis, in float64."""
     return np.sqrt(np.square(vectors, dtype=np.float64).sum(-1))
 
 
 def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Root mean square (C,) m of the vector error over the nodes whose true displacement exceeds 10 um.
+    """Return the root mean square (C,) m of the vector error over the nodes whose true displacement exceeds 10 um.
 
     NaN where no node moves that much. The average over contacts is the rmsC of docs/sources.md, Networks.
     """
@@ -43,7 +43,7 @@ def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def max_error(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Largest vector error (C,) m of any node."""
+    """Return the largest vector error (C,) m of any node."""
     return lengths(predicted - true).max(-1)
 
 
@@ -53,7 +53,8 @@ def height(displacement: np.ndarray) -> np.ndarray:
 
 
 def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
-    """RMS error (C,) m of the depth over the core, the nodes above 30 % of the true peak; NaN without contact.
+    """Return the RMS error (C,) m of the depth over the core, the nodes above 30 % of the true peak;
+    NaN without contact.
 
     depth : function that gives the depth: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved
     """
@@ -65,14 +66,15 @@ def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = he
 
 
 def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
-    """Error (C,) of the depth of the deepest node, as a share of the true depth; NaN without contact."""
+    """Return the error (C,) of the depth of the deepest node, as a share of the true depth; NaN without contact."""
     peak, truth = depth(predicted).max(-1), depth(true).max(-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(truth > MOVING, np.abs(peak - truth) / truth, np.nan)
 
 
 def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Centre (C, 2) = (x, z) m of the dent, depth-weighted mean position of its core; NaN where no node moves 10 um.
+    """Return the centre (C, 2) = (x, z) m of the dent, depth-weighted mean position of its core;
+    NaN where no node moves 10 um.
 
     displacement : (C, n, 3) m
     rest : (n, 3) m
@@ -81,7 +83,9 @@ def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) -> np.ndarray:
-    """Depth-weighted mean (C, 2) of the places (n, 2) of a dent's core; NaN if no depth (C, n) m is above least."""
+    """Return the depth-weighted mean (C, 2) of the places (n, 2) of a dent's core; NaN if no depth (C,
+    n) m is above least.
+    """
     peak = depth.max(-1, keepdims=True)
     weight = np.where((depth > CORE * peak) & (peak > least), depth, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -15,18 +15,18 @@ _SIGNS = np.array([1.0, 1.0, -1.0], np.float32)
 
 
 def to_blender(points: np.ndarray, per_metre: float) -> np.ndarray:
-    """Sensor points or displacements (..., 3) m as float32 Blender units."""
+    """Convert sensor points or displacements (..., 3) m to float32 Blender units."""
     return np.asarray(points, np.float32)[..., [0, 2, 1]] * (_SIGNS * np.float32(per_metre))
 
 
 def to_sensor(points: np.ndarray, per_metre: float) -> np.ndarray:
-    """The inverse of ``to_blender``, float64 m."""
+    """Convert Blender units to float64 m, the inverse of ``to_blender``."""
     x, y, z = np.moveaxis(np.asarray(points, np.float64) / per_metre, -1, 0)
     return np.stack([x, -z, y], -1)
 
 
 def units_per_metre(scene: bpy.types.Scene) -> float:
-    """Blender units a metre."""
+    """Return how many Blender units make a metre."""
     return 1.0 / scene.unit_settings.scale_length
 
 

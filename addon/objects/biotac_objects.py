@@ -18,14 +18,14 @@ _CORE_X, _CORE_ANGLE = (-18.8e-3, 4.9e-3), np.radians(115.0)
 
 
 def new_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
-    """A collection in the scene."""
+    """Make a collection in the scene."""
     group = bpy.data.collections.new(name)
     scene.collection.children.link(group)
     return group
 
 
 def add_skin(group: bpy.types.Collection, per_metre: float, name: str = "BioTac skin") -> bpy.types.Object:
-    """The resting outer skin."""
+    """Add the resting outer skin."""
     surface = sensors.biotac_surface()
     skin = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)
     properties.set_up(skin, "BIOTAC", per_metre)
@@ -36,7 +36,7 @@ def add_skin(group: bpy.types.Collection, per_metre: float, name: str = "BioTac 
 
 
 def add_core(group: bpy.types.Collection, skin: bpy.types.Object) -> bpy.types.Object:
-    """The rigid core under the pad, a child of the skin."""
+    """Add the rigid core under the pad, a child of the skin."""
     x, angle = np.linspace(*_CORE_X, 48), np.linspace(-_CORE_ANGLE, _CORE_ANGLE, 47)
     grid_x, grid_angle = (values.ravel() for values in np.meshgrid(x, angle, indexing="ij"))
     radius = biotac.core_radius(grid_x, grid_angle)

@@ -11,7 +11,7 @@ _LINEAR = 1  # bpy.types.Keyframe.interpolation as a number: CONSTANT 0, LINEAR 
 
 
 def fcurves_of(owner: bpy.types.ID) -> Any:
-    """The F-curves of a datablock's action, which is made where it is missing."""
+    """Return the F-curves of a datablock's action, which is made where it is missing."""
     animation = owner.animation_data or owner.animation_data_create()
     if animation.action is None:
         animation.action = bpy.data.actions.new(f"{owner.name} Tactile")
@@ -48,7 +48,7 @@ def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.
 
 
 def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
-    """The keyed values (T,) of one F-curve, none where there is none."""
+    """Return the keyed values (T,) of one F-curve, none where there is none."""
     curve = fcurves_of(owner).find(path, index=index)
     if curve is None:
         return np.zeros(0)

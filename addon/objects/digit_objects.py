@@ -16,7 +16,7 @@ BESIDE = 7.1e-3 + 23e-3 + 5e-3  # m: half widths of BioTac (docs/sources.md) and
 
 
 def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None) -> bpy.types.Object:
-    """The resting gel, beside a BioTac's skin where there is one."""
+    """Add the resting gel, beside a BioTac's skin where there is one."""
     surface = sensors.digit_surface()
     gel = surfaces.new_mesh_object("DIGIT gel", axes.to_blender(surface.rest, per_metre), surface.faces)
     properties.set_up(gel, "DIGIT", per_metre)
@@ -30,7 +30,7 @@ def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Obj
 
 
 def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Displacement (n, 3) m of the gel's nodes as the scene has them now, all keys and modifiers applied.
+    """Return the displacement (n, 3) m of the gel's nodes as the scene has them now, all keys and modifiers applied.
 
     Raises TactileError where modifiers have changed the number of vertices.
     """

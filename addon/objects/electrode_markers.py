@@ -18,7 +18,7 @@ _HIGH, _LOW = np.array([0.9, 0.05, 0.02]), np.array([0.02, 0.15, 0.9])  # film t
 def add_markers(
     skin: bpy.types.Object, group: bpy.types.Collection, change: np.ndarray, frames: np.ndarray
 ) -> list[bpy.types.Object]:
-    """Markers E1..E19, children of the skin; red where the reading rose, blue where it fell.
+    """Add the markers E1..E19, children of the skin; red where the reading rose, blue where it fell.
 
     change : (T, 19) counts; the strongest colour stands for the recording's largest change
     """

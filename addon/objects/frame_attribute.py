@@ -42,7 +42,7 @@ def add(
 
 
 def modifier_of(thing: bpy.types.Object, name: str) -> bpy.types.Modifier | None:
-    """The modifier that gives an object the attribute ``name``, if any."""
+    """Return the modifier that gives an object the attribute ``name``, if any."""
     return thing.modifiers.get(f"Tactile {name.replace('_', ' ')}")
 
 

@@ -9,14 +9,14 @@ from . import axes
 
 
 def to_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
-    """Places (..., 3) m, image frame (right, down, toward the camera), in the gel object's axes and units."""
+    """Convert places (..., 3) m, image frame (right, down, toward the camera), to the gel object's axes and units."""
     right, down, toward = np.moveaxis(np.asarray(places, float), -1, 0)
     x, z = camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right
     return axes.to_blender(np.stack([x, HEIGHT_ZERO_Y + toward, z], -1), per_metre)
 
 
 def from_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
-    """The inverse of ``to_gel``, float64 m."""
+    """Convert places in the gel object's axes and units to the image frame, float64 m, the inverse of ``to_gel``."""
     x, y, z = np.moveaxis(axes.to_sensor(places, per_metre), -1, 0)
     right, down = camera.right_z * (z - camera.centre_z), camera.down_x * (x - camera.centre_x)
     return np.stack([right, down, y - HEIGHT_ZERO_Y], -1)

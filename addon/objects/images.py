@@ -9,7 +9,7 @@ PICTURE, HEIGHTS = "DIGIT picture", "DIGIT height map"
 
 
 def new_image(name: str, width: int, height: int, *, floats: bool = False) -> bpy.types.Image:
-    """An image of this name and size, the old one where it fits.
+    """Make an image of this name and size, the old one where it fits.
 
     Bytes are a picture in sRGB, which editors show as it is; floats are data.
     """
@@ -31,7 +31,7 @@ def fill(image: bpy.types.Image, values: np.ndarray) -> None:
 
 
 def show_picture(picture: np.ndarray) -> bpy.types.Image:
-    """The picture (H, W, 3) uint8 in its datablock."""
+    """Show the picture (H, W, 3) uint8 in its datablock."""
     image = new_image(PICTURE, picture.shape[1], picture.shape[0])
     image.use_fake_user = True  # kept in the file, even while no editor shows it
     fill(image, picture.astype(np.float32) / 255)
@@ -39,7 +39,7 @@ def show_picture(picture: np.ndarray) -> bpy.types.Image:
 
 
 def show_heights(heights: np.ndarray) -> bpy.types.Image:
-    """The height map (H, W) m in its datablock, in millimetres."""
+    """Show the height map (H, W) m in its datablock, in millimetres."""
     image = new_image(HEIGHTS, heights.shape[1], heights.shape[0], floats=True)
     image.use_fake_user = True
     fill(image, 1e3 * heights)

@@ -20,7 +20,7 @@ _LOWEST = 1e-7  # m: vertices this near to the lowest one belong to one flat, as
 
 
 def add_indenter(group: bpy.types.Collection, spec: Any, per_metre: float) -> bpy.types.Object:
-    """An object of a spec of ``indenter_specs``; its origin is where the body touches."""
+    """Add an object of a spec of ``indenter_specs``; its origin is where the body touches."""
     import msgspec
 
     from .indenter_shapes import shape_of
@@ -61,7 +61,7 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
 
 
 def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> tuple[Any, bytes | None]:
-    """The spec of an indenter object, and the STL of its mesh where it needs one.
+    """Return the spec of an indenter object, and the STL of its mesh where it needs one.
 
     relative : (3, 3), see ``check_pose``. Raises TactileError.
     """
@@ -85,7 +85,9 @@ def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Triangles (m, 3, 3) in Blender units, all modifiers applied, in the sensor's axes, from the object's origin."""
+    """Return the triangles (m, 3, 3) in Blender units, all modifiers applied, in the sensor's axes,
+    from the object's origin.
+    """
     mesh = thing.evaluated_get(depsgraph).data
     mesh.calc_loop_triangles()
     nodes, corners = np.empty(len(mesh.vertices) * 3, np.float32), np.empty(len(mesh.loop_triangles) * 3, np.int32)
@@ -97,7 +99,7 @@ def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.t
 
 
 def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> bytes:
-    """The object's surface as a binary STL in mm, z out of the sensor."""
+    """Return the object's surface as a binary STL in mm, z out of the sensor."""
     corners = triangles_of(thing, relative, depsgraph) * np.float32(1e3 / thing.tactile.per_metre)
     record = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]))
     record["corners"] = corners
@@ -105,7 +107,9 @@ def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.D
 
 
 def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Vector from the object's origin to its point of first touch, (3,) Blender units: zero for a spec's body."""
+    """Return the vector from the object's origin to its point of first touch, (3,) Blender units:
+    zero for a spec's body.
+    """
     if thing.tactile.spec:
         return np.zeros(3)
     nodes = triangles_of(thing, relative, depsgraph).reshape(-1, 3)
@@ -114,11 +118,11 @@ def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
-    """Axes (3, 3) of the object, scaled, in those of a sensor object."""
+    """Return the axes (3, 3) of the object, scaled, in those of a sensor object."""
     return np.array(sensor.matrix_world.inverted() @ thing.matrix_world)[:3, :3]
 
 
 def place_of(thing: bpy.types.Object, sensor: bpy.types.Object, foot: np.ndarray) -> np.ndarray:
-    """Point where the indenter touches, (3,) m in the sensor's frame."""
+    """Return the point where the indenter touches, (3,) m in the sensor's frame."""
     origin = np.array((sensor.matrix_world.inverted() @ thing.matrix_world).translation)
     return axes.to_sensor(origin + foot, sensor.tactile.per_metre)

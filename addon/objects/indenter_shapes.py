@@ -16,7 +16,7 @@ _DIRECTIONS = 4000  # hull points of a body: edges of 0.5 mm round then look rou
 
 
 def shape_of(spec: Any) -> Surface:
-    """Nodes (n, 3) m and triangles (m, 3) of a spec's body; its own z points out of the sensor."""
+    """Return the nodes (n, 3) m and triangles (m, 3) of a spec's body; its own z points out of the sensor."""
     if isinstance(spec, MeshSpec):
         mesh = mesh_file.solid(mesh_file.read_bytes(spec.file), spec.file, spec.unit_mm * 1e-3, spec.up)
         return np.asarray(mesh.vertices) * 1e-3, np.asarray(mesh.faces)

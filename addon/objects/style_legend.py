@@ -26,7 +26,7 @@ def remove_legend(thing: bpy.types.Object) -> None:
 
 
 def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str, str] | None) -> bpy.types.Object:
-    """A colour bar, and a scale bar of 5 mm, in front of a sensor; one that is there is replaced.
+    """Add a colour bar, and a scale bar of 5 mm, in front of a sensor; one that is there is replaced.
 
     title : what the colours say; ends : what stands at the bar's ends, None where there is no bar
     """

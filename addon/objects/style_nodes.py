@@ -32,13 +32,13 @@ _EDGE = (1.3e-3, 1.7e-3)  # m from an electrode, where its colour begins and end
 
 
 def group(style: str) -> bpy.types.NodeTree:
-    """The node group of a style, made where the file lacks it."""
+    """Return the node group of a style, made where the file lacks it."""
     found = bpy.data.node_groups.get(NAMES[style])
     return found if found is not None else _BUILD[style](style)
 
 
 def input_of(tree: bpy.types.NodeTree, name: str) -> str:
-    """Key by which a modifier holds the value of a group's input."""
+    """Return the key by which a modifier holds the value of a group's input."""
     return next(item.identifier for item in tree.interface.items_tree if item.name == name and item.in_out == "INPUT")
 
 
@@ -68,7 +68,7 @@ def input_path(modifier: bpy.types.NodesModifier, name: str) -> str:
 
 
 def material() -> bpy.types.Material:
-    """A material of the attribute ``Tactile colour``."""
+    """Make a material of the attribute ``Tactile colour``."""
     return _material(MATERIAL, "Base Color")
 
 

@@ -44,7 +44,7 @@ def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration:
 
 
 def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
-    """An arrow, child of a sensor, that follows its custom property ``force``; works without the add-on.
+    """Add an arrow, child of a sensor, that follows its custom property ``force``; works without the add-on.
 
     length : of 1 N, in the object's units
     """
@@ -65,7 +65,7 @@ def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
 
 
 def arrow_of(sensor: bpy.types.Object) -> bpy.types.Object | None:
-    """The arrow of a sensor, if any."""
+    """Return the arrow of a sensor, if any."""
     known = (thing for thing in sensor.children if MODIFIER in thing.modifiers and thing.tactile.role == "LEGEND")
     return next(known, None)
 

@@ -11,7 +11,7 @@ _SHARP = math.radians(30)  # between faces that meet in an edge
 
 
 def new_mesh_object(name: str, nodes: np.ndarray, faces: np.ndarray, smooth: bool = True) -> bpy.types.Object:
-    """An object, in no collection yet, of nodes (n, 3) in Blender units and triangles (m, 3).
+    """Make an object, in no collection yet, of nodes (n, 3) in Blender units and triangles (m, 3).
 
     smooth : all over; else edges stay sharp where faces meet at more than 30 degrees
     """

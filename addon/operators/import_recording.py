@@ -90,7 +90,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         return "" if self.set_timeline else ". The scene's own frame rate and range are kept"
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """A file that was dropped opens a small popup, the menu the file browser."""
+        """Open a small popup for a file that was dropped; the menu opens the file browser."""
         return self.invoke_popup(context) if self.filepath else super().invoke(context, event)
 
     def _objects(

@@ -18,7 +18,7 @@ _shaders: dict[str, shading.Shader] = {}  # one at most: the frames of an animat
 
 
 def shader_of(unit: Calibration) -> shading.Shader:
-    """The fast shader of a unit."""
+    """Return the fast shader of a unit."""
     key = repr(unit)  # a calibration holds tables, which have no hash
     if key not in _shaders:
         _shaders.clear()
@@ -33,7 +33,7 @@ def draw(
     size: tuple[int, int] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Picture (H, W, 3) uint8 and heights (H, W) m of a gel, (width, height) pixels large, by a preset.
+    """Draw a gel's picture (H, W, 3) uint8 and heights (H, W) m, (width, height) pixels large, by a preset.
 
     The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba. Raises TactileError, and
     ``tracer.Stopped`` where stopped() is true.

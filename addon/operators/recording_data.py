@@ -34,7 +34,7 @@ class Translated:
 
 @functools.cache
 def translator() -> translate.Translator:
-    """The shipped networks, loaded once."""
+    """Return the shipped networks, loaded once."""
     return translate.load_translator()
 
 

@@ -60,7 +60,7 @@ def _describe_error(error: Exception) -> str:
 
 
 def to_linear(picture: np.ndarray) -> np.ndarray:
-    """Picture (H, W, 3) uint8 as Blender's scene-linear float32 (H, W, 4), last row first.
+    """Convert a picture (H, W, 3) uint8 to Blender's scene-linear float32 (H, W, 4), last row first.
 
     By the inverse of sRGB's curve, so that the view transform Standard writes the same 8-bit values again.
     """

@@ -57,12 +57,12 @@ class TACTILE_PT_render(bpy.types.Panel):
 
 
 def draw_error(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """The bound on the toolkit's own error, of simulations and pictures."""
+    """Draw the bound on the toolkit's own error, of simulations and pictures."""
     layout.prop(context.scene.tactile_render, "error", placeholder="50um,0.6levels")
 
 
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """The settings, for this panel and the sidebar's."""
+    """Draw the settings, for this panel and the sidebar's."""
     settings = context.scene.tactile_render
     layout.use_property_split = True
     layout.operator(TACTILE_OT_set_up_render.bl_idname, icon="RESTRICT_RENDER_OFF")
@@ -74,7 +74,9 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
 
 
 def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """LEDs and coating of the DIGIT as they stand, and what puts them back or keeps them; nothing without a DIGIT."""
+    """Draw the LEDs and coating of the DIGIT as they stand, and what puts them back or keeps them;
+    nothing without a DIGIT.
+    """
     gel = properties.of_role(context.scene, "DIGIT", context.object)
     if gel is None:
         return

@@ -32,7 +32,7 @@ class Authored:
 
 
 def indenter_of(context: bpy.types.Context) -> bpy.types.Object:
-    """The indenter to simulate: the active object if it is one, else the scene's first. Raises TactileError."""
+    """Return the indenter to simulate: the active object if it is one, else the scene's first. Raises TactileError."""
     found = properties.of_role(context.scene, "INDENTER", context.object)
     if found is None:
         raise TactileError("Tactile", "no indenter", "one in the scene", "Add > Tactile > an indenter")

@@ -38,7 +38,7 @@ class Result:
 
 
 def read(folder: Path) -> Result:
-    """The result in a job's folder."""
+    """Read the result in a job's folder."""
     with np.load(folder / "result.npz") as stored:
         moved = {sensor: stored[sensor] for sensor in ("biotac", "digit") if sensor in stored}
         picked = tuple(str(text) for text in stored["picked"])

@@ -34,7 +34,7 @@ class Tracer:
     def draw(
         self, unit: Calibration, around: Surroundings, heights: np.ndarray, stopped: Callable[[], bool]
     ) -> np.ndarray:
-        """Picture (H, W, 3) uint8 of heights (H, W) m. Raises TactileError, or Stopped when asked to stop."""
+        """Draw the picture (H, W, 3) uint8 of heights (H, W) m. Raises TactileError, or Stopped when asked to stop."""
         self._count += 1
         self._tell_unit(unit, around)
         np.save(self._folder.path / "heights.npy", heights)
@@ -79,7 +79,7 @@ _kept: dict[str, Tracer] = {}  # one at most: starting Mitsuba takes seconds, th
 
 
 def tracer_for(preset: str) -> Tracer:
-    """A running worker for this preset."""
+    """Return a running worker for this preset."""
     if preset not in _kept:
         close_all()
         _kept[preset] = Tracer(preset)

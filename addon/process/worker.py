@@ -47,7 +47,8 @@ def say(**message: Any) -> None:
 
 
 def simulate(folder: Path, job: dict, progress: Progress) -> None:
-    """FOLDER/scene.toml -> recording.h5, and result.npz: its truth, and where the indenter stands on each frame.
+    """Simulate FOLDER/scene.toml into recording.h5, and result.npz: its truth,
+    and where the indenter stands on each frame.
 
     job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None.
     With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
@@ -226,7 +227,9 @@ def variant(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def read(folder: Path, job: dict, progress: Progress) -> None:
-    """The recording at job["path"] -> arrays.npz and about.json, which ``recording_reader`` puts together again."""
+    """Read the recording at job["path"] into arrays.npz and about.json,
+    of which ``recording_reader`` makes it again.
+    """
     from tactile_core import recordings
 
     found = recordings.read(job["path"])

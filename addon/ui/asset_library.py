@@ -25,7 +25,7 @@ TOLD = {
 
 
 def folder() -> Path:
-    """The library's folder, which is made where it is missing."""
+    """Return the library's folder, which is made where it is missing."""
     return Path(bpy.utils.extension_path_user(_PACKAGE, path="assets", create=True))
 
 
@@ -53,7 +53,7 @@ def write(place: Path) -> Path:
 
 
 def entry() -> bpy.types.UserAssetLibrary | None:
-    """The library as Preferences > File Paths lists it, if it does."""
+    """Return the library as Preferences > File Paths lists it, if it does."""
     libraries = bpy.context.preferences.filepaths.asset_libraries
     return next((each for each in libraries if Path(each.path) == folder()), None)
 

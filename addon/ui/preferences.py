@@ -39,7 +39,7 @@ class TACTILE_OT_clear_cache(TactileOperator):
 
 
 def size_of(folder: Path) -> int:
-    """Bytes of the files in a folder."""
+    """Return how many bytes the files in a folder take."""
     return sum(file.stat().st_size for file in folder.iterdir() if file.is_file())
 
 

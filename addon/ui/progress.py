@@ -10,7 +10,7 @@ import bpy
 
 @contextmanager
 def shown(context: bpy.types.Context) -> Iterator[Callable[[float], None]]:
-    """A callback that takes the share done, 0..1."""
+    """Return a callback that takes the share done, 0..1."""
     manager = context.window_manager
     manager.progress_begin(0, 100)
     try:

@@ -38,7 +38,7 @@ class TactileRender(bpy.types.PropertyGroup):
 
 
 def budget_of(scene: bpy.types.Scene) -> accuracy.Budget:
-    """The bound that a scene's panel holds. Raises TactileError for anything else than bounds."""
+    """Return the bound that a scene's panel holds. Raises TactileError for anything else than bounds."""
     text = scene.tactile_render.error.strip()
     return accuracy.parse_budget(text) if text else accuracy.Budget()
 
@@ -56,7 +56,7 @@ def preset_of(scene: bpy.types.Scene) -> str:
 
 
 def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) -> Calibration:
-    """The unit whose file a scene names, else the preferences', its picture (width, height) pixels large.
+    """Return the unit whose file a scene names, else the preferences', its picture (width, height) pixels large.
 
     Raises TactileError.
     """

@@ -59,7 +59,9 @@ def agree(cost: str, seconds: float, agreed: bool) -> None:
 
 @contextmanager
 def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], None]]:
-    """A callback (done, in all) that draws a bar: on a terminal, for what takes over two seconds; or when forced."""
+    """Return a callback (done, in all) that draws a bar: on a terminal, for work of over two seconds;
+    or when forced.
+    """
     if not forced and not sys.stderr.isatty():
         yield lambda done, total: None
         return

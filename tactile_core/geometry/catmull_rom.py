@@ -11,7 +11,8 @@ _STEPS = np.arange(-1, 3)[:, None]
 
 
 def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray:
-    """Points (n, 3) m of the surface through nodes ``axes`` (3, rows, columns) m at (row, column) places (2, n).
+    """Return the points (n, 3) m of the surface through nodes ``axes`` (3, rows, columns) m at (row,
+    column) places (2, n).
 
     axes : contiguous; sums over many places at a time are faster axis by axis
     closed : whether the last column joins the first; places beyond other ends lie on them
@@ -23,7 +24,9 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
 
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (4, 4, n), as row * columns + column, whose weighted sum gives each place (2, n), and their weights."""
+    """Return the nodes (4, 4, n), as row * columns + column, whose weighted sum gives each place (2, n),
+    and their weights.
+    """
     rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)
@@ -41,7 +44,7 @@ def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tupl
 
 
 def catmull_rom(t: np.ndarray | float) -> np.ndarray:
-    """Weights (4, ...) of the nodes -1, 0, 1, 2 at places t between 0 and 1: cubic, once differentiable."""
+    """Return the weights (4, ...) of the nodes -1, 0, 1, 2 at places t between 0 and 1: cubic, once differentiable."""
     square = t * t
     cube = square * t  # numpy's general power takes ten times as long
     return np.array([

@@ -25,17 +25,21 @@ class EvenSpline:
         return self.start + self.step * np.arange(self.count)
 
     def refined(self, factor: int) -> EvenSpline:
-        """The spline on a grid with factor intervals for each of this one, same ends."""
+        """Return the spline on a grid with factor intervals for each of this one, same ends."""
         return EvenSpline(self.start, self.step / factor, (self.count - 1) * factor + 1)
 
     def cells(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """First of the four coefficients that matter at each position, and the place 0..1 in its interval."""
+        """Return the first of the four coefficients that matter at each position,
+        and the place 0..1 in its interval.
+        """
         place = np.clip((position - self.start) / self.step, 0, self.count - 1)
         cell = np.minimum(place.astype(np.intp), self.count - 2)
         return cell, place - cell
 
     def matrix(self, position: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Matrix (n, count) that takes values at nodes to the spline, or its first derivative, at positions (n,)."""
+        """Return the matrix (n, count) that takes values at nodes to the spline, or its first derivative,
+        at positions (n,).
+        """
         cell, place = self.cells(position)
         basis = np.zeros((len(cell), self.count + 2))
         weights = bspline_slopes(place) / self.step if derivative else bspline_weights(place)
@@ -48,7 +52,7 @@ class EvenSpline:
 
 
 def bspline_weights(t: np.ndarray) -> np.ndarray:
-    """The four uniform cubic B-splines at places t (n,) of their interval, 0..1; (4, n), they sum to 1."""
+    """Return the four uniform cubic B-splines at places t (n,) of their interval, 0..1; (4, n), they sum to 1."""
     s = 1 - t
     weights = np.empty((4, len(t)), t.dtype)
     weights[0] = s * s * s / 6
@@ -59,7 +63,7 @@ def bspline_weights(t: np.ndarray) -> np.ndarray:
 
 
 def bspline_slopes(t: np.ndarray) -> np.ndarray:
-    """Derivatives of ``bspline_weights`` by t; (4, n)."""
+    """Return the derivatives of ``bspline_weights`` by t; (4, n)."""
     s = 1 - t
     return np.stack([-s * s, 3 * t * t - 4 * t, 4 * s - 3 * s * s, t * t]) / 2
 

@@ -54,14 +54,14 @@ class Lattice:
         return np.ascontiguousarray(np.moveaxis(self.grid(self.rest), 2, 0))
 
     def grid(self, values: np.ndarray) -> np.ndarray:
-        """Values at nodes (..., n_nodes, k) as a grid (..., rows, columns, k); poles left out."""
+        """Return the values at nodes (..., n_nodes, k) as a grid (..., rows, columns, k); poles left out."""
         rows, columns = self.shape
         values = np.asarray(values)
         return values[..., : rows * columns, :].reshape(*values.shape[:-2], rows, columns, values.shape[-1])
 
 
 def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
-    """Triangles of a grid, two per cell, outward if the cross product (row x column) points outward.
+    """Return the triangles of a grid, two per cell, outward if the cross product (row x column) points outward.
 
     closed : the last column joins the first. Returns (n, 3) int32.
     """
@@ -75,5 +75,5 @@ def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
 
 
 def cap_faces(pole: int, ring: np.ndarray) -> np.ndarray:
-    """A fan of triangles that closes a ring of nodes at a pole; (n, 3) int32."""
+    """Return a fan of triangles that closes a ring of nodes at a pole; (n, 3) int32."""
     return np.stack([np.full(len(ring), pole), ring, np.roll(ring, -1)], -1).astype(np.int32)

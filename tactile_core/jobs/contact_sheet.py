@@ -66,7 +66,7 @@ COLUMNS = (
 
 
 def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
-    """Indices (k,) of the frames to show, in order: the strongest ones that lie apart from each other.
+    """Choose the frames (k,) to show, in order: the strongest contacts that lie apart from each other.
 
     Taken one by one, each at least half of a `count`-th of the recording away from those before.
     strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none

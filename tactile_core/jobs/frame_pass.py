@@ -77,15 +77,17 @@ class Tools:
     dots: MarkerField | None = None
 
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
+        """Draw the picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
         return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
 
     def marker_motion(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
-        """Array of frames.h5 of gels displaced by (T, M, 3) m. Raises TactileError for a unit without dots."""
+        """Return the array of frames.h5 of gels displaced by (T, M, 3) m.
+        Raises TactileError for a unit without dots.
+        """
         return {"marker_motion": self.needed_dots().motion(displacement)}
 
     def needed_dots(self) -> MarkerField:
-        """The unit's dots; raises TactileError where it has none."""
+        """Return the unit's dots; raises TactileError where it has none."""
         if self.dots is None:
             found = "asked of a unit without dots"
             advice = "Give a --calibration with a [markers] table (docs/calibration.md)"
@@ -93,7 +95,9 @@ class Tools:
         return self.dots
 
     def tracked(self, read: Callable[[int, int], tuple[np.ndarray, Signals]], count: int) -> Tracked | None:
-        """States of the contact in a recording of `count` frames, of which `read` gives some, with their times, s."""
+        """Track the contact's state in a recording of `count` frames, of which `read` gives some,
+        with their times, s.
+        """
         if self.posterior is None:
             return None
 

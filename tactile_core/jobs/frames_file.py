@@ -78,7 +78,7 @@ def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
 
 
 def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:
-    """Datasets of a file that keeps these words, with unit and meaning; a shard has the pictures, too."""
+    """Return the datasets of a file that keeps these words, with unit and meaning; a shard has the pictures, too."""
     kept = [PICTURES if shard and word == "image" else KEPT[word] for word in keep]
     return {name: meaning for about in (ALWAYS, *kept) for name, meaning in about.items()}
 

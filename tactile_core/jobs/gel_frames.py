@@ -44,7 +44,7 @@ class Frames:
     heights: np.ndarray | None = None
 
     def iterate_rows(self, rows: np.ndarray) -> Iterator[np.ndarray]:
-        """Displacement (M, 3) m or heights (H, W) m of each of some frames."""
+        """Yield the displacement (M, 3) m or heights (H, W) m of each of some frames."""
         for row in rows:
             if self.heights is not None:
                 yield self.heights[row]
@@ -144,7 +144,7 @@ def _of_scene(path: Path, progress: Progress, tier: str) -> Frames:
 
 
 def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.ndarray:
-    """Displacement (n, 3) m of a sensor's surface nodes in a frame, by its number in the recording.
+    """Return the displacement (n, 3) m of a sensor's surface nodes in a frame, by its number in the recording.
 
     Raises TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was
     not kept or lies on another surface, and a frame that it does not hold.

@@ -11,8 +11,8 @@ from ..translation.contact_patch import contact_patch
 
 
 def gel_traction(displacement: np.ndarray, touched: np.ndarray) -> dict[str, np.ndarray]:
-    """Arrays of frames.h5: ``traction_digit`` (T, M, 3) Pa of gels displaced by (T, M, 3) m, ``traction_force``
-    (T, 3) N.
+    """Return the arrays of frames.h5: ``traction_digit`` (T, M, 3) Pa of gels displaced by (T, M,
+    3) m, ``traction_force`` (T, 3) N.
 
     touched : (T,) bool, frames in contact; the others are zero
     """

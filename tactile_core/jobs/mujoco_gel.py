@@ -93,7 +93,7 @@ class MujocoGel:
         self._shift = np.clip(self._shift + step, -_MOST_SHIFT, _MOST_SHIFT)
 
     def forces(self, data: mujoco.MjData) -> dict[int, np.ndarray]:
-        """MuJoCo's force (3,) N on the gel by each geom that touches it, in the sensor's frame."""
+        """Return MuJoCo's force (3,) N on the gel by each geom that touches it, in the sensor's frame."""
         import mujoco
 
         found: dict[int, np.ndarray] = {}
@@ -133,7 +133,7 @@ class MujocoGel:
 
 
 def indenter_of(model: mujoco.MjModel, geom: int) -> tuple[Indenter, np.ndarray]:
-    """The indenter that a geom is, and its frame (4, 4) in the geom's.
+    """Return the indenter that a geom is, and its frame (4, 4) in the geom's.
 
     Spheres, capsules, boxes and cylinders are exact but for edges, which are rounded by 0.4 mm; meshes and ellipsoids
     go through a grid of their distance, built once. Raises TactileError for planes and height fields.

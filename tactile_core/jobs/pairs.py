@@ -82,7 +82,9 @@ def plan(
     electrodes: str = SHEET,
     pair: tuple[str, str] = SENSORS,
 ) -> tuple[jobs.Job, list[str], str]:
-    """The job, the names of the indenters and the scene's text; raises what ``make_pairs`` raises before it begins."""
+    """Return the job, the names of the indenters and the scene's text;
+    raises what ``make_pairs`` raises before it begins.
+    """
     source, target = pair
     of_kind(source, Fluid), of_kind(target, Gel)
     scene, text, inputs, files = scene_input.read_inputs(scene_path, ["presses"])
@@ -131,7 +133,7 @@ def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
 
 
 def blocks(folder: Path, job: Job) -> list[Path]:
-    """Files of the blocks that hold the contacts of a finished job, in order."""
+    """Return the files of the blocks that hold the contacts of a finished job, in order."""
     count = wanted(_counts(folder, job, 0), job.recipe.count, job.inputs[0].path)
     return [jobs.shard_file(folder, job.inputs[0].name, number) for number in range(count)]
 

@@ -166,7 +166,7 @@ def _tier(path: Path, um: float, say: Callable[[str], None]) -> str:
 
 
 def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
-    """The calibration in pixels of height maps (H, W), or of the size (width, height) asked for.
+    """Return the calibration in pixels of height maps (H, W), or of a given size (width, height).
 
     Raises TactileError where both are there and differ.
     """

@@ -125,7 +125,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
-    """Frames of an input that was read."""
+    """Return how many frames an inspected input has."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
     frames = _frames(folder, job, index)
@@ -133,12 +133,12 @@ def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
 
 
 def count(folder: Path, job: Job, index: int) -> int:
-    """Shards of an input that was read."""
+    """Return how many shards an inspected input has."""
     return -(-_frames(folder, job, index) // job.recipe.shard_frames)
 
 
 def input_kind(folder: Path, job: Job, index: int) -> tuple[str, bool, int]:
-    """Facts of an input that was read: its kind in words, true if it holds height maps, its frames."""
+    """Describe an inspected input: its kind in words, true if it holds height maps, its frames."""
     found = array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(KIND, HEIGHTS))
     return found[KIND].tobytes().decode(), bool(found[HEIGHTS]), _frames(folder, job, index)
 

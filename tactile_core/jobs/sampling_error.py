@@ -54,5 +54,5 @@ def check(bound: float, share: float | None) -> str:
 
 
 def depth_share(displacement: np.ndarray) -> float:
-    """The largest move of a gel's node in displacements (..., M, 3) m, over the gel's thickness."""
+    """Return the largest move of a gel's node in displacements (..., M, 3) m, over the gel's thickness."""
     return float(np.sqrt(np.square(displacement, dtype=np.float32).sum(-1).max(initial=0))) / THICKNESS

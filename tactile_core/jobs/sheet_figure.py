@@ -74,7 +74,7 @@ class SheetFigure:
             self.top += WARNING_LINE
 
     def electrodes(self, time: np.ndarray, electrodes: np.ndarray, frames: np.ndarray) -> None:
-        """Lines of (T, 19) counts over (T,) s, and where the columns ``frames`` (k,) lie among them."""
+        """Draw lines of (T, 19) counts over (T,) s, and mark where the columns ``frames`` (k,) lie among them."""
         import matplotlib
 
         self.top += NUMBERS
@@ -95,7 +95,9 @@ class SheetFigure:
         self.top += ELECTRODES + TIME_AXIS
 
     def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray | None) -> None:
-        """Lines of the fluid's pressure (T,) Pa over (T,) s, as translated and, where there is one, as measured."""
+        """Draw lines of the fluid's pressure (T,) Pa over (T,) s, as translated and, where there is one,
+        as measured.
+        """
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, PRESSURE)
         if measured is not None and np.isfinite(measured).any():
             axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")
@@ -115,13 +117,13 @@ class SheetFigure:
     def biotac_row(
         self, label: str, displacement: np.ndarray, largest: float, contact_center: np.ndarray | None
     ) -> None:
-        """Maps of (k, N, 3) m on the unrolled skin; largest : m where colours end; contact_center : (k, 2) m."""
+        """Draw maps of (k, N, 3) m on the unrolled skin; largest : m where colours end; contact_center : (k, 2) m."""
         plan, faces = unrolling.unrolled_nodes(), sensors.biotac_surface().faces
         faces = faces[np.isfinite(plan[faces]).all((1, 2))]
         self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, contact_center)
 
     def digit_row(self, label: str, displacement: np.ndarray, contact_center: np.ndarray | None) -> None:
-        """Maps of (k, M, 3) m on the gel, with the border of its picture; contact_center : (k, 2) m."""
+        """Draw maps of (k, M, 3) m on the gel, with the border of its picture; contact_center : (k, 2) m."""
         gel = sensors.digit_surface()
         largest = scale(displacement)
         axes = self._surface_row(
@@ -194,7 +196,7 @@ class SheetFigure:
         self.top += height
 
     def captions(self, force: np.ndarray, confidence: np.ndarray, expected_error: np.ndarray) -> None:
-        """Numbers below each column: (k, 3) N, (k,) 0..1 and (k,) m; and how to read the maps."""
+        """Write numbers below each column: (k, 3) N, (k,) 0..1 and (k,) m; and how to read the maps."""
         for k in range(self.columns):
             text = f"force {np.linalg.norm(force[k]):.2f} N\nconfidence {confidence[k]:.2f}"
             text += f"\nexpected error {1e3 * expected_error[k]:.2f} mm"
@@ -220,7 +222,7 @@ class SheetFigure:
 
 
 def scale(*displacements: np.ndarray | None) -> float:
-    """The largest of (k, n, 3) displacements, m; None stands for none."""
+    """Return the largest length of (k, n, 3) displacements, m; None counts as zero."""
     lengths = [np.linalg.norm(d, axis=-1).max(initial=0) for d in displacements if d is not None]
     return max(SMALLEST_SCALE, *lengths)
 

@@ -62,7 +62,7 @@ def plan(
     keep: Sequence[str] = DEFAULT,
     electrodes: str = SHEET,
 ) -> Job:
-    """The job: the [recording] of a scene for each combination of the values in ``grid`` (``scene_grid``).
+    """Return the job: the [recording] of a scene for each combination of the values in ``grid`` (``scene_grid``).
 
     seed : of the first recording, each has one more than that before it; keep : words of ``recording.OUTPUTS``
     electrodes : the law of their counts, of ``law.LAWS``

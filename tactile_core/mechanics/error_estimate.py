@@ -34,7 +34,7 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
-    """Errors of a contact ``depth`` m from first touch, of touching nodes, under an indenter as sharp as
+    """Return the errors of a contact ``depth`` m from first touch, of touching nodes, under an indenter as sharp as
     ``radius`` m.
     """
     if not nodes:
@@ -66,12 +66,15 @@ def _of_nothing(depth: float) -> Errors:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """The table: how, and by tier and sensor ms a contact and errors in bins of depth over thickness."""
+    """Read the table of measured errors: how they were measured, and by tier and sensor ms and
+    errors in bins of depth.
+    """
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
 def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
-    """Shape error, m rms, and relative force error that 95 of 100 contacts at a depth over thickness stay below.
+    """Return the shape error, m rms, and relative force error that 95 of 100 contacts at a
+    depth over thickness stay below.
 
     The fast tier's are from the full tier, whose own come on top; deeper than measured: those of the deepest bin.
     NaN for a sensor whose errors nobody has measured.

@@ -29,7 +29,8 @@ _MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
 
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
-    """Additional distance, m, to first touch of an indenter that has slid, against ``pose``, itself at first touch.
+    """Find the additional distance, m, to first touch of an indenter that has slid from ``pose``,
+    itself at first touch.
 
     Where it has slid off the sensor, as far as its motion is followed.
     """
@@ -42,7 +43,7 @@ def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -
 
 
 def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
-    """The pose moved along its direction, in or out, until the indenter just touches the resting surface.
+    """Move a pose along its direction, in or out, until the indenter just touches the resting surface.
 
     Between nodes the surface is the lattice's cubic (Catmull-Rom) interpolation. Raises TactileError for an indenter
     that passes the sensor by.

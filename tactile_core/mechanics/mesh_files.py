@@ -22,7 +22,7 @@ _VTK_NAMES = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "int
 
 
 def vtk_order() -> np.ndarray:
-    """Node (27,) of a ``HexMesh`` cell, a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
+    """Return the node (27,) of a ``HexMesh`` cell, a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
 
     VTK counts corners, then edges, faces -x +x -y +y -z +z and the middle, bottom before top and the bottom's edges
     before the upright ones last: Schroeder, Martin, Lorensen, The Visualization Toolkit, vtkTriQuadraticHexahedron.
@@ -37,7 +37,7 @@ def vtk_order() -> np.ndarray:
 
 
 def write_ply(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, columns: Data | None = None) -> None:
-    """A surface with outward unit normals, binary PLY: float32 x y z nx ny nz, then ``columns``.
+    """Write a surface with outward unit normals, binary PLY: float32 x y z nx ny nz, then ``columns``.
 
     nodes : (n, 3) m; faces : (m, 3) int, normals outward
     columns : values (n,) or (n, 3) by name, written as float32; a vector ``force`` becomes force_x force_y force_z
@@ -61,7 +61,7 @@ def write_ply(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, col
 
 
 def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> None:
-    """A surface, binary STL: triangles and their unit normals, float32, m. Raises what ``write_ply`` raises."""
+    """Write a surface, binary STL: triangles and their unit normals, float32, m. Raises what ``write_ply`` raises."""
     corners = _checked(path, "nodes", nodes, len(nodes))[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
@@ -73,7 +73,7 @@ def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> 
 def write_vtu(
     path: str | os.PathLike, mesh: HexMesh, solid: FiniteStrainSolid | None = None, state: State | None = None
 ) -> None:
-    """A volume of triquadratic hexahedra at rest; with a solved ``state`` of its ``solid``, what that says.
+    """Write a volume of triquadratic hexahedra at rest; with a solved ``state`` of its ``solid``, what that says.
 
     At points ``displacement`` m (in ParaView: Warp By Vector), ``force`` N that the outside exerts on each node
     (contact, fluid, support), ``stress`` Pa (Cauchy, xx yy zz xy yz xz) and ``von_mises`` Pa of it, see
@@ -89,7 +89,7 @@ def write_vtu(
 
 
 def solid_data(solid: FiniteStrainSolid, state: State) -> tuple[Data, Data]:
-    """Point and cell data of ``write_vtu`` by name."""
+    """Return the point and cell data of ``write_vtu`` by name."""
     cauchy = stress.cauchy(solid, state)
     at_nodes = stress.at_nodes(solid, cauchy)
     six = [at_nodes[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]

@@ -13,7 +13,7 @@ _GAUSS = np.sqrt(0.6) * np.array([-1.0, 0, 1]), np.array([5.0, 8, 5]) / 9
 
 @functools.cache
 def node_areas(sensor: str) -> np.ndarray:
-    """Area (n,) m2 of each resting surface node of a sensor: the integral of its shape function.
+    """Return the area (n,) m2 of each resting surface node of a sensor: the integral of its shape function.
 
     Surfaces are of quadratic faces, on which an even pressure loads corners, edges and middles as 1 : 4 : 16; divided
     by these areas it is even again.
@@ -34,7 +34,8 @@ def node_areas(sensor: str) -> np.ndarray:
 
 
 def traction(sensor: str, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Traction (n, 3) Pa on a resting surface whose ``nodes`` (k,) carry forces (k, 3) N; zero at the others.
+    """Return the traction (n, 3) Pa on a resting surface whose ``nodes`` (k,) carry forces (k, 3) N;
+    zero at the others.
 
     Times ``node_areas`` and added up it is the sum of the forces.
     """

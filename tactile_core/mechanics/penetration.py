@@ -33,7 +33,8 @@ class PenetrationError(TactileError):
 def penetration_between(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool, share: float = _SHARE
 ) -> float:
-    """Penetration, m, of a surface (rows, columns, 3) m into a body halfway between nodes, wherever some are near it.
+    """Return the penetration, m, of a surface (rows, columns, 3) m into a body halfway between nodes,
+    wherever some are near it.
 
     Raises PenetrationError for a body ``depth`` m in, where that is too much: also more than a share of the depth.
     """
@@ -52,7 +53,9 @@ def penetration_between(
 
 
 def penetration(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> float:
-    """Depth, m, of a body's foremost point under a surface (rows, columns, 3) m; 0 where that says nothing."""
+    """Return the depth, m, of a body's foremost point under a surface (rows, columns, 3) m;
+    0 where that says nothing.
+    """
     foremost = pose.support(indenter, pose.direction)
     met = None
     if abs(pose.distance(indenter, foremost[None])[0][0]) < _ON_BODY:

@@ -24,7 +24,9 @@ def check_suffix(path: str | os.PathLike) -> None:
 
 
 def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
-    """The resting sensor: ``.vtu`` its volume, ``.ply`` and ``.stl`` its surface. Raises what the writers raise."""
+    """Write the resting sensor: ``.vtu`` its volume, ``.ply`` and ``.stl`` its surface.
+    Raises what the writers raise.
+    """
     check_suffix(path)
     if Path(path).suffix.lower() == ".vtu":
         mesh_files.write_vtu(path, solid_mesh(sensor))
@@ -61,7 +63,9 @@ def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) 
 
 
 def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Mesh nodes (n,) of the touchable side, and triangles (m, 3) of them, outward: eight a quadratic face."""
+    """Return the mesh nodes (n,) of the touchable side, and triangles (m, 3) of them, outward:
+    eight a quadratic face.
+    """
     faces = mesh.cells[:, 18:][np.isin(mesh.cells[:, 18:], mesh.surface).all(axis=1)].reshape(-1, 3, 3)
     quads = [faces[:, i : i + 2, j : j + 2].reshape(-1, 4) for i in (0, 1) for j in (0, 1)]
     a, b, d, c = np.concatenate(quads).T
@@ -74,7 +78,7 @@ def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
 def write_surface(
     path: str | os.PathLike, sensor: Sensor, displacement: np.ndarray, columns: Mapping[str, np.ndarray]
 ) -> None:
-    """A sensor's surface moved by ``displacement`` (n, 3) m; ``columns`` (n,) or (n, 3) by name go along.
+    """Write a sensor's surface moved by ``displacement`` (n, 3) m; ``columns`` (n,) or (n, 3) by name go along.
 
     PLY and STL hold the deformed places; VTU the resting ones and the displacement beside them, as VTK's own tools
     expect it. STL has no room for columns. Raises what the writers raise.

@@ -78,7 +78,8 @@ class ShadowCaster:
         return self.distance * np.sqrt(rise @ rise - part) / self.led.radius
 
     def sight(self, height: np.ndarray, box: tuple[slice, slice]) -> tuple[np.ndarray, tuple[slice, slice]]:
-        """Height of the LED's centre above the horizon, in LED radii, clipped to -1 (hidden) .. 1 (all seen).
+        """Return the height of the LED's centre above the horizon, in LED radii, clipped to -1 (hidden) ..
+        1 (all seen).
 
         height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may throw shadows Returns
             sight (h, w) and the box of pixels it is for; it is 1 everywhere else.
@@ -128,7 +129,7 @@ class ShadowCaster:
 
 @functools.cache
 def march_steps(reach: int) -> tuple[int, ...]:
-    """Steps of a march: each one at first, then every tenth of the way; what throws a shadow far is wide."""
+    """Return the steps of a march: each one at first, then every tenth of the way; what throws a shadow far is wide."""
     steps, k = [], 1
     while k <= reach:
         steps.append(k)
@@ -137,7 +138,9 @@ def march_steps(reach: int) -> tuple[int, ...]:
 
 
 def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | None:
-    """Rows and columns that enclose what is true in mask (h, w), margin further within the mask; None for nothing."""
+    """Return the rows and columns that enclose what is true in mask (h, w), margin further within the mask;
+    None for nothing.
+    """
     box = []
     for axis in (1, 0):
         found = np.flatnonzero(mask.any(axis))
@@ -163,7 +166,8 @@ def _disc_tables() -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Visible area, and its first moment upward, of a disc of radius 1 cut by a horizon `sight` below its centre.
+    """Return the visible area, and its first moment upward, of a disc of radius 1 cut by a
+    horizon `sight` below its centre.
 
     Both over the whole disc's area (circular segment): share 1/2 + (t sqrt(1 - t^2) + asin t) / pi,
     moment 2 (1 - t^2)^(3/2) / (3 pi).

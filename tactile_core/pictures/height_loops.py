@@ -9,7 +9,7 @@ from ..files.compiled import Loop
 
 @Loop
 def look_up(coefficients, row, t, column, s):  # noqa: ANN001, ANN201
-    """Splines (k, rows, columns) at places (n,): t, s of the way through cells row, column; (n, k) float32.
+    """Evaluate splines (k, rows, columns) at places (n,): t, s of the way through cells row, column; (n, k) float32.
 
     The cubic B-splines of ``geometry.cubic_spline.bspline_weights``, written out.
     """
@@ -38,7 +38,7 @@ def look_up(coefficients, row, t, column, s):  # noqa: ANN001, ANN201
 def heights_above(  # noqa: ANN201
     coefficients, x, z, to_x, to_z, miss, start, step, tolerance, most_steps,  # noqa: ANN001
 ):  # fmt: skip
-    """Heights (n,) float32 m of the gel points that have moved to places x, z (n,) m, and how many were not found.
+    """Find heights (n,) float32 m of the gel points that have moved to places x, z (n,) m, and how many were not found.
 
     The search of ``HeightMapper._source`` place by place, and ``look_up`` of the height where it ends.
     coefficients : (3, rows, columns), of the splines of sideways motion along x, along z and of the height

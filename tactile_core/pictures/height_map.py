@@ -227,7 +227,7 @@ def _axis(nodes: np.ndarray) -> EvenSpline:
 
 
 def digit_mapper(camera: Camera | None = None) -> HeightMapper:
-    """The mapper of ``sensors.digit_surface()``, made once a camera; None for the shipped calibration's."""
+    """Return the mapper of ``sensors.digit_surface()``, made once a camera; None for the shipped calibration's."""
     return _digit_mapper(camera or load_calibration().camera)
 
 
@@ -237,17 +237,20 @@ def _digit_mapper(camera: Camera) -> HeightMapper:
 
 
 def height_map(displacement: np.ndarray, camera: Camera | None = None) -> np.ndarray:
-    """Heights (H, W) or (T, H, W) float32, m, of the DIGIT's gel displaced by (n_nodes, 3) or (T, n_nodes, 3) m."""
+    """Return the heights (H, W) or (T, H, W) float32, m, of the DIGIT's gel displaced by (n_nodes, 3) or (T,
+    n_nodes, 3) m.
+    """
     return digit_mapper(camera)(displacement)
 
 
 def rest_height_map(camera: Camera | None = None) -> np.ndarray:
-    """Heights (H, W) float32, m, of the undeformed DIGIT: its dome."""
+    """Return the heights (H, W) float32, m, of the undeformed DIGIT: its dome."""
     return digit_mapper(camera).rest.copy()
 
 
 def of_unit(heights: np.ndarray, calibration: Calibration) -> np.ndarray:
-    """Heights (H, W) or (T, H, W) m of the DIGIT's gel -> float32, of a unit whose dome is higher or flatter at rest.
+    """Convert heights (H, W) or (T, H, W) m of the DIGIT's gel to float32,
+    of a unit whose dome is higher or flatter at rest.
 
     What a contact raises stays; the resting dome is that of the public mesh times the calibration's ``dome_scale``.
     """

@@ -9,7 +9,7 @@ from ..files.compiled import Loop
 
 @Loop
 def in_picture(radiance, rest, response, background, largest):  # noqa: ANN001, ANN201
-    """Picture (H, W, 3) uint8: background (H, W, 3) + response (3, 3, H, W) times radiance less that at rest (3, H, W).
+    """Compute (H, W, 3) uint8: background (H, W, 3) + response (3, 3, H, W) times radiance less that at rest (3, H, W).
 
     largest : float32, level
     """

@@ -41,12 +41,14 @@ class MarkerField:
         self.rest = self._seen(still)[0]
 
     def motion(self, displacement: np.ndarray) -> np.ndarray:
-        """Motion (T, n, 2) float32, px to the right and down, of the dots on gels displaced by (T, M, 3) m."""
+        """Return the motion (T, n, 2) float32, px to the right and down, of the dots on gels displaced by (T,
+        M, 3) m.
+        """
         moved = [self._seen(frame)[0] - self.rest for frame in displacement]
         return np.stack(moved).astype(np.float32) if moved else np.zeros((0, *self.rest.shape), np.float32)
 
     def marks(self, displacement: np.ndarray) -> np.ndarray:
-        """Share (H, W) float32 of the coating's light that the dots of a gel displaced by (M, 3) m leave."""
+        """Return the share (H, W) float32 of the coating's light that the dots of a gel displaced by (M, 3) m leave."""
         share = np.ones(self.unit.camera.shape, np.float32)
         middle, *rim = self._seen(displacement)
         # Columns: half of the dot's image along x and along z, px.

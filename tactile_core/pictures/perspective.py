@@ -121,7 +121,7 @@ def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
 
 
 def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Slopes of heights (H, W) m along the picture's right and down, second order, at its edges too."""
+    """Return the slopes of heights (H, W) m along the picture's right and down, second order, at its edges too."""
     right, down = camera.pixel_size
     if available() and height.dtype == np.float32:
         return slope_maps(np.ascontiguousarray(height), np.float32(0.5 / right), np.float32(0.5 / down))

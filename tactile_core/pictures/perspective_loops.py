@@ -74,7 +74,7 @@ def seen_heights(height, steepness, start, start_near, start_nearest, rows, colu
 
 @Loop
 def seen_surface(seen, slope_right, slope_down, right, down, inverse):  # noqa: ANN001, ANN201
-    """Near, tilt, own, normal, square and mapped, (6, H, W) float32, of ``shading.SeenSurface``."""
+    """Compute near, tilt, own, normal, square and mapped, (6, H, W) float32, of ``shading.SeenSurface``."""
     rows, columns = seen.shape
     found, one = np.empty((6, rows, columns), np.float32), np.float32(1)
     for a in range(rows):

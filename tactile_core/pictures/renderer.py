@@ -39,7 +39,7 @@ class Light(Protocol):
     """Gives radiance (H, W, 3) of height maps (H, W) m."""
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3) of heights (H, W) m."""
+        """Return the radiance (H, W, 3) of heights (H, W) m."""
 
 
 class Renderer:
@@ -107,7 +107,7 @@ class Renderer:
         return self.picture(self.radiance(height_map), marks=marks)
 
     def render(self, displacement: np.ndarray) -> np.ndarray:
-        """Pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
+        """Render the pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
 
         displacement : of the DIGIT surface's 2,867 nodes, as ``translate`` and ``solve`` return it
         Raises TactileError for another shape or values that are not finite.
@@ -120,11 +120,13 @@ class Renderer:
         return pictures
 
     def marks(self, displacement: np.ndarray) -> np.ndarray | None:
-        """Share (H, W) of light that the dots of a gel displaced by (n_nodes, 3) m leave; None without dots."""
+        """Return the share (H, W) of light that the dots of a gel displaced by (n_nodes, 3) m leave;
+        None without dots.
+        """
         return None if self.dots is None else self.dots.marks(displacement)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3) float32, levels of its band, that each LED gives to what pixels see."""
+        """Return the radiance (H, W, 3) float32, levels of its band, that each LED gives to what pixels see."""
         return self._spread_radiance(self._heights(height_map, "height map"))
 
     def _spread_radiance(self, heights: np.ndarray) -> np.ndarray:
@@ -134,7 +136,8 @@ class Renderer:
     def picture(
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None
     ) -> np.ndarray:
-        """Picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times the dots' share.
+        """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest),
+        times the dots' share.
 
         noise : makes the camera's noise, as measured on the unit; None for none
         marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them.
@@ -157,7 +160,7 @@ class Renderer:
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
 
     def correction(self) -> dict[str, float]:
-        """Levels by which the picture at rest differs from what the lights alone make: mean and largest."""
+        """Return the levels by which the picture at rest differs from what the lights alone make: mean and largest."""
         return correction(self.calibration, self.rest_radiance, self.background)
 
     def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
@@ -168,7 +171,9 @@ class Renderer:
         return heights
 
     def in_levels(self, radiance: np.ndarray) -> np.ndarray:
-        """Response times radiance (H, W, 3), grey levels float32: what the camera's channels make of it."""
+        """Convert radiance (H, W, 3) to grey levels float32: the response times it,
+        what the camera's channels make of it.
+        """
         levels = np.empty_like(radiance)
         for channel, row in enumerate(self._response):
             levels[..., channel] = sum(part * radiance[..., led] for led, part in enumerate(row))
@@ -184,12 +189,14 @@ class MitsubaLight:
         self._start = np.random.default_rng(seed).random(4)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3) float32, levels, of heights (H, W) m."""
+        """Return the radiance (H, W, 3) float32, levels, of heights (H, W) m."""
         height = np.asarray(height_map, np.float32)
         return self.completed(height, *self.direct(height))
 
     def direct(self, height: np.ndarray) -> tuple[np.ndarray, Hits]:
-        """Radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W) float32, and what the first pass saw."""
+        """Return the radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W) float32,
+        and what the first pass saw.
+        """
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
         total, first = self._one_pass(0, tilt)
@@ -198,7 +205,7 @@ class MitsubaLight:
         return total / np.float32(self.preset.passes), first
 
     def completed(self, height: np.ndarray, direct: np.ndarray, hits: Hits) -> np.ndarray:
-        """Direct light with what else the preset has: the gel's own light, and the window."""
+        """Return the direct light with what else the preset has: the gel's own light, and the window."""
         radiance, preset = direct, self.preset
         if preset.gather and any(self.unit.coating.albedo):
             radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)

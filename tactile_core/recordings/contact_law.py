@@ -48,7 +48,7 @@ def unexplained_share(change: np.ndarray) -> tuple[float, int]:
 
 
 def limit(contacts: int) -> float:
-    """The share left over beyond which a recording of so many different contacts is doubted."""
+    """Return the share left over beyond which a recording of so many different contacts is doubted."""
     return LEFT + MORE / float(np.sqrt(contacts))
 
 

@@ -16,7 +16,7 @@ NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Flags (T,) of raw readings at an end of the 12-bit range; other kinds do not show it.
+    """Return the flags (T,) of raw readings at an end of the 12-bit range; other kinds do not show it.
 
     readings : (T, 19) counts; findings are added to the warnings
     """
@@ -33,7 +33,7 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
 
 
 def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """Flags (T,) where an electrode is constant for 1 s or more; none in recordings that are shorter.
+    """Return the flags (T,) where an electrode is constant for 1 s or more; none in recordings that are shorter.
 
     readings : (T, 19) counts; findings are added to the warnings
     """

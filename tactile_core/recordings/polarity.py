@@ -139,7 +139,9 @@ def _apart(less: float, more: float) -> bool:
 
 
 def likeness(changes: np.ndarray) -> float:
-    """Mean over changes (n, 19) counts of the cosine to the nearest simulated contact, in the networks' scale."""
+    """Return the mean over changes (n, 19) counts of the cosine to the nearest simulated contact,
+    in the networks' scale.
+    """
     return float((unit(changes) @ patterns().T).max(axis=1).mean())
 
 
@@ -155,6 +157,6 @@ def patterns() -> np.ndarray:
 
 
 def unit(changes: np.ndarray) -> np.ndarray:
-    """Unit vectors (n, 19) of changes (n, 19) counts, in the networks' scale."""
+    """Return the unit vectors (n, 19) of changes (n, 19) counts, in the networks' scale."""
     compressed = np.arcsinh(changes / SCALE)
     return compressed / np.maximum(np.linalg.norm(compressed, axis=1, keepdims=True), 1e-9)

@@ -93,7 +93,7 @@ def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slic
 
 
 def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
-    """Estimated readings (T, 19) counts without contact.
+    """Estimate the readings (T, 19) counts without contact.
 
     Level of each quiet part, linear between their middles, constant before the first and after the last: nothing is
     known there, and contact is never taken for drift. Without drift: one level over all quiet frames.
@@ -107,7 +107,9 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
-    """PDC at rest, counts: 0 for a tared file; else from the quiet frames, or the lowest where there are none."""
+    """Return PDC at rest, counts: 0 for a tared file; else from the quiet frames,
+    or the lowest where there are none.
+    """
     finite = pdc[np.isfinite(pdc)]
     if not len(finite) or (kind != "raw" and np.median(finite) < TARED_PDC):
         return 0.0
@@ -116,7 +118,9 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 
 
 def level(samples: np.ndarray) -> np.ndarray:
-    """Mean (19,) of the middle half of (n, 19) samples: robust as a median, but not rounded to whole counts."""
+    """Return the mean (19,) of the middle half of (n, 19) samples:
+    robust as a median, but not rounded to whole counts.
+    """
     cut = len(samples) // 4
     return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0)
 

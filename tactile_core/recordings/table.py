@@ -40,7 +40,7 @@ class Table:
     start: int = 0
 
     def columns(self, names: list[str], dtype: type = np.float64) -> np.ndarray:
-        """Values (T, len(names)) of the columns. Raises TactileError naming a column that is missing."""
+        """Return the values (T, len(names)) of the columns. Raises TactileError naming a column that is missing."""
         missing = [name for name in names if name not in self.header]
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
@@ -57,7 +57,7 @@ class Table:
         return found
 
     def column(self, name: str) -> np.ndarray:
-        """Values (T,) float of a column."""
+        """Return the values (T,) float of a column."""
         return self.columns([name])[:, 0]
 
     def essential(self, names: list[str]) -> list[Problem]:
@@ -92,7 +92,7 @@ def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | N
 
 
 def read_header(path: str) -> tuple[str, ...]:
-    """Lower-case column names of the first line that is not empty, in the file's first megabyte."""
+    """Read the lower-case column names of the first line that is not empty, in the file's first megabyte."""
     with outside.open_file(path, "a recording") as file:
         lines = _text(path, _whole_lines(path, file, file.read(MAX_LINE)))
     if not any(line.strip() for line in lines):

@@ -32,13 +32,13 @@ FORCE_SCALE = 9.17
 
 
 def core_radius(rays: np.ndarray) -> np.ndarray:
-    """Distance (n,) m from the origin to the core's surface along rays (n, 3) of any length."""
+    """Return the distance (n,) m from the origin to the core's surface along rays (n, 3) of any length."""
     unit = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
     return 1 / np.linalg.norm(unit / CORE, axis=-1)
 
 
 def radius_along(skin: np.ndarray, rays: np.ndarray) -> np.ndarray:
-    """Distance (n,) m from the origin to the skin along rays (n, 3); nan beside the skin.
+    """Return the distance (n,) m from the origin to the skin along rays (n, 3); nan beside the skin.
 
     skin : (k, 3) m, nodes of the whole outer skin, deformed or not
     Once differentiable (Clough-Tocher) over the skin's stereographic projection from the origin.

@@ -53,7 +53,7 @@ class Response:
                 raise TactileError("response, centre", found, "more than 0: light brightens its own colour")
 
     def matrices(self, camera: Camera) -> np.ndarray:
-        """The matrix (H, W, 3, 3) of each pixel."""
+        """Return the matrix (H, W, 3, 3) of each pixel."""
         centre, right, down = (np.asarray(matrix) for matrix in (self.centre, self.along_right, self.along_down))
         return centre + camera.right[None, :, None, None] * right + camera.down[:, None, None, None] * down
 

@@ -18,14 +18,16 @@ _RESTS = 500.0, 3900.0
 
 
 def reading(growth: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
-    """Counts (..., 19), not rounded, after impedances have grown by factors (..., 19) since rest, counts at
+    """Return the counts (..., 19), not rounded, after impedances have grown by factors (..., 19) since rest, counts at
     rest (19,).
     """
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 
 
 def growth(counts: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
-    """Factors (..., 19) by which impedances have grown since counts at rest (19,); inverse of ``reading``."""
+    """Return the factors (..., 19) by which impedances have grown since counts at rest (19,);
+    inverse of ``reading``.
+    """
     now, before = np.clip(counts, *_ENDS), np.clip(rest, *_ENDS)
     return (COUNT_MAX / now - 1) / (COUNT_MAX / before - 1)
 

@@ -15,7 +15,7 @@ from .profiles import read_heights
 
 @functools.cache
 def shape_of(name: str) -> GelShape:
-    """The shape of the gel of a sensor that is there. Raises TactileError for one that has none."""
+    """Return the shape of the gel of a sensor that is there. Raises TactileError for one that has none."""
     return GelShape(of_kind(name, Gel))
 
 
@@ -36,7 +36,7 @@ class GelShape:
         self.spacing = (window[1] - window[0]) / (self._lattice.window_nodes[0] - 1)
 
     def outline_distance(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Distance, m, from a place (x, z) m of the plane to the gel's outline; 0 outside."""
+        """Return the distance, m, from a place (x, z) m of the plane to the gel's outline; 0 outside."""
         side = self._half_width_at(x) - np.abs(z)
         if self._outline.tip == ROUND:
             side = np.where(x < self.arc_x, self.half_width - np.hypot(x - self.arc_x, z), side)
@@ -45,7 +45,7 @@ class GelShape:
         return np.clip(np.minimum(side, self.base_x - x), 0, None)
 
     def dome_height(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Height of the resting gel above its flat back, m, at (x, z) in m: even in z, smooth.
+        """Return the height of the resting gel above its flat back, m, at (x, z) in m: even in z, smooth.
 
         Least squares of the profile table by Chebyshev polynomials along and even powers across (a table of a faceted
         mesh, hence the smoothing); the thickness everywhere where there is no [dome].
@@ -75,7 +75,7 @@ class GelShape:
         return np.linalg.lstsq(self._dome_basis(dome, x[within], z[within]), height[within], rcond=1e-10)[0]
 
     def dome_point(self, x: float, z: float) -> tuple[np.ndarray, np.ndarray]:
-        """The place (3,) m of the resting surface at (x, z) m and its outward unit normal (3,)."""
+        """Return the place (3,) m of the resting surface at (x, z) m and its outward unit normal (3,)."""
         step = 1e-6  # m: differences over 2 um of a surface that is smooth over millimetres
         height = self.dome_height(np.array([x, x - step, x + step, x, x]), np.array([z, z, z, z - step, z + step]))
         normal = np.array([-(height[2] - height[1]) / (2 * step), -1.0, -(height[4] - height[3]) / (2 * step)])
@@ -118,7 +118,9 @@ class GelShape:
         return (1 - u) * u_zero + u * u_one + (1 - v) * v_zero + v * v_one - bilinear
 
     def plan_grid(self) -> np.ndarray:
-        """Places (rows, columns, 2) = (x, z) m of the gel's lattice: even window, rim that follows the outline."""
+        """Return the places (rows, columns, 2) = (x, z) m of the gel's lattice: even window,
+        rim that follows the outline.
+        """
         lattice = self._lattice
         x = np.linspace(*lattice.window_x, lattice.window_nodes[0])
         z = np.linspace(*lattice.window_z, lattice.window_nodes[1])
@@ -145,7 +147,7 @@ class GelShape:
 
     @functools.cache  # noqa: B019 - shapes are few and kept by ``shape_of`` anyway
     def surface(self) -> Lattice:
-        """The gel's coated top surface at rest; rows grow with x, columns with z, outward is -y."""
+        """Return the gel's coated top surface at rest; rows grow with x, columns with z, outward is -y."""
         plan, lattice = self.plan_grid(), self._lattice
         rest = np.stack([plan[..., 0], self.back_y - self.dome_height(plan[..., 0], plan[..., 1]), plan[..., 1]], -1)
         rows, columns = plan.shape[:2]

@@ -45,7 +45,7 @@ def converted(counts: np.ndarray) -> np.ndarray:
 
 
 def readings(change: np.ndarray, time: np.ndarray, wiring: Wiring, seed: int) -> np.ndarray:
-    """Readings of the 12-bit converter, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
+    """Return the readings of the 12-bit converter, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
 
     Changes are those of a unit that rests at ``REST_COUNTS``; this one reads them by its own rest, as its
     divider does. Rounded and held within 0..4095, then less the count at rest where ``wiring.tared``. Rest, gain, drift

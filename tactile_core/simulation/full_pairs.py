@@ -101,7 +101,7 @@ def _turn(scene: Scene, number: int) -> int:
 
 
 def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Rows of a press as in the file, see ``pairs_file.units``, and what was wanted and lost.
+    """Return the rows of a press as in the file, see ``pairs_file.units``, and what was wanted and lost.
 
     Of the latter: wanted () contacts; lost () str, why the last are missing, else empty; seconds () of this process.
     """

@@ -29,7 +29,7 @@ class SizedSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     name: str
 
     def build(self) -> Indenter:
-        """The indenter, in metres."""
+        """Build the indenter, in metres."""
         return forms()[self.__struct_config__.tag].build(msgspec.structs.asdict(self))
 
 
@@ -63,7 +63,7 @@ class MeshSpec(msgspec.Struct, tag="mesh", tag_field="kind", forbid_unknown_fiel
     spacing_mm: Positive = 0.1
 
     def build(self) -> Indenter:
-        """The indenter, in metres."""
+        """Build the indenter, in metres."""
         return MeshIndenter.from_file(self.file, self.unit_mm * 1e-3, self.up, self.spacing_mm * 1e-3)
 
 
@@ -83,7 +83,7 @@ class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     turn_deg: float = 0.0
 
     def build(self) -> tuple[Indenter, Pose]:
-        """The indenter, in metres, and its pose in the group, turned about z."""
+        """Build the indenter, in metres, and its pose in the group, turned about z."""
         c, s = np.cos(np.deg2rad(self.turn_deg)), np.sin(np.deg2rad(self.turn_deg))
         apex = np.array([self.x_mm, self.y_mm, self.z_mm]) * 1e-3
         return self.body.build(), Pose(apex, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
@@ -96,7 +96,7 @@ class SeveralSpec(msgspec.Struct, tag="several", tag_field="kind", forbid_unknow
     parts: Annotated[list[PartSpec], Meta(min_length=1, max_length=64)]
 
     def build(self) -> Indenter:
-        """The indenter, in metres."""
+        """Build the indenter, in metres."""
         return Several(tuple(part.build() for part in self.parts))
 
 
@@ -104,7 +104,7 @@ IndenterSpec = Single | SeveralSpec
 
 
 def with_files_of(folder: pathlib.Path, spec: IndenterSpec) -> IndenterSpec:
-    """The spec with its mesh files found in the scene's folder.
+    """Return the spec with its mesh files found in the scene's folder.
 
     Raises TactileError for a file that is missing or lies, by its name or by a link, outside of the folder.
     """

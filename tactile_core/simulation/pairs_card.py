@@ -45,7 +45,7 @@ def card(path: str | os.PathLike, source: str = SOURCE, target: str = TARGET) ->
 
 
 def card_path(path: str | os.PathLike) -> pathlib.Path:
-    """Path of the card of a file of pairs: ``<file>.card.json``."""
+    """Return the path of the card of a file of pairs: ``<file>.card.json``."""
     path = pathlib.Path(path)
     return path.with_name(path.name + ".card.json")
 

@@ -96,7 +96,7 @@ class Pairs:
     sha256: str
 
     def select_rows(self, rows: np.ndarray) -> Pairs:
-        """The contacts of these rows alone."""
+        """Select the contacts of these rows alone."""
         return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in DATASETS})
 
     @property
@@ -289,7 +289,7 @@ def _append(file, name: str, unit: str, values: np.ndarray, count: int, start: i
 
 
 def quantise(displacement: np.ndarray, scale: float = SCALE) -> np.ndarray:
-    """Displacement in m as int16 steps of ``scale`` m."""
+    """Convert displacement in m to int16 steps of ``scale`` m."""
     return np.round(displacement / scale).astype(np.int16)
 
 

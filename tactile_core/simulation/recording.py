@@ -111,12 +111,12 @@ def simulate_recording(
 
 
 def sensors_of(keep: Collection[str]) -> tuple[Sensor, ...]:
-    """The sensors that outputs need, of ``"biotac"`` and ``"digit"``."""
+    """Return the sensors that outputs need, of ``"biotac"`` and ``"digit"``."""
     return tuple(dict.fromkeys(sensor for word, sensor in OUTPUTS.items() if word in keep))
 
 
 def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
-    """The scene's [recording]; raises TactileError where it has none."""
+    """Return the scene's [recording]; raises TactileError where it has none."""
     if scene.recording is None:
         advice = "See scenes/press_roll_slide/scene.toml"
         raise TactileError(f"{path}, recording", "missing", "a [recording] table", advice)
@@ -197,7 +197,7 @@ def _pressure(frames: list[_Frame]) -> np.ndarray:
 
 
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
-    """PDC (...,) int16 counts, 0..4095, for the fluid's pressure, Pa."""
+    """Convert the fluid's pressure, Pa, to PDC (...,) int16 counts, 0..4095."""
     return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
 
 

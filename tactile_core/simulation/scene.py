@@ -70,7 +70,7 @@ class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
-    """The scene in a ``scene.toml`` (or in the folder that holds one), and its text.
+    """Load the scene of a ``scene.toml`` (or of the folder that holds one); also returns its text.
 
     Raises TactileError naming file and field for anything unreadable, unknown or out of range.
     """

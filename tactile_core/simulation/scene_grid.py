@@ -79,7 +79,7 @@ def name_of(values: dict[str, Value]) -> str:
 
 
 def with_values(scene: Scene, values: dict[str, Value], where: str) -> Scene:
-    """The scene with other values. Raises TactileError for a field it has not, or a value out of its range."""
+    """Return the scene with other values. Raises TactileError for a field it has not, or a value out of its range."""
     document = msgspec.to_builtins(scene)
     for name, value in values.items():
         if name in MOTION:

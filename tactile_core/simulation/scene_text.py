@@ -14,7 +14,7 @@ from .scene import Scene
 
 
 def to_toml(scene: Scene) -> str:
-    """The TOML text; every field is written, defaults too."""
+    """Write a scene as TOML text, with every field, defaults too."""
     document = msgspec.to_builtins(scene)
     lines = [f"{key} = {_value(document[key])}" for key in ("format", "name", "description")]
     for spec in document["indenters"]:

@@ -56,7 +56,7 @@ def _up_to(tier: str, sensor: str, share: float) -> float:
 
 
 def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
-    """The cheapest tier within a bound, um; fast without one. Raises TactileError where none is."""
+    """Choose the cheapest tier within a bound, um; fast without one. Raises TactileError where none is."""
     rows = tier_errors(sensor, share)
     what = f"shape, {title(sensor)} to {share:.0%} of its thickness"
     found = rows[0] if bound is None else cheapest(rows, bound, "um", what)
@@ -78,7 +78,7 @@ def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: floa
 
 
 def depth_share(sensor: str, indenter, spec: RecordingSpec) -> float:  # noqa: ANN001
-    """Depth of a scene at its points, over the thickness there, by the fast tier.
+    """Return the depth of a scene at its points, over the thickness there, by the fast tier.
 
     The most that a scene may, where a point is beyond it, or where the sensor's matrices are yet to be built.
     """

@@ -50,7 +50,7 @@ def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: tor
 
 
 def read(path: str | os.PathLike, identity: dict) -> State:
-    """The state in the file, or the state of a start if there is none.
+    """Read the state in the file, or return the state of a start if there is none.
 
     raises: TactileError if the file is damaged, or belongs to another training
     """

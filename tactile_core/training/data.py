@@ -61,7 +61,7 @@ class Contacts:
         )  # fmt: skip
 
     def with_silence(self, rows: np.ndarray) -> np.ndarray:
-        """The rows and, behind them, the share of silent samples."""
+        """Return the rows and, behind them, the share of silent samples."""
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
@@ -71,14 +71,14 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Signals (B, 20) of the contacts as a sensor would give them: see `noise_model.measured`."""
+        """Simulate signals (B, 20) of the contacts as a sensor reads them: see `noise_model.measured`."""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes()]
         return measured(true, rng, self.options, rectified, unit)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
-        """The contacts of these rows with these signals."""
+        """Return the contacts of these rows with these signals."""
         at, turned = self._which(rows)
         force = self.pairs.force[at]
         force[turned] = across(force[turned])

@@ -14,7 +14,9 @@ _REPEATABLE = ("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
 
 
 def device_of(name: str) -> torch.device:
-    """The device of one of DEVICES. Raises TactileError for another name, and for a GPU that torch does not see."""
+    """Return the device of one of DEVICES. Raises TactileError for another name,
+    and for a GPU that torch does not see.
+    """
     if name not in DEVICES:
         raise TactileError("device", repr(name), ", ".join(DEVICES))
     there = torch.cuda.is_available()
@@ -28,5 +30,5 @@ def device_of(name: str) -> torch.device:
 
 
 def label(device: torch.device) -> str:
-    """The device's name, for a card: numbers depend on it."""
+    """Return the device's name, for a card: numbers depend on it."""
     return torch.cuda.get_device_name(device) if device.type == "cuda" else device.type

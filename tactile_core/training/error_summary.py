@@ -17,7 +17,9 @@ BASELINES = {"MVB": "baseline_biotac", "S2MPN": "baseline_biotac", "D2B": "basel
 
 
 def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median: bool = False) -> float | None:
-    """Mean over depth bins of the mean over indenters of the mean (or median) over contacts; None without any."""
+    """Return the mean over depth bins of the mean over indenters of the mean (or median) over contacts;
+    None without any.
+    """
     middle = np.median if median else np.mean
     bins = []
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):
@@ -65,7 +67,9 @@ def figure_row(name: str, value: float | None, baseline: float | None, target: f
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
-    """Contacts in rows of their own: light ones, each depth bin, deeper and sliding ones; name, mask over ``rows``."""
+    """Yield subsets of contacts for rows of their own: light ones, each depth bin, deeper and sliding ones; name,
+    mask over ``rows``.
+    """
     depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
     yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

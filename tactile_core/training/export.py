@@ -73,7 +73,7 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
 
 
 def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndarray]:
-    """The tensors of one network under the names of `networks.py`, in float16; scales and turns in float32."""
+    """Return the tensors of one network under the names of `networks.py`, in float16; scales and turns in float32."""
     state = {name: tensor.numpy().astype(np.float16) for name, tensor in getattr(model, net).state_dict().items()}
     if net == "SVB" or net in POSTERIORS:
         return state
@@ -85,7 +85,7 @@ def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndar
 
 
 def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
-    """The sizes in the card, from which `network_sizes.tensor_shapes` knows every shape."""
+    """Return the sizes in the card, from which `network_sizes.tensor_shapes` knows every shape."""
     options = contacts.options
     head = {"width": FORCE_WIDTH, "blocks": FORCE_BLOCKS}
     common = {"width": options.width, "blocks": options.blocks}
@@ -106,7 +106,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
 
 
 def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
-    """Sizes of a surface's lattice, window and bases."""
+    """Return the sizes of a surface's lattice, window and bases."""
     frame, wide, near = surface.frame, len(surface.wide), len(surface.near)
     lattice = {"rows": frame.rows, "columns": frame.columns, "half": frame.half, "nodes": surface.nodes}
     return {**lattice, "wide": wide, "near": near}

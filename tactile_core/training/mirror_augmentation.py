@@ -38,6 +38,6 @@ def image_of_electrodes() -> np.ndarray:
 
 
 def across(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) as the mirror shows them; overwrites them."""
+    """Return the vectors (..., 3) as the mirror shows them; overwrites them."""
     vectors[..., Z] *= -1
     return vectors

@@ -82,7 +82,7 @@ class ContactPosterior(nn.Module):
         return weight.log_softmax(-1), rest[:, 0], LEAST_SPREAD + rest[:, 1].clamp(*SPREAD_LIMITS).exp()
 
     def surprise(self, latent: Tensor, state: Tensor) -> Tensor:
-        """Negative logarithm (B,), nats, of the mixture's density at the true state (B, STATE)."""
+        """Return the negative logarithm (B,), nats, of the mixture's density at the true state (B, STATE)."""
         weight, mean, spread = self.mixture(latent)
         away = (state[:, None] - mean) / spread
         density = -0.5 * away.square().sum(-1) - spread.log().sum(-1)
@@ -160,11 +160,13 @@ class MeshVae(Vae):
         return torch.cat([x[:, self.modes : self.modes + PLACE], code], -1), divergence
 
     def placed(self, latent: Tensor) -> Tensor:
-        """Latent (B, L) -> (B, L + 2), with what the whole cell leaves of the place."""
+        """Append to a latent (B, L) the remainder of its place after rounding to whole cells: (B, L + 2)."""
         return torch.cat([latent, self.surface.cells(latent[:, :PLACE])[1]], -1)
 
     def loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Error of what the latent (B, L) decodes to against the contacts of these rows: see `Surface.loss`."""
+        """Compute the error of what the latent (B, L) decodes to against the contacts of these rows:
+        see `Surface.loss`.
+        """
         cell, left = self.surface.cells(latent[:, :PLACE])
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
 
@@ -173,18 +175,18 @@ class MeshVae(Vae):
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Distance, in cells, of the places of latents (B, L) from the contacts': see `Surface.astray`."""
+        """Return the distance, in cells, of the places of latents (B, L) from the contacts': see `Surface.astray`."""
         return self.surface.astray(latent[:, :PLACE], rows)
 
     def field(self, latent: Tensor) -> Tensor:
-        """Latent (B, L) -> displacement (B, n, 3) m in the nodes' own frames; carries no gradient."""
+        """Decode a latent (B, L) to displacement (B, n, 3) m in the nodes' own frames; carries no gradient."""
         cell, left = self.surface.cells(latent[:, :PLACE])
         with torch.no_grad():
             return self.surface.field(self.decoder(torch.cat([latent, left], -1)), cell)
 
 
 def signal_vae(latent: int) -> Vae:
-    """SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (ACROSS: docs/sources.md, Networks).
+    """Make SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (ACROSS: docs/sources.md, Networks).
 
     The twentieth input says whether the signals are rectified.
     """
@@ -193,7 +195,7 @@ def signal_vae(latent: int) -> Vae:
 
 
 def compress(signal: Tensor) -> Tensor:
-    """Changes in counts and whether they are rectified, (B, 20) -> what SVB sees; see `networks.compress`."""
+    """Convert changes in counts and whether they are rectified, (B, 20), to SVB's input; see `networks.compress`."""
     return torch.cat([torch.asinh(signal[:, :ELECTRODES] / COUNT_SCALE), signal[:, ELECTRODES:]], -1)
 
 

@@ -12,7 +12,8 @@ from .options import Options
 def measured(
     change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0, unit: float = 0.0
 ) -> np.ndarray:
-    """True changes (B, 19) counts -> as read, (B, 20): changes in counts, and whether they are rectified.
+    """Simulate a sensor's reading (B, 20) of true changes (B, 19) counts: changes in counts,
+    and whether they are rectified.
 
     Rectified changes are given with the sign of a thinning film, as the networks read them.
 

@@ -15,7 +15,7 @@ Fields = Callable[[np.ndarray], Tensor]  # row numbers (B,) -> (B, size) in mill
 
 
 def principal_basis(fields: Fields, rows: np.ndarray, modes: int, generator: torch.Generator) -> Tensor:
-    """Orthonormal rows (K, size) that span most of the fields; K = min(modes, contacts, size).
+    """Return the orthonormal rows (K, size) that span most of the fields; K = min(modes, contacts, size).
 
     Not centred: no displacement has the coefficients zero. Rounded to float16, the dtype it is shipped in.
     rows : contacts to use

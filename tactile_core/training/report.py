@@ -48,7 +48,7 @@ class Measure:
         self.change = self.read(self.rows, 2)
 
     def read(self, rows: np.ndarray, stream: int) -> np.ndarray:
-        """Signals (C, 19) counts as read, signed."""
+        """Return signals (C, 19) counts as a sensor reads them, with their sign."""
         return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
 
@@ -80,7 +80,9 @@ def direct_columns(model: Model, measure: Measure) -> Columns:
 
 
 def signal_rows(measure: Measure) -> list[Row]:
-    """SVB: rms over electrodes of the reconstruction against the signal as read, averaged over contacts."""
+    """Make the rows of SVB: rms over electrodes of its reconstruction against the signal as read,
+    averaged over contacts.
+    """
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
     value, baseline = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
@@ -101,7 +103,7 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
 
 
 def silence_rows(measure: Measure) -> list[Row]:
-    """Means of `silence`; doing nothing gives zero."""
+    """Make rows of the means of `silence`; doing nothing gives zero."""
     values = silence(measure)
     largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
     named = [*largest, ("silence_force_N", values["force_N"])]
@@ -109,7 +111,7 @@ def silence_rows(measure: Measure) -> list[Row]:
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Quantiles at QUANTILES, their levels, of `silence`: what lies below them is no contact."""
+    """Return the quantiles at QUANTILES, their levels, of `silence`: what lies below them is no contact."""
     return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in silence(measure).items()}}
 
 
@@ -119,7 +121,8 @@ def quantiles(values: np.ndarray) -> list[float]:
 
 
 def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
-    """Quantiles at QUANTILES of `Networks.signal_distance` on validation presses, signed and rectified apart.
+    """Return the quantiles at QUANTILES of `Networks.signal_distance` on validation presses,
+    signed and rectified apart.
 
     Rectified signals scatter more: quantiles of both together would hide what is strange among signed ones.
     """
@@ -134,7 +137,9 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """The numbers of `error_bounds.fit` on the validation presses; signed and rectified apart. silence : the card's"""
+    """Fit the numbers of `error_bounds.fit` on the validation presses; signed and rectified apart.
+    silence : the card's
+    """
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():

@@ -105,7 +105,7 @@ class Stage:
 
 
 def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Reconstruction of the signal as read, over its mean square, and KL."""
+    """Compute the loss of the signal's reconstruction, as read, over its mean square, and KL."""
     signal = compress(batch.signal)
     latent, divergence = model.SVB.sample(signal, generator)
     change = signal[:, :ELECTRODES]
@@ -114,19 +114,20 @@ def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def mvb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Reconstruction of the BioTac's displacement, and KL."""
+    """Compute the loss of the BioTac's reconstructed displacement, and KL."""
     latent, divergence = model.MVB.sample(batch.biotac, generator)
     return model.MVB.loss(latent, batch.rows) + options.beta * divergence
 
 
 def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Reconstruction of the DIGIT's displacement, and KL."""
+    """Compute the loss of the DIGIT's reconstructed displacement, and KL."""
     latent, divergence = model.MVD.sample(batch.digit, generator)
     return model.MVD.loss(latent, batch.rows) + options.beta * divergence
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Surprise at the contact, in nats, code of a frozen autoencoder given the contact, and the signal itself.
+    """Compute the negative log likelihood of the contact, nats, and errors of a frozen
+    autoencoder's code and of the signal.
 
     By likelihood alone a contact is never estimated fainter than it may be. SVB learns along: it keeps of a signal
     then what separates contacts.
@@ -138,14 +139,14 @@ def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Latent of the BioTac -> latent of the DIGIT, both means of frozen autoencoders."""
+    """Compute the loss of the map from the BioTac's latent to the DIGIT's, both means of frozen autoencoders."""
     with torch.no_grad():
         biotac, target = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
     return latent_loss(model.across(biotac), target)
 
 
 def latent_loss(found: Tensor, target: Tensor) -> Tensor:
-    """Mean square errors of place and code, each over its mean square."""
+    """Compute the mean square errors of place and code, each over its mean square."""
     error, size = (found - target).square(), target.square()
     place, code = (
         error[:, part].mean() / size[:, part].mean().clamp(min=LEAST_SIZE)
@@ -175,7 +176,9 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Force from the BioTac's latent, encoded from a mesh, or estimated from a signal and its contact's state."""
+    """Compute the loss of the force, from the BioTac's latent of a mesh,
+    or of one estimated from a signal and a contact's state.
+    """
     with torch.no_grad():
         latent = torch.cat([model.MVB.mean(batch.biotac), model.given(batch.signal, batch.state)[0]])
     true = batch.force.repeat(2, 1)
@@ -186,7 +189,8 @@ def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 def pressure_loss(
     model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator
 ) -> Tensor:
-    """The fluid's pressure from the signal as read with its sign, on the head's own scale, nearly a logarithm.
+    """Compute the loss of the fluid's pressure, from the signal as read with its sign, on the head's scale,
+    nearly a logarithm.
 
     Relative errors in its place biased uncertain pressures low: the estimates for slides were a sixth lower still.
     """
@@ -196,12 +200,14 @@ def pressure_loss(
 
 
 def length(vectors: Tensor) -> Tensor:
-    """Length (B,) of vectors (B, 3), with a gradient at zero."""
+    """Return the length (B,) of vectors (B, 3), with a gradient at zero."""
     return (vectors.square().sum(-1) + 1e-12).sqrt()
 
 
 def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Largest node error of the chain, in its logarithm: the mean absolute deviation is least at the median."""
+    """Compute the loss of the expected largest node error, in its logarithm:
+    the mean absolute deviation is least at the median.
+    """
     with torch.no_grad():
         biotac, digit = model.from_signal(batch.signal)
         answers = (model.MVB, biotac), (model.MVD, digit)
@@ -210,13 +216,13 @@ def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
-    """Largest node error (B,) m of a decoded latent, at least ERROR_FLOOR."""
+    """Return the largest node error (B,) m of a decoded latent, at least ERROR_FLOOR."""
     error = vae.field(latent) - vae.surface.true(rows)
     return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR).to(latent.device)
 
 
 def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """The other way round: DIGIT mesh to BioTac mesh, BioTac mesh to the signal as read."""
+    """Compute the loss of the way back: DIGIT mesh to BioTac mesh, BioTac mesh to the signal as read."""
     with torch.no_grad():
         biotac, digit = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
     signed = batch.signal[:, ELECTRODES:] == 0
@@ -231,7 +237,7 @@ def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, 
 
 
 def direct_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Signal -> DIGIT in one network, the bar the chain must reach."""
+    """Compute the loss of one network from signal to DIGIT, which the chain must beat."""
     found, decoder = model.directly(batch.signal), model.direct_decoder
     return decoder.loss(found, batch.rows) + options.astray * decoder.astray(found, batch.signed)
 

@@ -35,14 +35,14 @@ def our_bodies() -> Bodies:
 
 
 def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:
-    """Displacement (B, n, 3) float32 m of the contacts in these rows."""
+    """Return the displacement (B, n, 3) float32 m of the contacts in these rows."""
     return getattr(pairs, f"displacement_{sensor}")[rows].astype(np.float32) * np.float32(
         getattr(pairs, f"scale_{sensor}")
     )
 
 
 def translation_figures(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
-    """Errors of every step for the contacts in these rows, read as ``change`` (C, 19) counts.
+    """Return the errors of every step for the contacts in these rows, read as ``change`` (C, 19) counts.
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
     (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); the other way ``D2B`` (DIGIT mesh to BioTac mesh), and
@@ -56,7 +56,7 @@ def _rms(values: np.ndarray) -> np.ndarray:
 
 
 def parts(count: int) -> list[slice]:
-    """Slices of at most ROWS."""
+    """Yield slices of at most ROWS contacts."""
     return [slice(start, start + ROWS) for start in range(0, count, ROWS)]
 
 
@@ -109,7 +109,7 @@ def error_columns(
     silent: float,
     rectified: bool = False,
 ) -> Columns:
-    """Largest node error (m) of signal to BioTac mesh and to DIGIT mesh, what the error head expects, and where.
+    """Return the largest node errors, m, of signal to BioTac mesh and to DIGIT mesh, and what the error head expects.
 
     ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m.
     """
@@ -128,7 +128,9 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
-    """RMS over moving nodes, largest node error, error of the core's height (um), error of the peak (per cent)."""
+    """Return the RMS over moving nodes, largest node error, error of the core's height (um),
+    error of the peak (per cent).
+    """
     figures = accuracy.mesh_figures(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
     figures["peak_depth_percent"] = np.where(deep, figures["peak_depth_percent"], np.nan)
@@ -136,7 +138,7 @@ def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy
 
 
 def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodies) -> Columns:
-    """Intersection over union of the patches, and distance of their middles in mm."""
+    """Return the intersection over union of the patches, and distance of their middles in mm."""
     predicted = contact_patch(found, bodies.digit)
     with np.errstate(invalid="ignore", divide="ignore"):
         overlap = (predicted & patch).sum(-1) / (predicted | patch).sum(-1)

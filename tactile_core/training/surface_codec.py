@@ -90,7 +90,9 @@ class SurfaceCodec:
         return torch.stack([squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()], -1)
 
     def inputs(self, rows: np.ndarray) -> Tensor:
-        """Input (B, K + K' + 4) of the encoder: coefficients, place, what is left of it; zero for silent ones."""
+        """Return the input (B, K + K' + 4) of the encoder: coefficients, place, what is left of it;
+        zero for silent ones.
+        """
         at = np.maximum(rows, 0)
         place = torch.from_numpy(np.concatenate([self.place[at], self.left[at]], -1))
         return torch.cat([self.modes[at], place], -1) * touching(rows)
@@ -105,16 +107,17 @@ class SurfaceCodec:
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
     def true_place(self, rows: np.ndarray) -> Tensor:
-        """Places (B, 2) of the contacts' dents; 0 for silent ones."""
+        """Return the places (B, 2) of the contacts' dents; 0 for silent ones."""
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
-        """Mean distance, in cells, of places (B, 2) from those of the contacts; silent ones have none."""
+        """Return the mean distance, in cells, of places (B, 2) from those of the contacts; silent ones have none."""
         away = PLACE_UNIT * (place - self.true_place(rows).to(place.device)) * touching(rows).to(place.device)
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
-        """Mean over contacts of the rms error over moving nodes, for coefficients (B, K + K') round cells (B, 2).
+        """Compute the mean over contacts of the rms error over moving nodes, for coefficients (B,
+        K + K') round cells (B, 2).
 
         1 for no displacement. The root is taken contact by contact, as in the figure we report: deep contacts do not
         drown shallow ones. The bases being orthonormal, an error in coefficients is one of nodes; what no coefficients
@@ -129,15 +132,16 @@ class SurfaceCodec:
         return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.baseline
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
-        """Coefficients (B, K + K') round cells (B, 2) -> displacement (B, n, 3) m in the nodes' own frames, in the
-        host's memory."""
+        """Decode coefficients (B, K + K') around cells (B, 2) to displacement (B, n, 3) m in the nodes' own frames,
+        in the host's memory.
+        """
         metres, wide, width = modes.cpu() * self.scale, len(self.wide), self.frame.width
         whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
         near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()
         return torch.from_numpy(self.frame.add(whole, near, cell.cpu().numpy()))
 
     def true(self, rows: np.ndarray) -> Tensor:
-        """Displacements (B, n, 3) m, in the nodes' own frames."""
+        """Return the true displacements (B, n, 3) m of contacts, in the nodes' own frames."""
         values = torch.from_numpy(self._local(np.maximum(rows, 0)))
         return values * (self.unit * touching(rows)[:, :, None])
 
@@ -182,5 +186,5 @@ def _parts(count: int) -> list[slice]:
 
 
 def touching(rows: np.ndarray) -> Tensor:
-    """Mask (B, 1): 1 for contacts, 0 for silent samples."""
+    """Return the mask (B, 1): 1 for contacts, 0 for silent samples."""
     return torch.from_numpy((rows != SILENT).astype(np.float32))[:, None]

@@ -78,12 +78,14 @@ def train(
 
 
 def quiet(share: float, text: str) -> None:
-    """Log progress where no callback is given."""
+    """Log progress; used where no callback is given."""
     log.info("%3.0f %% %s", 100 * share, text)
 
 
 def without(split: Split, pairs: Pairs, options: Options, path: str | os.PathLike) -> Split:
-    """The split less what is kept from the training; raises TactileError for an indenter that the pairs do not know."""
+    """Return the split less the contacts kept from training; raises TactileError for an
+    indenter that the pairs do not know.
+    """
     names = pairs.indenter_names
     for name in options.without:
         if name not in names:

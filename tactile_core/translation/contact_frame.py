@@ -89,7 +89,9 @@ class ContactFrame:
         return np.array([self.rows - 1, self.columns - 1], np.float32) / 2
 
     def fade(self) -> np.ndarray:
-        """Weights (width, width) float32: 1 in the window's middle, falling over FADE cells to 0 beyond its edge."""
+        """Return the weights (width, width) float32: 1 in the window's middle,
+        falling over FADE cells to 0 beyond its edge.
+        """
         inside = 1 + self.half - np.abs(np.arange(-self.half, self.half + 1))
         along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(inside / (FADE + 1), 1))
         return np.outer(along, along).astype(np.float32)
@@ -122,7 +124,7 @@ class ContactFrame:
 
 
 def frame_of(sensor: str, half: int) -> ContactFrame:
-    """The moving frame of a sensor's surface; the BioTac's nodes are turned with their angle round its axis."""
+    """Return the moving frame of a sensor's surface; the BioTac's nodes are turned with their angle round its axis."""
     lattice = sensors.sensor_surface(sensor)
     turn = np.zeros(len(lattice.rest), np.float32)
     if not sensors.is_gel(sensor):

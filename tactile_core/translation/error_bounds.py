@@ -25,7 +25,7 @@ KINDS = ("signed", "rectified")
 
 
 def place(x: np.ndarray) -> np.ndarray:
-    """Index (T,) int of the region's number. x : (T,) m, contact's middle along the finger, NaN without contact."""
+    """Return the region's number (T,) int. x : (T,) m, contact's middle along the finger, NaN without contact."""
     return np.where(np.isnan(x), 0, 1 + np.searchsorted(EDGES, x, side="right"))
 
 

@@ -49,7 +49,7 @@ def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndar
 
 
 def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
-    """Tensor shapes of `plain` with these layer sizes."""
+    """Return the tensor shapes of `plain` with these layer sizes."""
     shapes: dict[str, tuple[int, ...]] = {}
     for layer, (inputs, outputs) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
         shapes |= {f"{name}.{layer}.weight": (outputs, inputs), f"{name}.{layer}.bias": (outputs,)}
@@ -57,7 +57,7 @@ def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]
 
 
 def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: int) -> dict[str, tuple[int, ...]]:
-    """Tensor shapes of `residual`."""
+    """Return the tensor shapes of `residual`."""
     shapes: dict[str, tuple[int, ...]] = {
         f"{name}.first.weight": (width, inputs),
         f"{name}.last.weight": (outputs, width),

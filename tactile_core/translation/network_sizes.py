@@ -21,7 +21,7 @@ MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small
 
 
 def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]:
-    """Tensor names and shapes of one network from the sizes in its card."""
+    """Return the tensor names and shapes of one network from the sizes in its card."""
     if net == "SVB":
         latent, hidden = sizes["latent"], SIGNAL_HIDDEN
         shapes = plain_shapes("encoder", (ELECTRODES + 1, *hidden, 2 * latent))

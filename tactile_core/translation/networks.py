@@ -160,7 +160,9 @@ class Networks:
         return self._map_placed("B2SPN", "MVB", latent_biotac)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Expected largest node error (T, 2) m on BioTac and DIGIT, of change (T, 19) counts, rectified (T,) or one."""
+        """Return the expected largest node error (T, 2) m on BioTac and DIGIT, of change (T, 19) counts,
+        rectified (T,) or one.
+        """
         return self._blocks(self._expected_error, *_signal(change, rectified), "expected_error")
 
     def encode_biotac(self, displacement: np.ndarray) -> np.ndarray:
@@ -180,18 +182,18 @@ class Networks:
         return self._decode_mesh("MVD", latent_digit)
 
     def force(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """Force (T, 3) N exerted by the object, sensor frame, from latent_biotac (T, L)."""
+        """Return the force (T, 3) N exerted by the object, sensor frame, from latent_biotac (T, L)."""
         return self._blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
 
     def force_in(self, state: np.ndarray, latent_biotac: np.ndarray) -> np.ndarray:
-        """Force (T, 3) N, of the states' size, from states (T, STATE) and their latent_biotac (T, L)."""
+        """Return the force (T, 3) N, of the states' size, from states (T, STATE) and their latent_biotac (T, L)."""
         estimate = self.force(latent_biotac)
         length = np.sqrt(np.square(estimate).sum(-1))
         size = np.float32(FORCE_SCALE) * np.sinh(np.clip(state[:, PLACE], 0, COMPRESSED_LIMIT))
         return estimate * (size / np.where(length > 0, length, 1))[:, None]
 
     def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one.
+        """Return the rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one.
 
         Rectified ones' is proportional to the sum of their changes: where the gains are not known and a real finger
         shares its changes out among the electrodes otherwise than a simulated one, their pattern misleads.
@@ -199,7 +201,9 @@ class Networks:
         return self._blocks(self._pressure, *_signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
-        """Distances of each frame from the training signals, of change (T, 19) counts, rectified (T,) or one."""
+        """Return the distances of each frame from the training signals, of change (T, 19) counts,
+        rectified (T,) or one.
+        """
         distances = self._blocks(self._distance, *_signal(change, rectified), "signal_distance")
         return SignalDistance(*np.ascontiguousarray(distances.T))
 

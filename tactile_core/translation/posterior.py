@@ -43,7 +43,7 @@ class Posterior:
         return state.astype(np.float32)
 
     def near(self, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
-        """Mean (T, STATE) over components, weighted by their density at places (T, PLACE).
+        """Return the mean (T, STATE) over components, weighted by their density at places (T, PLACE).
 
         touched : (T,) bool, whether those in contact count or those without: the latter's place is zero, where contacts
             lie too

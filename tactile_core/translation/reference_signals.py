@@ -41,7 +41,7 @@ class ReferenceSignals:
     bias_rectified: np.ndarray
 
     def bias(self, rectified: bool) -> np.ndarray:
-        """Log gain (19,) to subtract from a match."""
+        """Return the log gain (19,) to subtract from a match."""
         return self.bias_rectified if rectified else self.bias_signed
 
 

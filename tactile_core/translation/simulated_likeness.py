@@ -31,7 +31,8 @@ FIRST = 64  # patterns, the likest to the signal, that one of the two is looked 
 
 
 def left_over(change: np.ndarray, rectified: np.ndarray) -> np.ndarray:
-    """Shares (T, 2) of the changes (T, 19) counts of a typical unit that one and two simulated contacts leave.
+    """Return the shares (T, 2) of the changes (T, 19) counts of a typical unit that one and
+    two simulated contacts leave.
 
     rectified : (T,) bool; these frames and those that hardly change are not judged: NaN
     """
@@ -54,7 +55,7 @@ def unlike(shares: np.ndarray) -> np.ndarray:
 
 
 def left(signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Length (T,) of what the best single pattern, and the best two, leave of signals (T, 19) of length one.
+    """Return the length (T,) of what the best single pattern, and the best two, leave of signals (T, 19) of length one.
 
     Two are sought where one leaves enough for them to matter; elsewhere they count as leaving as much.
     """

@@ -83,15 +83,17 @@ def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
 
 
 def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
-    """Centre (T, 2) = (x, z) float32 m of the dent in a gel at ``rest``; NaN where no node moves by ``silent`` m."""
+    """Return the centre (T, 2) = (x, z) float32 m of the dent in a gel at ``rest``;
+    NaN where no node moves by ``silent`` m.
+    """
     center = accuracy.dent_center(displacement, rest).astype(np.float32)
     center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
     return center
 
 
 def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Share (T,) of the posterior in contacts whose place on the gel is ``APART`` m and more from that of states
-    (T, STATE).
+    """Return the share (T,) of the posterior in contacts whose place on the gel is ``APART``
+    m and more from that of states (T, STATE).
     """
     place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
     points = gel_place.on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)

@@ -8,7 +8,7 @@ from .indenter import NEAREST
 
 
 def circle_distance(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Distance (n,) m of points (n, 3) m from a circle of ``radius`` m, and its gradient (n, 3)."""
+    """Return the distance (n,) m of points (n, 3) m from a circle of ``radius`` m, and its gradient (n, 3)."""
     _, radial, arm, length = _arms(points, radius)
     gradient = np.empty((len(points), 3))
     gradient[:, :2], gradient[:, 2] = arm[:, :1] * radial, arm[:, 1]
@@ -17,7 +17,7 @@ def circle_distance(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.n
 
 
 def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
-    """Second derivatives (n, 3, 3) 1/m of ``circle_distance``: 1 / length round the wire, and along it."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``circle_distance``: 1 / length round the wire, and along it."""
     around, radial, arm, length = _arms(points, radius)
     turn = np.column_stack([-arm[:, 1:] * radial, arm[:, 0]])
     along = np.column_stack([-radial[:, 1], radial[:, 0], np.zeros(len(points))])

@@ -25,7 +25,7 @@ class Outline(NamedTuple):
 
 
 def disc(across: np.ndarray, radius: float) -> Outline:
-    """The outline of a disc about the origin at places (n, 2) m; radius 0 is a point."""
+    """Return the outline of a disc about the origin at places (n, 2) m; radius 0 is a point."""
     length = np.sqrt(np.einsum("ni,ni->n", across, across))
     if length.min(initial=np.inf) >= NEAREST:
         return Outline(length - radius, across / length[:, None], length)
@@ -37,7 +37,7 @@ def disc(across: np.ndarray, radius: float) -> Outline:
 
 
 def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float) -> tuple[np.ndarray, np.ndarray]:
-    """Distance (n,) m and gradient (n, 3): two components across, then one along.
+    """Return the distance (n,) m and gradient (n, 3): two components across, then one along.
 
     along : (n,) m, from the middle of the span; half_span : m, of the prism before it is inflated by ``edge`` m
     """
@@ -58,7 +58,7 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
 
 
 def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarray:
-    """Second derivatives (n, 3, 3) 1/m of ``distance``, in the same order of components."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``distance``, in the same order of components."""
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
     # On a round corner the normal turns in the plane of the outline's normal and the axis.

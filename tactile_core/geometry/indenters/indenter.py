@@ -23,28 +23,32 @@ class Indenter(Protocol):
     """A rigid body given by its signed distance. Shapes inherit from it."""
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distance (n,) m, positive outside, and its gradient (n, 3), at points (n, 3) m in the own frame."""
+        """Return the signed distance (n,) m, positive outside, and its gradient (n, 3), at points (n,
+        3) m in the own frame.
+        """
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """Symmetric second derivatives (n, 3, 3) 1/m of the distance at points (n, 3) m in the own frame.
+        """Return the symmetric second derivatives (n, 3, 3) 1/m of the distance at points (n, 3) m in the own frame.
 
         They belong to the same branch as ``distance``'s gradient; on creases, a thin set, one side's are given.
         """
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """The point (3,) m of the body's convex hull farthest along a unit vector (3,), in the own frame.
+        """Return the point (3,) m of the body's convex hull farthest along a unit vector (3,), in the own frame.
 
         Where a whole flat, circle or line lies farthest, its middle.
         """
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper corner (3,) m of the smallest box along the own axes that holds the body."""
+        """Return the lower and upper corner (3,) m of the smallest box along the own axes that holds the body."""
         lower = [self.support(-axis)[k] for k, axis in enumerate(np.eye(3))]
         upper = [self.support(axis)[k] for k, axis in enumerate(np.eye(3))]
         return np.array(lower), np.array(upper)
 
     def preview(self, hull: Hull) -> Surface:
-        """Nodes (n, 3) m in the own frame and triangles (m, 3) that show the body; a convex one is its hull."""
+        """Return the nodes (n, 3) m in the own frame and triangles (m, 3) that show the body;
+        a convex one is its hull.
+        """
         return hull(self.support)
 
     @functools.cached_property
@@ -55,7 +59,9 @@ class Indenter(Protocol):
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """Lengths (n,) of vectors (n, 3); ``np.linalg.norm`` takes twice as long for the few vectors of a contact."""
+    """Return the lengths (n,) of vectors (n, 3); ``np.linalg.norm`` takes twice as long
+    for the few vectors of a contact.
+    """
     return np.sqrt(np.einsum("ai,ai->a", vectors, vectors))
 
 

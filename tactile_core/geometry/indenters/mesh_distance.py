@@ -11,7 +11,8 @@ _COARSER = 4
 
 
 def signed(triangles: np.ndarray, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
-    """Signed distance (shape) mm of grid nodes at ``origin`` + spacing * (i, j, k) to triangles (m, 3, 3) mm.
+    """Return the signed distance (shape) mm of grid nodes at ``origin`` + spacing * (i, j, k) to triangles (m, 3,
+    3) mm.
 
     within : bool (shape), true for nodes inside
     Triangles are cut into pieces of two spacings; a node looks at the triangles of its nearest pieces. Beyond 2 mm a

@@ -23,7 +23,7 @@ _NEAR_MM = 0.3  # how near
 
 
 def finest(extent: np.ndarray) -> float:
-    """The spacing, m, of the finest grid that a body of extent (3,) m fits in, 0.1 mm at least."""
+    """Return the spacing, m, of the finest grid that a body of extent (3,) m fits in, 0.1 mm at least."""
     spacing = _FINEST
     while np.prod(np.ceil((extent + 2 * MARGIN) / spacing) + 3 + 2 * _SPARE) > MAX_NODES:
         spacing *= _COARSER
@@ -31,7 +31,7 @@ def finest(extent: np.ndarray) -> float:
 
 
 def build(mesh: Any, where: str | os.PathLike, spacing: float) -> SplineGrid:
-    """The grid of a solid mesh's signed distance (a trimesh, mm).
+    """Build the grid of a solid mesh's signed distance (a trimesh, mm).
 
     where : names the mesh in messages; spacing : m
     Raises TactileError for a grid of more than MAX_NODES nodes, and for a mesh that overlaps itself.
@@ -70,7 +70,7 @@ def _signed(
 
 
 def error_of(mesh: Any, distance: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (mm) near the surface.
+    """Return the RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (mm) near the surface.
 
     Measured at random places over its area, up to 0.3 mm inside and outside. The signs are checked by counting how
     often a ray from there meets the mesh.

@@ -40,7 +40,7 @@ class Pose:
         return _OWN_DOWN if self.push is None else self.push @ self.axes
 
     def moved(self, depth: float) -> Pose:
-        """The pose after moving ``depth`` m along ``direction``."""
+        """Return the pose after moving ``depth`` m along ``direction``."""
         return Pose(self.apex + depth * self.direction, self.axes, self.push)
 
     def slid(self, along: float, across: float) -> Pose:
@@ -56,23 +56,24 @@ class Pose:
         return points @ self.axes.T + self.apex
 
     def distance(self, indenter: Indenter, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distance (n,) m and gradient (n, 3) of the placed indenter at sensor points (n, 3) m."""
+        """Return the signed distance (n,) m and gradient (n, 3) of the placed indenter at sensor points (n, 3) m."""
         distance, gradient = indenter.distance(self.to_own(points))
         return distance, gradient @ self.axes.T
 
     def curvature(self, indenter: Indenter, points: np.ndarray) -> np.ndarray:
-        """Second derivatives (n, 3, 3) 1/m of the placed indenter's distance at sensor points (n, 3) m."""
+        """Return the second derivatives (n, 3, 3) 1/m of the placed indenter's distance at sensor points (n, 3) m."""
         return self.axes @ indenter.curvature(self.to_own(points)) @ self.axes.T
 
     def support(self, indenter: Indenter, direction: np.ndarray) -> np.ndarray:
-        """The placed indenter's farthest point (3,) m along a unit vector (3,) of the sensor."""
+        """Return the placed indenter's farthest point (3,) m along a unit vector (3,) of the sensor."""
         return self.apex + self.axes @ indenter.support(direction @ self.axes)
 
 
 def pose_on(
     indenter: Indenter, point: np.ndarray, outward: np.ndarray, tilt: float = 0.0, tilt_heading: float = 0.0
 ) -> Pose:
-    """Pose in which the indenter just touches ``point`` (3,) m of a surface with unit normal ``outward`` (3,).
+    """Return the pose in which the indenter just touches ``point`` (3,) m of a surface with
+    unit normal ``outward`` (3,).
 
     tilt : rad, between its axis (the way it moves) and that normal
     tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z

@@ -16,7 +16,7 @@ _FARTHEST = 1.0  # m from the sensor's origin; farther off a pose is in millimet
 
 
 def rigid_pose(pose: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Origin (3,) m and axes (3, 3), as columns, of a pose in the sensor's frame.
+    """Return the origin (3,) m and axes (3, 3), as columns, of a pose in the sensor's frame.
 
     pose : (4, 4) matrix, or (position (3,) m, quaternion (4,) w, x, y, z), as MuJoCo and Isaac order it
     Raises TactileError for another shape, numbers that are not finite, scale, shear, mirroring, and places beyond 1 m.

@@ -26,13 +26,13 @@ class SplineGrid:
     coefficients: np.ndarray
 
     def value_and_gradient(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (n,) and gradients (n, 3) a metre at points (n, 3) m."""
+        """Return the values (n,) and gradients (n, 3) a metre at points (n, 3) m."""
         known, beyond, away = self._split(points)
         sums = self._sums(known, 2)
         return sums[:, 0, 0, 0] + away, self._gradient(sums, beyond, away)
 
     def gradient_and_hessian(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gradients (n, 3) a metre and second derivatives (n, 3, 3) a square metre at points (n, 3) m."""
+        """Return the gradients (n, 3) a metre and second derivatives (n, 3, 3) a square metre at points (n, 3) m."""
         known, beyond, away = self._split(points)
         sums = self._sums(known, 3)
         hessian = np.empty((len(points), 3, 3))

@@ -69,7 +69,7 @@ class Cluster:
         future.add_done_callback(self._done.put)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Replies as they come, as long as `count` says that some are awaited."""
+        """Yield the replies as they come, as long as `count` says that some are awaited."""
         while count():
             future = self._next()
             yield self._tasks.pop(future.key)[0], self._reply(future)
@@ -192,7 +192,9 @@ def _start(wanted: QueueFile, options: dict[str, Any]) -> Any:
 
 
 def wait() -> float:
-    """Seconds to wait for a loop or a scheduler; DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s asks for more."""
+    """Return how many seconds to wait for a loop or a scheduler;
+    DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s asks for more.
+    """
     import dask
     import distributed  # noqa: F401 - brings its settings
     from dask.utils import parse_timedelta
@@ -202,7 +204,7 @@ def wait() -> float:
 
 @functools.cache
 def loop() -> Any:
-    """A tornado loop that runs in a thread as long as this process.
+    """Start a tornado loop that runs in a thread as long as this process.
 
     Dask starts one by itself, but gives up after 10 s whatever its settings are: too little on a machine that is very
     busy (seen). Raises TactileError where it does not start.

@@ -115,10 +115,10 @@ def _encodes(name: str) -> bool:
 
 
 def prepared_file(folder: Path, name: str) -> Path:
-    """Path of the prepared recording of that name."""
+    """Return the path of the prepared recording of that name."""
     return folder / PREPARED / f"{name}.h5"
 
 
 def shard_file(folder: Path, name: str, number: int) -> Path:
-    """Path of the shard of that number in the recording, from 0."""
+    """Return the path of the shard of that number in the recording, from 0."""
     return folder / SHARDS / f"{name}-{number:06d}.h5"

@@ -48,7 +48,7 @@ class Local:
         self._todo.put(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Replies as they come, as long as `count` says that some are awaited."""
+        """Yield the replies as they come, as long as `count` says that some are awaited."""
         while count():
             found = self._done.get()
             if isinstance(found, BaseException):
@@ -159,7 +159,7 @@ class InProcess:
         self._todo.append(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Replies as they come, as long as `count` says that some are awaited."""
+        """Yield the replies as they come, as long as `count` says that some are awaited."""
         while count():
             task = self._todo.popleft()
             yield task, msgspec.convert(tasks.run(str(self._folder), msgspec.to_builtins(task)), Reply)

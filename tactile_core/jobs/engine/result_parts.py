@@ -16,7 +16,7 @@ from .job import Job
 
 
 def folder_of(out: Path) -> Path:
-    """Folder of the job whose result `out` is."""
+    """Return the folder of the job whose result `out` is."""
     return out.with_name(out.name + ".parts")
 
 

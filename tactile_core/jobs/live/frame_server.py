@@ -54,7 +54,7 @@ class FrameServer:
 
 
 def message(shown: Shown, arrays: dict[str, np.ndarray]) -> bytes:
-    """A frame's header in JSON, a line feed, and its arrays' bytes, row by row.
+    """Return a frame's header in JSON, a line feed, and its arrays' bytes, row by row.
 
     Of the header: frame, its index; force_n; latency_s, from the newest row to the picture; arrays, a name, a type of
     numpy's and a shape each.

@@ -85,7 +85,9 @@ def _identity(found: os.stat_result) -> tuple[int, int]:
 
 
 def newest(recording: Recording) -> np.ndarray:
-    """Counts (19,) of the last row that is whole; its NaN cells filled from the rows before, 0 where there are none."""
+    """Return the counts (19,) of the last row that is whole; its NaN cells filled from the rows before,
+    0 where there are none.
+    """
     found = np.full(recording.electrodes.shape[1], np.nan)
     for row in recording.electrodes[::-1]:
         found = np.where(np.isfinite(found), found, row)

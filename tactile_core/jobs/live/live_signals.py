@@ -108,7 +108,7 @@ class LiveSignals:
         self.polarity = polarity_of(change, still, self._seen, pdc)
 
     def signals(self, electrodes: np.ndarray) -> Signals:
-        """Signals of frames (T, 19) counts; call when rest is known."""
+        """Return the signals of frames (T, 19) counts; call when rest is known."""
         flags = Flag.RECTIFIED if self.kind == "rectified" else 0
         count = len(electrodes)
         signals = Signals(

@@ -33,7 +33,7 @@ class ThinSheet:
         self._prepare_matrix()
 
     def potentials(self, film: np.ndarray, conductivity: float = 1.0) -> np.ndarray:
-        """Mean potential (k, k) V of electrode i for 1 A into electrode j, up to a constant a column.
+        """Return the mean potential (k, k) V of electrode i for 1 A into electrode j, up to a constant a column.
 
         film : (n,) m, thickness at the nodes; conductivity : S/m. Raises ValueError where the film is not positive.
         Only combinations of currents that sum to zero have a meaning: the current leaves at the first node.
@@ -44,7 +44,9 @@ class ThinSheet:
         return self.patches[1:].T @ answer
 
     def matrix(self, film: np.ndarray, conductivity: float = 1.0):  # noqa: ANN201 (scipy is imported where it is needed)
-        """Currents out of the nodes per potential, S, sparse (n_fine, n_fine): sum of sigma h grad N_i . grad N_j."""
+        """Assemble the currents out of the nodes per potential, S, sparse (n_fine, n_fine):
+        sum of sigma h grad N_i . grad N_j.
+        """
         if not (film > 0).all():  # false for NaN too
             raise ValueError("a film without thickness does not conduct")
         thickness = (self.prolong @ film)[self.faces].mean(1)  # exact for a film that is linear in each triangle
@@ -53,11 +55,12 @@ class ThinSheet:
         return matrix
 
     def mean_over_electrodes(self, film: np.ndarray) -> np.ndarray:
-        """Mean (k,) over each electrode of values (n,) at the nodes."""
+        """Return the mean (k,) over each electrode of values (n,) at the nodes."""
         return (self.prolong @ film) @ self.patches
 
     def unresolved(self, refine: int) -> np.ndarray:
-        """Error of each electrode's own resistance on this grid against a refined one, (k,) ohm for 1 m and 1 S/m.
+        """Return the error of each electrode's own resistance on this grid against a refined one,
+        (k,) ohm for 1 m and 1 S/m.
 
         Near an electrode the current spreads in a film of nearly one thickness h, so the miss is this over sigma h.
         """
@@ -82,7 +85,8 @@ class ThinSheet:
 
 
 def resistances(potentials: np.ndarray, sensing: int) -> np.ndarray:
-    """Resistance (sensing,) ohm between each of the first ``sensing`` electrodes and all others, joined by a wire.
+    """Return the resistance (sensing,) ohm between each of the first ``sensing`` electrodes and all others,
+    joined by a wire.
 
     potentials : (k, k), of ``ThinSheet.potentials``. The currents of the joined ones share out so that they are at one
     potential: a bordered system with one unknown a joined electrode and their potential.

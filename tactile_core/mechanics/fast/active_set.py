@@ -43,7 +43,7 @@ def complement(
     *,
     factors: dict[bytes, np.ndarray] | None = None,
 ) -> Pressing:
-    """Forces p >= 0 with gaps ``matrix p + gap - step along >= 0`` and one of the two zero at every node.
+    """Find forces p >= 0 with gaps ``matrix p + gap - step along >= 0`` and one of the two zero at every node.
 
     matrix : (k, k) m/N; gap : (k,) m; active : (k,) bool, first guess
     along : (k,) or None; with it, ``step`` is free and ``carry . p`` is ``force`` N, otherwise ``step`` is 0

@@ -45,18 +45,20 @@ class ComplianceBlock:
             self.matrix[size:, size:] = compliance.inner_watch[np.ix_(inner, inner)]
 
     def respond(self, force: np.ndarray, pressing_core: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement (k, 3) m and motion of the inner points (c,) m, away from the core, under forces (k, 3), (c,)
-        N."""
+        """Return the displacement (k, 3) m and motion of the inner points (c,) m, away from the core,
+        under forces (k, 3), (c,) N."""
         answer = np.concatenate([force.ravel(), pressing_core]).astype(np.float32) @ self.matrix
         return answer[: 3 * self.k].reshape(self.k, 3).astype(float), answer[3 * self.k :].astype(float)
 
     def along(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-        """Compliance (k, k) m/N between forces along ``right`` (k, 3) and displacement along ``left`` (k, 3)."""
+        """Return the compliance (k, k) m/N between forces along ``right`` (k,
+        3) and displacement along ``left`` (k, 3).
+        """
         size = 3 * self.k
         return _contract(self.matrix[:size, :size], left.astype(np.float32), right.astype(np.float32)).astype(float)
 
     def normal(self, normals: np.ndarray) -> np.ndarray:
-        """Compliance (k + c, k + c) m/N of the gaps: along ``normals`` (k, 3), and of the core's gaps."""
+        """Return the compliance (k + c, k + c) m/N of the gaps: along ``normals`` (k, 3), and of the core's gaps."""
         k, size = self.k, 3 * self.k
         if available():
             return normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, _RIDGE)

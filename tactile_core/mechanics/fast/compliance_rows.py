@@ -24,16 +24,16 @@ class ComplianceRows:
         self._known = np.zeros(len(near), bool)
 
     def block(self, nodes: np.ndarray) -> np.ndarray:
-        """Compliance (3 k, 3 k) float32 m/N among sorted touchable nodes (k,), all of them near ones."""
+        """Return the compliance (3 k, 3 k) float32 m/N among sorted touchable nodes (k,), all of them near ones."""
         return self._rows(nodes).take(axes_of(np.searchsorted(self.near, nodes)), axis=1)
 
     def sensing_motion(self, nodes: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Motion (3 k, c) float32 m/N of sensing points (c,) under forces on touchable nodes (k,)."""
+        """Return the motion (3 k, c) float32 m/N of sensing points (c,) under forces on touchable nodes (k,)."""
         return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Displacement (n, 3) m of the near nodes under forces (k, 3) N at sorted, single near ones and (c,) N at
-        sensing points."""
+        """Return the displacement (n, 3) m of the near nodes under forces (k, 3) N at sorted,
+        single near ones and (c,) N at sensing points."""
         moved = np.zeros(3 * len(self.near), np.float32)
         if len(nodes):
             moved += force.ravel().astype(np.float32) @ self._rows(nodes)

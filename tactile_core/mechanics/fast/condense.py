@@ -35,7 +35,7 @@ class Half:
 
 
 def mirror_nodes(nodes: np.ndarray) -> np.ndarray:
-    """The node (n,) that is each node's image under z -> -z. Raises ValueError where one has none."""
+    """Return the node (n,) that is each node's image under z to -z. Raises ValueError where one has none."""
     from scipy.spatial import cKDTree
 
     away, image = cKDTree(nodes).query(nodes * _MIRROR)
@@ -45,7 +45,7 @@ def mirror_nodes(nodes: np.ndarray) -> np.ndarray:
 
 
 def condense(mesh: HexMesh, material: Material, keep: np.ndarray, loads: np.ndarray, parity: int) -> Half:
-    """The even (``parity`` 1) or odd (-1) half of a solid, condensed to the nodes ``keep`` (k,) with z >= 0.
+    """Condense the even (``parity`` 1) or odd (-1) half of a solid to the nodes ``keep`` (k,) with z >= 0.
 
     loads : (3 n_nodes, w), unit loads anywhere. Raises ValueError for a solid that is not even in z.
     """

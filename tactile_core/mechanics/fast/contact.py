@@ -68,15 +68,17 @@ class ContactProblem:
         return self.compliance.surface.rest[self.compliance.touchable]
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
-        """The contact at a given depth, m, going on from ``start`` where there is one."""
+        """Solve the contact at a given depth, m, going on from ``start`` where there is one."""
         return self._walk(self.pose.moved(depth), None, start)
 
     def at_force(self, axial_force: float, start: Contact) -> Contact:
-        """The contact whose force along the motion is ``axial_force`` N, in or out from where ``start`` stands."""
+        """Solve the contact whose force along the motion is ``axial_force`` N,
+        in or out from where ``start`` stands.
+        """
         return self._walk(start.pose, axial_force, start)
 
     def at_pose(self, pose: Pose, start: Contact | None = None, axial_force: float | None = None) -> Contact:
-        """The contact of the indenter at another pose, moved there from ``start`` in one step.
+        """Solve the contact of the indenter at another pose, moved there from ``start`` in one step.
 
         axial_force : N; with it the indenter then moves along its own direction until it bears that force
         """

@@ -85,7 +85,7 @@ class Contact:
 
 
 def sideways_share(force: np.ndarray, normal: np.ndarray) -> float:
-    """Forces (k, 3) N across the normals (k, 3) there, over the whole force."""
+    """Return the forces (k, 3) N across the normals (k, 3) there, over the whole force."""
     size = np.linalg.norm(force.sum(axis=0))
     across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
     return float(np.linalg.norm(across) / size) if size else 0.0

@@ -13,7 +13,7 @@ from .mirror_symmetry import axes_of
 
 @Loop
 def respond(matrix, force, core):  # noqa: ANN001, ANN201
-    """Displacement (k, 3) m of the nodes and motion (c,) m of the core's points under forces (k, 3), (c,) N."""
+    """Compute the displacement (k, 3) m of nodes and motion (c,) m of the core's points under forces (k, 3), (c,) N."""
     k, c = force.shape[0], core.shape[0]
     size = 3 * k + c
     moved = np.zeros(size)
@@ -56,7 +56,9 @@ def reduce_to_law(force, core, active, slips, normal, friction, lean):  # noqa: 
 
 @Loop
 def linearise(moved, place, off, gap, normal, moves, slip, gap_then):  # noqa: ANN001, ANN201
-    """Motion from the place (k, 3), slip from the spots (k, 3) and gaps (k,) m that the moved nodes have then."""
+    """Compute the motion from the place (k, 3), slip from the spots (k,
+    3) and gaps (k,) m that the moved nodes then have.
+    """
     for a in range(place.shape[0]):
         onto, along = 0.0, 0.0
         for i in range(3):
@@ -72,7 +74,7 @@ def assemble(  # noqa: ANN201
     matrix, k, stuck, core_at, slipping, normal, lean, force, slip, gap, core_gap, moves, curved, bend, direction,  # noqa: ANN001
     friction, ridge, least,  # noqa: ANN001
 ):  # fmt: skip
-    """The system of a Newton step and its two right sides; see ``stick_slip.Step``.
+    """Assemble the system of a Newton step and its two right sides; see ``stick_slip.Step``.
 
     stuck, slipping : nodes (t,), (s,) that stick and slip; core_at : (d,) points that press
     curved : (q,), which of the slipping nodes' normals turn; bend : (q, 3, 3) 1/m
@@ -205,7 +207,9 @@ def advance(  # noqa: ANN201
     force, core, answer, step, stuck, core_at, slipping, normal, lean, across, pressing, curved, bend, friction, least,  # noqa: ANN001
     largest_turn, largest_tilt,  # noqa: ANN001
 ):  # fmt: skip
-    """New forces (k, 3), (c,) N after a Newton step; answer : (j, 2), its solution, at rest and a metre of ``step``."""
+    """Compute forces (k, 3), (c,) N after a Newton step; answer : (j, 2), its solution,
+    at rest and a metre of ``step``.
+    """
     t, d, s = len(stuck), len(core_at), len(slipping)
     n = 3 * t + d
     new, new_core = force.copy(), core.copy()
@@ -252,7 +256,7 @@ def sort(  # noqa: ANN201
     force, core, active, slips, normal, lean, off, gap, core_gap, turned, stuck_again, left, friction, least, noise,  # noqa: ANN001
     gap_tolerance, slip_tolerance, sideways_tolerance, beyond, beyond_wavering, wavers, may_be_empty,  # noqa: ANN001
 ):  # fmt: skip
-    """Which points touch and slip after a step; whether that changed and whether nodes are where they belong.
+    """Sort points into touching and slipping ones after a step, and check whether nodes are where they belong.
 
     Returns active (k + c,), slips (k,), changed, settled, the largest gap, m, of what touches, and that or the deepest
     place in the indenter. ``force`` of nodes that touch again, ``stuck_again`` and ``left`` (k,) are updated in place.

@@ -85,7 +85,7 @@ class Pace:
         return len(best) >= _HOPE + _WINDOW and best[-1] > _NEARER * best[-1 - _WINDOW]
 
     def after(self, gap: np.ndarray, active: np.ndarray) -> float:
-        """The share of the next step to take, for gaps (k,) m that should be closed where ``active`` (k,)."""
+        """Return the share of the next step to take, for gaps (k,) m that should be closed where ``active`` (k,)."""
         return self.after_wrong(max(-gap.min(), np.abs(gap[active]).max(initial=0.0)))
 
     def after_wrong(self, wrong: float) -> float:
@@ -119,7 +119,7 @@ class Frictionless:
         self._probes = bool(probe.any())
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-        """Gaps (k,) m and normals (k, 3); at a crease's second face measured a little toward it."""
+        """Return the gaps (k,) m and normals (k, 3); at a crease's second face measured a little toward it."""
         points = self.rest + displacement
         there = self.pose.moved(shift) if shift else self.pose
         if not self._probes:

@@ -20,12 +20,12 @@ class InterpolatedPoints(NamedTuple):
     weights: np.ndarray
 
     def interpolate(self, values: np.ndarray) -> np.ndarray:
-        """Values (v, 3) at the points from those at all touchable nodes (m, 3)."""
+        """Interpolate the values (v, 3) at the points from those at all touchable nodes (m, 3)."""
         return np.einsum("vs,vsi->vi", self.weights, values[self.nodes])
 
 
 def interpolated_points(lattice: Lattice, touchable: np.ndarray) -> InterpolatedPoints:
-    """Points halfway along the lattice's lines and amid its cells, if all their nodes are touchable."""
+    """Return the points halfway along the lattice's lines and amid its cells, if all their nodes are touchable."""
     rows, columns = lattice.shape
     halves = np.mgrid[: 2 * rows - 1, : 2 * columns - (not lattice.closed)].reshape(2, -1)
     between = halves[:, (halves % 2).any(axis=0)] / 2
@@ -52,7 +52,9 @@ class SpringRows:
         self._weights = np.concatenate([_alone(np.ones(len(nodes))), points.weights[number]])
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Compliance (3 k, 3 k) float32 m/N among sorted numbers (k,), all of them near ones, with their springs."""
+        """Return the compliance (3 k, 3 k) float32 m/N among sorted numbers (k,), all of them near ones,
+        with their springs.
+        """
         used, sums = self._sums(numbers)
         among = self._rows.block(used)
         block = np.empty((3 * len(numbers), 3 * len(numbers)), np.float32)
@@ -65,18 +67,22 @@ class SpringRows:
         return block
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Motion (3 k, c) float32 m/N of sensing points (c,) under forces on numbers (k,)."""
+        """Return the motion (3 k, c) float32 m/N of sensing points (c,) under forces on numbers (k,)."""
         used, sums = self._sums(numbers)
         felt = self._rows.sensing_motion(used, inner)
         return (sums @ felt.reshape(len(used), -1)).reshape(3 * len(numbers), len(inner))
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Displacement (n, 3) m of the surface at the near numbers; forces as ``NearRows.moved`` takes them."""
+        """Return the displacement (n, 3) m of the surface at the near numbers;
+        forces as ``NearRows.moved`` takes them.
+        """
         moved = self._rows.moved(nodes, force, inner, inner_force)
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Sorted nodes (j,) that carry forces (k, 3) N at sorted, single numbers (k,), and theirs (j, 3) N."""
+        """Return the sorted nodes (j,) that carry forces (k, 3) N at sorted, single numbers (k,),
+        and theirs (j, 3) N.
+        """
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
         np.add.at(loads, self._nodes[at], self._weights[at][:, :, None] * force[:, None])

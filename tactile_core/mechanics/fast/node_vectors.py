@@ -8,7 +8,7 @@ _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def dot(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Products (n,) of vectors (n, 3)."""
+    """Compute the dot products (n,) of vectors (n, 3)."""
     return np.einsum("ai,ai->a", left, right)
 
 
@@ -20,7 +20,7 @@ def cross(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def weighted(parts: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Sum of three ``parts`` (3, ...) by ``weights`` (3, ...) in single precision."""
+    """Return the sum of three ``parts`` (3, ...) by ``weights`` (3, ...) in single precision."""
     weights = weights.astype(np.float32)
     total = parts[0] * weights[0]
     total += parts[1] * weights[1]

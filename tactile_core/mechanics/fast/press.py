@@ -59,7 +59,7 @@ class CorrectedPress:
         self._last_power = 1.0
 
     def at_depth(self, depth: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact:
-        """The contact at a depth, m, of the press's pose or of another one; it may not have converged.
+        """Solve the contact at a depth, m, of the press's pose or of another one; it may not have converged.
 
         touches : whether ``pose`` is known to be at first touch, which is looked for otherwise
         Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
@@ -69,7 +69,9 @@ class CorrectedPress:
         return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
 
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
-        """The contact whose corrected force along the motion is ``force`` N; None beyond the limit, or if not found."""
+        """Solve the contact whose corrected force along the motion is ``force`` N; None beyond the limit,
+        or if not found.
+        """
         there = pose or self.pose
         fall = self._surface_drop(there, touches=touches)
         try:

@@ -53,13 +53,15 @@ class Slipping:
         return self.friction * np.maximum(self.pressing, LEAST_FORCE)
 
     def turning(self) -> np.ndarray:
-        """Change of the forces of the curved nodes (c, 3, 3) N/m with their motion, at the same normal forces."""
+        """Return the change of the forces of the curved nodes (c, 3, 3) N/m with their motion,
+        at the same normal forces.
+        """
         at = self.curved
         follows = np.eye(3) - self.friction * self.normal[at][:, :, None] * self.lean[at][:, None, :]
         return self.pressing[at, None, None] * (follows @ self.bend)
 
     def forces(self, pressing: np.ndarray, turn: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """Forces (s, 3) N after a turn (s,) of friction and motion (c, 3) m of the curved nodes."""
+        """Return the forces (s, 3) N after a turn (s,) of friction and motion (c, 3) m of the curved nodes."""
         turn = np.minimum(np.maximum(turn, -LARGEST_TURN), LARGEST_TURN)[:, None]
         normal, lean = self.normal, np.cos(turn) * self.lean + np.sin(turn) * self.across
         if len(self.curved):
@@ -107,15 +109,17 @@ class Step:
         self._answer = solved(matrix, right, symmetric=not s)
 
     def step_for(self, missing: float) -> float:
-        """Distance, m, that the indenter moves for ``missing`` N more along its motion. Raises UnsolvedError."""
+        """Return the distance, m, that the indenter moves for ``missing`` N more along its motion.
+        Raises UnsolvedError.
+        """
         carried, per_step = self._carry @ self._answer
         if not per_step > 0:
             raise UnsolvedError("no node can carry the force")
         return float((missing - carried) / per_step)
 
     def change(self, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Changes of the forces of sticking nodes (t, 3) N and of the core (d,) N as the indenter moves by ``step`` m,
-        and new forces (s, 3) N of slipping nodes."""
+        """Return the changes of the forces of sticking nodes (t, 3) N and of the core (d,) N
+        as the indenter moves by ``step`` m, and new forces (s, 3) N of slipping nodes."""
         found = self._answer[:, 0] + step * self._answer[:, 1]
         slipping = self._slipping
         s, unknown = len(slipping.at), found[self._whole :]

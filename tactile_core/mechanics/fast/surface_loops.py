@@ -31,7 +31,7 @@ def gather_rows(move, entries, at, rows, mirrored, columns, mirrored_columns):  
 
 @Loop
 def surface_motion(move, rows, mirrored, image, force, inner_move, inner, inner_force):  # noqa: ANN001, ANN201
-    """Displacement (n, 3) float32, m, of the whole surface; see ``surface_response.displacement``.
+    """Compute the displacement (n, 3) float32, m, of the whole surface; see ``surface_response.displacement``.
 
     rows : (k,) of ``move`` for each node; mirrored : (k,) bool; image : (n,), of every surface node
     """

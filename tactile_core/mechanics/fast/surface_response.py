@@ -12,7 +12,9 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 
 def runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """Stretches of consecutive numbers in sorted ``indices``: (start, stop) there, and first and last + 1 number."""
+    """Find stretches of consecutive numbers in sorted ``indices``:
+    (start, stop) there, and first and last + 1 number.
+    """
     cuts = np.flatnonzero(np.diff(indices) != 1) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
     return list(
@@ -23,8 +25,8 @@ def runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
 def displacement(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
 ) -> np.ndarray:
-    """Displacement (n, 3) float32, m, of the surface under forces (k, 3) N at sorted, single touchable ``nodes`` and
-    (c,) N at sensing points."""
+    """Return the displacement (n, 3) float32, m, of the surface under forces (k, 3) N at sorted,
+    single touchable ``nodes`` and (c,) N at sensing points."""
     rows, mirror, image = compliance.answers
     row, mirrored = rows[nodes], mirror[nodes]
     if available():
@@ -50,7 +52,7 @@ def _under(compliance: Compliance, row: np.ndarray, force: np.ndarray) -> np.nda
 def sensing_gaps(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray, count: int
 ) -> np.ndarray:
-    """Gaps (count,) m of the first sensing points under the same forces."""
+    """Return the gaps (count,) m of the first sensing points under the same forces."""
     gaps = compliance.watch_gap[:count].astype(float)
     if not len(gaps):
         return gaps

@@ -72,7 +72,7 @@ class ContactSet:
         return self.friction > 0 and bool((self.active & self.slipping).any())
 
     def gaps(self, at: np.ndarray) -> np.ndarray:
-        """Gaps (m,) m of all candidates, negative in the obstacle; at (n, 3) m: the mesh's nodes."""
+        """Return gaps (m,) m of all candidates, negative in the obstacle; at (n, 3) m: the mesh's nodes."""
         return self.obstacle.distance(at[self.candidates])[0] if len(self.candidates) else np.empty(0)
 
     def carried(
@@ -85,7 +85,7 @@ class ContactSet:
         grip: float = 0.0,
         first_share: float = 0.0,
     ) -> ContactSet:
-        """The start of the next load step: what touched goes on, what the moved obstacle has reached begins.
+        """Return the start of the next load step: what touched goes on, what the moved obstacle has reached begins.
 
         at : (n, 3) m, the mesh's nodes now; before : where the obstacle stood until now.
         Anchors of slipping nodes have been dragged to where their friction holds.
@@ -149,7 +149,8 @@ class ContactSet:
         return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips
 
     def slide_share(self, move: np.ndarray, force: float, stiffness: float) -> float:
-        """The share of a step at which friction balances the rest along it; 1 where the whole step is good enough.
+        """Return the share of a step at which friction balances the rest along it;
+        1 where the whole step is good enough.
 
         move : (k, 3) m, of the nodes, in the frames of ``begin``; force : N m, of all other forces times the step, at
         its start; stiffness : N m, what the whole step adds to them and to friction as linearised by ``gripping``.
@@ -175,7 +176,7 @@ class ContactSet:
         return high
 
     def bending(self, at: np.ndarray) -> np.ndarray:
-        """Change (k, 3, 3) N/m of the contact forces with the normals' turn: pressing times the Hessian.
+        """Return the change (k, 3, 3) N/m of the contact forces with the normals' turn: pressing times the Hessian.
 
         Taken where the nodes will come to lie, on the obstacle: near a centre of curvature, deep in it, it is no guide.
         """
@@ -186,7 +187,8 @@ class ContactSet:
         )
 
     def gripping(self, along: float) -> np.ndarray:
-        """Stiffness (k, 3, 3) N/m of friction: all of the springs that hold, across their pull of those that slip.
+        """Return the stiffness (k, 3, 3) N/m of friction: all of the springs that hold,
+        across their pull of those that slip.
 
         along : 0 for Newton's method; more of the secant's stiffness along the pull keeps nodes from swinging to and
         fro between stick and slip.
@@ -204,7 +206,9 @@ class ContactSet:
         return self._gripping
 
     def prescribe(self, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Held degrees of freedom and their steps, both (k, 3) in the frames of ``begin``; fixed ones do not move."""
+        """Return held degrees of freedom and their steps, both (k, 3) in the frames of ``begin``;
+        fixed ones do not move.
+        """
         held, step = fixed.copy(), np.zeros(fixed.shape)
         if len(fixed):
             held[:, 0] = True
@@ -213,7 +217,7 @@ class ContactSet:
         return held, step
 
     def rubbing_in_frames(self) -> np.ndarray:
-        """Friction (k, 3) N in the frames of ``begin``."""
+        """Return the friction (k, 3) N in the frames of ``begin``."""
         if not self.friction:
             return np.zeros((int(self.active.sum()), 3))
         return np.einsum("kji,kj->ki", self._frames, self.rubbing)

@@ -96,7 +96,7 @@ class FiniteStrainContact:
         return ContactState(0.0, self.pose, self.solid.rest(), ContactSet.none(), ContactSet.none(), NO_PUSH)
 
     def press(self, depth: float, start: ContactState | None = None, step: float = 0.1e-3) -> ContactState:
-        """The contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
+        """Solve the contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
 
         A step that fails is halved. Raises TactileError with the depth reached where a sixteenth of a step fails, or
         where too many have failed.
@@ -118,7 +118,7 @@ class FiniteStrainContact:
         return dataclasses.replace(touch, depth=depth)
 
     def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
-        """The contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel.
+        """Solve the contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel.
 
         Raises TactileError with the part of the way that was reached.
         """

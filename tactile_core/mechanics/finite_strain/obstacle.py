@@ -14,10 +14,10 @@ class Obstacle(Protocol):
     """A rigid body in the sensor's frame."""
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distance (n,) m, positive outside, and unit normal (n, 3) at points (n, 3) m."""
+        """Return the distance (n,) m, positive outside, and unit normal (n, 3) at points (n, 3) m."""
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """Second derivatives (n, 3, 3) 1/m of the distance."""
+        """Return the second derivatives (n, 3, 3) 1/m of the distance."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -52,7 +52,7 @@ class Push:
         return self.force.sum(axis=0)
 
     def loads(self, n: int) -> np.ndarray:
-        """Loads (n, 3) N on a mesh's n nodes."""
+        """Return the loads (n, 3) N on a mesh's n nodes."""
         loads = np.zeros((n, 3))
         np.add.at(loads, self.nodes, self.weights[:, :, None] * self.force[:, None])
         return loads
@@ -72,7 +72,7 @@ class PenaltyPoints:
         self._nodes, self._weights = np.repeat(faces, len(_WEIGHTS), axis=0), np.tile(_WEIGHTS, (len(faces), 1))
 
     def deepest(self, obstacle: Obstacle, at: np.ndarray) -> float:
-        """Penetration, m, of the deepest point into an obstacle."""
+        """Return the penetration, m, of the deepest point into an obstacle."""
         return max(-float(obstacle.distance(self._points(at))[0].min(initial=0.0)), 0.0)
 
     def _points(self, at: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ LAYERS = 3  # nodes through the skin: one quadratic element, enough for a shell 
 def half_ellipsoid_mesh(
     outer: np.ndarray, inner: np.ndarray, intervals: tuple[int, int, int], *, mirrored: bool = False
 ) -> tuple[HexMesh, np.ndarray, np.ndarray]:
-    """The solid between two half ellipsoids z <= 0 about the origin, clamped at its rim z = 0.
+    """Return the solid between two half ellipsoids z <= 0 about the origin, clamped at its rim z = 0.
 
     outer, inner : (3,) m, semi-axes; intervals : node intervals along x and along y in the middle patch, and from it
     to the rim, even; along y a multiple of four

@@ -33,7 +33,7 @@ class DampedFactor:
         self.damping = self.damping / 4 if self.damping > _LEAST else 0.0
 
     def solver(self, blocks: np.ndarray, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """A function from forces (n, 3) N to displacements (n, 3) m of what is not ``held`` (n, 3) bool.
+        """Return a function from forces (n, 3) N to displacements (n, 3) m of what is not ``held`` (n, 3) bool.
 
         blocks : of the tangent on the solid's pattern; the damping is added to them.
         Raises NotPositiveDefiniteError where even much damping is too little.
@@ -59,7 +59,7 @@ class DampedFactor:
 
 
 def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Curvature terms (k, 3, 3) N/m, no larger than a share of their nodes' own stiffness (k, 3, 3).
+    """Return the curvature terms (k, 3, 3) N/m, no larger than a share of their nodes' own stiffness (k, 3, 3).
 
     Where a node rides a ridge sharper than the mesh, the whole term would make the matrix indefinite; less of it costs
     iterations, not exactness.

@@ -15,14 +15,14 @@ _POINTS, _POINT_WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 def quadratic(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values and slopes (n, 3) of the quadratic Lagrange polynomials on nodes -1, 0, 1."""
+    """Return the values and slopes (n, 3) of the quadratic Lagrange polynomials on nodes -1, 0, 1."""
     value = np.stack([t * (t - 1) / 2, 1 - t**2, t * (t + 1) / 2], -1)
     slope = np.stack([t - 0.5, -2 * t, t + 0.5], -1)
     return value, slope
 
 
 def reference_gradients() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Gauss points (27, 3), weights (27,) and shape gradients (27, 27, 3) in the reference cube."""
+    """Return the Gauss points (27, 3), weights (27,) and shape gradients (27, 27, 3) in the reference cube."""
     points = np.stack(np.meshgrid(_POINTS, _POINTS, _POINTS, indexing="ij"), -1).reshape(-1, 3)
     weights = np.einsum("a,b,c->abc", *[_POINT_WEIGHTS] * 3).ravel()
     (fx, dx), (fy, dy), (fz, dz) = (quadratic(points[:, k]) for k in range(3))
@@ -34,7 +34,7 @@ def reference_gradients() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def cell_stiffness(corners: np.ndarray, material: Material) -> np.ndarray:
-    """Stiffness (n_cells, 81, 81), N/m, of cells with nodes (n_cells, 27, 3) m.
+    """Return the stiffness (n_cells, 81, 81), N/m, of cells with nodes (n_cells, 27, 3) m.
 
     2 mu dev(strain) : dev(strain) plus kappa times the volume change projected on linear functions of the cell.
     Raises ValueError for a cell that is turned inside out at a Gauss point.
@@ -65,7 +65,9 @@ def cell_stiffness(corners: np.ndarray, material: Material) -> np.ndarray:
 
 
 def assemble(mesh: HexMesh, material: Material):  # noqa: ANN201 (scipy is imported only where it is needed)
-    """Global stiffness, scipy CSC (3 n, 3 n), N/m, degree of freedom = 3 node + axis, nothing clamped yet."""
+    """Assemble the global stiffness, scipy CSC (3 n, 3 n), N/m, degree of freedom = 3 node + axis,
+    nothing clamped yet.
+    """
     import scipy.sparse
 
     local = cell_stiffness(mesh.nodes[mesh.cells], material)

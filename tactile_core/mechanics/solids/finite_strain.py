@@ -32,7 +32,7 @@ class State:
     pressure: np.ndarray
 
     def copy(self) -> State:
-        """A state that can be changed alone."""
+        """Return a copy that can be changed without changing this state."""
         return State(self.displacement.copy(), self.pressure.copy())
 
 
@@ -72,20 +72,20 @@ class FiniteStrainSolid:
         return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 4)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Deformation gradient F (n_cells, 27, 3, 3) and its determinant J (n_cells, 27)."""
+        """Return the deformation gradient F (n_cells, 27, 3, 3) and its determinant J (n_cells, 27)."""
         moved = displacement[self.mesh.cells].swapaxes(1, 2)
         f = (moved @ self._by_node).reshape(-1, 3, 27, 3).swapaxes(1, 2) + np.eye(3)
         return f, determinants(f)
 
     def energy(self, state: State) -> float:
-        """Stored elastic energy, J."""
+        """Return the stored elastic energy, J."""
         f, j = self.deformation(state.displacement)
         p = state.pressure @ self.linear.T
         density = self.law.energy(f, j) + p * (j - 1) - p**2 / (2 * self.law.bulk)
         return float((density * self.weight).sum())
 
     def linearise(self, state: State) -> Linearised:
-        """Residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
+        """Compute residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
         f, j = self.deformation(state.displacement)
         if not (j > 0).all():  # NaN, too
             raise FloatingPointError("a cell is turned inside out")
@@ -137,20 +137,20 @@ class Linearised:
     pressure_gap: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """Internal force (3 n,) N; ``condensed`` as the Newton step needs it."""
+        """Return the internal force (3 n,) N; ``condensed`` as the Newton step needs it."""
         values = self.condensed if condensed else self.residual
         size = 3 * len(self.solid.mesh.nodes)
         return np.bincount(self.solid.dofs.ravel(), values.ravel(), minlength=size)
 
     def blocks(self) -> np.ndarray:
-        """Tangent stiffness (n_blocks, 3, 3) N/m on the solid's pattern."""
+        """Return the tangent stiffness (n_blocks, 3, 3) N/m on the solid's pattern."""
         return self.solid.pattern.gather(self.stiffness)
 
     def matrix(self):  # noqa: ANN201 (scipy is imported only where it is needed)
-        """Tangent stiffness, scipy CSC (3 n, 3 n), N/m."""
+        """Assemble the tangent stiffness, scipy CSC (3 n, 3 n), N/m."""
         return self.solid.pattern.sparse(self.blocks()).tocsc()
 
     def pressure_step(self, step: np.ndarray) -> np.ndarray:
-        """Change of the pressures (n_cells, 4) Pa that goes with a displacement step (n, 3) m."""
+        """Return the change of the pressures (n_cells, 4) Pa that goes with a displacement step (n, 3) m."""
         local = step.reshape(-1)[self.solid.dofs]
         return np.einsum("epi,ei->ep", self.to_pressure, local) + self.pressure_gap

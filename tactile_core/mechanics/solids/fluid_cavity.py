@@ -21,11 +21,11 @@ class FluidCavity:
         self.faces, self.n_nodes = faces, n_nodes
 
     def volume(self, nodes: np.ndarray) -> float:
-        """Volume, m3, for node positions (n_nodes, 3) m."""
+        """Return the volume, m3, for node positions (n_nodes, 3) m."""
         return float((nodes.ravel() @ self.gradient(nodes)) / 3)
 
     def gradient(self, nodes: np.ndarray) -> np.ndarray:
-        """Gradient dV / d(node) (3 n_nodes,), m2."""
+        """Return the gradient dV / d(node) (3 n_nodes,), m2."""
         corners = nodes[self.faces]
         parts = 3 * np.cross(corners[:, None], self._arms(corners)).sum(axis=2)
         gradient = np.zeros((self.n_nodes, 3))
@@ -33,7 +33,7 @@ class FluidCavity:
         return gradient.ravel()
 
     def hessian(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Hessian d2V / d(node)2: node pairs (k,), (k,) and the 3 x 3 blocks (k, 3, 3), m, of each; repeated
+        """Return the Hessian d2V / d(node)2: node pairs (k,), (k,) and the 3 x 3 blocks (k, 3, 3), m, of each; repeated
         pairs add up.
         """
         arms = self._arms(nodes[self.faces])

@@ -17,10 +17,14 @@ class Law(Protocol):
     bulk: float  # Pa
 
     def energy(self, f: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """Isochoric energy density (...,) J/m3 of deformation gradients f (..., 3, 3) with determinants j (...,)."""
+        """Return the isochoric energy density (...,) J/m3 of deformation gradients f (..., 3,
+        3) with determinants j (...,).
+        """
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """First Piola-Kirchhoff stress (..., 3, 3) Pa, p J F^-T included, and d(stress)/dF (..., 3, 3, 3, 3)."""
+        """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, p J F^-T included, and d(stress)/dF (..., 3, 3,
+        3, 3).
+        """
 
 
 @dataclasses.dataclass(frozen=True)

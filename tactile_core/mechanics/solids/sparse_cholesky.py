@@ -23,7 +23,8 @@ _BATCH = 128  # right-hand sides cholespy takes at once
 
 
 def factor(matrix) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy sparse, imported lazily)
-    """A function that solves ``matrix @ x = b`` for b (n, k), float64. ``matrix``: symmetric positive definite CSC.
+    """Return a function that solves ``matrix @ x = b`` for b (n, k), float64. ``matrix``:
+    symmetric positive definite CSC.
 
     Raises NotPositiveDefiniteError where cholespy finds that it is not; SuperLU does not look.
     """

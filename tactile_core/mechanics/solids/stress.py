@@ -11,7 +11,7 @@ _BATCH = 256  # cells at once: the law makes its tangent, too, 0.7 kB a point
 
 
 def cauchy(solid: FiniteStrainSolid, state: State) -> np.ndarray:
-    """Cauchy stress (n_cells, 27, 3, 3) Pa at the quadrature points, tension positive: P F^T / J.
+    """Return the Cauchy stress (n_cells, 27, 3, 3) Pa at the quadrature points, tension positive: P F^T / J.
 
     P is the law's first Piola-Kirchhoff stress with the cell's own pressure. Raises FloatingPointError where a cell is
     turned inside out.
@@ -22,7 +22,7 @@ def cauchy(solid: FiniteStrainSolid, state: State) -> np.ndarray:
 
 
 def nodal_force(solid: FiniteStrainSolid, state: State) -> np.ndarray:
-    """Force (n, 3) N that holds each node where it is: contact, fluid and reactions; zero at free nodes.
+    """Return the force (n, 3) N that holds each node where it is: contact, fluid and reactions; zero at free nodes.
 
     Raises what ``cauchy`` raises.
     """
@@ -44,14 +44,14 @@ def _points(solid: FiniteStrainSolid, state: State):  # noqa: ANN202 (batches of
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Von Mises stress sqrt(3/2 s : s) (...,) Pa of stresses (..., 3, 3), s their deviator."""
+    """Return the Von Mises stress sqrt(3/2 s : s) (...,) Pa of stresses (..., 3, 3), s their deviator."""
     mean = np.einsum("...ii->...", stress) / 3
     deviator = stress - mean[..., None, None] * np.eye(3)
     return np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator))
 
 
 def at_nodes(solid: FiniteStrainSolid, values: np.ndarray) -> np.ndarray:
-    """Values (n, ...) at the nodes of a field (n_cells, 27, ...) known at the quadrature points.
+    """Return the values (n, ...) at the nodes of a field (n_cells, 27, ...) known at the quadrature points.
 
     In each cell the trilinear function nearest to them (least squares with the volumes as weights, local L2
     projection); at a node the mean of its cells, by their volumes. A field that is linear in a cell's own coordinates

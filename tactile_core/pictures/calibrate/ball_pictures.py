@@ -31,17 +31,17 @@ class BallPictures(abc.ABC):
 
     @abc.abstractmethod
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Change (3, H, W) by a press of each LED's light, in what it gives on a coating that faces it.
+        """Return the change (3, H, W) by a press of each LED's light, in what it gives on a coating that faces it.
 
         ball : right, down, depth, radius, m
         """
 
     def heights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Heights (H, W) float32, m, of the gel under a ball (right, down, depth, radius), m."""
+        """Return the heights (H, W) float32, m, of the gel under a ball (right, down, depth, radius), m."""
         return print_on(self.rest, self.right, self.down, ball)
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Change (H, W, 3) of the picture by a press, grey levels."""
+        """Return the change (H, W, 3) of the picture by a press, grey levels."""
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
 
 
@@ -55,7 +55,7 @@ class FastPictures(BallPictures):
         self._resting = self._radiance(self.rest)
 
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Change (3, H, W) by a press of each LED's light."""
+        """Return the change (3, H, W) by a press of each LED's light."""
         return self.spread(self._radiance(self.heights(ball)) - self._resting)
 
     def _radiance(self, heights: np.ndarray) -> np.ndarray:
@@ -64,13 +64,13 @@ class FastPictures(BallPictures):
 
 
 def working_factor(width: int, height: int) -> int:
-    """The whole factor by which pictures are made smaller for a fit."""
+    """Return the whole factor by which pictures are made smaller for a fit."""
     wanted = max(width // WORKING_WIDTH, 1)
     return next(factor for factor in range(wanted, 0, -1) if width % factor == 0 and height % factor == 0)
 
 
 def smaller(values: np.ndarray, factor: int) -> np.ndarray:
-    """Means of values (H, W, ...) over squares of factor x factor pixels."""
+    """Return the means of values (H, W, ...) over squares of factor x factor pixels."""
     height, width = values.shape[0] // factor, values.shape[1] // factor
     blocks = values.reshape(height, factor, width, factor, *values.shape[2:])
     return blocks.mean((1, 3), dtype=np.float32)

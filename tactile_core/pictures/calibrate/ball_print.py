@@ -22,7 +22,7 @@ SPHERE_TO = 0.9  # of the radius: beyond, the ball's profile goes on as a cone, 
 def print_on(
     rest: np.ndarray, right: np.ndarray, down: np.ndarray, ball: tuple[float, float, float, float]
 ) -> np.ndarray:
-    """Heights (H, W) float32, m, of gel at rest (H, W) m under a ball; right, down : (H, W) m, image frame.
+    """Return the heights (H, W) float32, m, of gel at rest (H, W) m under a ball; right, down : (H, W) m, image frame.
 
     ball : right, down of its centre, depth from first touch, radius, m.
     The dome changes the gap g between ball and gel. The print is that of the flat layer at the radius where the flat

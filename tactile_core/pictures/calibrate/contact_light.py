@@ -17,17 +17,17 @@ LIKELY = 20.0  # grey levels, how large it is (assumed): holds it near none wher
 
 
 def contact_radius(depth: float, radius: float) -> float:
-    """Radius, m, of the contact of a ball of a radius pressed so deep, m."""
+    """Return the radius, m, of the contact of a ball of a radius pressed so deep, m."""
     return float(CONTACT_SHARE * np.sqrt(2 * radius * depth))
 
 
 def contact_disc(bench: BallPictures, ball: tuple[float, float, float, float]) -> np.ndarray:
-    """Share (H, W), 0..1, of each pixel that shows the contact of a ball (right, down, depth, radius), m."""
+    """Return the share (H, W), 0..1, of each pixel that shows the contact of a ball (right, down, depth, radius), m."""
     right, down, depth, radius = ball
     distance = np.hypot(bench.right - right, bench.down - down)
     return 1 / (1 + np.exp((distance - contact_radius(depth, radius)) / SOFT))
 
 
 def fitted_light(left: np.ndarray, disc: np.ndarray, model_error: float) -> np.ndarray:
-    """Light (3,), grey levels, that leaves least of what a picture lacks, left (n, 3), under a disc (n,)."""
+    """Return the light (3,), grey levels, that leaves least of what a picture lacks, left (n, 3), under a disc (n,)."""
     return disc @ left / (disc @ disc + (model_error / LIKELY) ** 2)

@@ -75,7 +75,7 @@ def evaluate_unit(
 
 
 def fitted_size(calibration: Calibration, photographs: Photographs) -> Calibration:
-    """The calibration in the photographs' pixels; raises TactileError for another aspect ratio."""
+    """Return the calibration in the photographs' pixels; raises TactileError for another aspect ratio."""
     height, width = photographs.shape
     try:
         return calibration.at_size(width, height)
@@ -131,7 +131,7 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
 
 
 def mean_figures(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
-    """Means over presses of the metrics and of the baseline's; NaN ones left out, NaN where all are."""
+    """Return the means over presses of the metrics and of the baseline's; NaN ones left out, NaN where all are."""
     means = []
     for which in ("figures", "baseline"):
         rows = [getattr(each, which) for each in tried]

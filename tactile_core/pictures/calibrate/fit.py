@@ -225,7 +225,7 @@ def finishing_trouble() -> str:
 
 
 def unexplained_share(sight: Sight, left: float) -> float:
-    """Share of a photograph's squares that a fit leaves; left : mean square, grey levels squared."""
+    """Return the share of a photograph's squares that a fit leaves; left : mean square, grey levels squared."""
     return left / max(float(np.square(sight.change[sight.counts]).mean()), 1e-9)
 
 

@@ -18,13 +18,15 @@ class Problem(Protocol):
         """Return half the sum of squares at x; infinity where x is meaningless."""
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gauss-Newton's matrix (n, n) and the gradient (n,) of the cost, at the x of the last cost that was taken."""
+        """Return Gauss-Newton's matrix (n, n) and the gradient (n,) of the cost,
+        at the x of the last cost that was taken.
+        """
 
 
 def minimise(
     problem: Problem, x: np.ndarray, *, most: int, tolerance: float, progress: Callable[[int], None] = lambda _: None
 ) -> tuple[np.ndarray, float]:
-    """A minimum near x and its cost, after ``most`` steps or once a step gains less than a share ``tolerance``."""
+    """Find a minimum near x and its cost, after ``most`` steps or once a step gains less than a share ``tolerance``."""
     cost, damping = problem.cost(x), START_DAMPING
     for step in range(most):
         matrix, gradient = problem.normal_equations(x)

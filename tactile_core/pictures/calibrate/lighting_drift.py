@@ -10,7 +10,7 @@ SOFTNESS = 3.0  # grey levels: what lies farther from the drift than twice that 
 
 
 def lighting_drift(change: np.ndarray) -> np.ndarray:
-    """Drift (H, W, 3) float32 grey levels: the quadratic nearest most of a photograph's change (H, W, 3).
+    """Return the drift (H, W, 3) float32 grey levels: the quadratic nearest most of a photograph's change (H, W, 3).
 
     By iteratively reweighted least squares with Geman and McClure's weights, from the median; a press that covers less
     than half of the picture counts for next to nothing.

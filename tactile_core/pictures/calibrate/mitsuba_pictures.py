@@ -25,7 +25,7 @@ class MitsubaPictures:
         return _OfUnit(calibration, self)
 
     def radiance(self, unit: Calibration, heights: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3), levels, of heights (H, W) m of a unit's gel."""
+        """Return the radiance (H, W, 3), levels, of heights (H, W) m of a unit's gel."""
         if self._light is None:
             self._light = GelLight(unit, self.preset, heights, 0)
         elif self._light.unit is not unit:
@@ -49,5 +49,5 @@ class _OfUnit(BallPictures):
 
 
 def working_preset(preset: Preset, factor: int) -> Preset:
-    """A preset for pictures smaller by a factor: the bounce on as many places of the gel, or half as many."""
+    """Return a preset for pictures smaller by a factor: the bounce on as many places of the gel, or half as many."""
     return dataclasses.replace(preset, bounce_step=max(preset.bounce_step // factor, 4) if preset.bounce_step else 0)

@@ -28,7 +28,7 @@ SMALLEST_RADIUS, LARGEST_RADIUS = 0.1, 8.0  # mm; the gel's window is 18 mm wide
 
 
 def parameters_of(calibration: Calibration) -> np.ndarray:
-    """The vector (18,) of a calibration, in the order of NAMES."""
+    """Return the vector (18,) of a calibration, in the order of NAMES."""
     camera = calibration.camera
     leds = [1e3 * value for led in calibration.leds for value in (*led.position, led.radius)]
     head = [camera.px_per_mm_x, camera.px_per_mm_y, 1e3 * camera.apparent_height, calibration.dome_scale]
@@ -37,7 +37,7 @@ def parameters_of(calibration: Calibration) -> np.ndarray:
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
-    """A calibration with other numbers and the same gain; raises TactileError for some that mean nothing."""
+    """Return a calibration with other numbers and the same gain; raises TactileError for some that mean nothing."""
     scale_x, scale_y, height, dome, albedo, spread = (float(value) for value in numbers[:FIRST_LED])
     shares = np.asarray(calibration.coating.albedo)
     of_red, of_green, of_blue = (shares * (albedo / shares.mean())).tolist()

@@ -29,12 +29,12 @@ def figures(picture: np.ndarray, photograph: np.ndarray, background: np.ndarray,
 
 
 def psnr(error: np.ndarray) -> float:
-    """10 log10 (255^2 / mean square), dB; an exact picture counts as an error of a thousandth of a level."""
+    """Compute 10 log10 (255^2 / mean square), dB; an exact picture counts as an error of a thousandth of a level."""
     return float(10 * np.log10(PEAK**2 / max(float(np.square(error).mean()), 1e-6)))
 
 
 def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray) -> float:
-    """Mean over colours of the lobes' intersection over union; colours without any lobe are left out."""
+    """Return the mean over colours of the lobes' intersection over union; colours without any lobe are left out."""
     overlaps = []
     for channel in range(len(COLOURS)):
         ours, true = ((each[..., channel] < LOBE) & region for each in (change, true_change))
@@ -45,7 +45,9 @@ def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray
 
 
 def similarity(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Structural similarity (H, W, 3) of two pictures in a window of 7 x 7 px, unbiased variances, edges mirrored."""
+    """Return the structural similarity (H, W, 3) of two pictures in a window of 7 x 7 px, unbiased variances,
+    edges mirrored.
+    """
     mean_one, mean_other = windowed(one), windowed(other)
     unbiased = WINDOW**2 / (WINDOW**2 - 1)
     var_one = unbiased * (windowed(one * one) - mean_one**2)
@@ -56,7 +58,7 @@ def similarity(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def windowed(values: np.ndarray, width: int = WINDOW) -> np.ndarray:
-    """Means of values (H, W, k) over squares of ``width`` px, odd; edges mirrored."""
+    """Return the means of values (H, W, k) over squares of ``width`` px, odd; edges mirrored."""
     half = width // 2
     padded = np.pad(values, ((half + 1, half), (half + 1, half), (0, 0)), mode="symmetric")
     total = padded.cumsum(0).cumsum(1)

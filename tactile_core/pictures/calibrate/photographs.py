@@ -117,14 +117,15 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
 
 
 def turned(press: Press, rows: bool, columns: bool) -> Press:
-    """A press whose picture has its rows, its columns or both reversed."""
+    """Return a press whose picture has its rows, its columns or both reversed."""
     way = slice(None, None, -1 if rows else 1), slice(None, None, -1 if columns else 1)
     arrays = ("picture", "drift", "change", "touched", "region")
     return dataclasses.replace(press, **{name: getattr(press, name)[way] for name in arrays})
 
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
-    """Untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3), where presses cover less than half of them.
+    """Estimate the untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3),
+    where presses cover less than half of them.
 
     The median at each pixel of those that differ from the median of all by CHANGE at most: presses that cover a third
     of the pictures pull the plain median by up to that much.
@@ -136,7 +137,8 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
-    """Standard deviation (3,) of the camera's noise, grey levels: of what changes outside the presses, less its means.
+    """Measure the standard deviation (3,) of the camera's noise, grey levels: of what changes outside the presses,
+    less its means.
 
     Means over NOISE_WINDOW hold drift of the light. A photographed background adds noise of its own.
     """
@@ -153,7 +155,9 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """Mask (H, W) bool where some channel differs by more than 18 levels within 9 px; from the photograph alone."""
+    """Return the mask (H, W) bool where some channel differs by more than 18 levels within 9 px;
+    from the photograph alone.
+    """
     changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
     return dilated(changed, DILATION)
 
@@ -184,7 +188,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def press_of(name: str, picture: np.ndarray, background: np.ndarray) -> Press | None:
-    """The press that a photograph shows; None where it shows none."""
+    """Return the press that a photograph shows; None where it shows none."""
     difference = picture.astype(np.float32) - background
     drift = lighting_drift(difference)
     change = difference - drift

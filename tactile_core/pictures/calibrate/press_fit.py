@@ -50,7 +50,9 @@ class Sight:
         self.counts = dilated(self.region, MARGIN) & ~spoilt
 
     def guesses(self, bench: BallPictures) -> list[tuple[float, float]]:
-        """Right and down, m, of the change's middle, and of where it is largest over about a ball's print."""
+        """Return the right and down, m, of the change's middle, and of where it is largest over about a
+        ball's print.
+        """
         weight = np.abs(self.change).max(-1) * self.region
         width = round(PRINT / bench.camera.pixel_size[0]) | 1
         largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)

@@ -43,7 +43,9 @@ def rows_by_press(tried: list[Evaluation]) -> list[Row]:
 
 
 def write_sheet(path: str | os.PathLike, tried: list[Evaluation]) -> None:
-    """Photograph, render and difference (twice, on grey) of each press as a PNG; equal input makes equal bytes."""
+    """Write the photograph, render and difference (twice, on grey) of each press as a PNG;
+    equal input makes equal bytes.
+    """
     from PIL import Image, ImageDraw
 
     shown = tried[:LARGEST_SHEET]

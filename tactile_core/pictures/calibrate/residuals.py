@@ -66,7 +66,7 @@ class UnitResiduals:
         self.gain = self._start_gain
 
     def unit(self, x: np.ndarray) -> Calibration:
-        """The calibration of x, with the gain of the last cost that was taken."""
+        """Return the calibration of x, with the gain of the last cost that was taken."""
         numbers = self._numbers.copy()
         numbers[self._free] = x[: self._free.sum()]
         centre, right, down = (tuple(map(tuple, part.tolist())) for part in np.split(self.gain, 3, axis=1))
@@ -78,7 +78,7 @@ class UnitResiduals:
         return with_parameters(self._start.with_gain(gain), numbers)
 
     def balls(self, x: np.ndarray) -> np.ndarray:
-        """Right, down, depth, mm, of each press (n, 3)."""
+        """Return the right, down, depth, mm, of each press (n, 3)."""
         return x[self._free.sum() :].reshape(-1, 3)
 
     def cost(self, x: np.ndarray) -> float:
@@ -99,12 +99,14 @@ class UnitResiduals:
         return float(cost / 2)
 
     def unexplained(self) -> np.ndarray:
-        """Share (n,) of each photograph's squares that the pictures of the last cost leave."""
+        """Return the share (n,) of each photograph's squares that the pictures of the last cost leave."""
         pairs = zip(self._missed(), self._seen, strict=True)
         return np.array([np.square(missed).sum() / np.square(seen).sum() for missed, seen in pairs])
 
     def gain_errors(self) -> tuple[float, float, float]:
-        """Standard errors of the gain and its two slopes, root mean squares over LEDs, at the last cost's presses."""
+        """Return the standard errors of the gain and its two slopes, root mean squares over LEDs,
+        at the last cost's presses.
+        """
         matrix = np.diag(self._gain_weight)
         for lights in self._last:
             matrix = matrix + lights.terms @ lights.terms.T
@@ -140,7 +142,7 @@ class UnitResiduals:
         self.gain = np.linalg.solve(matrix, right_side.T).T
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Matrix and gradient over x, the gain eliminated."""
+        """Return the matrix and gradient over x, the gain eliminated."""
         self.cost(x)
         count, free = len(x), int(self._free.sum())
         matrix, gradient = np.zeros((count, count)), np.zeros(count)

@@ -16,7 +16,8 @@ _SINES = np.linspace(0, 0.999, 2000)  # of rays in air, for the table that inver
 
 
 def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and directions (3, n) float32 of rays, right, up, toward the camera, mm, that look at places (n,) m.
+    """Return the starts and directions (3, n) float32 of rays, right, up, toward the camera, mm,
+    that look at places (n,) m.
 
     right, down : on the plane of height zero. Rays start under the window. A camera too near for its window to fit in
     has none.

@@ -45,14 +45,14 @@ class Hits:
 
 
 def map_lookup(right: np.ndarray, down: np.ndarray, camera: Camera) -> Callable[[np.ndarray], np.ndarray]:
-    """Looks up what maps (H, W) of the gel hold at places on it, m, image frame."""
+    """Return a function that looks up maps (H, W) of the gel at places on it, m, image frame."""
     step_right, step_down = camera.pixel_size
     row = down * np.float32(1 / step_down) + np.float32(camera.height / 2 - 0.5)
     return lookup(row, right * np.float32(1 / step_right) + np.float32(camera.width / 2 - 0.5), camera.shape)
 
 
 def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Callable[[np.ndarray], np.ndarray]:
-    """Looks up maps of a shape at fractional places, bilinear; beyond an edge, the edge."""
+    """Return a function that looks up maps of a shape at fractional places, bilinear; beyond an edge, the edge."""
     row, column = np.clip(row, 0, shape[0] - 1), np.clip(column, 0, shape[1] - 1)
     return lambda values: bilinear(values, row, column)
 
@@ -60,7 +60,7 @@ def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Calla
 def direct_light(
     hits: Hits, seen: np.ndarray | None, points: Sequence[np.ndarray], unit: Calibration, soften: bool = False
 ) -> np.ndarray:
-    """Radiance (H, W, 3) float32, levels, of the three LEDs on a matte coating.
+    """Return the radiance (H, W, 3) float32, levels, of the three LEDs on a matte coating.
 
     seen : (H, W) uint32, a bit a point; None where all of them are
     points : (n, 3) m of each LED, n <= 8, in the order of the bits
@@ -104,7 +104,7 @@ def _dim(facing: np.ndarray, hits: Hits, seen: np.ndarray, cloud: np.ndarray, so
 
 
 def evened(values: np.ndarray) -> np.ndarray:
-    """Means of values (h, w) over 3 x 3 pixels; at the border, of what is there twice."""
+    """Return the means of values (h, w) over 3 x 3 pixels; at the border, of what is there twice."""
     for axis in (0, 1):
         total = np.moveaxis(values.copy(), axis, 0)
         along = np.moveaxis(values, axis, 0)

@@ -41,24 +41,26 @@ class GelMesh:
         self.count = len(along) * len(across)
 
     def vertices(self, height: np.ndarray) -> np.ndarray:
-        """Vertices (n, 3) float32 in mesh coordinates of a height map (H, W) m."""
+        """Return the vertices (n, 3) float32 in mesh coordinates of a height map (H, W) m."""
         self._plan[..., 2] = height[np.ix_(self._rows, self._columns)] * MM
         return self._plan.reshape(-1, 3).copy()
 
     def normals(self, height: np.ndarray) -> np.ndarray:
-        """Unit normals (n, 3) float32 of the vertices, of the map's own slopes; in real, unscaled space alone."""
+        """Return the unit normals (n, 3) float32 of the vertices, of the map's own slopes; in real,
+        unscaled space alone.
+        """
         right, down = (each[np.ix_(self._rows, self._columns)] for each in slopes(height, self.camera))
         found = np.stack([-right, down, np.ones_like(right)], -1)
         found /= np.linalg.norm(found, axis=-1, keepdims=True)
         return found.reshape(-1, 3).astype(np.float32)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest corner (3,) of the plane of height zero, mesh coordinates."""
+        """Return the lowest and highest corner (3,) of the plane of height zero, mesh coordinates."""
         flat = self._plan[..., :2].reshape(-1, 2)
         return np.r_[flat.min(0), 0.0].astype(float), np.r_[flat.max(0), 0.0].astype(float)
 
     def to_mesh(self, points: np.ndarray) -> np.ndarray:
-        """Points (n, 3) m, image frame (right, down, toward the camera), in mesh coordinates."""
+        """Return the points (n, 3) m, image frame (right, down, toward the camera), in mesh coordinates."""
         return np.asarray(points) * [MM, -MM * self.up_scale, MM]
 
 

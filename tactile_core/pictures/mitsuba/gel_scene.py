@@ -24,7 +24,7 @@ WALL_GAP = 1.0  # mm round the LEDs, and above them
 
 
 def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration, *, smooth: bool) -> Any:
-    """The gel as a mesh of Mitsuba's with its coating; height : (H, W) m; smooth : give its vertices normals."""
+    """Return the gel as a mesh of Mitsuba's with its coating; height : (H, W) m; smooth : give its vertices normals."""
     vertices = mesh.vertices(height)
     check_mesh(vertices, mesh.faces, mesh.count)
     gel = mi.Mesh("gel", mesh.count, len(mesh.faces), has_vertex_normals=smooth)
@@ -36,7 +36,7 @@ def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration, *, 
 
 
 def material(coating: Coating, gel_index: float) -> dict[str, Any]:
-    """A coating as Mitsuba's plugin."""
+    """Return a coating as Mitsuba's plugin."""
     albedo = {"type": "rgb", "value": list(coating.albedo)}
     if coating.bsdf == DIFFUSE:
         return {"type": "diffuse", "reflectance": albedo}
@@ -57,7 +57,7 @@ def _outer_index(gel_index: float) -> float:
 
 
 def lamps(unit: Calibration) -> dict[str, Any]:
-    """LEDs by their colours: black spheres that shine, or points where they look as small."""
+    """Return the LEDs by their colours: black spheres that shine, or points where they look as small."""
     return {led.colour: _lamp(led) for led in unit.leds}
 
 
@@ -68,7 +68,7 @@ def _lamp(led: Led) -> dict[str, Any]:
 
 
 def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[float]) -> dict[str, Any]:
-    """A lamp as Mitsuba's plugin; place and radius in m, image frame; brightness : (3,) radiance x radius^2."""
+    """Return a lamp as Mitsuba's plugin; place and radius in m, image frame; brightness : (3,) radiance x radius^2."""
     if radius < POINTLIKE * np.linalg.norm(position):
         intensity = [value * np.pi * MM**2 for value in brightness]  # of an evenly bright disc
         return {"type": "point", "position": to_scene(position), "intensity": {"type": "rgb", "value": intensity}}
@@ -81,7 +81,7 @@ def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[f
 
 
 def plugin_names(unit: Calibration) -> list[str]:
-    """Plugins of the coating and of each LED."""
+    """Return the plugins of the coating and of each LED."""
     return [unit.coating.bsdf, *(lamp["type"] for lamp in lamps(unit).values())]
 
 
@@ -114,7 +114,7 @@ def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
 
 
 def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
-    """Four black walls round gel and LEDs, from the gel's height up, that keep light from outside away.
+    """Return four black walls round gel and LEDs, from the gel's height up, that keep light from outside away.
 
     Their places are matrices (4, 4). What the housing throws back near an LED is in that LED's fitted radius, which is
     several times a chip's.
@@ -140,5 +140,5 @@ def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
 
 
 def to_scene(place: Sequence[float]) -> list[float]:
-    """A place right, down, toward the camera in m, in the scene's mm."""
+    """Return a place right, down, toward the camera in m, in the scene's mm."""
     return [place[0] * MM, -place[1] * MM, place[2] * MM]

@@ -34,7 +34,7 @@ class Gather:
 def interreflection(
     height: np.ndarray, direct: np.ndarray, hits: Hits, unit: Calibration, gather: Gather
 ) -> np.ndarray:
-    """Radiance (H, W, 3) float32 that the gel's own light adds to what pixels see.
+    """Return the radiance (H, W, 3) float32 that the gel's own light adds to what pixels see.
 
     height : (H, W) m; direct : (H, W, 3) radiance of the pixels by the LEDs alone; hits : what they see
     """
@@ -84,7 +84,7 @@ def _on_gel(
 def irradiance(
     height: np.ndarray, radiance: np.ndarray, margin: int, spacing: tuple[float, float], gather: Gather
 ) -> np.ndarray:
-    """Irradiance (h - 2 margin, w - 2 margin, 3) by the gel itself, in the unit of radiance.
+    """Return the irradiance (h - 2 margin, w - 2 margin, 3) by the gel itself, in the unit of radiance.
 
     height : (h, w) m; radiance : (h, w, 3); margin : places on each side that only give light, as far as is looked
     spacing : (right, down) m

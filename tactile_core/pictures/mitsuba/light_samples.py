@@ -11,7 +11,8 @@ _GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
 
 
 def light_points(led: Led, count: int) -> np.ndarray:
-    """Points (count, 3) m, image frame, round the light's middle, in the plane that faces the picture's middle.
+    """Return the points (count, 3) m, image frame, round the light's middle,
+    in the plane that faces the picture's middle.
 
     A ring with the second moments of an even disc, the best of a few points: radius sqrt(1/2).
     """
@@ -20,7 +21,7 @@ def light_points(led: Led, count: int) -> np.ndarray:
 
 
 def sphere_points(led: Led, count: int, turn: float, depth: float) -> np.ndarray:
-    """Points (count, 3) m, image frame, of a cloud that shines as an evenly bright sphere does.
+    """Return the points (count, 3) m, image frame, of a cloud that shines as an evenly bright sphere does.
 
     They fill the ball with density 1 / sqrt(1 - r^2), which shows an even disc to every side (Abel's transform).
     Where nothing is in the way, such a cloud lights exactly as its middle would: the light of a point falls on a

@@ -81,7 +81,7 @@ def square_pixels(camera: Camera) -> Camera:
 
 
 def camera_planes(unit: Calibration, ambient: np.ndarray) -> dict[str, np.ndarray]:
-    """Planes (H, W) of an EXR file: response.R.red, ... and ambient.R, ..., which is (H, W, 3) levels."""
+    """Return the planes (H, W) of an EXR file: response.R.red, ... and ambient.R, ..., which is (H, W, 3) levels."""
     response = unit.response.matrices(unit.camera).astype(np.float32)
     planes = {f"ambient.{name}": ambient[..., k] for k, name in enumerate("RGB")}
     for k, name in enumerate("RGB"):

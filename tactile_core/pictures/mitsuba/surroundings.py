@@ -45,12 +45,12 @@ class Surroundings:
         return bool(self.lamps or self.occluders)
 
     def emitters(self) -> dict[str, Any]:
-        """Lamps as plugins of Mitsuba's, by name."""
+        """Return the lamps as plugins of Mitsuba's, by name."""
         lamps = (sphere_lamp(each.position, each.radius, each.brightness) for each in self.lamps)
         return {f"lamp_{k}": plugin for k, plugin in enumerate(lamps)}
 
     def shapes(self, mi: Any) -> dict[str, Any]:
-        """Bodies as meshes of Mitsuba's, by name."""
+        """Return the bodies as meshes of Mitsuba's, by name."""
         return {f"body_{k}": _mesh(mi, f"body_{k}", each) for k, each in enumerate(self.occluders)}
 
 

@@ -27,7 +27,8 @@ class Tracer(Protocol):
         """Give the gel other heights (H, W) m."""
 
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Places (H, W, 3) float32 m, image frame, that pixels see, and what they see of points (n, 3) m, 1 <= n <= 32.
+        """Return the places (H, W, 3) float32 m, image frame, that pixels see, and what they see of points (n, 3) m,
+        1 <= n <= 32.
 
         shift : pixels to the right and down from each pixel's middle
         Returns the places and seen (H, W) uint32, bit k for point k: nothing in the way, and on the gel's front.
@@ -35,7 +36,7 @@ class Tracer(Protocol):
 
 
 def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
-    """A scene of a height map (H, W) m in ``"llvm_ad_rgb"`` or ``"scalar_rgb"``."""
+    """Make a scene of a height map (H, W) m in ``"llvm_ad_rgb"`` or ``"scalar_rgb"``."""
     return (_LlvmTracer if variant == LLVM else _ScalarTracer)(mesh, height, variant)
 
 

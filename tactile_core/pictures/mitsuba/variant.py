@@ -46,7 +46,7 @@ class Choice:
 
 
 def choose_variant(wanted: str | None = None) -> Choice:
-    """The variant asked for, or the faster one that works here.
+    """Choose the variant that was given, or the faster one that works on this machine.
 
     Raises TactileError for an unknown one or one that does not work; ModuleNotFoundError without mitsuba.
     """
@@ -65,7 +65,9 @@ def choose_variant(wanted: str | None = None) -> Choice:
 
 
 def variant_for(preset: str, wanted: str | None = None) -> str:
-    """The variant that all workers of a job use, so that their pictures agree; "" for fast ones, which need none."""
+    """Return the variant that all workers of a job use, so that their pictures agree; "" for fast ones,
+    which need none.
+    """
     return "" if preset == "fast" else choose_variant(wanted).name
 
 
@@ -102,7 +104,7 @@ def _too_old(message: str) -> str:
 
 
 def activate(variant: str) -> Any:
-    """The module ``mitsuba``, with this variant active."""
+    """Activate a variant of Mitsuba and return the module."""
     import mitsuba
 
     if mitsuba.variant() != variant:  # 0.1 s

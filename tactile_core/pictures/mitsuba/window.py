@@ -19,13 +19,15 @@ WINDOW_HEIGHT = BACK_Y - HEIGHT_ZERO_Y + ACRYLIC  # m over the plane of height z
 
 
 def air_over_window(camera: Camera, index: float) -> float:
-    """Air, m, between window and pinhole, with which it appears at the camera's height on the axis (Snell's law)."""
+    """Return the air, m, between window and pinhole, with which it appears at the camera's
+    height on the axis (Snell's law).
+    """
     return (camera.apparent_height - WINDOW_HEIGHT) / index
 
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
-    """Apparent height of the pinhole, m above height zero, for pixels that look at that plane a distance, m, off its
-    axis.
+    """Return the apparent height of the pinhole, m above height zero, for pixels that look at that plane a distance,
+    m, off its axis.
 
     Snell's law through a flat window. A camera too near for its window to fit in keeps its height.
     """
@@ -39,12 +41,12 @@ def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.nd
 
 
 def tangent(sine: np.ndarray) -> np.ndarray:
-    """Tangents of angles with these sines."""
+    """Convert the sines of angles to their tangents."""
     return sine / np.sqrt(1 - sine**2)
 
 
 def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -> np.ndarray:
-    """The picture (H, W, k) of a pinhole as it looks through the window, float32.
+    """Return the picture (H, W, k) of a pinhole as it looks through the window, float32.
 
     height : (H, W) m of the gel that each pixel of the picture sees
     """
@@ -59,7 +61,7 @@ def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -
 
 
 def cubic(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Catmull-Rom interpolation of (h, w, k) at fractional places, edges held; exact at whole ones."""
+    """Interpolate (h, w, k) at fractional places by Catmull-Rom splines, edges held; exact at whole ones."""
     i, j = np.floor(row).astype(int), np.floor(column).astype(int)
     weights_row, weights_column = _catmull_rom(row - i), _catmull_rom(column - j)
     found = np.zeros(row.shape + picture.shape[2:])

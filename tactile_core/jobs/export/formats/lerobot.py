@@ -45,7 +45,9 @@ PLAIN = {
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """The data set. Needs pyarrow, of the extra [batch]; raises TactileError for one that this numpy does not load."""
+    """Write the data set. Needs pyarrow, of the extra [batch]; raises TactileError for one
+    that this numpy does not load.
+    """
     try:
         import pyarrow  # noqa: F401
     except ModuleNotFoundError:
