@@ -29,7 +29,7 @@ class TACTILE_OT_check_llvm(TactileOperator):
             finally:
                 job.cancel()
             verdict = (folder / "variant.txt").read_text(encoding="utf-8")
-        preferences.of(context).verdict = verdict
+        preferences.addon_preferences(context).verdict = verdict
         self.report({"INFO"}, verdict)
 
 

@@ -11,7 +11,7 @@ from ...tactile_core.errors import TactileError
 from ..objects import axes, biotac_objects, custom_properties, electrode_markers, motion
 from ..ui import properties, timeline, view
 from ..ui.progress import shown
-from ..ui.properties import MOTIONS, POLARITIES, POLARITY_TOLD
+from ..ui.properties import MOTIONS, POLARITIES, POLARITY_HELP
 from ..ui.reports import TactileOperator
 from . import recording_data
 
@@ -34,7 +34,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         name="Tare", description="Frames without contact as A:B, auto to find them, none to keep the file's own zero",
         default="auto",
     )  # fmt: skip
-    polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_TOLD, items=POLARITIES)
+    polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_HELP, items=POLARITIES)
     frames: bpy.props.StringProperty(
         name="Frames", description="Part of the recording, A:B:STEP as in Python; a colon alone takes all", default=":"
     )

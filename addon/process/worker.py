@@ -153,7 +153,7 @@ def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -
 def _result(folder: Path, picked: list[str]) -> None:
     """The truth; what was picked, in words; and apex (T, 3) m and axes (T, 3, 3) of the indenter.
 
-    It has sunk until it touches the dented gel: on the DIGIT, or on the BioTac where that alone was solved.
+    It is lowered until it touches the dented gel: on the DIGIT, or on the BioTac where that alone was solved.
     """
     from tactile_core import sensors
     from tactile_core.mechanics.placement import Placement, pose_at

@@ -16,7 +16,7 @@ NAME = "Tactile"
 _PACKAGE = __package__.rsplit(".", 2)[0]
 _CATALOG = "7e0a52a2-5f4c-4c1b-9a55-1f6f0d0f6a29"
 _CATALOGS = f"# Asset catalogs of the extension Tactile\n\nVERSION 1\n\n{_CATALOG}:Tactile:Tactile\n"
-TOLD = {
+DESCRIPTIONS = {
     "DISPLACEMENT": "Colours a BioTac's skin or a DIGIT's gel by how far each place has moved",
     "CONTACT_PATCH": "Colours what is touched of a DIGIT's gel",
     "ELECTRODES": "Colours a BioTac's skin round its electrodes by the change of each reading",
@@ -38,7 +38,7 @@ def write(place: Path) -> Path:
     groups = {style: style_nodes.group(style) for style in style_nodes.NAMES}
     for style, group in groups.items():
         group.asset_mark()
-        group.asset_data.catalog_id, group.asset_data.description = _CATALOG, TOLD[style]
+        group.asset_data.catalog_id, group.asset_data.description = _CATALOG, DESCRIPTIONS[style]
         group.asset_data.author = "Tactile"
     path = place / "styles.blend"
     partial = path.with_suffix(".partial.blend")

@@ -13,7 +13,7 @@ ID = __package__.rsplit(".", 2)[0]  # the extension, not this package in it
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"  # by which Mitsuba finds the library
 
 
-def of(context: bpy.types.Context) -> bpy.types.AddonPreferences:
+def addon_preferences(context: bpy.types.Context) -> bpy.types.AddonPreferences:
     """Return the extension's preferences."""
     return context.preferences.addons[ID].preferences
 

@@ -35,7 +35,7 @@ MOTIONS = (
 )
 
 
-POLARITY_TOLD = "What the electrodes' counts do where the film over them thins"
+POLARITY_HELP = "What the electrodes' counts do where the film over them thins"
 POLARITIES = (
     ("auto", "Automatic", "As the file says, or the recording shows"),
     ("falls", "Falls", "Counts fall, as raw readings of a BioTac do"),
@@ -53,7 +53,7 @@ class TactileObject(bpy.types.PropertyGroup):
         name="Recording", description="The file this was imported from", subtype="FILE_PATH", options=_RELATIVE
     )
     tare: bpy.props.StringProperty(name="Tare", description="Frames without contact A:B, auto or none", default="auto")
-    polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_TOLD, items=POLARITIES)
+    polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_HELP, items=POLARITIES)
     frames: bpy.props.StringProperty(name="Frames", description="Part of the recording, A:B:STEP", default=":")
     motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
     colour: bpy.props.StringProperty(name="Colour", description="Which LED of the calibration this is")

@@ -17,7 +17,7 @@ from .solids.finite_strain import FiniteStrainSolid, State
 from .solids.hex_mesh import HexMesh
 
 Data = Mapping[str, np.ndarray]
-TRIANGLE, TETRAHEDRON, TRIQUADRATIC_HEXAHEDRON = 5, 10, 29  # cell types of VTK
+TRIANGLE, TRIQUADRATIC_HEXAHEDRON = 5, 29  # cell types of VTK
 _VTK_NAMES = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "int64": "Int64", "uint8": "UInt8"}
 
 

@@ -23,7 +23,7 @@ ADVICE = (
 def describe_sp(recording: Recording, unit: ElectrodeGains | None = None) -> str:
     """Describe sensor, channels, frames, rest and counts as a short table, and that it is not translated.
 
-    unit : with the rest against which changes are told
+    unit : with the rest against which changes are taken
     """
     count, electrodes = len(recording), recording.electrodes
     finger = recording.about["finger"]

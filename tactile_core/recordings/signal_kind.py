@@ -10,7 +10,7 @@ SCALED_LIMIT = (
     20.0  # larger values than this are counts; scaled ones are volts, shares or standard deviations (assumed)
 )
 NEGATIVE_SHARE = 0.005  # of all samples: more than the odd glitch
-WHOLE_SHARE = 0.99
+WHOLE_SHARE = 0.99  # of all samples: a file with more whole numbers holds counts (assumed)
 
 
 def detect(electrodes: np.ndarray) -> tuple[str, str]:

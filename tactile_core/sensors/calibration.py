@@ -19,15 +19,14 @@ from .camera import COLOURS, Camera, Led
 from .coating import Coating
 from .markers import Markers
 
-AMBIENT_DEGREE = 5
+AMBIENT_DEGREE = 5  # of the polynomial of the ambient light over the picture (assumed)
 AMBIENT_TERMS = (AMBIENT_DEGREE + 1) * (AMBIENT_DEGREE + 2) // 2
 AMBIENT_UNIT = 10e-3  # m; image coordinates are divided by it in the ambient light's polynomial
 # m: ambient light is counted in what a LED gives on a coating that faces it from there, so that it goes with the LED's
 # power alone, not with its place.
 AMBIENT_DISTANCE = 20e-3
-GEL_INDEX = 1.41  # of clear silicone rubbers (assumed)
 MOST_INDEX = 4.0  # germanium's: no clear solid has more
-LARGEST_LEVEL = 255.0
+LARGEST_LEVEL = 255.0  # of 8 bits
 
 
 @dataclasses.dataclass(frozen=True)

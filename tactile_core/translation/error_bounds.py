@@ -17,7 +17,7 @@ from ..errors import TactileError
 from .network_sizes import SURFACES
 from .weights import ADVICE
 
-LEVEL = 0.95
+LEVEL = 0.95  # share of frames whose error the bound covers
 EDGES = (-14e-3, -8e-3, -2e-3)  # m, x of the contact's middle: tip, first and last electrodes, base (assumed)
 PLACES = len(EDGES) + 2  # results without contact first
 FEWEST = 100  # contacts of a place: of fewer the 95 % quantile says little, and the factor of all counts (assumed)

@@ -30,7 +30,7 @@ ALIKE = 0.6
 FIRST = 64  # patterns, the likest to the signal, that one of the two is looked for among: an eighth of the work
 
 
-def left_over(change: np.ndarray, rectified: np.ndarray) -> np.ndarray:
+def residual_shares(change: np.ndarray, rectified: np.ndarray) -> np.ndarray:
     """Return the shares (T, 2) of the changes (T, 19) counts of a typical unit that one and
     two simulated contacts leave.
 
@@ -39,7 +39,7 @@ def left_over(change: np.ndarray, rectified: np.ndarray) -> np.ndarray:
     found = np.full((len(change), 2), np.nan)
     length = np.sqrt(np.square(change, dtype=np.float64).sum(axis=1))
     rows = np.flatnonzero((length >= TOUCHING) & ~rectified)
-    found[rows] = np.stack(left(change[rows] / length[rows, None]), axis=1)
+    found[rows] = np.stack(residual_lengths(change[rows] / length[rows, None]), axis=1)
     return found
 
 
@@ -54,7 +54,7 @@ def unlike(shares: np.ndarray) -> np.ndarray:
     return shares[:, 0] > UNLIKE
 
 
-def left(signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def residual_lengths(signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the length (T,) of what the best single pattern, and the best two, leave of signals (T, 19) of length one.
 
     Two are sought where one leaves enough for them to matter; elsewhere they count as leaving as much.

@@ -24,7 +24,7 @@ from .lost_signs import recovered
 from .network_sizes import PLACE, SURFACES
 from .networks import Networks
 from .posterior import Posterior, touches
-from .simulated_likeness import left_over, two_contacts, unlike
+from .simulated_likeness import residual_shares, two_contacts, unlike
 from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
@@ -160,7 +160,7 @@ class Translator:
         silent = np.isnan(center[:, 0])
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
-        shares = left_over(change, rectified)
+        shares = residual_shares(change, rectified)
         flags[unlike(shares)] |= np.uint16(Flag.UNEXPLAINED)
         confidence = self._confidence(change, flags, rectified)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from tactile_core.sensors.calibration import AMBIENT_TERMS, GEL_INDEX, Calibration, Fit, Response
+from tactile_core.sensors.calibration import AMBIENT_TERMS, Calibration, Fit, Response
 from tactile_core.sensors.camera import Camera, Led
 from tactile_core.sensors.coating import Coating
 
@@ -28,7 +28,7 @@ def plain_unit(**changes: object) -> Calibration:
     gain = Response(tuple(tuple(LEVELS * (i == k) for k in range(3)) for i in range(3)), ZERO, ZERO)
     fit = Fit("round numbers, not fitted", (), 6e-3, {}, {}, ())
     dark = ((0.0,) * AMBIENT_TERMS,) * 3
-    unit = Calibration("plain", camera, LEDS, gain, dark, Coating(), GEL_INDEX, 1.0, "", (1.0, 1.0, 1.0), fit)
+    unit = Calibration("plain", camera, LEDS, gain, dark, Coating(), 1.41, 1.0, "", (1.0, 1.0, 1.0), fit)
     unit = dataclasses.replace(unit, **changes).with_gain(gain)
     lit = tuple((AMBIENT / level, *[0.0] * (AMBIENT_TERMS - 1)) for level in unit.ambient_unit.tolist())
     return dataclasses.replace(unit, ambient=lit)

@@ -9,7 +9,7 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.readers import each_finger
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.translation import simulated_likeness as module
-from tactile_core.translation.simulated_likeness import left, left_over, two_contacts, unlike
+from tactile_core.translation.simulated_likeness import residual_lengths, residual_shares, two_contacts, unlike
 from tactile_core.translation.translate import UNTRAINED_CONFIDENCE, load_translator
 
 
@@ -27,8 +27,8 @@ def test_two_patterns_are_two_and_each_alone_is_one():
     first = 0
     second = int(alike[first].argmin())
     change = 100 * np.stack([patterns[first], patterns[second], patterns[first] + 0.7 * patterns[second]])
-    assert two_contacts(left_over(change, signed(3))).tolist() == [False, False, True]
-    one, two = left(change[2:] / np.linalg.norm(change[2]))
+    assert two_contacts(residual_shares(change, signed(3))).tolist() == [False, False, True]
+    one, two = residual_lengths(change[2:] / np.linalg.norm(change[2]))
     assert two[0] == pytest.approx(0, abs=1e-6) and one[0] > module.MORE_BY_ONE
 
 
@@ -36,13 +36,13 @@ def test_what_is_not_judged_is_not_marked():
     patterns, alike = module._patterns()
     both = patterns[0] + patterns[int(alike[0].argmin())]
     light = both * (0.9 * module.TOUCHING / np.linalg.norm(both))
-    assert not two_contacts(left_over(np.stack([light, 100 * both]), np.array([False, True]))).any()
-    assert not unlike(left_over(np.stack([-light, -100 * both]), np.array([False, True]))).any()
-    assert two_contacts(left_over(np.empty((0, 19)), signed(0))).shape == (0,)
+    assert not two_contacts(residual_shares(np.stack([light, 100 * both]), np.array([False, True]))).any()
+    assert not unlike(residual_shares(np.stack([-light, -100 * both]), np.array([False, True]))).any()
+    assert two_contacts(residual_shares(np.empty((0, 19)), signed(0))).shape == (0,)
     # A unit that resembles no simulated one: noise as large as the signal.
     random = np.random.default_rng(0).standard_normal((50, 19))
-    assert not two_contacts(left_over(100 * random, signed(50))).any()
-    assert unlike(left_over(100 * random, signed(50))).all()
+    assert not two_contacts(residual_shares(100 * random, signed(50))).any()
+    assert unlike(residual_shares(100 * random, signed(50))).all()
 
 
 def test_far_contacts_are_found_and_single_ones_seldom_mistaken(pairs):

@@ -69,7 +69,7 @@ the region, grey levels.
 
 
 def renew(docs: Path) -> list[Row]:
-    """Hold bounds of mechanics and translation against errors anew, in seconds: the plot and its table; their rows.
+    """Compare bounds of mechanics and translation with errors measured again, in seconds; return the rows of the table.
 
     Raises TactileError where docs/benchmark.md has no such table.
     """

@@ -23,7 +23,7 @@ from tactile_core.sensors import digit, digit_surface, electrodes
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation import adapt, networks, reference_signals
 from tactile_core.translation.contact_track import track
-from tactile_core.translation.simulated_likeness import left_over, unlike
+from tactile_core.translation.simulated_likeness import residual_shares, unlike
 from tactile_core.translation.translate import Translator, contact_center
 from tactile_core.translation.unit_rest import find_rest
 
@@ -92,7 +92,7 @@ def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
 
 def unexplained(several: list[Signals]) -> float:
     """Share of all recordings' frames with a change that are called unexplained."""
-    shares = np.concatenate([left_over(each.typical, np.zeros(len(each.change), bool)) for each in several])
+    shares = np.concatenate([residual_shares(each.typical, np.zeros(len(each.change), bool)) for each in several])
     return float(unlike(shares[np.isfinite(shares[:, 0])]).mean())
 
 

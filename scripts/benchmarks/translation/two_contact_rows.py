@@ -10,7 +10,7 @@ import numpy as np
 from tactile_core.accuracy import Row, lengths, row
 from tactile_core.recordings.polarity import TOUCHING
 from tactile_core.simulation.pairs_file import Pairs
-from tactile_core.translation.simulated_likeness import left_over, two_contacts
+from tactile_core.translation.simulated_likeness import residual_shares, two_contacts
 
 from .noise import as_read
 
@@ -50,4 +50,4 @@ def pairs_apart(
 
 
 def _marked(change: np.ndarray) -> np.ndarray:
-    return two_contacts(left_over(as_read(change, SEED), np.zeros(len(change), bool)))
+    return two_contacts(residual_shares(as_read(change, SEED), np.zeros(len(change), bool)))

@@ -24,7 +24,7 @@ import numpy as np  # noqa: E402
 from tactile_core.accuracy import HEADER, Row, line, row  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
 from tactile_core.recordings import contact_law  # noqa: E402
-from tactile_core.translation.simulated_likeness import left_over, unlike  # noqa: E402
+from tactile_core.translation.simulated_likeness import residual_shares, unlike  # noqa: E402
 
 CONTACTS = 5, 10, 20, 40, 100
 FRAMES = 20  # of each recording whose frames are judged one by one
@@ -119,7 +119,7 @@ def measured() -> list[Row]:
     rows = []
     for name, law in ({"right": right} | WRONG).items():
         seen = np.concatenate(recordings(signals(odd=True), FRAMES, law, seed=3))
-        share = unlike(left_over(seen, np.zeros(len(seen), bool))).mean()
+        share = unlike(residual_shares(seen, np.zeros(len(seen), bool))).mean()
         of = f"{len(seen)} frames, each judged alone"
         rows.append(row(f"unexplained_{name}", 100 * float(share), "%", of=of))
     for contacts in CONTACTS:

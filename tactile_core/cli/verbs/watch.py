@@ -43,7 +43,7 @@ examples:
 LEAVES = NOTHING
 POLL = 0.002  # s between two looks at the file
 LONGEST_WAIT = 10.0  # s without a frame that are played; a longer gap is skipped
-TOLD = 1.0  # s between two lines of figures
+REPORT_EVERY = 1.0  # s between two lines of numbers
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
@@ -128,7 +128,7 @@ def _follow(source: Rows, view: View, camera: DigitCamera | None, outputs: list[
             if camera is not None and camera.lost and not lost:
                 lost = True
                 say("the camera gives no more pictures; watching goes on without it")
-            if time.perf_counter() - reported >= TOLD:
+            if time.perf_counter() - reported >= REPORT_EVERY:
                 reported = time.perf_counter()
                 say(view.describe_latency() + (f"; force {shown.newtons:.2f} N" if shown else ""))
     except TactileError:

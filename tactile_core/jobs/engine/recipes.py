@@ -14,7 +14,7 @@ from ...recordings.electrode_gains import SensorFile
 from ...translation.answer import Answer
 from ..results import TRANSLATED, Gel
 
-SHARD_FRAMES = 1000
+SHARD_FRAMES = 1000  # frames a task: seconds of work, so that little is lost when a worker dies (assumed)
 MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
 PICTURE_FRAMES = 50  # rendered frames a shard: some seconds of work, and 80 MB with OpenEXR
 

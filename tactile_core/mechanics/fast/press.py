@@ -127,7 +127,7 @@ class CorrectedPress:
             found = linear, linear * force_factor(self.compliance, seen)
             close = found[1] > 0 and abs(found[1] / force - 1) < FORCE_TOLERANCE
             if seen.depth > self.limit and (close or found[1] < force):
-                if not self.problem.friction:  # what has sunk in bears less than it would
+                if not self.problem.friction:  # what has penetrated bears less than it would
                     self.problem.check_follows(contact)
                 return None
             if close:

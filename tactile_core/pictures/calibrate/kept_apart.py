@@ -14,7 +14,7 @@ from .fit import calibrate, unexplained_share
 from .photographs import Photographs, Press, chosen, turned
 from .press_fit import Sight, fit_ball
 
-FOLDS = 3
+FOLDS = 3  # of cross-validation
 WORTH = 0.8  # of the background's L1: a calibration that leaves more of a press is worth nothing (assumed)
 # What a picture that keeps its shape may be turned by: rows, columns reversed.
 WAYS = {
