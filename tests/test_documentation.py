@@ -75,6 +75,8 @@ ELSEWHERE = {
     "python scenes/mujoco_grasp/grasp.py": ("tests/jobs/test_mujoco_gel.py", "--no-speed"),
     "python3 scripts/build_extension.py": ("tests/blender/test_extension_zip.py", "build_extension"),
     "blender ": ("tests/blender/test_command_line.py", "tactile"),
+    "tactile adapt slips/": ("tests/recordings/test_biotac_sp.py", '["adapt"'),
+    "tactile info slips/": ("tests/recordings/test_biotac_sp.py", '["info"'),
     "sbatch ": ("tests/jobs/engine/test_batch_slurm.py", "sbatch"),
 }
 # What no test runs, and why.
