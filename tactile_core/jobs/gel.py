@@ -157,7 +157,7 @@ class Gel:
         return self._contact
 
     def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
-        """The contact at each of many poses, one after the other; forces : N, as in ``press``, one a pose.
+        """Solve the contact at each of many poses and yield each; forces : N, as in ``press``, one a pose.
 
         What is no pose or force is passed over: the contact before comes again, flagged ``refused``, and the reason is
         logged. Raises TactileError where poses or forces end before the others.
@@ -191,7 +191,7 @@ class Gel:
         return node_areas(self.sensor)
 
     def height_map(self) -> np.ndarray:
-        """Heights (H, W) float32, m, of the DIGIT's gel under the camera's pixels in the last contact.
+        """Return the heights (H, W) float32, m, of the DIGIT's gel under the camera's pixels in the last contact.
 
         Where a hard slide folds the gel over itself the height there is a guess. Raises TactileError for the BioTac.
         """
@@ -202,14 +202,15 @@ class Gel:
             return digit_mapper(self._renderer.camera)(self._contact.displacement)
 
     def picture(self) -> np.ndarray:
-        """Picture (H, W, 3) uint8 that the DIGIT's camera takes of the last contact.
+        """Return the picture (H, W, 3) uint8 that the DIGIT's camera takes of the last contact.
 
         Raises TactileError for the BioTac, which has no camera.
         """
         return self._renderer(self.height_map(), self._renderer.marks(self._contact.displacement))
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
-        """The pose (4, 4) in which the indenter, its own z out of the sensor, stands ``depth`` m past first touch.
+        """Return the pose (4, 4) in which the indenter, its own z out of the sensor,
+        stands ``depth`` m past first touch.
 
         x, z : m, place of its origin in the sensor's frame. Raises TactileError where it passes the sensor by.
         """

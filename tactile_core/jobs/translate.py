@@ -38,7 +38,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
-    """Shards, frames and warnings of a prepared recording."""
+    """Return the shards, frames and warnings of a prepared recording."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
     try:
         about = prepared_signals.Prepared(file).about()

@@ -62,7 +62,7 @@ class Cluster:
         self._tasks: dict[str, tuple[Task, Any]] = {}  # a future that nobody holds is given up
 
     def submit(self, task: Task) -> None:
-        """Have a task done."""
+        """Submit a task; `results` gives its reply."""
         plain = msgspec.to_builtins(task)
         future = self._client.submit(tasks.run, self._folder, plain, pure=False)
         self._tasks[future.key] = task, future

@@ -44,7 +44,7 @@ class Local:
         self._stopped = False
 
     def submit(self, task: Task) -> None:
-        """Have a task done."""
+        """Submit a task; `results` gives its reply."""
         self._todo.put(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
@@ -155,7 +155,7 @@ class InProcess:
         self._folder, self._todo = folder, deque[Task]()
 
     def submit(self, task: Task) -> None:
-        """Have a task done."""
+        """Submit a task; `results` gives its reply."""
         self._todo.append(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:

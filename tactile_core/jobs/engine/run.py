@@ -23,10 +23,10 @@ class Place(Protocol):
     """Executor of tasks; a context manager."""
 
     def submit(self, task: Task) -> None:
-        """Have a task done, some time."""
+        """Submit a task; `results` gives its reply."""
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Replies as they come, as long as `count` says that some are awaited."""
+        """Yield the replies as they come, as long as `count` says that some are awaited."""
 
     def __enter__(self) -> Self: ...
 

@@ -15,7 +15,7 @@ _LONGEST_READ = 2.0  # s, waited at the end for a camera that hangs
 
 
 class DigitCamera:
-    """Reads in a thread of its own, so that a camera that is slow or vanishes holds nothing up.
+    """A DIGIT's camera, read in a thread of its own, so that one that is slow or vanishes holds nothing up.
 
     source : number of a camera (0 is /dev/video0), or a video file, which is played at its own rate
     lost : whether no more pictures come

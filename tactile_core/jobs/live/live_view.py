@@ -46,7 +46,7 @@ class Shown:
 
 
 class View:
-    """Rows in, pictures out: always the newest, older ones that came meanwhile are passed over."""
+    """Translation of arriving rows to pictures: always of the newest; older ones that came meanwhile are skipped."""
 
     def __init__(
         self,

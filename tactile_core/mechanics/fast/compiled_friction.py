@@ -24,7 +24,7 @@ from .stick_slip import LEAST_FORCE
 
 
 class CompiledFriction(Friction):
-    """See ``Friction``; ``solve`` alone is another."""
+    """``Friction`` whose iteration, ``solve``, is compiled."""
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
         """See ``Friction.solve``."""
