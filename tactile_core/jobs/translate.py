@@ -44,7 +44,7 @@ def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
         about = prepared_signals.Prepared(file).about()
     except TactileError:  # none yet, or a damaged one, which the next run makes again
         return None
-    frames, kb = about["frames"], ALWAYS_KB + sum(KEEP_KB[word] for word in job.recipe.keep)
+    frames, kb = about["frames"], sum((KEEP_KB[word] for word in job.recipe.keep), ALWAYS_KB)
     return InputFacts(frame_shard.count(frames, job), frames, tuple(about["warnings"]), int(1e3 * kb * frames))
 
 
