@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .polarity import TOUCHING, patterns, unit
+from .polarity import patterns, spread_out, touching, unit
 
 MOST = 2000  # frames looked at, evenly spread
 NEIGHBOURS = 8  # simulated contacts that a change is put together from
@@ -21,18 +21,13 @@ FEWEST = 15  # different contacts: one press and its noise are like up to a doze
 LEFT, MORE = 0.1856, 0.2076
 
 
-def touching(change: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the changes (T, 19) counts that are contacts."""
-    return np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
-
-
 def unexplained_share(change: np.ndarray) -> tuple[float, int]:
     """Return the share of changes in contact (n, 19) counts, of a typical unit, that simulated contacts do not
     explain, the mean over different contacts, and their number; (0, 0) without contacts.
     """
     if not len(change):
         return 0.0, 0
-    change = change[np.linspace(0, len(change) - 1, min(len(change), MOST)).astype(int)]
+    change = change[spread_out(len(change), MOST)]
     chosen = unit(change)
     known = patterns()
     like = chosen @ known.T

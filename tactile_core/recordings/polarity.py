@@ -25,6 +25,7 @@ TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; belo
 SWING = 15.0
 FEWEST = 20  # frames; of fewer no slope is taken (assumed)
 MOST = 500  # frames looked at, evenly spread
+BLOCK = 2**16  # frames at a time, which bounds the memory of a long recording
 # By how much the likeness of the one sign must exceed the other's; or how much less of the change it must leave over,
 # as a share of what the other leaves: simulated contacts, with noise of 1.5 counts and gains 10 % apart, leave .41 of
 # it in the median, and 1 of 100 more than .7. A light touch that makes the skin bulge is like a firm one upside down,
@@ -91,8 +92,8 @@ def polarity_of(
     change : (T, 19) counts against rest; quiet : (T,) bool, frames that rest was taken from, none where it is a guess
     electrodes : (T, 19) counts, repaired; pdc : (T,) counts, or None; rest_known : true if rest is the unit's own
     """
-    touching = np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
-    contacts = by_contacts(change[touching & ~quiet])
+    frames = np.flatnonzero(touching(change) & ~quiet)
+    contacts = by_contacts(change[frames[spread_out(len(frames), MOST)]])
     if pdc is not None and not (len(pdc) >= FEWEST and bool(np.isfinite(pdc).all()) and np.ptp(pdc) > 0):
         pdc = None
     swing = 0.0 if pdc is None else float(np.subtract(*np.percentile(pdc, [95, 5])))
@@ -122,8 +123,21 @@ def by_contacts(touches: np.ndarray) -> Polarity | None:
     """Decide by changes in contact (n, 19) counts against a known rest; None if there are too few."""
     if len(touches) < FEWEST:
         return None
-    chosen = np.linspace(0, len(touches) - 1, min(len(touches), MOST)).astype(int)
-    return _decided(touches[chosen], "the change in contact")
+    return _decided(touches[spread_out(len(touches), MOST)], "the change in contact")
+
+
+def touching(change: np.ndarray) -> np.ndarray:
+    """Mark (T,) bool the changes (T, 19) counts that are contacts."""
+    found = np.empty(len(change), bool)
+    for start in range(0, len(change), BLOCK):  # their squares would take as much memory as a long recording
+        rows = slice(start, start + BLOCK)
+        found[rows] = np.sqrt(np.square(change[rows]).sum(axis=1)) >= TOUCHING
+    return found
+
+
+def spread_out(count: int, most: int) -> np.ndarray:
+    """Return the indices of at most so many out of ``count``, evenly spread."""
+    return np.linspace(0, count - 1, min(count, most)).astype(int)
 
 
 def _decided(changes: np.ndarray, what: str) -> Polarity:

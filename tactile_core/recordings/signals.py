@@ -16,7 +16,7 @@ from .assemble import check_electrodes
 from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
-from .polarity import AUTO, Polarity, choose, polarity_of
+from .polarity import AUTO, BLOCK, Polarity, choose, polarity_of, spread_out, touching
 from .recording import Recording
 from .repair import fill, find_glitches, is_time_series
 from .rest_level import TARED_PDC, Quiet, baseline, calmest, find_quiet, level, pressure_rest, window_frames
@@ -28,7 +28,6 @@ SCALED_PEAK = 150.0
 FRAMEWISE = ("change", "electrodes", "quiet", "flags", "pdc")  # arrays of `Signals` with a row for each frame
 UNIT_DRIFT = 60.0  # counts that a unit's rest may drift between recordings (the slide set's: 40 to 51 in two days)
 SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (docs/sources.md, BioTac read-out)
-BLOCK = 2**16  # frames that are converted at a time, which bounds the memory of a long recording
 SHOWN = 8  # bad places spelled out one by one in the warnings
 
 
@@ -127,8 +126,12 @@ class Signals:
             return self.change
         found = np.empty(self.change.shape)
         for start in range(0, len(found), BLOCK):
-            found[start : start + BLOCK] = divider.typical(self.change[start : start + BLOCK], self.rest)
+            found[start : start + BLOCK] = self.typical_of(slice(start, start + BLOCK))
         return found
+
+    def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
+        """Change (n, 19) counts of some frames alone, as ``typical`` has them."""
+        return divider.typical(self.change[rows], self.rest) if self.kind == "raw" else self.change[rows]
 
 
 def prepare(recording: Recording, options: PrepareOptions | None = None) -> Signals:
@@ -178,9 +181,12 @@ def doubt_law(signals: Signals) -> Signals:
     """Flag the frames in contact, and warn, where together they resemble no simulated ones; undoes an older doubt."""
     if signals.kind not in ("raw", "tared"):
         return signals
-    typical = signals.typical
-    contact = contact_law.touching(typical) & ~signals.quiet
-    words = contact_law.doubt(typical[contact])
+    contact = ~signals.quiet
+    for start in range(0, len(contact), BLOCK):
+        rows = slice(start, start + BLOCK)
+        contact[rows] &= touching(signals.typical_of(rows))
+    frames = np.flatnonzero(contact)
+    words = contact_law.doubt(signals.typical_of(frames[spread_out(len(frames), contact_law.MOST)]))
     flags = signals.flags & ~np.uint16(Flag.LAW_DOUBTED)
     if words:
         flags[contact] |= np.uint16(Flag.LAW_DOUBTED)
