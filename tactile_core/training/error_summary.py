@@ -1,4 +1,4 @@
-"""Figures a contact -> rows: depth bins and indenters count alike, deeper and sliding contacts stand apart."""
+"""Summarise metrics of contacts in rows: depth bins and indenters count alike, deeper and sliding contacts apart."""
 
 from __future__ import annotations
 

@@ -158,7 +158,7 @@ def latent_loss(found: Tensor, target: Tensor) -> Tensor:
 def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
     """Compute the loss of the whole chain: a frozen chain is 23-26 % worse than signal -> DIGIT directly.
 
-    docs/sources.md, Networks, has the figure. Shapes are held against the truth where the contact truly is, places by
+    docs/sources.md, Networks, has the number. Shapes are held against the truth where the contact truly is, places by
     themselves: a dent beside its place would be paid for with being faint. The gel's place is the state's, which the
     signal's surprise has learned. The autoencoders' own losses stay in at half, so that latents keep their meaning and
     meshes can be encoded. What the signal says of the contact is learned before and stays as it is.

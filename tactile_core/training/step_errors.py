@@ -18,7 +18,7 @@ from ..translation.translate import contact_center
 
 ROWS = 128  # contacts at a time, to bound memory
 LEAST_PATCH = 20  # nodes: on smaller patches a share says little
-Columns = dict[str, np.ndarray]  # name of a figure -> (C,) a number a contact; NaN where it does not apply
+Columns = dict[str, np.ndarray]  # name of a metric -> (C,) a number a contact; NaN where it does not apply
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def translation_figures(nets: Networks, pairs: Pairs, rows: np.ndarray, change: 
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
     (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); the other way ``D2B`` (DIGIT mesh to BioTac mesh), and
-    ``B2S``, ``D2S`` (meshes to signal). Figures: see `mesh_columns`; ``baseline_*`` are those of no displacement.
+    ``B2S``, ``D2S`` (meshes to signal). Metrics: see `mesh_columns`; ``baseline_*`` are those of no displacement.
     """
     return joined(_part(nets, pairs, rows[part], change[part], bodies) for part in parts(len(rows)))
 

@@ -22,7 +22,7 @@ from .live_signals import LiveSignals
 if TYPE_CHECKING:
     from ...recordings.electrode_gains import ElectrodeGains
 
-REMEMBERED = 1000  # latencies that figures are taken over
+REMEMBERED = 1000  # latencies whose quantiles are reported
 
 
 @dataclass(frozen=True, eq=False)
