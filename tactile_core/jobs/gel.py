@@ -91,7 +91,7 @@ class Gel:
     >>> contact = gel.press(pose)                        # contact.force N, .displacement m, .traction Pa
     >>> picture = gel.picture()                          # (320, 240, 3) uint8
 
-    sensor : the name of one that is there, as "digit" or "biotac"
+    sensor : name of a sensor, such as "digit" or "biotac"
     indenter : one of ``geometry.indenters``, or a closed ``trimesh.Trimesh`` in metres
     friction : Coulomb's coefficient; 0 for none
     calibration : of the camera and its lights, None for the one that ships; preset : of the pictures

@@ -11,7 +11,7 @@ import numpy as np
 
 from .solids.finite_strain import FiniteStrainSolid, State
 
-Sensor = str  # the name of one that is there, as "biotac"
+Sensor = str  # name of a sensor, such as "biotac"
 Tier = Literal["fast", "full", "reference"]
 TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
 

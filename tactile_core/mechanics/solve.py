@@ -40,7 +40,7 @@ def solve(
 ) -> Solution:
     """Press ``indenter`` into ``sensor`` at ``place`` to a depth, m, or a force along the motion, N.
 
-    sensor : the name of one that is there, as ``"digit"``; indenter : of ``tactile.indenters``, in m
+    sensor : name of a sensor, such as ``"digit"``; indenter : of ``tactile.indenters``, in m
     place : a ``tactile.Placement``, or the indenter's pose at first touch
     depth, force : one of the two: m beyond first touch, or N, found to a thousandth
     tier : ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round

@@ -18,7 +18,7 @@ from .fluid_sensor import Fluid
 from .gel_sensor import Gel
 
 FOLDER = Path(__file__).parent
-OWN = "TACTILE_SENSORS"  # environment variable: a folder with sensors of one's own
+OWN = "TACTILE_SENSORS"  # environment variable: a folder with the user's own sensors
 FILE, FORMAT = "sensor.toml", "tactile-sensor-1"
 _S = TypeVar("_S", Fluid, Gel)
 
@@ -26,25 +26,23 @@ KINDS: dict[str, type[Fluid] | type[Gel]] = {"fluid": Fluid, "gel": Gel}
 
 
 def _folders() -> dict[str, Path]:
-    """Folders with a descriptor by their names: those that ship, and those in ``$TACTILE_SENSORS``."""
+    """Find folders with a descriptor, by their names: those that ship, and those in ``$TACTILE_SENSORS``."""
     own = os.environ.get(OWN)
     places = [Path(own), FOLDER] if own else [FOLDER]
     return {path.parent.name: path.parent for place in places for path in sorted(place.glob(f"*/{FILE}"))}
 
 
 def names() -> tuple[str, ...]:
-    """List the sensors that are there: those that ship, and folders of one's own in ``$TACTILE_SENSORS``."""
+    """List the known sensors: those that ship, and the user's own folders in ``$TACTILE_SENSORS``."""
     return tuple(sorted(_folders()))
 
 
 @functools.cache
 def describe(name: str) -> Fluid | Gel:
-    """Read the descriptor of a sensor that is there. Raises TactileError for a name that is none."""
+    """Read the descriptor of a known sensor. Raises TactileError for an unknown name."""
     folder = _folders().get(name)
     if folder is None:
-        raise TactileError(
-            "sensor", repr(name), ", ".join(names()), f"Name one that is there, or put its folder into ${OWN}"
-        )
+        raise TactileError("sensor", repr(name), ", ".join(names()), f"Name a known one, or put its folder into ${OWN}")
     return read(folder)
 
 

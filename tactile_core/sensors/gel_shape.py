@@ -15,7 +15,7 @@ from .profiles import read_heights
 
 @functools.cache
 def shape_of(name: str) -> GelShape:
-    """Return the shape of the gel of a sensor that is there. Raises TactileError for one that has none."""
+    """Return the shape of a sensor's gel. Raises TactileError for a sensor without one."""
     return GelShape(of_kind(name, Gel))
 
 
