@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -15,6 +16,9 @@ from typing import Any
 from ..errors import TactileError
 from . import lock
 
+# What json.dumps writes for a number, name or constant, and for a list of them, one a line. Strings hold no line feed.
+_PLAIN = re.compile(r'"(?:[^"\\]|\\.)*"|[-+.\w]+')
+_PLAIN_LIST = re.compile(rf"\[\n\s*(?:{_PLAIN.pattern})(?:,\n\s*(?:{_PLAIN.pattern}))*\n\s*\]")
 _LONGEST = 200  # bytes of a name; with a dot, a word and a token it stays below the 255 of common file systems
 
 
@@ -50,8 +54,12 @@ def write_bytes(path: str | os.PathLike, content: bytes, *, shared: bool = False
 
 
 def write_json(path: str | os.PathLike, content: Any, *, shared: bool = False) -> None:
-    """Write readable JSON with sorted keys, so that equal content is equal bytes; raises ValueError for NaN."""
+    """Write readable JSON with sorted keys, so that equal content is equal bytes; raises ValueError for NaN.
+
+    A list of numbers or names takes one line.
+    """
     text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    text = _PLAIN_LIST.sub(lambda found: "[" + ", ".join(_PLAIN.findall(found[0])) + "]", text)
     # A file name that is no UTF-8 holds lone surrogates, which become JSON's own escapes.
     write_bytes(path, (text + "\n").encode(errors="backslashreplace"), shared=shared)
 

@@ -168,3 +168,12 @@ def test_a_name_as_long_as_file_systems_take(tmp_path):
     with atomic.new_folder(tmp_path / ("m" * 254)) as folder:
         (folder / "a").write_bytes(b"x")
     assert sorted(len(each.name) for each in tmp_path.iterdir()) == [254, 254]
+
+
+def test_json_has_plain_lists_on_one_line_and_reads_back(tmp_path):
+    hostile = ["a", 'b "c", [\n1\n]', "\\", "ä", -1.5e-300, 3, True, None]
+    content = {"z": hostile, "a": [[1, 2], [], [{"b": [0.25]}]], "s": "[\n  1,\n  2\n]", "e": {}, 'k"[': ["x"]}
+    atomic.write_json(tmp_path / "a.json", content)
+    text = (tmp_path / "a.json").read_text(encoding="utf-8")
+    assert json.loads(text) == content and list(json.loads(text)) == sorted(content)
+    assert "[1, 2]" in text and '"b": [0.25]' in text and len(text.splitlines()) < 24
