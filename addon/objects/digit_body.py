@@ -12,7 +12,7 @@ from ...tactile_core.sensors import digit
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from ...tactile_core.sensors.camera import HEIGHT_ZERO_Y, Camera, Led
 from ..ui import properties
-from . import digit_materials, image_frame, surfaces
+from . import digit_materials, held_light, image_frame, surfaces
 
 CAMERA = "DIGIT camera"
 _CHIP = np.array([1.6e-3, 0.8e-3, 0.6e-3])  # m, sides of an LED package (0603)
@@ -52,6 +52,8 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
     if camera_of(gel) is None:
         lens = _child(gel, CAMERA, bpy.data.cameras.new(CAMERA), "NONE")
         place_camera(lens, gel, unit.camera)
+    if held_light.NODE not in coating_of(gel).node_tree.nodes:
+        _hold_light(gel, unit)
 
 
 def reset(gel: bpy.types.Object, unit: Calibration) -> None:
@@ -65,6 +67,22 @@ def reset(gel: bpy.types.Object, unit: Calibration) -> None:
     lens.animation_data_clear(), lens.data.animation_data_clear()
     place_camera(lens, gel, unit.camera)
     digit_materials.set_coating(coating_of(gel), unit.coating)
+    _hold_light(gel, unit)
+
+
+def _hold_light(gel: bpy.types.Object, unit: Calibration) -> None:
+    """Add the light that gel and acrylic hold, which goes with the LEDs' power."""
+    held_light.write(gel, unit)
+    gel.visible_shadow = False  # its dome, higher than the calibrated gel's, would hide the LEDs from its edges
+    material = coating_of(gel)
+    if held_light.NODE not in material.node_tree.nodes:
+        held_light.add_nodes(material)
+    held_light.drive(material, leds_of(gel), {led.colour: _power(led, gel) for led in unit.leds})
+
+
+def _power(led: Led, gel: bpy.types.Object) -> float:
+    """Blender's power, W, of an LED's lamp."""
+    return led.radiance * led.radius**2 * watts_per_brightness(gel.tactile.per_metre)
 
 
 def watts_per_brightness(per_metre: float) -> float:
@@ -110,6 +128,7 @@ def _add_led(gel: bpy.types.Object, led: Led) -> bpy.types.Object:
     properties.set_up(chip, "BODY", gel.tactile.per_metre)
     gel.users_collection[0].objects.link(chip)
     chip.parent, chip.hide_select = thing, True
+    chip.visible_shadow = False  # it stands inside its lamp
     chip.data.materials.append(digit_materials.glow())
     for index in range(3):
         _drive(chip, index, thing.data)
@@ -133,8 +152,8 @@ def _place_led(thing: bpy.types.Object, gel: bpy.types.Object, led: Led, unit: C
     thing.location = image_frame.to_gel([led.position], unit.camera, per_metre)[0]
     lamp = thing.data
     lamp.color = _COLOURS[led.colour]
-    lamp.shadow_soft_size = led.radius * per_metre
-    lamp.energy = led.radiance * led.radius**2 * watts_per_brightness(per_metre)
+    lamp.shadow_soft_size, lamp.use_soft_falloff = led.radius * per_metre, False
+    lamp.energy = _power(led, gel)
 
 
 def _add_shell(gel: bpy.types.Object, unit: Calibration) -> None:

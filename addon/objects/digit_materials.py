@@ -1,4 +1,8 @@
-"""Materials of a DIGIT's body for Cycles and EEVEE; the coating's numbers are those that the picture is made with."""
+"""Materials of a DIGIT's body for Cycles and EEVEE; the coating's numbers are those that the picture is made with.
+
+Packages, acrylic and housing shine and reflect toward a camera alone: what they give the gel is part of the light held
+in it (``held_light``), as the calibration counts it.
+"""
 
 from __future__ import annotations
 
@@ -53,28 +57,28 @@ def glow() -> bpy.types.Material:
     material, shader = _new("DIGIT LED", (1, 1, 1, 1))
     colour = material.node_tree.nodes.new("ShaderNodeObjectInfo")
     material.node_tree.links.new(colour.outputs["Color"], shader.inputs["Emission Color"])
-    shader.inputs["Base Color"].default_value = (0, 0, 0, 1)
-    shader.inputs["Emission Strength"].default_value = 20.0  # shows as lit; the lamp is what lights the gel
+    shader.inputs["Base Color"].default_value, shader.inputs["Specular IOR Level"].default_value = (0, 0, 0, 1), 0.0
+    # Shows as lit; the lamp is what lights the gel.
+    material.node_tree.links.new(toward_camera(material, 20.0), shader.inputs["Emission Strength"])
     return material
 
 
 def acrylic() -> bpy.types.Material:
-    """Clear acrylic that lets the LEDs' light through: transparent, with what glass reflects."""
+    """Clear acrylic: all light goes through, as losses are part of the calibration too; reflections come on top."""
     found = bpy.data.materials.get("DIGIT acrylic")
     if found is not None:
         return found
     material, shader = _new("DIGIT acrylic", (0.7, 0.8, 0.85, 0.25))
     nodes, links = material.node_tree.nodes, material.node_tree.links
-    clear, gloss, mix = (nodes.new(f"ShaderNode{kind}") for kind in ("BsdfTransparent", "BsdfGlossy", "MixShader"))
+    clear, gloss, both = (nodes.new(f"ShaderNode{kind}") for kind in ("BsdfTransparent", "BsdfGlossy", "AddShader"))
     fresnel = nodes.new("ShaderNodeFresnel")
     fresnel.inputs["IOR"].default_value = 1.49  # of acrylic
-    clear.inputs["Color"].default_value = (0.93, 0.97, 0.97, 1)
     gloss.inputs["Roughness"].default_value = 0.05
     output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
     nodes.remove(shader)
-    links.new(fresnel.outputs[0], mix.inputs[0])
-    links.new(clear.outputs[0], mix.inputs[1]), links.new(gloss.outputs[0], mix.inputs[2])
-    links.new(mix.outputs[0], output.inputs["Surface"])
+    links.new(toward_camera(material, fresnel.outputs[0]), gloss.inputs["Color"])
+    links.new(clear.outputs[0], both.inputs[0]), links.new(gloss.outputs[0], both.inputs[1])
+    links.new(both.outputs[0], output.inputs["Surface"])
     if hasattr(material, "surface_render_method"):
         material.surface_render_method = "BLENDED"
     return material
@@ -86,9 +90,28 @@ def housing() -> bpy.types.Material:
     if found is not None:
         return found
     material, shader = _new("DIGIT housing", (0.03, 0.03, 0.035, 1.0))
-    shader.inputs["Base Color"].default_value = (0.015, 0.015, 0.017, 1)
     shader.inputs["Roughness"].default_value = 0.45
+    material.node_tree.links.new(toward_camera(material, 0.015), shader.inputs["Base Color"])
+    material.node_tree.links.new(toward_camera(material, 0.5), shader.inputs["Specular IOR Level"])
     return material
+
+
+def toward_camera(material: bpy.types.Material, value: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
+    """A value for rays that come from a camera, 0 for all others."""
+    ray = material.node_tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"]
+    return math(material, "MULTIPLY", ray, value)
+
+
+def math(material: bpy.types.Material, operation: str, *values: object, kind: str = "Math") -> bpy.types.NodeSocket:
+    """The output of a new math node; kind : ``VectorMath`` for one of vectors."""
+    node = material.node_tree.nodes.new(f"ShaderNode{kind}")
+    node.operation = operation
+    for socket, value in zip([socket for socket in node.inputs if socket.enabled], values, strict=False):
+        if isinstance(value, bpy.types.NodeSocket):
+            material.node_tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+    return node.outputs[0]
 
 
 def _new(name: str, shown: tuple[float, ...]) -> tuple[bpy.types.Material, bpy.types.Node]:

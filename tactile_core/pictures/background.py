@@ -50,11 +50,15 @@ def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> 
 
 
 def _open_light(unit: Calibration) -> np.ndarray:
-    """Picture (H, W, 3) of the untouched gel where nothing is in the LEDs' way, as nothing is on a smooth dome."""
+    return by_led(unit, open_radiance(unit)).sum(-1)
+
+
+def open_radiance(unit: Calibration) -> np.ndarray:
+    """Radiance (H, W, 3) of the untouched gel where nothing is in the LEDs' way, as nothing is on a smooth dome."""
     height = of_unit(rest_height_map(unit.camera), unit).astype(np.float32)
     right, down = np.meshgrid(unit.camera.right, unit.camera.down)
     hits = Hits.from_slopes(np.stack([right, down, height], -1).astype(np.float32), *slopes(height, unit.camera))
-    return by_led(unit, direct_light(hits, None, [np.array([led.position]) for led in unit.leds], unit)).sum(-1)
+    return direct_light(hits, None, [np.array([led.position]) for led in unit.leds], unit)
 
 
 def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:

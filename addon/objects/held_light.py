@@ -1,0 +1,125 @@
+"""Light held in gel and acrylic, for Cycles and EEVEE: what a DIGIT's picture at rest has over its lamps' own light.
+
+Three attributes of the gel's points hold it, one an LED, in levels of each channel at the calibration's power and an
+albedo of 1; the coating's material adds them to what the lamps give, as bright as the LEDs and the albedo are now. With
+the camera's response, which mixes the LEDs' colours, a lamp can be brighter than the picture: then it is negative.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...tactile_core import sensors
+from ...tactile_core.pictures.background import by_led, open_radiance, resting_picture
+from ...tactile_core.pictures.mitsuba.direct_light import lookup
+from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
+from ...tactile_core.sensors.camera import COLOURS, HEIGHT_ZERO_Y
+from ...tactile_core.sensors.unrolling import node_normals
+from . import digit_materials
+
+NODE = "Held light"  # the sum of the LEDs' parts, in the material
+_DARKEST = 1e-3  # of an albedo or a radiance that is divided by
+
+
+def attribute(colour: str) -> str:
+    """The name of an LED's attribute."""
+    return f"{NODE} {colour}"
+
+
+def write(gel: bpy.types.Object, unit: Calibration) -> None:
+    """Give the gel's points a unit's held light, in place of another's."""
+    levels = held_light(unit)
+    mesh = gel.data
+    for k, colour in enumerate(COLOURS):
+        name = attribute(colour)
+        held = mesh.attributes.get(name) or mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+        scaled = levels[..., k] / max(unit.coating.albedo[k], _DARKEST)
+        held.data.foreach_set("vector", np.ascontiguousarray(scaled, np.float32).ravel())
+
+
+def held_light(unit: Calibration) -> np.ndarray:
+    """Levels (n, 3, 3), channel by LED, that the picture at rest has at the gel's nodes over the light of its lamps."""
+    radiance = open_radiance(unit)
+    levels = by_led(unit, radiance)
+    diagonal = np.arange(3)
+    levels[..., diagonal, diagonal] += resting_picture(unit, radiance) - levels.sum(-1)  # a photograph's
+    camera = unit.camera
+    x, y, z = sensors.digit_surface().rest.T
+    look_up = lookup(*camera.to_pixel(x, z, y - HEIGHT_ZERO_Y), camera.shape)
+    maps = np.ascontiguousarray(levels.reshape(*camera.shape, 9).transpose(2, 0, 1))
+    held = np.stack([look_up(part) for part in maps], -1).reshape(-1, 3, 3)
+    held[:, diagonal, diagonal] -= _lamp_light(unit)
+    return held
+
+
+def _lamp_light(unit: Calibration) -> np.ndarray:
+    """Levels (n, 3) that each LED's lamp gives the gel's nodes as Blender has them, by Lambert's law."""
+    surface, camera = sensors.digit_surface(), unit.camera
+
+    def in_image(points: np.ndarray) -> np.ndarray:
+        return np.stack([camera.right_z * points[:, 2], camera.down_x * points[:, 0], points[:, 1]], -1)
+
+    middle = np.array([[camera.centre_x, HEIGHT_ZERO_Y, camera.centre_z]])
+    places, inward = in_image(surface.rest - middle), -in_image(node_normals(surface.rest, surface.faces))
+    light = np.empty((len(places), 3))
+    for k, led in enumerate(unit.leds):
+        toward = np.asarray(led.position) - places
+        distance = np.linalg.norm(toward, axis=1)
+        facing = np.maximum((toward * inward).sum(1), 0.0) / distance
+        light[:, k] = led.radiance * unit.coating.albedo[k] * led.radius**2 * facing / distance**2
+    return light
+
+
+def add_nodes(material: bpy.types.Material) -> None:
+    """Let a coating glow by the attributes, on its inner side and toward a camera alone.
+
+    There it throws no light back onto itself either: on the calibrated gel that is a part of a level, but Blender's
+    gel has the public mesh's dome, three times as high, and the light held has all of it at rest.
+    """
+    nodes, links, math = material.node_tree.nodes, material.node_tree.links, digit_materials.math
+    albedo = nodes[digit_materials.ALBEDO].outputs[0]
+    colour = nodes.new("ShaderNodeSeparateColor")
+    links.new(albedo, colour.inputs[0])
+    total = None
+    for k, name in enumerate(COLOURS):
+        held, power = nodes.new("ShaderNodeAttribute"), nodes.new("ShaderNodeValue")
+        held.attribute_name, power.name, power.label = attribute(name), attribute(name), attribute(name)
+        share = math(material, "MULTIPLY", power.outputs[0], colour.outputs[k])
+        part = math(material, "SCALE", held.outputs["Vector"], share, kind="VectorMath")
+        total = part if total is None else math(material, "ADD", total, part, kind="VectorMath")
+    inner = nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"]
+    seen = digit_materials.toward_camera(material, inner)
+    glow, both = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeAddShader")
+    glow.name = glow.label = NODE
+    links.new(total, glow.inputs["Color"])
+    links.new(math(material, "DIVIDE", seen, LARGEST_LEVEL), glow.inputs["Strength"])
+    output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
+    links.new(output.inputs["Surface"].links[0].from_socket, both.inputs[0])
+    links.new(glow.outputs[0], both.inputs[1])
+    links.new(both.outputs[0], output.inputs["Surface"])
+    between = math(material, "SUBTRACT", inner, seen)
+    lit = math(material, "SCALE", albedo, math(material, "SUBTRACT", 1.0, between), kind="VectorMath")
+    for link in [link for link in albedo.links if link.to_socket.name == "Base Color"]:
+        links.new(lit, link.to_socket)
+
+
+def drive(material: bpy.types.Material, leds: dict[str, bpy.types.Object], full: dict[str, float]) -> None:
+    """Let each part follow its LED's power in its own colour; works without the add-on.
+
+    full : Blender's power of each LED's lamp, W, at the calibration's
+    """
+    for k, name in enumerate(COLOURS):
+        socket = material.node_tree.nodes[attribute(name)].outputs[0]
+        socket.driver_remove("default_value")
+        socket.default_value = 0.0
+        if name not in leds or not full[name] > 0:
+            continue
+        driver = socket.driver_add("default_value").driver
+        driver.type, lamp = "SCRIPTED", leds[name].data
+        for label, kind, thing, path in (("power", "LIGHT", lamp, "energy"), ("shade", "LIGHT", lamp, f"color[{k}]"),
+                                         ("off", "OBJECT", leds[name], "hide_render")):  # fmt: skip
+            variable = driver.variables.new()
+            variable.name, target = label, variable.targets[0]
+            target.id_type, target.id, target.data_path = kind, thing, path
+        driver.expression = f"power * shade * (1 - off) / {full[name]!r}"
