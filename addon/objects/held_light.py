@@ -78,6 +78,8 @@ def add_nodes(material: bpy.types.Material) -> None:
     gel has the public mesh's dome, three times as high, and the light held has all of it at rest.
     """
     nodes, links, math = material.node_tree.nodes, material.node_tree.links, digit_materials.math
+    for left in [node for node in nodes if node.name.startswith(NODE)]:
+        nodes.remove(left)
     albedo = nodes[digit_materials.ALBEDO].outputs[0]
     colour = nodes.new("ShaderNodeSeparateColor")
     links.new(albedo, colour.inputs[0])
@@ -95,7 +97,8 @@ def add_nodes(material: bpy.types.Material) -> None:
     links.new(total, glow.inputs["Color"])
     links.new(math(material, "DIVIDE", seen, LARGEST_LEVEL), glow.inputs["Strength"])
     output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
-    links.new(output.inputs["Surface"].links[0].from_socket, both.inputs[0])
+    for link in output.inputs["Surface"].links:
+        links.new(link.from_socket, both.inputs[0])
     links.new(glow.outputs[0], both.inputs[1])
     links.new(both.outputs[0], output.inputs["Surface"])
     between = math(material, "SUBTRACT", inner, seen)
