@@ -34,20 +34,6 @@ def pressed():
     return solve("digit", Sphere(5e-3), Placement(-8e-3, 1e-3), force=1.0)
 
 
-def test_the_radius_of_a_ball_is_read_off_its_dent(pressed):
-    # Nodes between those in contact are off the ball, and the dent is a cap where the fit is a paraboloid: 15 %.
-    assert solved_gel.patch_radius(pressed.displacement, pressed.contact_patch) == pytest.approx(5e-3, rel=0.15)
-
-
-def test_flat_and_small_patches_take_radii_that_the_networks_know():
-    rest = np.zeros_like(sensors.digit_surface().rest)
-    none = np.zeros(len(rest), bool)
-    assert solved_gel.patch_radius(rest, none) == solved_gel.USUAL_RADIUS
-    level = rest.copy()
-    level[:, 1] = -sensors.digit_surface().rest[:, 1]  # all nodes in one plane
-    assert solved_gel.patch_radius(level, ~none) == pytest.approx(solved_gel.RADII[1])
-
-
 def test_a_solved_gel_is_the_gel_that_was_pressed(pressed):
     gel = pressed.displacement[None]
     center = accuracy.dent_center(gel, sensors.digit_surface().rest)

@@ -169,18 +169,19 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
     mean = (posterior.weight[:, :, None] * posterior.mean).sum(1)
     found = {}
     for name, state in (("likely", posterior.likely), ("mean", mean)):
-        gel, force = nets.decode_digit(nets.latents(read, state)[1]), FORCE_SCALE * np.sinh(state[:, PLACE])
+        skin, latent = nets.latents(read, state)
+        gel, force = nets.decode_digit(latent), FORCE_SCALE * np.sinh(state[:, PLACE])
         found |= _figures(name, gel, force, pairs, part, bodies)
         if name == "likely":
-            found |= _figures("solved", solved_gels(gel, force), force, pairs, part, bodies)
+            found |= _figures("solved", solved_gels(gel, nets.force_in(state, skin)), force, pairs, part, bodies)
     return found
 
 
 def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Solve the contacts of gels (B, M, 3) m that networks translated, under forces (B,) N."""
+    """Solve the contacts of gels (B, M, 3) m that networks translated, under forces (B, 3) N."""
     arrays = {
         "displacement_digit": gel, "contact_center": accuracy.dent_center(gel, sensors.digit_surface().rest),
-        "force": force[:, None], "flags": np.zeros(len(gel), np.uint16),
+        "force": force, "flags": np.zeros(len(gel), np.uint16),
     }  # fmt: skip
     return solved_gel.solved(arrays)["displacement_digit"]
 

@@ -15,6 +15,7 @@ from tactile_core.translation.network_sizes import SURFACES
 from tactile_core.translation.translate import Translator
 
 from .contact_rows import answer_rows, gel_force_rows, posterior_rows, rectified_rows
+from .mechanics_rows import mechanics_rows
 from .noise import as_read
 from .slide_metrics import rank_correlation
 
@@ -55,6 +56,7 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
         at = pairs.indenter == number
         each = {figure: np.where(at, columns[figure], np.nan) for figure in (*EACH_INDENTER, *BASELINE_FIGURES)}
         found += [one for one in figure_rows(each, pairs, rows, name, {}) if one["value"] is not None]
+    found += mechanics_rows(pairs, bodies)
     found += window_rows(translator, pairs, bodies)
     return [*found, *expected_error_rows(translator, pairs, rows, change, bodies, "seen indenters")]
 
