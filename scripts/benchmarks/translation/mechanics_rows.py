@@ -37,7 +37,7 @@ def mechanics_rows(pairs: Pairs, bodies: Bodies) -> list[Row]:
 
 
 def _columns(pairs: Pairs, rows: np.ndarray, bodies: Bodies) -> Columns:
-    """Figures of one contact; one that is not found or not borne by the gel counts as no displacement."""
+    """Metrics of one contact; one that is not found or not borne by the gel counts as no displacement."""
     skin, gel = (true_displacement(pairs, sensor, rows) for sensor in ("biotac", "digit"))
     found = np.zeros_like(gel)
     with contextlib.suppress(TactileError):
