@@ -117,6 +117,12 @@ def inputs(tmp_path_factory) -> Path:
         write_touch(folder / name, frames)
     own = (folder / "touch.csv").read_text(encoding="utf-8").replace("ele", "Taxel ").replace("timestamp", "t")
     (folder / "own.csv").write_text(own, encoding="utf-8")
+    (folder / "slips").mkdir()
+    for name in ("n1", "n2", "s1"):  # of a BioTac SP
+        counts = np.random.default_rng(0).integers(2600, 3700, (30, 24))
+        header = ",".join(f"ff_e{number}" for number in range(1, 25))
+        np.savetxt(folder / "slips" / f"{name}.csv", counts, fmt="%d", delimiter=",", header=header, comments="")
+    (folder / "locations.csv").touch()
     (folder / "brief").mkdir()
     (folder / "brief" / "scene.toml").write_text(BRIEF)
     unit = plain_unit()

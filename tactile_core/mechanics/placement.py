@@ -30,11 +30,16 @@ class Placement:
     tilt_heading: float = 0.0
 
 
-def biotac_pose(indenter: Indenter, place: Placement) -> Pose:
-    """First touch on the BioTac, at the place of its pad that rolls onto (x, z) of the DIGIT's plane."""
-    point, outward = unrolling.roll_up(np.array([place.x, place.z]))
+def skin_pose(sensor: str, indenter: Indenter, place: Placement) -> Pose:
+    """First touch on a fluid sensor, at the place of its pad that rolls onto (x, z) of the DIGIT's plane."""
+    point, outward = unrolling.roll_up(np.array([place.x, place.z]), sensor)
     pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
-    return first_touch(sensors.biotac_surface(), indenter, pose)
+    return first_touch(sensors.sensor_surface(sensor), indenter, pose)
+
+
+def biotac_pose(indenter: Indenter, place: Placement) -> Pose:
+    """First touch on the BioTac; see ``skin_pose``."""
+    return skin_pose("biotac", indenter, place)
 
 
 def gel_pose(sensor: str, indenter: Indenter, place: Placement) -> Pose:
@@ -51,7 +56,7 @@ def digit_pose(indenter: Indenter, place: Placement) -> Pose:
 
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
     """First touch on a sensor."""
-    return gel_pose(sensor, indenter, place) if sensors.is_gel(sensor) else biotac_pose(indenter, place)
+    return (gel_pose if sensors.is_gel(sensor) else skin_pose)(sensor, indenter, place)
 
 
 def on_gel(x: float, z: float, margin: float = 0.0, sensor: str = "digit") -> bool:

@@ -8,7 +8,6 @@ import numpy as np
 
 from .. import sensors
 from ..geometry.indenters import Indenter, Pose
-from ..sensors import biotac
 
 DEPTH_LIMIT = 0.6  # of the thickness: the deepest that contacts are asked for
 _DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
@@ -27,16 +26,17 @@ def thickness(sensor: str, point: np.ndarray) -> float:
         shape = sensors.shape_of(sensor)
         on_dome, outward = shape.dome_point(float(point[0]), float(point[2]))
         return float((shape.back_y - on_dome[1]) / -outward[1])
-    node = int(np.argmin(((sensors.biotac_surface().rest - point) ** 2).sum(axis=1)))
-    return _to_core(point, _outward()[node])
+    node = int(np.argmin(((sensors.sensor_surface(sensor).rest - point) ** 2).sum(axis=1)))
+    return _to_core(sensor, point, _outward(sensor)[node])
 
 
-def _to_core(point: np.ndarray, outward: np.ndarray) -> float:
-    """Distance, m, from a point (3,) m of the BioTac's skin along its inward normal to the core, or to the axis."""
+def _to_core(sensor: str, point: np.ndarray, outward: np.ndarray) -> float:
+    """Distance, m, from a point (3,) m of a skin along its inward normal to the core, or to the axis."""
+    skin = sensors.skin_of(sensor)
     distance = np.arange(0, _FARTHEST, _STEP)
     x, y, z = (point - distance[:, None] * outward).T
-    radius = np.hypot(y - biotac.AXIS_Y, z)
-    over = radius - biotac.core_radius(x, np.arctan2(z, biotac.AXIS_Y - y))
+    radius = np.hypot(y - skin.axis_y, z)
+    over = radius - skin.core_radius(x, np.arctan2(z, skin.axis_y - y))
     inside = np.flatnonzero(over <= 0)
     if not len(inside):
         return float(distance[np.argmin(radius)])
@@ -56,7 +56,7 @@ def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
     node = int(nodes[np.argmin(gap)])
     if sensors.is_gel(sensor):
         return thickness(sensor, surface.rest[node])
-    return _to_core(surface.rest[node], _outward()[node])
+    return _to_core(sensor, surface.rest[node], _outward(sensor)[node])
 
 
 def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:
@@ -65,9 +65,9 @@ def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float
 
 
 @functools.cache
-def _outward() -> np.ndarray:
+def _outward(sensor: str) -> np.ndarray:
     """Outward normals (n, 3) of the resting skin."""
     from ..sensors import unrolling as surface
 
-    lattice = sensors.biotac_surface()
+    lattice = sensors.sensor_surface(sensor)
     return surface.node_normals(lattice.rest, lattice.faces)

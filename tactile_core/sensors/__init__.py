@@ -9,25 +9,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import TactileError
 from ..geometry.lattice import Lattice
 from . import biotac, digit
 from .descriptor import describe
 from .descriptor_fields import Material
-from .electrodes import Places, read_places
+from .electrodes import Places, places_of
 from .fluid_sensor import FALLS
 from .gel_sensor import Gel
 from .gel_shape import shape_of
+from .skin_shape import skin_of
 
 __all__ = [
     "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PRESSURE_PER_COUNT", "REST_COUNTS",
     "SAMPLE_RATE", "Lattice", "Material", "biotac_surface", "describe", "digit_surface", "electrodes",
-    "excitation_electrodes", "from_syntouch", "is_gel", "sensor_surface", "shape_of", "thickness", "title",
+    "excitation_electrodes", "from_maker", "from_syntouch", "is_gel", "places_of", "sensor_surface", "shape_of",
+    "skin_of", "thickness", "title",
 ]  # fmt: skip
 
 BIOTAC_SKIN, DIGIT_GEL = biotac.DESCRIPTOR.material, digit.DESCRIPTOR.material
 
-_PLACES: Places = read_places(biotac.DESCRIPTOR.folder / biotac.DESCRIPTOR.electrodes.places)
+_PLACES: Places = places_of("biotac")
 _READOUT = biotac.DESCRIPTOR.readout
 ELECTRODES = len(_PLACES.sensing)
 SAMPLE_RATE = _READOUT.rate  # Hz, one frame of all electrodes
@@ -39,27 +40,35 @@ COUNT_SIGN = -1.0 if _READOUT.polarity == FALLS else 1.0  # of a change where th
 PRESSURE_PER_COUNT = _READOUT.pressure  # Pa a count of PDC
 
 
-def electrodes() -> np.ndarray:
-    """Electrode positions (19, 3), m, shared frame. Raises TactileError for places outside the body."""
-    places = from_syntouch(1e-3 * _PLACES.sensing)
-    biotac.check_inside(places)
+def electrodes(sensor: str = "biotac") -> np.ndarray:
+    """Electrode positions (19, 3), m, shared frame; (24, 3) of a BioTac SP.
+
+    Raises TactileError for places outside the body, and where their table is missing.
+    """
+    places = from_maker(1e-3 * places_of(sensor).sensing, sensor)
+    skin_of(sensor).check_inside(places)
     return places
 
 
-def excitation_electrodes() -> np.ndarray:
-    """Positions (4, 3) m of the excitation electrodes X1..X4 in the shared frame, read from a drawing
+def excitation_electrodes(sensor: str = "biotac") -> np.ndarray:
+    """Positions (4, 3) m of the excitation electrodes X1..X4 in the shared frame, the BioTac's read from a drawing
     (docs/sources.md, BioTac electrodes).
     """
-    frame = biotac.DESCRIPTOR.frame
-    x, y, z = _PLACES.excitation.T
-    return 1e-3 * np.column_stack([-x - 1e3 * frame.shift_x, z, frame.lateral_sign * y])
+    frame = skin_of(sensor).descriptor.frame
+    x, y, z = places_of(sensor).excitation.T
+    return 1e-3 * np.column_stack([-x - 1e3 * frame.shift_x, z + 1e3 * frame.shift_y, frame.lateral_sign * y])
 
 
 def from_syntouch(points: np.ndarray) -> np.ndarray:
-    """Transform points (n, 3) m of SynTouch's frame to the shared one (docs/sources.md, Frame)."""
-    frame = biotac.DESCRIPTOR.frame
+    """Transform points (n, 3) m of SynTouch's frame of the BioTac to the shared one (docs/sources.md, Frame)."""
+    return from_maker(points, "biotac")
+
+
+def from_maker(points: np.ndarray, sensor: str) -> np.ndarray:
+    """Transform points (n, 3) m of the frame of a fluid sensor's maker to the shared one."""
+    frame = skin_of(sensor).descriptor.frame
     x, y, z = np.asarray(points).T
-    return np.column_stack([-x - frame.shift_x, z, frame.lateral_sign * y])
+    return np.column_stack([-x - frame.shift_x, z + frame.shift_y, frame.lateral_sign * y])
 
 
 def biotac_surface() -> Lattice:
@@ -74,23 +83,20 @@ def digit_surface() -> Lattice:
 
 def sensor_surface(sensor: str) -> Lattice:
     """The resting surface of a sensor that is there, as ``"biotac"`` or ``"digit"``."""
-    return shape_of(sensor).surface() if is_gel(sensor) else biotac_surface()
+    return shape_of(sensor).surface() if is_gel(sensor) else skin_of(sensor).skin_surface("outer")
 
 
 def is_gel(sensor: str) -> bool:
-    """Return true for a sensor whose descriptor tells of a gel, false for the BioTac.
+    """Return true for a sensor whose descriptor tells of a gel, false for one of skin and fluid.
 
-    Raises TactileError for a name that is none, and for another fluid sensor: ``biotac`` builds the one skin there is.
+    Raises TactileError for a name that is none.
     """
-    found = describe(sensor)
-    if not isinstance(found, Gel) and found is not biotac.DESCRIPTOR:
-        raise TactileError(f"sensor {sensor!r}", "another one of kind fluid", "biotac, or a gel")
-    return isinstance(found, Gel)
+    return isinstance(describe(sensor), Gel)
 
 
 def thickness(sensor: str) -> float:
     """Thickness, m, of a gel at its apex, or of the skin."""
-    return shape_of(sensor).thickness if is_gel(sensor) else biotac.SKIN_THICKNESS
+    return shape_of(sensor).thickness if is_gel(sensor) else skin_of(sensor).thickness
 
 
 def title(sensor: str) -> str:

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import functools
+import os
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import TactileError
 from ..files.text_file import read_small
+from .descriptor import OWN, of_kind
+from .fluid_sensor import Fluid
 
 COLUMNS = ("name", "x_mm", "y_mm", "z_mm", "rest_counts")
+
+SP_COLUMNS = ("id", "core_x", "core_y", "core_z", "skin_x", "skin_y", "skin_z", "note", "u", "v")  # of bsadr/biotac
 
 
 @dataclasses.dataclass(frozen=True)
 class Places:
     """Electrodes of a sensor, mm in its maker's frame.
 
-    sensing : (n, 3), electrodes that are read; rest_counts : (n,), of a typical unit without contact
+    sensing : (n, 3), electrodes that are read
+    rest_counts : (n,), of a typical unit without contact; NaN where none has been seen
     excitation : (m, 3), those that feed the current
     """
 
@@ -27,12 +34,36 @@ class Places:
     excitation: np.ndarray
 
 
+@functools.cache
+def places_of(name: str) -> Places:
+    """The electrodes of a sensor, from the table that its descriptor names.
+
+    The table lies beside the descriptor, or in ``$TACTILE_SENSORS/<name>/``.
+
+    Raises TactileError for a sensor without electrodes, and for a table that is missing or bad.
+    """
+    found = of_kind(name, Fluid)
+    table, own = found.electrodes.places, os.environ.get(OWN)
+    path = found.folder / table
+    if not path.is_file() and own:
+        path = Path(own) / name / table
+    if not path.is_file():
+        raise TactileError(
+            path, "there is no such file", f"the places of the electrodes of a {found.title}",
+            f"Put {table} ({found.sources[0]}) into the folder {name} of a folder that ${OWN} names",
+        )  # fmt: skip
+    return read_places(path)
+
+
 def read_places(path: Path) -> Places:
     """Read a table of ``COLUMNS``; electrodes without counts at rest are those of the excitation.
 
-    Raises TactileError naming file and row.
+    Or bsadr/biotac's own table of a BioTac SP, ``SP_COLUMNS``, where those have numbers below zero. Raises TactileError
+    naming file and row.
     """
     rows = list(csv.reader(read_small(path).splitlines()))
+    if rows and tuple(rows[0]) == SP_COLUMNS:
+        return _read_sp(path, rows[1:])
     if not rows or tuple(rows[0]) != COLUMNS:
         raise TactileError(f"{path}, row 1", ",".join(rows[0]) if rows else "nothing", ",".join(COLUMNS))
     places, rest = [], []
@@ -48,3 +79,22 @@ def read_places(path: Path) -> Places:
     if not np.isfinite(read).all() or not sensing.any():
         raise TactileError(path, "no electrode that is read, or a place that is no number", "finite places, mm")
     return Places(read[sensing], level[sensing], read[~sensing])
+
+
+def _read_sp(path: Path, rows: list[list[str]]) -> Places:
+    """Electrodes by their numbers; those of the excitation have -1, -2, ..."""
+    places: dict[int, tuple[float, ...]] = {}
+    for at, row in enumerate(rows, start=2):
+        try:
+            places[int(row[0])] = float(row[1]), float(row[2]), float(row[3])
+        except (ValueError, IndexError) as error:
+            raise TactileError(f"{path}, row {at}", ",".join(row), ",".join(SP_COLUMNS)) from error
+    sensing, fed = ([places[n] for n in sorted(places, key=abs) if n * sign > 0] for sign in (1, -1))
+    if sorted(places) != [*range(-len(fed), 0), *range(1, len(sensing) + 1)] or not (sensing and fed):
+        raise TactileError(
+            path, "numbers that leave some out", "1, 2, ... of those read, -1, -2, ... of the excitation"
+        )
+    found = Places(np.array(sensing), np.full(len(sensing), np.nan), np.array(fed))
+    if not (np.isfinite(found.sensing).all() and np.isfinite(found.excitation).all()):
+        raise TactileError(path, "a place that is no number", "finite places, mm")
+    return found

@@ -12,9 +12,13 @@ FALLS, RISES = POLARITIES = ("falls", "rises")
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """The maker's frame in the shared one: x = -x_maker - shift_x m, y = z_maker, z = lateral_sign y_maker."""
+    """The maker's frame in the shared one, in m.
+
+    x = -x_maker - shift_x, y = z_maker + shift_y, z = lateral_sign y_maker
+    """
 
     shift_x: float = number("mm")
+    shift_y: float = number("mm")
     lateral_sign: int = number(above=-2, below=2)
 
 
@@ -42,11 +46,18 @@ class Skin:
 class Core:
     """The rigid core that holds the skin where it lies on it.
 
-    attached : m, inner points this close to the core are glued to it; base_cap_x : m, from where on all are
+    attached : m, inner points this close to the core are glued to it
+    tip_cap_x, base_cap_x : m, beyond which all are
+    contact_x, contact_half_angle : m and rad, part of the table that says how near the skin is to the core
+    facing_half_angle : rad, of the part of the skin that may come to press on it
     """
 
     attached: float = number("mm", above=0)
+    tip_cap_x: float = number("mm")
     base_cap_x: float = number("mm")
+    contact_x: tuple[float, float] = number("mm")
+    contact_half_angle: float = number("deg", above=0, below=180)
+    facing_half_angle: float = number("deg", above=0, below=180)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,7 +85,7 @@ class FluidFilm:
 
 @dataclasses.dataclass(frozen=True)
 class Electrodes:
-    """The electrodes on the core. places : table of names, places and counts at rest; radius : m"""
+    """The electrodes on the core. places : table of names, places and counts at rest, see ``electrodes``; radius : m"""
 
     places: str = file_beside()
     radius: float = number("mm", above=0)

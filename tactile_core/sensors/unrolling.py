@@ -8,9 +8,8 @@ import numpy as np
 
 from ..geometry.catmull_rom import on_grid
 from ..geometry.lattice import Lattice
-from . import biotac
+from .skin_shape import skin_of
 
-PAD_RADIUS, ROLL_ORIGIN_X = biotac.DESCRIPTOR.unrolling.radius, biotac.DESCRIPTOR.unrolling.origin_x
 _STENCIL = 1e-3 * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])  # of (row, column), for differences
 
 
@@ -38,43 +37,52 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 @functools.cache
-def _rolled_x() -> np.ndarray:
-    """Unrolled x (stations,) m of each station: arc length along the pad's lowest line from ROLL_ORIGIN_X."""
-    line = biotac.skin_grid("outer")[:, np.argmin(np.abs(biotac.angles()))]
+def rolled_x(sensor: str) -> np.ndarray:
+    """Unrolled x (stations,) m of each station: arc length along the pad's lowest line from where x is shared."""
+    skin = skin_of(sensor)
+    origin = skin.descriptor.unrolling.origin_x
+    line = skin.skin_grid("outer")[:, np.argmin(np.abs(skin.angles()))]
     length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
-    return ROLL_ORIGIN_X + length - np.interp(ROLL_ORIGIN_X, line[:, 0], length)
+    return origin + length - np.interp(origin, line[:, 0], length)
 
 
-def unrolled_nodes() -> np.ndarray:
-    """Positions (n_nodes, 2) = (x, z) m of the nodes of ``sensors.biotac_surface()``, unrolled onto the DIGIT's plane.
+def rolled_grid(sensor: str) -> np.ndarray:
+    """Unrolled places (rows, columns, 2) = (x, z) m of the skin's lattice, also of its back."""
+    skin = skin_of(sensor)
+    across = skin.descriptor.unrolling.radius * skin.angles()
+    return np.stack(np.broadcast_arrays(rolled_x(sensor)[1:-1, None], across), -1)
 
-    The BioTac rolls on the plane: z = R theta across, arc length of the lowest line along (docs/sources.md).
+
+def unrolled_nodes(sensor: str = "biotac") -> np.ndarray:
+    """Positions (n_nodes, 2) = (x, z) m of the nodes of a fluid sensor's surface, unrolled onto the DIGIT's plane.
+
+    The finger rolls on the plane: z = R theta across, arc length of the lowest line along (docs/sources.md).
     NaN for nodes on the back, beyond 90 degrees, and for the poles, which never touch the plane.
     """
-    theta = biotac.angles()
-    x, z = np.broadcast_arrays(_rolled_x()[1:-1, None], PAD_RADIUS * theta)
-    rolled = np.stack([x, z], -1)
-    rolled = np.where(np.abs(theta)[None, :, None] <= biotac.PAD_ANGLE + 1e-9, rolled, np.nan)
+    skin = skin_of(sensor)
+    on_pad = np.abs(skin.angles())[None, :, None] <= skin.pad_angle + 1e-9
+    rolled = np.where(on_pad, rolled_grid(sensor), np.nan)
     return np.concatenate([rolled.reshape(-1, 2), np.full((2, 2), np.nan)])
 
 
 @functools.cache
-def _skin_axes() -> np.ndarray:
+def _skin_axes(sensor: str) -> np.ndarray:
     """Coordinates of the outer skin's stations axis by axis, (3, stations, columns) m."""
-    return np.ascontiguousarray(np.moveaxis(biotac.skin_grid("outer"), 2, 0))
+    return np.ascontiguousarray(np.moveaxis(skin_of(sensor).skin_grid("outer"), 2, 0))
 
 
-def roll_up(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the place on the BioTac's resting skin that corresponds to an unrolled point (x, z) m.
+def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.ndarray]:
+    """Find the place on a fluid sensor's resting skin that corresponds to an unrolled point (x, z) m.
 
     Returns the surface point (3,) m and the outward unit normal there (3,). The point is clamped to the pad: unrolled x
     between the poles, angle within 90 degrees.
     """
-    stations, angles = _rolled_x(), biotac.angles()
+    skin = skin_of(sensor)
+    stations, angles, radius = rolled_x(sensor), skin.angles(), skin.descriptor.unrolling.radius
     row = np.interp(point[0], stations, np.arange(len(stations)))
-    column = np.interp(point[1] / PAD_RADIUS, angles, np.arange(len(angles)))
+    column = np.interp(point[1] / radius, angles, np.arange(len(angles)))
     places = np.array([[row], [column]]) + _STENCIL
-    position, above, below, right, left = on_grid(_skin_axes(), places, closed=True)
+    position, above, below, right, left = on_grid(_skin_axes(sensor), places, closed=True)
     normal = np.cross(above - below, right - left)
     return position, normal / np.linalg.norm(normal)
 

@@ -17,7 +17,7 @@ from ..mechanics.placement import Placement, on_gel, pose_at
 from ..mechanics.solve import Sensor, Solution, Step, solve_path
 from ..mechanics.thickness import depth_at
 from ..sensors import unrolling
-from .pairs_file import SENSORS, TARGET, quantise
+from .pairs_file import SENSORS, SOURCE, TARGET, quantise
 from .scene import PairSpec, Scene
 
 _SLIDE_FROM, _SLIDE_TO = 2, 10  # steps of a path's force at which a slide may begin (assumed)
@@ -120,7 +120,7 @@ def pair_row(
     return {
         f"displacement_{source}": quantise(biotac.displacement),
         f"displacement_{target}": quantise(digit.displacement),
-        "signal": signal_of(biotac, electrodes).astype(np.float32),
+        "signal": signal_of(biotac, electrodes, source).astype(np.float32),
         "gap": biotac.electrode_gaps.astype(np.float32),
         "force": biotac.force.astype(np.float32),
         f"force_{target}": digit.force.astype(np.float32),
@@ -128,16 +128,16 @@ def pair_row(
         f"depth_{source}": np.float32(biotac.depth),
         f"depth_{target}": np.float32(digit.depth),
         "contact_center": digit.centre.astype(np.float32),
-        f"beyond_{target}": beyond_gel(biotac.contact_patch, target),
+        f"beyond_{target}": beyond_gel(biotac.contact_patch, target, source),
         f"contact_patch_{source}": biotac.contact_patch,
         f"contact_patch_{target}": digit.contact_patch,
     }
 
 
-def beyond_gel(touched: np.ndarray, target: str = TARGET) -> np.bool_:
-    """Return true if these nodes (n,) bool of the BioTac reach beside what rolls onto the gel.
+def beyond_gel(touched: np.ndarray, target: str = TARGET, source: str = SOURCE) -> np.bool_:
+    """Return true if these nodes (n,) bool of the source reach beside what rolls onto the gel.
 
     No contact of the gel is their equal.
     """
-    x, z = unrolling.unrolled_nodes()[touched].T
+    x, z = unrolling.unrolled_nodes(source)[touched].T
     return (sensors.shape_of(target).outline_distance(x, z) <= 0).any()  # it is 0 everywhere outside

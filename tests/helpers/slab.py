@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_core.geometry.lattice import Lattice, grid_faces
-from tactile_core.mechanics.fast.compliance import Compliance, build
+from tactile_core.mechanics.fast.compliance import Compliance, Solid, build
 from tactile_core.mechanics.solids.hex_mesh import HexMesh, hex_cells
 from tactile_core.sensors import Material
 
@@ -24,4 +24,4 @@ def slab_compliance(x: np.ndarray, z: np.ndarray, y: np.ndarray, material: Mater
     """Its compliance, touchable within ``reach`` m of the middle."""
     mesh, lattice = slab_mesh(x, z, y)
     touchable = np.flatnonzero(np.hypot(lattice.rest[:, 0], lattice.rest[:, 2]) < reach)
-    return Compliance("slab", lattice, touchable, *build(mesh, material, touchable, lattice))
+    return Compliance("slab", lattice, touchable, *build(Solid("slab", lattice, touchable, mesh, material)))

@@ -292,7 +292,7 @@ def test_meshes_and_sensors_that_cannot_be_are_refused():
             Gel("digit", mesh)
     with pytest.raises(TactileError, match="scale"):
         Gel("digit", trimesh.creation.icosphere(2, 3.0))  # in millimetres
-    with pytest.raises(TactileError, match="biotac, digit"):
+    with pytest.raises(TactileError, match="biotac, biotac_sp, digit"):
         Gel("gelsight", BALL)
     for friction in (-1.0, "rough"):
         with pytest.raises(TactileError, match="coefficient"):

@@ -82,5 +82,5 @@ def test_thickness_of_the_gel_and_of_skin_and_fluid():
     on_skin, _ = unrolling.roll_up(np.array([-8e-3, 0.0]))
     # docs/sources.md, BioTac skin and fluid: skin 1.58 mm and a fluid film of up to 2.45 mm
     assert 1.58e-3 + 0.5e-3 < thickness("biotac", on_skin) < 1.63e-3 + 2.45e-3
-    with pytest.raises(TactileError, match="biotac, digit"):
+    with pytest.raises(TactileError, match="biotac, biotac_sp, digit"):
         thickness("finger", on_skin)

@@ -66,19 +66,25 @@ def test_what_is_wrong_in_a_descriptor_is_said(tmp_path, old, new, words):
 
 
 def test_a_name_that_is_no_sensor_is_refused_with_those_that_are():
-    with pytest.raises(TactileError, match="biotac, digit"):
+    with pytest.raises(TactileError, match="biotac, biotac_sp, digit"):
         descriptor.describe("biotak")
     with pytest.raises(TactileError, match="kind fluid"):
         descriptor.of_kind("biotac", descriptor.Gel)
 
 
-def test_a_second_fluid_sensor_does_not_pass_for_the_biotac(tmp_path, monkeypatch):
-    """Its skin would be the BioTac's, whatever its descriptor says."""
-    shutil.copytree(descriptor.FOLDER / "biotac", tmp_path / "my_biotac")
+def test_a_second_fluid_sensor_has_a_skin_of_its_own(tmp_path, monkeypatch):
+    changed(tmp_path, "thickness_mm = 1.58", "thickness_mm = 1.5").rename(tmp_path / "my_biotac")
+    lines = (tmp_path / "my_biotac" / "profile.csv").read_text().splitlines()
+    wider = [
+        f"{x},{angle},{float(outer) + 0.1:.4f},{more}"
+        for x, angle, outer, more in (at.split(",", 3) for at in lines[1:])
+    ]
+    (tmp_path / "my_biotac" / "profile.csv").write_text("\n".join([lines[0], *wider]))
     monkeypatch.setenv(descriptor.OWN, str(tmp_path))
-    for ask in (sensors.is_gel, sensors.sensor_surface, sensors.thickness):
-        with pytest.raises(TactileError, match="'my_biotac': another one of kind fluid; expected biotac, or a gel"):
-            ask("my_biotac")
+    assert not sensors.is_gel("my_biotac") and sensors.thickness("my_biotac") == 1.5e-3
+    mine, theirs = (sensors.sensor_surface(name).rest[:, 1].min() for name in ("my_biotac", "biotac"))
+    assert mine == pytest.approx(theirs - 0.1e-3, abs=1e-6)
+    np.testing.assert_array_equal(sensors.electrodes("my_biotac"), sensors.electrodes())
 
 
 def test_an_open_profile_is_refused(tmp_path):

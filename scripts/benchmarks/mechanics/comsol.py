@@ -19,7 +19,8 @@ from tactile_core.errors import TactileError
 from tactile_core.mechanics.finite_strain.sp_press import INTERVALS, Pressed, SpPress
 from tactile_core.sensors import biotac_sp
 
-GAP, VOLUME, FORCE = 0.05, 0.2, 5.0  # mm, %, %: targets (docs/sources.md, Targets)
+GAP, VOLUME, FORCE, STEEP_FORCE = 0.05, 0.2, 5.0, 15.0  # mm, %, %, %: targets (docs/sources.md, Targets)
+STEEP = np.radians(40.0)  # of a plate, from where on the last one holds
 SQUEEZED = 1e-3  # mm, within which electrodes count as squeezed alike: mirrored twins differ by our interpolation
 DEEP = 0.3e-3  # m, forces count beyond this depth
 FITTED = "001"  # the press that ``biotac_sp.FORCE_SCALE`` was fitted on
@@ -33,8 +34,9 @@ def published_volume(intervals: tuple[int, int, int] = INTERVALS) -> Row:
     No number is fitted here: COMSOL and we inflate one ellipsoid of one material.
     """
     point = np.array([0.0, 0.0, -2 * biotac_sp.PUBLISHED_OUTER[2]])
-    press = SpPress(point, np.array([0.0, 0.0, 1.0]), intervals, biotac_sp.PUBLISHED_OUTER)
-    flat = 2 / 3 * np.pi * float(np.prod(biotac_sp.PUBLISHED_OUTER - biotac_sp.THICKNESS))
+    skin = biotac_sp.PUBLISHED_OUTER, biotac_sp.PUBLISHED_THICKNESS
+    press = SpPress(point, np.array([0.0, 0.0, 1.0]), intervals, *skin)
+    flat = 2 / 3 * np.pi * float(np.prod(skin[0] - skin[1]))
     off, baseline = (100 * (found / biotac_sp.PUBLISHED_VOLUME - 1) for found in (press.fluid_volume, flat))
     return row(
         "comsol_published_volume", off, "percent", VOLUME, baseline=baseline, of="1,750 Pa in the model of July 2020"
@@ -57,6 +59,16 @@ class Press:
     electrodes: np.ndarray
     skin: np.ndarray
 
+    @property
+    def force_target(self) -> float:
+        """Percent, of the mean error of force."""
+        return FORCE if np.arccos(min(abs(self.into[2]), 1.0)) < STEEP else STEEP_FORCE
+
+    def first(self, steps: int) -> Press:
+        """The press as far as its first steps."""
+        names = ("advances", "force", "electrodes", "skin")
+        return dataclasses.replace(self, **{name: getattr(self, name)[:steps] for name in names})
+
 
 def rows(quick: bool, data: Path) -> Iterator[Row]:
     """Yield the rows of all presses of the outside data; without it, and in the quick form, those that need none."""
@@ -69,16 +81,21 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
 
 def comsol(folder: Path, intervals: tuple[int, int, int] = INTERVALS) -> Iterator[Row]:
     """Rows of all presses in a folder; raises TactileError for one that is not of the module's layout."""
+    every = list(presses(folder))
+    yield published_volume(intervals)
+    for press in every:
+        steps = SpPress(press.point, press.into, intervals).steps(press.advances)
+        yield from compare(press, steps)
+        if press is every[0]:
+            yield from _other_mesh(press, steps)
+
+
+def presses(folder: Path) -> Iterator[Press]:
+    """Read all presses of a folder; raises TactileError where there is none, and what ``read`` raises."""
     cases = sorted(path.parent for path in folder.glob("*/config.csv"))
     if not cases:
         raise TactileError(folder, "no folder with a config.csv in it", "a folder of COMSOL presses")
-    yield published_volume(intervals)
-    for case in cases:
-        press = read(case)
-        steps = SpPress(press.point, press.into, intervals).steps(press.advances)
-        yield from compare(press, steps)
-        if case == cases[0]:
-            yield from _other_mesh(press, steps)
+    yield from map(read, cases)
 
 
 def read(case: Path) -> Press:
@@ -122,10 +139,11 @@ def _stack(tables: list[np.ndarray], case: Path) -> np.ndarray:
 def compare(press: Press, steps: list[Pressed]) -> Iterator[Row]:
     """Rows of one press that has been solved."""
     changes, expected = gap_changes(press, steps)
-    none = np.linalg.norm(_cut(press, press.electrodes[0]), axis=-1) - np.linalg.norm(press.electrodes[0], axis=-1)
     of = f"COMSOL press {press.name}, {len(steps)} steps"
     name = f"comsol_{press.name}"
-    yield row(f"{name}_gap_rms", _rms(changes - expected), "mm", GAP, baseline=_rms(none * 1e3 - expected), of=of)
+    yield row(
+        f"{name}_gap_rms", _rms(changes - expected), "mm", GAP, baseline=_rms(resting_gaps_cut(press) - expected), of=of
+    )
     yield row(f"{name}_gap_rms_at_the_end", _rms((changes - expected)[-1]), "mm", of=of)
     most = int(expected[-1].argmin())
     behind = float(changes[-1, most] - changes[-1].min())
@@ -138,7 +156,7 @@ def compare(press: Press, steps: list[Pressed]) -> Iterator[Row]:
     ratio = force_ratios(press, steps)
     error = 100 * float(np.abs(ratio - 1).mean())
     fitted = press.name == FITTED
-    yield row(f"{name}_force_error", error, "percent", None if fitted else FORCE, baseline=100.0, of=of)
+    yield row(f"{name}_force_error", error, "percent", None if fitted else press.force_target, baseline=100.0, of=of)
     yield row(f"{name}_force_bias", 100 * float(ratio.mean() - 1), "percent", of="fitted here" if fitted else of)
     # the COMSOL model knows no contact with the core, nor does ours: below zero both would be wrong
     yield row(f"{name}_core_gap", 1e3 * min(step.core_gap for step in steps), "mm", of=of)
@@ -150,6 +168,12 @@ def gap_changes(press: Press, steps: list[Pressed]) -> tuple[np.ndarray, np.ndar
     ours = np.stack([biotac_sp.radius_along(step.skin, rays) for step in steps])
     theirs = np.linalg.norm(press.electrodes, axis=-1)
     return (ours - ours[0]) * 1e3, (theirs - theirs[0]) * 1e3
+
+
+def resting_gaps_cut(press: Press) -> np.ndarray:
+    """Change (steps, 24) mm of the gaps if the plate only cuts the skin off, which does not bulge."""
+    cut = _cut(press, press.electrodes[0])
+    return 1e3 * (np.linalg.norm(cut, axis=-1) - np.linalg.norm(press.electrodes[0], axis=-1))
 
 
 def volumes(press: Press, steps: list[Pressed]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,10 +11,8 @@ from tactile_core import sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.geometry.indenters import Cylinder, Indenter, Sphere
 from tactile_core.mechanics.electrodes.biotac_sheet import (
-    CONDUCTIVITY,
     BiotacSheet,
     biotac_sheet,
-    growth,
     sensing_films,
 )
 from tactile_core.mechanics.electrodes.gap_law import FILM_CONSTANT, signal_of_gaps
@@ -63,7 +61,7 @@ def electrode_rows(contacts: int = 240, *, each: bool = True) -> Iterator[Row]:
             yield row(f"{name}_largest_fall", change.min(), "percent", baseline=0.0, of=f"7 mm ball, {of}")
         found = np.stack([sheet.resistances(sheet.films(moved)) for moved in skin])
         yield from _law_rows(found - rest, gaps, of, each=each)
-        divided = divider.reading(growth(found, rest), sensors.REST_COUNTS) - sensors.REST_COUNTS
+        divided = divider.reading(sheet.growth(found, rest), sensors.REST_COUNTS) - sensors.REST_COUNTS
         yield from _law_rows(divided, gaps, f"{of}, through a divider", each=False)
 
 
@@ -93,7 +91,7 @@ def _grid_rows(sheet: BiotacSheet, skin: list[np.ndarray]) -> Iterator[Row]:
         rest = solve(sheet.film)
         return 100 * np.stack([solve(sheet.films(moved)) / rest - 1 for moved in skin])
 
-    exact = changes(lambda films: resistances(fine.potentials(films, CONDUCTIVITY), 19))
+    exact = changes(lambda films: resistances(fine.potentials(films, sheet.fluid.conductivity), 19))
     started = time.perf_counter()
     coarse = changes(sheet.resistances)
     yield row("sheet_solve_time", 1e3 * (time.perf_counter() - started) / (len(skin) + 1), "ms", of="19 electrodes")

@@ -1,4 +1,4 @@
-"""The BioTac's fluid as a thin conducting sheet: what its 19 electrodes read for a deformed inner skin.
+"""A finger's fluid as a thin conducting sheet: what its electrodes read for a deformed inner skin.
 
 Assumed: the size of the electrodes, that the four excitation electrodes are joined and that the electrodes that are not
 being read float. The sheet lies half way between core and resting inner skin, which is exact to
@@ -15,31 +15,31 @@ import numpy as np
 
 from ... import sensors
 from ...geometry.lattice import Lattice, cap_faces
-from ...sensors import biotac
+from ...sensors.fluid_sensor import FluidFilm
 from ...sensors.unrolling import closest_on_triangles
 from ..fast.contact_state import Contact
 from ..fast.sensing_points import sensing_nodes
 from ..solids.biotac_core import above_core
 from ..solids.hex_mesh import skin_mesh
-from .gap_law import FILM_FLOOR
+from .gap_law import film_floor
 from .thin_sheet import ThinSheet, resistances
 
-_FILM, ELECTRODE_RADIUS = biotac.DESCRIPTOR.fluid, biotac.DESCRIPTOR.electrodes.radius
-CONDUCTIVITY, INTERFACE = _FILM.conductivity, _FILM.interface
+FED = 4  # electrodes of the excitation
 _FINE = 2  # times the triangles are halved to find what the grid leaves unresolved near an electrode: 0.12 mm
 
 
 @dataclasses.dataclass(frozen=True)
 class BiotacSheet:
-    """The fluid film between core and inner skin.
+    """The fluid film between core and inner skin; e electrodes, 19 of the BioTac.
 
-    sheet : on the nodes that bound fluid, with the 19 electrodes and the 4 of the excitation
-    wet : (k,) the sheet's nodes in ``biotac.skin_surface("inner")``
+    fluid : what conducts; sheet : on the nodes that bound fluid, with the electrodes and the 4 of the excitation
+    wet : (k,) the sheet's nodes in the inner skin's surface
     sensing : (k,) which of ``sensing_points.sensing_nodes`` they are
     film : (k,) m, thickness at rest; outward : (k, 3), from the core to the skin
-    unresolved : (23,) what the grid is too coarse for: resistance of each electrode in a film of 1 m and 1 S/m
+    unresolved : (e + 4,) what the grid is too coarse for: resistance of each electrode in a film of 1 m and 1 S/m
     """
 
+    fluid: FluidFilm
     sheet: ThinSheet
     wet: np.ndarray
     sensing: np.ndarray
@@ -48,59 +48,63 @@ class BiotacSheet:
     unresolved: np.ndarray
 
     def films(self, displacement: np.ndarray) -> np.ndarray:
-        """Thickness (k,) m for a displacement (n_inner, 3) m of the whole inner skin; at least ``FILM_FLOOR``."""
-        return np.maximum(self.film + np.einsum("ki,ki->k", displacement[self.wet], self.outward), FILM_FLOOR)
+        """Thickness (k,) m for a displacement (n_inner, 3) m of the whole inner skin, at least the thinnest."""
+        moved = np.einsum("ki,ki->k", displacement[self.wet], self.outward)
+        return np.maximum(self.film + moved, self.fluid.thinnest)
 
     def films_of(self, change: np.ndarray) -> np.ndarray:
         """Thickness (k,) m where the gaps of ``sensing_points.sensing_nodes`` (f,) have changed by so much, m."""
-        return np.maximum(self.film + change[self.sensing], FILM_FLOOR)
+        return np.maximum(self.film + change[self.sensing], self.fluid.thinnest)
 
     def near(self, films: np.ndarray) -> np.ndarray:
-        """Part of each electrode's resistance (23,) ohm in films (k,) m that the grid does not resolve."""
-        return self.unresolved / (CONDUCTIVITY * self.sheet.mean_over_electrodes(films))
+        """Part of each electrode's resistance (e + 4,) ohm in films (k,) m that the grid does not resolve."""
+        return self.unresolved / (self.fluid.conductivity * self.sheet.mean_over_electrodes(films))
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
-        """Resistance (19,) ohm of each electrode to the excitation for films (k,) m."""
-        return resistances(self.sheet.potentials(films, CONDUCTIVITY) + np.diag(self.near(films)), 19)
+        """Resistance (e,) ohm of each electrode to the excitation for films (k,) m."""
+        potentials = self.sheet.potentials(films, self.fluid.conductivity)
+        return resistances(potentials + np.diag(self.near(films)), len(potentials) - FED)
 
-
-def growth(resistance: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
-    """Factors (19,) by which impedances have grown where the film's resistances (19,) ohm are those, not at_rest."""
-    return (resistance + INTERFACE) / (at_rest + INTERFACE)
+    def growth(self, resistance: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
+        """Factors (e,) by which impedances have grown where the film's resistances (e,) ohm are those, not at_rest."""
+        return (resistance + self.fluid.interface) / (at_rest + self.fluid.interface)
 
 
 @functools.cache
-def biotac_sheet(*, core_of_mesh: bool = False) -> BiotacSheet:
-    """The sheet of the resting BioTac; a solve takes 10 ms.
+def biotac_sheet(sensor: str = "biotac", *, core_of_mesh: bool = False) -> BiotacSheet:
+    """The sheet of the resting finger; a solve takes 10 ms.
 
     core_of_mesh : whether the film ends on the public mesh's core. By default it ends on a core that carries the
     electrodes, so that films over electrodes are the published gaps: the mesh's core stands 0.25 mm over the electrodes
     of the trunk and 0.6 mm under those of the tip.
     """
-    inner = biotac.skin_surface("inner")
-    outward, film = above_core()
-    free = ~skin_mesh().clamped[skin_mesh().inner]
+    skin, mesh, thinnest = sensors.skin_of(sensor), skin_mesh(sensor), film_floor(sensor)
+    inner = skin.skin_surface("inner")
+    outward, film = above_core(sensor)
+    free = ~mesh.clamped[mesh.inner]
     faces = _mirrored_faces(inner)
     faces = faces[free[faces].all(1)]
-    positions = np.concatenate([sensors.electrodes(), sensors.excitation_electrodes()])
+    read = sensors.electrodes(sensor)
+    positions = np.concatenate([read, sensors.excitation_electrodes(sensor)])
     face, weights, feet = closest_on_triangles(Lattice(inner.rest.copy(), faces, inner.shape), positions)
     corners = faces[face]
     if not core_of_mesh:
-        gap = np.linalg.norm(feet - positions, axis=1)[:19]
-        film = film + _spread(feet[:19], gap - (weights * film[corners]).sum(1)[:19], inner.rest)
+        gap = np.linalg.norm(feet - positions, axis=1)[: len(read)]
+        film = film + _spread(feet[: len(read)], gap - (weights * film[corners]).sum(1)[: len(read)], inner.rest)
     middle = inner.rest - outward * film[:, None] / 2
     centers = np.einsum("ek,ekd->ed", weights, middle[corners])
-    wet, faces = np.unique(_connected(faces[(film > FILM_FLOOR)[faces].all(1)]), return_inverse=True)
-    sheet = ThinSheet(middle[wet], faces.reshape(-1, 3), centers, ELECTRODE_RADIUS)
-    order = np.argsort(sensing_nodes())
-    sensing = order[np.searchsorted(sensing_nodes(), wet, sorter=order)]
-    return BiotacSheet(sheet, wet, sensing, film[wet], outward[wet], sheet.unresolved(_FINE))
+    wet, faces = np.unique(_connected(faces[(film > thinnest)[faces].all(1)]), return_inverse=True)
+    sheet = ThinSheet(middle[wet], faces.reshape(-1, 3), centers, skin.descriptor.electrodes.radius)
+    watched = sensing_nodes(sensor)
+    order = np.argsort(watched)
+    sensing = order[np.searchsorted(watched, wet, sorter=order)]
+    return BiotacSheet(skin.descriptor.fluid, sheet, wet, sensing, film[wet], outward[wet], sheet.unresolved(_FINE))
 
 
 def sensing_films(contact: Contact) -> np.ndarray:
     """Films (k,) m of the sheet in a contact of the fast tier, from the inner nodes that it watches."""
     skin = contact.compliance
-    return biotac_sheet().films_of((contact.sensing_gaps - skin.watch_gap)[skin.feet :])
+    return biotac_sheet(skin.name).films_of((contact.sensing_gaps - skin.watch_gap)[skin.feet :])
 
 
 def _spread(places: np.ndarray, values: np.ndarray, points: np.ndarray) -> np.ndarray:

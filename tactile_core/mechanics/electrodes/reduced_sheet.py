@@ -11,8 +11,7 @@ import functools
 import numpy as np
 
 from ..solids.sparse_cholesky import factor
-from .biotac_sheet import CONDUCTIVITY, BiotacSheet, biotac_sheet, growth
-from .gap_law import FILM_FLOOR
+from .biotac_sheet import FED, BiotacSheet, biotac_sheet
 from .thin_sheet import resistances
 
 # 60 fields of 60 dents leave 0.28 % rms of rest where contacts change resistances by 9.3 % (docs/mechanics.md); in
@@ -29,24 +28,24 @@ class ReducedSheet:
     def __init__(self, sheet: BiotacSheet, fields: np.ndarray) -> None:
         self.sheet, self.fields = sheet, fields
         self._patches = fields.T @ sheet.sheet.patches[1:]
-        self._at_rest = self.resistances(sheet.film)
+        self.at_rest = self.resistances(sheet.film)
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
-        """Resistance (19,) ohm of each electrode to the excitation for films (k,) m at the sheet's nodes."""
-        stiffness = self.sheet.sheet.matrix(films, CONDUCTIVITY)[1:, 1:]
+        """Resistance (e,) ohm of each electrode to the excitation for films (k,) m at the sheet's nodes."""
+        stiffness = self.sheet.sheet.matrix(films, self.sheet.fluid.conductivity)[1:, 1:]
         reduced = self.fields.T @ (stiffness @ self.fields)
         potentials = self._patches.T @ np.linalg.solve(reduced, self._patches)
-        return resistances(potentials + np.diag(self.sheet.near(films)), 19)
+        return resistances(potentials + np.diag(self.sheet.near(films)), len(potentials) - FED)
 
     def growth(self, films: np.ndarray) -> np.ndarray:
-        """Factor (19,) by which each electrode's impedance has grown since rest, for films (k,) m."""
-        return growth(self.resistances(films), self._at_rest)
+        """Factor (e,) by which each electrode's impedance has grown since rest, for films (k,) m."""
+        return self.sheet.growth(self.resistances(films), self.at_rest)
 
 
 @functools.cache
-def reduced_sheet() -> ReducedSheet:
-    """The reduced sheet of the resting BioTac: 1 s once, then 3 ms a contact."""
-    sheet = biotac_sheet()
+def reduced_sheet(sensor: str = "biotac") -> ReducedSheet:
+    """The reduced sheet of the resting finger: 1 s once, then 3 ms a contact."""
+    sheet = biotac_sheet(sensor)
     rest = sheet.sheet.matrix(sheet.film)[1:, 1:].tocsc()
     at_rest, dented = _potentials(sheet, sheet.film), [_potentials(sheet, films) for films in _dents(sheet)]
     changes = np.concatenate(dented, 1)
@@ -58,7 +57,7 @@ def reduced_sheet() -> ReducedSheet:
 
 
 def _potentials(sheet: BiotacSheet, films: np.ndarray) -> np.ndarray:
-    """Potentials (n - 1, 23) of all nodes but the first, for 1 A into each electrode at 1 S/m."""
+    """Potentials (n - 1, e + 4) of all nodes but the first, for 1 A into each electrode at 1 S/m."""
     return factor(sheet.sheet.matrix(films)[1:, 1:].tocsc())(sheet.sheet.patches[1:])
 
 
@@ -71,4 +70,4 @@ def _dents(sheet: BiotacSheet) -> list[np.ndarray]:
         away = np.linalg.norm(nodes - nodes[random.choice(pad)], axis=1)
         bell = np.exp(-((away / random.uniform(*_WIDTH)) ** 2))
         found.append(sheet.film - random.uniform(*_DEPTH) * bell + random.uniform(*_BULGE) * (1 - bell))
-    return [np.maximum(films, FILM_FLOOR) for films in found]
+    return [np.maximum(films, sheet.fluid.thinnest) for films in found]

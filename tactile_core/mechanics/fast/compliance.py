@@ -107,7 +107,7 @@ def compliance_of(sensor: str) -> Compliance:
     return _cached(_solid(sensor))
 
 
-class _Solid(NamedTuple):
+class Solid(NamedTuple):
     """Solid from which a compliance is computed; touchable : (m,) surface nodes."""
 
     name: str
@@ -117,10 +117,10 @@ class _Solid(NamedTuple):
     material: Material
 
 
-def _solid(sensor: str) -> _Solid:
+def _solid(sensor: str) -> Solid:
     lattice, material = sensors.sensor_surface(sensor), sensors.describe(sensor).material
-    touchable = np.arange(len(lattice.rest)) if sensors.is_gel(sensor) else _touchable_skin()
-    return _Solid(sensor, lattice, touchable, solid_mesh(sensor), material)
+    touchable = np.arange(len(lattice.rest)) if sensors.is_gel(sensor) else _touchable_skin(sensor)
+    return Solid(sensor, lattice, touchable, solid_mesh(sensor), material)
 
 
 class Stored(NamedTuple):
@@ -145,18 +145,18 @@ def stored(sensor: str) -> Stored:
     return Stored(folder, size, len(solid.lattice.rest), len(solid.touchable), len(solid.mesh.nodes))
 
 
-def _touchable_skin() -> np.ndarray:
-    rolled = surface.unrolled_nodes()
+def _touchable_skin(sensor: str) -> np.ndarray:
+    rolled = surface.unrolled_nodes(sensor)
     x, z = rolled.T
     near = (x > digit.X_TIP - _BESIDE_GEL) & (x < digit.X_BASE + _BESIDE_GEL)
     return np.flatnonzero(near & (np.abs(z) < digit.HALF_WIDTH + _BESIDE_GEL))
 
 
-def _folder(solid: _Solid) -> pathlib.Path:
+def _folder(solid: Solid) -> pathlib.Path:
     """Named by all that decides the arrays."""
     name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
-    sensing = sensing_points_of(mesh)
+    sensing = sensing_points_of(name, mesh)
     # Rounded, and without a minus before zero, which differ between versions of numpy and scipy.
     places = sensing.rows, sensing.columns, *(np.round(each * 1e9) + 0.0 for each in (sensing.weights, sensing.gap))
     for array in (np.round(mesh.nodes * 1e9), mesh.cells, mesh.clamped, touchable, *places):
@@ -164,7 +164,7 @@ def _folder(solid: _Solid) -> pathlib.Path:
     return cache_folder() / f"compliance-{name}-{digest.hexdigest()[:16]}"
 
 
-def _cached(solid: _Solid) -> Compliance:
+def _cached(solid: Solid) -> Compliance:
     """Read the matrices, checked against the hashes of when they were built; build them where they are not there."""
     name, lattice, touchable, mesh, _ = solid
     folder = _folder(solid)
@@ -174,11 +174,11 @@ def _cached(solid: _Solid) -> Compliance:
         array_cache.claim(folder, _ROOM)
         with lock.awaited(folder.with_name(f".{folder.name}.lock")):
             loaded = _built(solid, folder)
-    counts = (len(electrode_feet().gap), len(facing_nodes(mesh))) if len(mesh.inner) else (0, 0)
+    counts = (len(electrode_feet(name).gap), len(facing_nodes(name, mesh))) if len(mesh.inner) else (0, 0)
     return Compliance(name, lattice, touchable, **loaded, feet=counts[0], facing=counts[1])
 
 
-def _built(solid: _Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
+def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
     """Return what another process built while this one waited, or build it."""
     try:
         return array_cache.load(folder, Arrays._fields)
@@ -186,19 +186,20 @@ def _built(solid: _Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
         if (folder / array_cache.HASHES).exists():
             log.warning("%s: damaged (%s); it is built again", folder, damage)
     log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)
-    arrays = build(solid.mesh, solid.material, solid.touchable, solid.lattice)
+    arrays = build(solid)
     array_cache.store(folder, arrays._asdict(), _ROOM)
     return array_cache.load(folder, Arrays._fields)
 
 
-def build(mesh: HexMesh, material: Material, touchable: np.ndarray, lattice: Lattice) -> Arrays:
+def build(solid: Solid) -> Arrays:
     """The arrays of a ``Compliance``, from a solid that is even in z.
 
-    touchable : (m,) surface nodes that may carry force. Raises ValueError for a solid without mirror symmetry or held
+    Raises ValueError for a solid without mirror symmetry or held
     nowhere, TactileError where the memory does not suffice.
     """
-    sensing = sensing_points_of(mesh)
-    source, mirrored = images(mesh, len(sensing.gap))
+    name, lattice, touchable, mesh, material = solid
+    sensing = sensing_points_of(name, mesh)
+    source, mirrored = images(name, mesh, len(sensing.gap))
     kept = np.unique(source)
     loads = sensing.dense(3 * len(mesh.nodes), kept)
     column, sign = np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)

@@ -17,7 +17,7 @@ import numpy as np
 from ... import sensors
 from ...files.compiled import available
 from ...files.shipped import shipped
-from ...sensors import biotac, unrolling
+from ...sensors import unrolling
 from .compliance import Compliance
 from .contact_state import Contact
 from .surface_loops import add_field
@@ -148,9 +148,8 @@ def plane(sensor: str) -> np.ndarray:
     """Unrolled places (n, 2) = (x, z) m of a sensor's surface nodes; the BioTac's back goes on round its axis."""
     if sensors.is_gel(sensor):
         return sensors.sensor_surface(sensor).rest[:, [0, 2]]
-    x, z = np.broadcast_arrays(unrolling._rolled_x()[1:-1, None], unrolling.PAD_RADIUS * biotac.angles())
-    ends = [[unrolling._rolled_x()[0], 0.0], [unrolling._rolled_x()[-1], 0.0]]
-    return np.concatenate([np.stack([x, z], -1).reshape(-1, 2), ends])
+    ends = [[unrolling.rolled_x(sensor)[0], 0.0], [unrolling.rolled_x(sensor)[-1], 0.0]]
+    return np.concatenate([unrolling.rolled_grid(sensor).reshape(-1, 2), ends])
 
 
 @functools.cache
@@ -159,7 +158,7 @@ def node_frames(sensor: str) -> np.ndarray:
     if sensors.is_gel(sensor):
         axes = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
         return np.broadcast_to(axes, (len(sensors.sensor_surface(sensor).rest), 3, 3))
-    lattice = biotac.skin_surface()
+    lattice = sensors.sensor_surface(sensor)
     outward = unrolling.node_normals(lattice.rest, lattice.faces)
     along = np.array([1.0, 0, 0]) - outward[:, :1] * outward
     length = np.linalg.norm(along, axis=1, keepdims=True)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import sensors
-from ...sensors import biotac, unrolling
-from ..solids.biotac_core import BiotacCore, above_core, facing_core
+from ...sensors import unrolling
+from ..solids.biotac_core import Core, above_core, facing_core
 from ..solids.hex_mesh import HexMesh, skin_mesh
 from .condense import mirror_nodes
 from .mirror_symmetry import axes_of
@@ -36,14 +36,14 @@ class SensingPoints(NamedTuple):
         return matrix
 
 
-def sensing_points_of(mesh: HexMesh) -> SensingPoints:
+def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
     """The electrodes' feet, three nodes each, then the inner nodes over the core, then the free ones beside it."""
     if not len(mesh.inner):
         return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
-    feet = electrode_feet()
-    corners = biotac.skin_surface("inner").faces[feet.face]
-    core_nodes, core_out, core_gap = _over_core(mesh)
-    side_nodes, side_out, side_gap = _beside_core(mesh)
+    feet = electrode_feet(sensor)
+    corners = sensors.skin_of(sensor).skin_surface("inner").faces[feet.face]
+    core_nodes, core_out, core_gap = _over_core(sensor, mesh)
+    side_nodes, side_out, side_gap = _beside_core(sensor, mesh)
     nodes = mesh.inner[np.r_[corners.ravel(), core_nodes, side_nodes]]
     single = len(core_nodes) + len(side_nodes)
     columns = np.r_[np.repeat(np.arange(len(feet.gap)), 3), len(feet.gap) + np.arange(single)]
@@ -51,14 +51,15 @@ def sensing_points_of(mesh: HexMesh) -> SensingPoints:
     return SensingPoints(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap, side_gap])
 
 
-def sensing_nodes() -> np.ndarray:
+def sensing_nodes(sensor: str = "biotac") -> np.ndarray:
     """Nodes (f,) of the inner skin that are watched after the electrodes' feet: all that can move, in their order."""
-    return np.r_[facing_nodes(skin_mesh()), _beside(skin_mesh())]
+    mesh = skin_mesh(sensor)
+    return np.r_[facing_nodes(sensor, mesh), _beside(sensor, mesh)]
 
 
 @dataclasses.dataclass(frozen=True)
 class ElectrodeFeet:
-    """Ends of the film over each electrode on the inner skin: face, weights, direction (19, 3), gap (19,) m."""
+    """Ends of the film over each electrode on the inner skin: face, weights, direction (e, 3), gap (e,) m."""
 
     face: np.ndarray
     weights: np.ndarray
@@ -67,63 +68,70 @@ class ElectrodeFeet:
 
 
 @functools.cache
-def electrode_feet() -> ElectrodeFeet:
-    """The nearest point of the resting inner skin to each electrode; gaps 0.49 to 1.76 mm (published: 0.51 to 1.76)."""
-    positions = sensors.electrodes()
-    face, weights, place = unrolling.closest_on_triangles(biotac.skin_surface("inner"), positions)
+def electrode_feet(sensor: str = "biotac") -> ElectrodeFeet:
+    """The nearest point of the resting inner skin to each electrode; the BioTac's gaps are 0.49 to 1.76 mm (published:
+    0.51 to 1.76).
+    """
+    positions = sensors.electrodes(sensor)
+    face, weights, place = unrolling.closest_on_triangles(sensors.skin_of(sensor).skin_surface("inner"), positions)
     gap = np.linalg.norm(place - positions, axis=1)
     return ElectrodeFeet(face, weights, (place - positions) / gap[:, None], gap)
 
 
-def _over_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _over_core(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m; even in
     z."""
-    nodes = facing_nodes(mesh)
-    mirrored, right = _right_images(nodes)
-    gap, outward = BiotacCore().distance(biotac.skin_surface("inner").rest[right])
+    nodes = facing_nodes(sensor, mesh)
+    mirrored, right = _right_images(sensor, nodes)
+    gap, outward = Core(sensor).distance(_inner(sensor)[right])
     return nodes, np.where(mirrored[:, None], outward * [1.0, 1.0, -1.0], outward), gap
 
 
-def _beside_core(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _beside_core(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Free inner nodes that never meet the core: node, direction from its nearest point (n, 3), gap (n,) m; even in
     z."""
-    nodes = _beside(mesh)
-    mirrored, right = _right_images(nodes)
-    outward, gap = above_core()
+    nodes = _beside(sensor, mesh)
+    mirrored, right = _right_images(sensor, nodes)
+    outward, gap = above_core(sensor)
     return nodes, np.where(mirrored[:, None], outward[right] * [1.0, 1.0, -1.0], outward[right]), gap[right]
 
 
-def _right_images(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _inner(sensor: str) -> np.ndarray:
+    """Resting inner skin (n, 3) m."""
+    return sensors.skin_of(sensor).skin_surface("inner").rest
+
+
+def _right_images(sensor: str, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mark nodes (n,) of the inner skin on the side z < 0, (n,) bool, and return the one of each pair with z >= 0."""
-    rest = biotac.skin_surface("inner").rest
+    rest = _inner(sensor)
     mirrored = rest[nodes, 2] < -ON_PLANE
     return mirrored, np.where(mirrored, mirror_nodes(rest)[nodes], nodes)
 
 
-def _beside(mesh: HexMesh) -> np.ndarray:
+def _beside(sensor: str, mesh: HexMesh) -> np.ndarray:
     """Free inner nodes that do not face the core, each with its mirror image."""
     free = ~mesh.clamped[mesh.inner]
-    free &= free[mirror_nodes(biotac.skin_surface("inner").rest)]
-    free[facing_nodes(mesh)] = False
+    free &= free[mirror_nodes(_inner(sensor))]
+    free[facing_nodes(sensor, mesh)] = False
     return np.flatnonzero(free)
 
 
-def facing_nodes(mesh: HexMesh) -> np.ndarray:
+def facing_nodes(sensor: str, mesh: HexMesh) -> np.ndarray:
     """Inner nodes that may come to press on the core, each with its mirror image."""
-    inner = biotac.skin_surface("inner")
-    faces = facing_core(inner.rest) & ~mesh.clamped[mesh.inner]
-    return np.flatnonzero(faces & faces[mirror_nodes(inner.rest)])
+    inner = _inner(sensor)
+    faces = facing_core(sensor, inner) & ~mesh.clamped[mesh.inner]
+    return np.flatnonzero(faces & faces[mirror_nodes(inner)])
 
 
-def images(mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
+def images(sensor: str, mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Index, for each of ``count`` watched points, of the one whose mirror image it is, else itself; true for
     images.
     """
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count
-    for nodes in (_beside(mesh), facing_nodes(mesh)) if count else ():
+    for nodes in (_beside(sensor, mesh), facing_nodes(sensor, mesh)) if count else ():
         first -= len(nodes)
         here = slice(first, first + len(nodes))
-        mirrored[here], right = _right_images(nodes)
+        mirrored[here], right = _right_images(sensor, nodes)
         source[here] = first + np.searchsorted(nodes, right)
     return source, mirrored

@@ -11,7 +11,7 @@ from ... import sensors
 from ...geometry.indenters import Indenter, Pose
 from ..penetration import BLUNT, check_follows, penetration_between
 from ..sharpness import BENDS, sharpest
-from ..solids.biotac_core import BiotacCore, facing_core
+from ..solids.biotac_core import Core, facing_core
 from ..solids.finite_strain import FiniteStrainSolid
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.graded_mesh import Footprint, GradedMesh, graded
@@ -55,7 +55,7 @@ class Body:
         near = mesh.surface[distance < _REACH]
         return FiniteStrainContact(
             self.solid, near[~mesh.clamped[near]], indenter, pose, self.cavity, friction=friction,
-            core=BiotacCore() if len(self.core_nodes) else None, inner=self.core_nodes,
+            core=Core(self.sensor) if len(self.core_nodes) else None, inner=self.core_nodes,
             factor=self.graded.factor, tolerance=_FULL if self.tier == "full" else EXACT,
             first_share=_first_share(self.sensor),
             faces=None if friction else self._faces(indenter, pose.moved(depth), near),  # friction holds nodes at edges
@@ -114,7 +114,7 @@ def graded_body(
     solid = FiniteStrainSolid(mesh, material, fine.pattern)
     free = mesh.inner[~mesh.clamped[mesh.inner]]
     cavity = FluidCavity(inner_faces(mesh), len(mesh.nodes))
-    return Body(sensor, tier, solid, cavity, np.sort(free[facing_core(mesh.nodes[free])]), fine)
+    return Body(sensor, tier, solid, cavity, np.sort(free[facing_core(sensor, mesh.nodes[free])]), fine)
 
 
 def _first_share(sensor: str) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
-from ...sensors import biotac, sensor_surface
+from ...sensors import sensor_surface, skin_of
 from .. import error_estimate
 from ..electrodes.biotac_sheet import biotac_sheet
 from ..fast.sensing_points import electrode_feet
@@ -140,15 +140,15 @@ class LoadPath:
 
 
 def _electrode_gaps(body: Body, touch: ContactState) -> np.ndarray:
-    """Film (19,) m over each electrode of the BioTac."""
-    feet, inner = electrode_feet(), biotac.skin_surface("inner")
+    """Film (e,) m over each electrode of a fluid sensor."""
+    feet, inner = electrode_feet(body.sensor), skin_of(body.sensor).skin_surface("inner")
     at_feet = np.einsum("ek,ekj->ej", feet.weights, _inner_skin(body, touch)[inner.faces[feet.face]])
     return feet.gap + np.einsum("ej,ej->e", at_feet, feet.outward)
 
 
 def _films(body: Body, touch: ContactState) -> np.ndarray:
     """Film (k,) m at the nodes of the conducting sheet."""
-    return biotac_sheet().films(_inner_skin(body, touch))
+    return biotac_sheet(body.sensor).films(_inner_skin(body, touch))
 
 
 def _inner_skin(body: Body, touch: ContactState) -> np.ndarray:

@@ -64,10 +64,14 @@ class SpPress:
         into: np.ndarray,
         intervals: tuple[int, int, int] = INTERVALS,
         outer: np.ndarray = biotac_sp.OUTER,
+        thickness: float = biotac_sp.THICKNESS,
     ) -> None:
-        """A plate that leans neither to +y nor to -y is solved on half of the skin. outer : (3,) m, semi-axes."""
+        """A plate that leans neither to +y nor to -y is solved on half of the skin.
+
+        outer : (3,) m, semi-axes; thickness : m, by which the inner ones are less
+        """
         self.mirrored = abs(into[1]) < MIRROR_TOLERANCE
-        inner = outer - biotac_sp.THICKNESS
+        inner = outer - thickness
         self.mesh, fixed, faces = half_ellipsoid_mesh(outer, inner, intervals, mirrored=self.mirrored)
         self.solid = FiniteStrainSolid(self.mesh, MooneyRivlin(biotac_sp.C10, biotac_sp.C01, biotac_sp.BULK))
         self.cavity = FluidCavity(faces, len(self.mesh.nodes))

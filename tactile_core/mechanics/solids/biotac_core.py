@@ -1,4 +1,4 @@
-"""The BioTac's rigid core as an obstacle: a smooth gap that the inner skin may close but not pass."""
+"""A fluid sensor's rigid core as an obstacle: a smooth gap that the inner skin may close but not pass."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ import functools
 
 import numpy as np
 
-from ...sensors import biotac
+from ...errors import TactileError
+from ...sensors import skin_of
 
-# The part of the profile table where every ray meets the core, and a little more than the pad.
-_X = -18.9e-3, 5.0e-3
-_THETA = np.radians(120.0)
 _ROUGHNESS = 10e-6  # m rms, the table's facets, which the spline smooths away (assumed: half of the skin's 20 um fit)
 _HESSIAN_STEP = 1e-6  # m, of the differences of the exact gradient
 _POINT_STEP = (0.05e-3, np.radians(1.0))  # m and rad between points that stand for the core: at most 0.09 mm apart
 
 
-class BiotacCore:
-    """Gap and normal of the core's surface r = R(x, theta) about the axis (y, z) = (``AXIS_Y``, 0)."""
+class Core:
+    """Gap and normal of a core's surface r = R(x, theta) about the axis (y, z) = (``axis_y``, 0)."""
+
+    def __init__(self, sensor: str) -> None:
+        self.sensor, self._skin = sensor, skin_of(sensor)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gap (n,) m, positive outside, and outward unit normal (n, 3) of the core at points (n, 3) m.
@@ -26,10 +27,11 @@ class BiotacCore:
         Beyond the table's ends the last radius is held.
         """
         x, y, z = points.T
-        x = np.clip(x, *_X)
-        theta = np.clip(np.arctan2(z, biotac.AXIS_Y - y), -_THETA, _THETA)
-        r = np.maximum(np.hypot(y - biotac.AXIS_Y, z), 1e-6)
-        radius = _spline()
+        axis_y, core = self._skin.axis_y, self._skin.descriptor.core
+        x = np.clip(x, *core.contact_x)
+        theta = np.clip(np.arctan2(z, axis_y - y), -core.contact_half_angle, core.contact_half_angle)
+        r = np.maximum(np.hypot(y - axis_y, z), 1e-6)
+        radius = _spline(self.sensor)
         along = (radius.ev(x, theta, dx=1) + radius.ev(x, -theta, dx=1)) / 2  # the core is even in z, the spline nearly
         around = (radius.ev(x, theta, dy=1) - radius.ev(x, -theta, dy=1)) / (2 * r)
         # d theta / d(y, z) = (sin, cos) / r of the angle, whose own direction outward is (-cos, sin)
@@ -48,44 +50,52 @@ class BiotacCore:
 
 
 @functools.cache
-def _spline():  # noqa: ANN202 (scipy is imported only where it is needed)
+def _spline(sensor: str):  # noqa: ANN202 (scipy is imported only where it is needed)
     """Radius m over x m and theta rad: a bicubic spline through the table, smoothed by its roughness."""
     import scipy.interpolate
 
-    table = biotac._table()
-    rows = (table["x"] > _X[0]) & (table["x"] < _X[1])
-    columns = np.abs(table["theta"]) <= _THETA + 1e-9
+    table, core = skin_of(sensor).table, skin_of(sensor).descriptor.core
+    rows = (table["x"] > core.contact_x[0]) & (table["x"] < core.contact_x[1])
+    columns = np.abs(table["theta"]) <= core.contact_half_angle + 1e-9
     radius = table["core"][np.ix_(rows, columns)]
     if not np.isfinite(radius).all():
-        raise ValueError("the core's table has holes")
+        raise TactileError(skin_of(sensor).descriptor.folder, "holes in the core's table", "a core within contact_x_mm")
     smoothing = radius.size * _ROUGHNESS**2
     return scipy.interpolate.RectBivariateSpline(table["x"][rows], table["theta"][columns], radius, s=smoothing)
 
 
-def facing_core(nodes: np.ndarray) -> np.ndarray:
+def facing_core(sensor: str, nodes: np.ndarray) -> np.ndarray:
     """Mark the resting inner-skin nodes (n, 3) m that may come to touch the core: (n,) bool.
 
     Under the pad, within the table, and clear of the core by 0.1 mm: nearer ones lie beside it and hardly move.
     """
     x, y, z = nodes.T
-    inside = (x > _X[0]) & (x < _X[1]) & (np.abs(np.arctan2(z, biotac.AXIS_Y - y)) < np.radians(100.0))
-    return inside & (BiotacCore().distance(nodes)[0] > 0.1e-3)
+    skin = skin_of(sensor)
+    (low, high), half = skin.descriptor.core.contact_x, skin.descriptor.core.facing_half_angle
+    inside = (x > low) & (x < high) & (np.abs(np.arctan2(z, skin.axis_y - y)) < half)
+    return inside & (Core(sensor).distance(nodes)[0] > 0.1e-3)
 
 
 @functools.cache
-def above_core() -> tuple[np.ndarray, np.ndarray]:
+def above_core(sensor: str) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors (n, 3) from the core's nearest point to each node of the resting inner skin; distances (n,) m.
 
-    On the sides too, where ``BiotacCore`` has no table.
+    On the sides too, where ``Core`` has no table.
     """
     import scipy.spatial
 
-    points = biotac.skin_surface("inner").rest
+    skin = skin_of(sensor)
+    points = skin.skin_surface("inner").rest
     step, turn = _POINT_STEP
-    x, theta = np.meshgrid(np.arange(-20e-3, 5.3e-3, step), np.arange(-np.pi, np.pi - turn / 2, turn), indexing="ij")
+    tip, base = skin.descriptor.skin.inner_poles
+    x, theta = np.meshgrid(
+        np.arange(np.floor(1e3 * tip) / 1e3, base + 0.2e-3, step),
+        np.arange(-np.pi, np.pi - turn / 2, turn),
+        indexing="ij",
+    )
     x, theta = x.ravel(), theta.ravel()
-    radius = biotac.core_radius(x, theta)
-    core = np.column_stack([x, biotac.AXIS_Y - radius * np.cos(theta), radius * np.sin(theta)])
+    radius = skin.core_radius(x, theta)
+    core = np.column_stack([x, skin.axis_y - radius * np.cos(theta), radius * np.sin(theta)])
     core = core[np.isfinite(radius)]
     distance, nearest = scipy.spatial.cKDTree(core).query(points)
     return (points - core[nearest]) / np.maximum(distance, 1e-9)[:, None], distance

@@ -12,7 +12,6 @@ import numpy as np
 
 from ... import sensors
 from ...geometry.catmull_rom import catmull_rom
-from ...sensors import biotac
 from ...sensors.gel_shape import GelShape
 from .block_pattern import BlockPattern
 from .hex_mesh import SKIN_LAYERS, HexMesh, gel_solid, glued_skin, skin_solid
@@ -94,7 +93,7 @@ class GradedMesh:
 
 def graded(sensor: str, footprint: Footprint) -> GradedMesh:
     """A sensor's solid, fine under ``footprint``."""
-    return _graded_gel(sensor, footprint) if sensors.is_gel(sensor) else _graded_skin(footprint)
+    return _graded_gel(sensor, footprint) if sensors.is_gel(sensor) else _graded_skin(sensor, footprint)
 
 
 def _graded_gel(sensor: str, footprint: Footprint) -> GradedMesh:
@@ -111,15 +110,15 @@ def _graded_gel(sensor: str, footprint: Footprint) -> GradedMesh:
     return GradedMesh(mesh, pattern, factor, rows, columns, to_rows, to_columns)
 
 
-def _graded_skin(footprint: Footprint) -> GradedMesh:
-    glued = glued_skin()
+def _graded_skin(sensor: str, footprint: Footprint) -> GradedMesh:
+    glued = glued_skin(sensor)
     stations, around = glued.shape
     rows = _lines((0, *_SKIN_ROW_MARKS, stations - 1), footprint, 0, _WIDEST_SKIN)
     columns = _lines((0, *_SKIN_COLUMN_MARKS, around), footprint, 1, _WIDEST_SKIN)
-    outer, inner = (_skin_points(layer, rows, columns[:-1]) for layer in ("outer", "inner"))
+    outer, inner = (_skin_points(sensor, layer, rows, columns[:-1]) for layer in ("outer", "inner"))
     nearest = glued[np.rint(rows).astype(int)][:, np.rint(columns[:-1]).astype(int) % around]
     mesh = skin_solid(outer, inner, nearest, 2 * footprint.refine * (SKIN_LAYERS // 2) + 1)
-    pattern, factor = _pattern(mesh, "biotac", len(rows), len(columns))
+    pattern, factor = _pattern(mesh, sensor, len(rows), len(columns))
     to_columns = _spline(columns, around, periodic=True)
     return GradedMesh(mesh, pattern, factor, rows, columns, _spline(rows, stations), to_columns)
 
@@ -176,9 +175,11 @@ def _bilinear(grid: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.nda
     return grid
 
 
-def _skin_points(layer: str, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _skin_points(sensor: str, layer: str, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Points (i, j, 3) m of a skin's grid at real-valued stations and columns, by cubics along both."""
-    points = biotac.skin_points(layer, np.interp(columns, np.arange(65), np.r_[biotac.angles(), np.pi]))
+    skin = sensors.skin_of(sensor)
+    angles = np.r_[skin.angles(), np.pi]
+    points = skin.skin_points(layer, np.interp(columns, np.arange(len(angles)), angles))
     cell = np.minimum(rows.astype(int), len(points) - 2)
     weights = catmull_rom(rows - cell)
     last = len(points) - 1

@@ -8,7 +8,6 @@ import functools
 import numpy as np
 
 from ... import sensors
-from ...sensors import biotac
 
 SKIN_LAYERS = 5  # nodes through the skin: two quadratic elements
 # Through the gel, 0 = bonded back, 1 = surface: three quadratic elements, thinner toward the contact.
@@ -110,26 +109,30 @@ def gel_mesh(sensor: str = "digit") -> HexMesh:
 
 
 @functools.cache
-def skin_mesh() -> HexMesh:
-    """The BioTac's skin on its lattice, clamped where its inner side lies on or in the rigid core; 18,200 nodes."""
-    return skin_solid(biotac.skin_grid("outer"), biotac.skin_grid("inner"), glued_skin())
+def skin_mesh(sensor: str = "biotac") -> HexMesh:
+    """A sensor's skin on its lattice, clamped where its inner side lies on or in the rigid core; the BioTac's has
+    18,200 nodes.
+    """
+    skin = sensors.skin_of(sensor)
+    return skin_solid(skin.skin_grid("outer"), skin.skin_grid("inner"), glued_skin(sensor))
 
 
 def solid_mesh(sensor: str) -> HexMesh:
     """The solid of a sensor: its gel, or its skin."""
-    return gel_mesh(sensor) if sensors.is_gel(sensor) else skin_mesh()
+    return gel_mesh(sensor) if sensors.is_gel(sensor) else skin_mesh(sensor)
 
 
 @functools.cache
-def glued_skin() -> np.ndarray:
+def glued_skin(sensor: str = "biotac") -> np.ndarray:
     """Mark the inner points of the skin's grid (stations, columns) that lie on or in the core."""
-    inner = biotac.skin_grid("inner")
-    return _on_core(inner.reshape(-1, 3)).reshape(inner.shape[:2])
+    inner = sensors.skin_of(sensor).skin_grid("inner")
+    return _on_core(sensor, inner.reshape(-1, 3)).reshape(inner.shape[:2])
 
 
-def _on_core(inner: np.ndarray) -> np.ndarray:
-    held = biotac.DESCRIPTOR.core
+def _on_core(sensor: str, inner: np.ndarray) -> np.ndarray:
+    skin = sensors.skin_of(sensor)
+    held = skin.descriptor.core
     x, y, z = inner.T
-    radius = np.hypot(y - biotac.AXIS_Y, z)
-    core = biotac.core_radius(x, np.arctan2(z, biotac.AXIS_Y - y))
-    return (np.nan_to_num(core, nan=-1.0) >= radius - held.attached) | (x > held.base_cap_x)
+    radius = np.hypot(y - skin.axis_y, z)
+    core = skin.core_radius(x, np.arctan2(z, skin.axis_y - y))
+    return (np.nan_to_num(core, nan=-1.0) >= radius - held.attached) | (x > held.base_cap_x) | (x < held.tip_cap_x)

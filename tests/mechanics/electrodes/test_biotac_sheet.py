@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, growth
-from tactile_core.mechanics.electrodes.gap_law import FILM_FLOOR
+from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet
+from tactile_core.mechanics.electrodes.gap_law import film_floor
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.sensors import biotac
 
@@ -53,8 +53,8 @@ def test_a_symmetric_sensor_reads_symmetrically():
 
 def test_half_the_film_doubles_every_resistance():
     sheet = biotac_sheet()
-    assert sheet.film.min() > FILM_FLOOR
-    far = np.maximum(sheet.film, 2.2 * FILM_FLOOR)  # so that no film meets the floor on the way
+    assert sheet.film.min() > film_floor("biotac")
+    far = np.maximum(sheet.film, 2.2 * film_floor("biotac"))  # so that no film meets the floor on the way
     start, halved = REST.copy(), REST.copy()
     start[sheet.wet] = sheet.outward * (far - sheet.film)[:, None]
     halved[sheet.wet] = sheet.outward * (far / 2 - sheet.film)[:, None]
@@ -74,7 +74,7 @@ def test_a_dent_is_felt_where_it_is_and_little_elsewhere(electrode):
 
 def test_a_skin_on_its_core_leaves_the_floor():
     films = biotac_sheet().films(dent(17, 3e-3))
-    assert films.min() == FILM_FLOOR
+    assert films.min() == film_floor("biotac")
     assert np.isfinite(biotac_sheet().resistances(biotac_sheet().films(dent(17, 3e-3)))).all()
 
 
@@ -86,7 +86,7 @@ def test_excitation_stands_on_both_sides_of_the_core():
 
 
 def test_the_interface_hides_a_part_of_the_film():
-    rest = biotac_sheet().resistances(biotac_sheet().film)
+    rest, growth = biotac_sheet().resistances(biotac_sheet().film), biotac_sheet().growth
     np.testing.assert_array_equal(growth(rest, rest), 1)
     assert (growth(2 * rest, rest) < 2).all() and (growth(2 * rest, rest) > 1.3).all()
     assert (growth(0 * rest, rest) > 0).all()

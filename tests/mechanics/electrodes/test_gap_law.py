@@ -3,7 +3,7 @@
 import numpy as np
 
 from tactile_core import sensors
-from tactile_core.mechanics.electrodes.gap_law import FILM_FLOOR, signal_of_gaps
+from tactile_core.mechanics.electrodes.gap_law import film_floor, signal_of_gaps
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 
 
@@ -23,5 +23,5 @@ def test_no_change_without_deformation_and_growth_with_thinning():
 
 def test_films_thinner_than_the_floor_do_not_blow_up():
     rest = electrode_feet().gap
-    np.testing.assert_array_equal(signal_of_gaps(np.full(19, -1e-3)), signal_of_gaps(np.full(19, FILM_FLOOR)))
+    np.testing.assert_array_equal(signal_of_gaps(np.full(19, -1e-3)), signal_of_gaps(np.full(19, film_floor("biotac"))))
     assert np.isfinite(signal_of_gaps(rest * 0)).all()

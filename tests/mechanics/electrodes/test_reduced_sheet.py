@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tactile_core.mechanics.electrodes.biotac_sheet import CONDUCTIVITY, biotac_sheet
-from tactile_core.mechanics.electrodes.gap_law import FILM_FLOOR
+from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet
+from tactile_core.mechanics.electrodes.gap_law import film_floor
 from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
 from tactile_core.mechanics.fast.compliance import biotac_compliance
 from tactile_core.mechanics.fast.sensing_points import sensing_nodes
@@ -14,7 +14,7 @@ def dented(seed: int) -> np.ndarray:
     sheet, random = biotac_sheet(), np.random.default_rng(seed)
     nodes = sheet.sheet.nodes
     away = np.linalg.norm(nodes - nodes[random.choice(np.flatnonzero(nodes[:, 1] < -4e-3))], axis=1)
-    return np.maximum(sheet.film * (1 - 0.7 * np.clip(1 - (away / 3e-3) ** 2, 0, 1)), FILM_FLOOR)
+    return np.maximum(sheet.film * (1 - 0.7 * np.clip(1 - (away / 3e-3) ** 2, 0, 1)), film_floor("biotac"))
 
 
 def test_it_is_exact_at_rest_and_in_films_of_any_one_scale():
@@ -38,15 +38,15 @@ def test_sensing_nodes_are_all_that_move_and_fill_the_sheet():
     skin, sheet, nodes = biotac_compliance(), biotac_sheet(), sensing_nodes()
     assert len(skin.watch_gap) == skin.feet + len(nodes) and len(np.unique(nodes)) == len(nodes)
     np.testing.assert_array_equal(nodes[sheet.sensing], sheet.wet)
-    np.testing.assert_array_equal(sheet.films_of(np.zeros(len(nodes))), np.maximum(sheet.film, FILM_FLOOR))
+    np.testing.assert_array_equal(sheet.films_of(np.zeros(len(nodes))), np.maximum(sheet.film, film_floor("biotac")))
 
 
 def test_energy_never_falls_short():
     """Galerkin's potentials are too small for the same current: resistances of one electrode against a joined rest."""
     sheet, films = biotac_sheet(), dented(3)
-    exact = sheet.sheet.potentials(films, CONDUCTIVITY)
+    exact = sheet.sheet.potentials(films, sheet.fluid.conductivity)
     fields, patches = reduced_sheet().fields, sheet.sheet.patches[1:]
-    stiffness = sheet.sheet.matrix(films, CONDUCTIVITY)[1:, 1:]
+    stiffness = sheet.sheet.matrix(films, sheet.fluid.conductivity)[1:, 1:]
     seen = fields.T @ patches
     found = seen.T @ np.linalg.solve(fields.T @ (stiffness @ fields), seen)
     assert np.linalg.eigvalsh(exact - found).min() > -1e-9 * np.abs(exact).max()

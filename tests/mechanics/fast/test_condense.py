@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse.linalg
 from slab import slab_mesh
 
-from tactile_core.mechanics.fast.compliance import Compliance, build
+from tactile_core.mechanics.fast.compliance import Compliance, Solid, build
 from tactile_core.mechanics.fast.compliance_block import ComplianceBlock
 from tactile_core.mechanics.fast.condense import condense, mirror_nodes
 from tactile_core.mechanics.fast.surface_response import displacement
@@ -35,7 +35,7 @@ def test_every_force_has_the_answer_of_the_solid(block):
     """Also where the matrix holds only the mirror image's answer."""
     mesh, lattice, answer = block
     touchable = np.flatnonzero(lattice.rest[:, 0] > -1.5e-3)
-    compliance = Compliance("slab", lattice, touchable, *build(mesh, MATERIAL, touchable, lattice))
+    compliance = Compliance("slab", lattice, touchable, *build(Solid("slab", lattice, touchable, mesh, MATERIAL)))
     none = np.empty(0, int)
     matrix = ComplianceBlock(compliance, np.arange(len(touchable)), none).matrix
     surface = (3 * mesh.surface[:, None] + np.arange(3)).ravel()

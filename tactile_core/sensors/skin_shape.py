@@ -1,0 +1,182 @@
+"""A fluid sensor's shape by its descriptor: skin and core as structured surfaces, from the table of their radii."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..errors import TactileError
+from ..geometry.catmull_rom import catmull_rom
+from ..geometry.lattice import Lattice, cap_faces, grid_faces
+from .descriptor import of_kind
+from .fluid_sensor import Fluid
+from .profiles import read_radii
+
+_ROUNDING = 0.5e-3  # m, by which the corner of a flat inner cap, where the table ends, is rounded as the outer one is
+
+
+@functools.cache
+def skin_of(name: str) -> SkinShape:
+    """The shape of the skin of a sensor that is there. Raises TactileError for one that has none."""
+    return SkinShape(of_kind(name, Fluid))
+
+
+class SkinShape:
+    """The resting skin and core of a descriptor, about the axis (y, z) = (``axis_y``, 0); lengths m, angles rad.
+
+    pad_angle : of the part that unrolls, to either side of the lowest line; thickness : of the skin
+    """
+
+    def __init__(self, descriptor: Fluid) -> None:
+        self.descriptor = descriptor
+        self._skin, self._lattice = descriptor.skin, descriptor.lattice
+        self.axis_y, self.pad_angle = self._skin.axis_y, self._skin.pad_half_angle
+        self.thickness = self._skin.thickness
+        self._poles = {"outer": self._skin.outer_poles, "inner": self._skin.inner_poles}
+
+    @functools.cached_property
+    def _angles(self) -> np.ndarray:
+        pad = np.linspace(-self.pad_angle, self.pad_angle, self._lattice.pad_intervals + 1)
+        back = np.linspace(self.pad_angle, 2 * np.pi - self.pad_angle, self._lattice.back_intervals + 1)[1:-1]
+        back = np.where(back > np.pi - 1e-9, back - 2 * np.pi, back)
+        return np.sort(np.concatenate([pad, back]))
+
+    def angles(self) -> np.ndarray:
+        """Angles (columns,) rad about the axis, 0 at the pad's lowest line, growing toward +z, from -pi up."""
+        return self._angles
+
+    @functools.cached_property
+    def table(self) -> dict[str, np.ndarray]:
+        """x (n,) m, theta (72,) rad and radii (n, 72) m of outer skin, inner skin and core, made even in theta."""
+        rows = read_radii(self.descriptor.folder / self._skin.profile)
+        mirror = (-np.arange(72)) % 72  # the table starts at -180 degrees in 5 degree steps
+        radii = _mean_of_known(rows[..., 2:], rows[:, mirror, 2:]) * 1e-3
+        return {
+            "x": rows[:, 0, 0] * 1e-3,
+            "theta": np.radians(rows[0, :, 1]),
+            "outer": radii[..., 0],
+            "inner": radii[..., 1],
+            "core": radii[..., 2],
+        }
+
+    def _meridian(self, layer: str, column: int) -> np.ndarray:
+        """Points (rows, 2) = (x, r) in m along one meridian of the table, from the tip pole to the base pole."""
+        table = self.table
+        known = np.isfinite(table[layer][:, column])
+        x, r = table["x"][known], table[layer][known, column]
+        tip, base = self._poles[layer]
+        x, r = np.r_[min(tip, x[0] - 1e-6), x, base], np.r_[0, r, 0]
+        if layer == "inner" and r[-2] > 2 * _ROUNDING:
+            x, r = np.insert(x, -1, base - 5e-6), np.insert(r, -1, r[-2] - _ROUNDING)
+        skin, lattice = self._skin, self._lattice
+        pieces = [
+            _piece(x, r, x[0], skin.tip_x, np.linspace(0, 1, lattice.tip_rows + 1)),
+            _piece(x, r, skin.tip_x, skin.base_x, np.linspace(0, 1, lattice.trunk_rows + 1))[1:],
+            _piece(x, r, skin.base_x, base, np.linspace(0, 1, lattice.base_rows + 1))[1:],
+        ]
+        return np.concatenate(pieces)
+
+    @functools.cached_property
+    def _meridians(self) -> dict[str, np.ndarray]:
+        return {
+            layer: np.stack([self._meridian(layer, column) for column in range(72)], -1)  # (stations, 2, 72)
+            for layer in self._poles
+        }
+
+    @functools.cached_property
+    def _grids(self) -> dict[str, np.ndarray]:
+        return {layer: self.skin_points(layer, self._angles) for layer in self._poles}
+
+    def skin_grid(self, layer: str) -> np.ndarray:
+        """Nodes (stations, columns, 3) m of the ``"outer"`` or ``"inner"`` skin.
+
+        Stations run from the tip pole to the base pole (both included, each one point repeated over the columns);
+        outer and inner points of one station and column face each other through the skin.
+        """
+        return self._grids[layer]
+
+    def skin_points(self, layer: str, theta: np.ndarray) -> np.ndarray:
+        """The stations of ``skin_grid`` at any angles (columns,) rad: (stations, columns, 3) m."""
+        x, r = np.moveaxis(_around(self._meridians[layer], theta), 1, 0)
+        x[[0, -1]] = x[[0, -1]].mean(axis=1, keepdims=True)
+        r[[0, -1]] = 0
+        return np.stack([x, self.axis_y - r * np.cos(theta), r * np.sin(theta)], -1)
+
+    def core_radius(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """Radius of the rigid core, m, about the axis at stations x (n,) m and angles theta (n,) rad; nan off the
+        core.
+        """
+        return self._radius("core", x, theta)
+
+    def _radius(self, layer: str, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        table = self.table
+        row = np.clip(np.searchsorted(table["x"], x) - 1, 0, len(table["x"]) - 2)
+        t = (x - table["x"][row]) / (table["x"][row + 1] - table["x"][row])
+        columns, weights = _columns(theta)
+        lower, upper = ((weights * table[layer][at, columns]).sum(axis=0) for at in (row, row + 1))
+        return lower * (1 - t) + upper * t
+
+    def check_inside(self, points: np.ndarray) -> None:
+        """Raise TactileError where one of the electrodes at points (n, 3) m does not lie inside the inner skin."""
+        x, y, z = points.T
+        inside = np.hypot(y - self.axis_y, z) < self._radius("inner", x, np.arctan2(z, self.axis_y - y))
+        if not inside.all():
+            at = points[int(np.argmin(inside))]
+            found = f"an electrode at x, y, z = {', '.join(f'{1e3 * each:.3g}' for each in at)} mm, outside the body"
+            where = self.descriptor.folder / self.descriptor.electrodes.places
+            raise TactileError(where, found, "places inside the inner skin, mm in the maker's frame of [frame]")
+
+    @functools.cached_property
+    def _surfaces(self) -> dict[str, Lattice]:
+        return {layer: self._surface(layer) for layer in self._poles}
+
+    def skin_surface(self, layer: str = "outer") -> Lattice:
+        """The outer (or inner) skin at rest: rows from tip to base, columns round the axis, then the two poles.
+
+        The inner skin's triangles point away from the solid too, into the fluid.
+        """
+        return self._surfaces[layer]
+
+    def _surface(self, layer: str) -> Lattice:
+        grid = self.skin_grid(layer)
+        stations, columns = grid.shape[:2]
+        rows = stations - 2
+        rest = np.concatenate([grid[1:-1].reshape(-1, 3), grid[:1, 0], grid[-1:, 0]])
+        ring = np.arange(columns)
+        faces = np.concatenate(
+            [
+                grid_faces(rows, columns, closed=True),
+                cap_faces(rows * columns, ring),
+                cap_faces(rows * columns + 1, (rows - 1) * columns + ring)[:, ::-1],
+            ]
+        )
+        outward = faces if layer == "outer" else faces[:, ::-1]
+        return Lattice(rest, np.ascontiguousarray(outward), (rows, columns))
+
+
+def _mean_of_known(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    mean = (a + b) / 2
+    return np.where(np.isnan(a), b, np.where(np.isnan(b), a, mean))
+
+
+def _piece(x: np.ndarray, r: np.ndarray, low: float, high: float, fractions: np.ndarray) -> np.ndarray:
+    """Points (n, 2) at fractions of the arc length of the polyline (x, r) between x = low and x = high."""
+    keep = (x > low) & (x < high)
+    ends = np.interp([low, high], x, r)
+    line = np.column_stack([np.r_[low, x[keep], high], np.r_[ends[0], r[keep], ends[1]]])
+    length = np.r_[0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
+    at = fractions * length[-1]
+    return np.column_stack([np.interp(at, length, line[:, 0]), np.interp(at, length, line[:, 1])])
+
+
+def _around(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Periodic cubic (Catmull-Rom) interpolation of values (..., 72) on the table's angles, at angles (n,)."""
+    return sum(weight * values[..., column] for column, weight in zip(*_columns(at), strict=True))
+
+
+def _columns(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The table's columns (4, n) next to angles (n,), and their weights (4, n)."""
+    position = (at + np.pi) / (2 * np.pi) * 72
+    cell = np.floor(position + 1e-9).astype(int)
+    return (cell + np.arange(-1, 3)[:, None]) % 72, catmull_rom(position - cell)

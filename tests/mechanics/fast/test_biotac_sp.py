@@ -1,0 +1,74 @@
+"""The BioTac SP in the fast tier: pressed by every kind of body, its electrodes felt; COMSOL's presses on it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks.mechanics import comsol, comsol_fast
+
+from tactile_core.geometry.indenters import Sphere
+from tactile_core.mechanics.electrodes.law import GAP, SHEET, rest_counts, signal_of
+from tactile_core.mechanics.placement import Placement
+from tactile_core.mechanics.solve import solve
+from tactile_core.sensors import descriptor, excitation_electrodes
+from tactile_core.sensors.electrodes import places_of
+from tactile_core.simulation.pair_sampling import press_rows
+from tactile_core.simulation.scene import load_scene
+
+NAME, BALL = "biotac_sp", Sphere(3.5e-3)
+SCENE = Path(__file__).parents[3] / "scenes" / "training"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def places(outside_data, tmp_path_factory):
+    """The public table of electrodes, where the descriptor looks for it."""
+    table = outside_data(NAME) / "locations.csv"
+    folder = tmp_path_factory.mktemp("own")
+    (folder / NAME).mkdir()
+    (folder / NAME / "locations.csv").write_bytes(table.read_bytes())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(descriptor.OWN, str(folder))
+        places_of.cache_clear()
+        assert len(excitation_electrodes(NAME)) == 4
+        yield
+
+
+def test_it_is_even_across():
+    left, right = (solve(NAME, BALL, Placement(-8e-3, z), depth=0.3e-3, friction=0.0) for z in (-3e-3, 3e-3))
+    assert left.axial_force == pytest.approx(right.axial_force, rel=1e-4)
+    np.testing.assert_allclose(left.force * [1, 1, -1], right.force, atol=1e-3 * right.axial_force)
+    # E1..E10 and E11..E20 are each other's images, E22 and E23 too
+    image = np.r_[10:20, 0:10, 20, 22, 21, 23]
+    # the middle ones' feet lie in triangles that are not even: 10 um
+    np.testing.assert_allclose(left.electrode_gaps[image], right.electrode_gaps, atol=15e-6)
+
+
+def test_counts_fall_where_it_is_squeezed():
+    pressed = solve(NAME, BALL, Placement(-9.5e-3, 0.0), depth=0.5e-3)
+    squeezed = int(
+        np.argmin(pressed.electrode_gaps - solve(NAME, BALL, Placement(-9.5e-3, 0.0), depth=0.0).electrode_gaps)
+    )
+    for law in (SHEET, GAP):
+        change = signal_of(pressed, law, NAME)
+        assert change.shape == (24,) and change[squeezed] < 0 and np.isfinite(change).all()
+    assert pressed.pressure > 0 and pressed.axial_force > 0
+    rest = rest_counts(NAME)
+    assert rest.shape == (24,) and (rest > 2500).all() and (rest < 4000).all()  # as real units': 2,840 to 3,720
+
+
+def test_a_press_gives_pairs_with_the_digit():
+    scene, _ = load_scene(SCENE)
+    rows = press_rows(scene, 3, 1, SHEET, (NAME, "digit"))
+    assert len(rows) > 3 and rows[0]["signal"].shape == (24,)
+    for row in rows:
+        ratio = np.linalg.norm(row["force"]) / np.linalg.norm(row["force_digit"])
+        assert 0.5 < ratio < 2  # the same along the motion; across it by friction, which differs
+    assert f"displacement_{NAME}" in rows[0] and rows[-1]["contact_patch_digit"].any()
+
+
+def test_a_press_of_comsol(outside_data):
+    press = comsol.read(outside_data("biotac_comsol") / "001").first(12)  # further down our skin meets the core
+    found = {row["name"].removeprefix("comsol_fast_001_"): row for row in comsol_fast.rows(press)}
+    gaps, force = found["gap_rms"], found["force_error"]
+    assert gaps["value"] < gaps["baseline"]  # better than a skin that does not bulge
+    assert force["value"] < 10  # percent: one number is fitted on it, the curve's shape is the tier's own
