@@ -15,8 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
-from benchmarks.mechanics.comsol import comsol, presses
-from benchmarks.mechanics.comsol_fast import rows as fast_rows
+from benchmarks.mechanics.comsol import comsol, fast_rows, presses
 from tactile_core.accuracy import failed
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic

@@ -14,9 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
+from tactile_core import sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.finite_strain.sp_press import INTERVALS, Pressed, SpPress
+from tactile_core.geometry.indenters import Pose
+from tactile_core.mechanics.finite_strain.sp_press import INTERVALS, Plate, Pressed, SpPress
+from tactile_core.mechanics.first_touch import first_touch
+from tactile_core.mechanics.solution import Step
+from tactile_core.mechanics.solve import solve_path
 from tactile_core.sensors import biotac_sp
 
 GAP, VOLUME, FORCE, STEEP_FORCE = 0.05, 0.2, 5.0, 15.0  # mm, %, %, %: targets (docs/sources.md, Targets)
@@ -26,6 +31,7 @@ DEEP = 0.3e-3  # m, forces count beyond this depth
 FITTED = "001"  # the press that ``biotac_sp.FORCE_SCALE`` was fitted on
 COARSE = (16, 12, 6)  # node intervals of the second mesh
 _RAYS_DOWN = 32  # rays of the skin from rim to pole
+SENSOR, _DEEPEST = "biotac_sp", 3e-3  # in the fast tier; m, deeper than any press goes
 
 
 def published_volume(intervals: tuple[int, int, int] = INTERVALS) -> Row:
@@ -216,6 +222,48 @@ def _other_mesh(press: Press, steps: list[Pressed]) -> Iterator[Row]:
     yield row(f"comsol_{press.name}_coarser_mesh_force", shift, "percent", of=of)
     moved = gap_changes(press, other)[0] - gap_changes(press, steps)[0]
     yield row(f"comsol_{press.name}_coarser_mesh_gap_rms", _rms(moved), "mm", of=of)
+
+
+def fast_rows(press: Press) -> Iterator[Row]:
+    """Yield the rows of one press; the stiffness of the descriptor's skin was fitted on ``FITTED``."""
+    steps = fast_steps(press)
+    press = press.first(len(steps))
+    changes, expected = gap_changes(press, steps)
+    off, baseline = changes - expected, resting_gaps_cut(press) - expected
+    ratio = force_ratios(press, steps)
+    of = f"COMSOL press {press.name}, {len(steps)} steps, fast tier of {SENSOR}"
+    name, target = f"comsol_fast_{press.name}", None if press.name == FITTED else press.force_target
+    yield row(f"{name}_gap_rms", _rms(off), "mm", GAP, baseline=_rms(baseline), of=of)
+    yield row(f"{name}_gap_rms_at_the_end", _rms(off[-1]), "mm", of=of)
+    yield row(f"{name}_force_error", 100 * float(np.abs(ratio - 1).mean()), "percent", target, baseline=100.0, of=of)
+    yield row(f"{name}_force_bias", 100 * float(ratio.mean() - 1), "percent", of=of)
+
+
+def fast_steps(press: Press) -> list[Pressed]:
+    """The steps of a press in the fast tier, frictionless, as far as it follows them."""
+    turned = np.array([[-1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]])  # COMSOL's axes in the shared frame, even in z
+    shift = sensors.from_maker(np.zeros((1, 3)), SENSOR)[0]
+    axis = -turned @ press.into
+    first = np.cross([0.0, 0.0, 1.0], axis)
+    first /= np.linalg.norm(first)
+    start = Pose(turned @ press.point + shift, np.column_stack([first, np.cross(axis, first), axis]))
+    surface = sensors.sensor_surface(SENSOR)
+    touch = first_touch(surface, Plate(), start)
+    clearance = float((touch.apex - start.apex) @ start.direction)
+    depths = np.maximum(press.advances - clearance, 0.0)
+    pad = surface.rest[:, 1] < sensors.skin_of(SENSOR).axis_y + 0.2e-3
+    found: list[Pressed] = []
+    try:
+        for advance, step in zip(
+            press.advances,
+            solve_path(SENSOR, Plate(), touch, map(Step, depths), friction=0.0, limit=_DEEPEST),
+            strict=True,
+        ):
+            skin = ((surface.rest + step.displacement)[pad] - shift) @ turned
+            found.append(Pressed(advance - clearance, skin, step.axial_force, step.pressure, np.nan, np.nan))
+    except TactileError:
+        pass  # deeper than the linear tier finds
+    return found
 
 
 def _rms(values: np.ndarray) -> float:

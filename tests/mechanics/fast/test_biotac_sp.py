@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.mechanics import comsol, comsol_fast
+from benchmarks.mechanics import comsol
 
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.electrodes.law import GAP, SHEET, rest_counts, signal_of
@@ -68,7 +68,7 @@ def test_a_press_gives_pairs_with_the_digit():
 
 def test_a_press_of_comsol(outside_data):
     press = comsol.read(outside_data("biotac_comsol") / "001").first(12)  # further down our skin meets the core
-    found = {row["name"].removeprefix("comsol_fast_001_"): row for row in comsol_fast.rows(press)}
+    found = {row["name"].removeprefix("comsol_fast_001_"): row for row in comsol.fast_rows(press)}
     gaps, force = found["gap_rms"], found["force_error"]
     assert gaps["value"] < gaps["baseline"]  # better than a skin that does not bulge
     assert force["value"] < 10  # percent: one number is fitted on it, the curve's shape is the tier's own
