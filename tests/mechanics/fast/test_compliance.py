@@ -24,7 +24,7 @@ def tiny(tmp_path, monkeypatch):
     touchable = np.arange(len(lattice.rest))
 
     def load(youngs=1e6):
-        return compliance._cached(compliance._Solid("tiny", lattice, touchable, mesh, Material(youngs, 0.45)))
+        return compliance._cached(compliance.Solid("tiny", lattice, touchable, mesh, Material(youngs, 0.45)))
 
     return load
 
