@@ -22,9 +22,9 @@ RESTING_CENTRE = -0.242e-3  # m, z of its centre, likewise
 # INITIAL_PRESSURE (model, its ``vol_0``).
 PUBLISHED_OUTER, PUBLISHED_THICKNESS, PUBLISHED_VOLUME = np.array([14.23e-3, 9.94e-3, 9.94e-3]), 0.2e-3, 3.0524e-6
 
-# The presses were made with a later skin, whose dimensions are not published. Its thickness is chosen by all four presses
-# at hand: with 0.2 mm the force at 50 degrees is 29 % too low, with 0.6 mm that at 30 is 10 % too high; with 0.47 mm the
-# volume of 007 is 0.21 % off.
+# The presses were made with a later skin, whose dimensions are not published. Its thickness is chosen by all four
+# presses at hand: with 0.2 mm the force at 50 degrees is 29 % too low, with 0.6 mm that at 30 is 10 % too high; with
+# 0.47 mm the volume of 007 is 0.21 % off.
 # Its semi-axes are those that INITIAL_PRESSURE swells to the resting skin of press 001, within 10 um rms.
 THICKNESS = 0.46e-3
 OUTER = np.array([13.928e-3, 9.647e-3, 10.151e-3])
