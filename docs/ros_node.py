@@ -28,7 +28,7 @@ LAYOUTS = {layout.MESSAGE: layout for layout in (bag_biotac_hand, bag_biotac_all
 
 
 class Finger:
-    """One finger's messages to pictures; knows nothing of ROS but the messages' fields.
+    """A translator of one finger's messages to pictures; it knows nothing of ROS but the messages' fields.
 
     kind : a key of LAYOUTS; number : of the finger in its messages, from 0; tools : what `load_tools` returns
     """
@@ -38,7 +38,7 @@ class Finger:
         self.view = View(tools, rate)
 
     def __call__(self, message: Any) -> Shown | None:
-        """What is to be shown of a message (`live.Shown`); None before rest is known. Raises TactileError."""
+        """Translate and draw a message; returns a `live.Shown`, None before rest is known. Raises TactileError."""
         came, sensors = time.perf_counter(), self._layout.sensors(message)
         if self._number >= len(sensors):
             raise TactileError(
@@ -52,14 +52,14 @@ class Finger:
 
 
 def picture_message(kind: type, header: Any, picture: np.ndarray) -> Any:
-    """A sensor_msgs/Image of a picture (H, W, 3) uint8."""
+    """Build a sensor_msgs/Image of a picture (H, W, 3) uint8."""
     height, width, _ = picture.shape
     data = array.array("B", picture.tobytes())  # which rclpy takes as it is; of bytes it looks at each
     return kind(header=header, height=height, width=width, encoding="rgb8", step=3 * width, data=data)
 
 
 def wrench_message(kind: type, header: Any, force: np.ndarray) -> Any:
-    """A geometry_msgs/WrenchStamped of a force (3,) N."""
+    """Build a geometry_msgs/WrenchStamped of a force (3,) N."""
     message = kind(header=header)
     message.wrench.force.x, message.wrench.force.y, message.wrench.force.z = map(float, force)
     return message

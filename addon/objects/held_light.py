@@ -23,7 +23,7 @@ _DARKEST = 1e-3  # of an albedo or a radiance that is divided by
 
 
 def attribute(colour: str) -> str:
-    """The name of an LED's attribute."""
+    """Name an LED's attribute."""
     return f"{NODE} {colour}"
 
 
@@ -39,7 +39,7 @@ def write(gel: bpy.types.Object, unit: Calibration) -> None:
 
 
 def held_light(unit: Calibration) -> np.ndarray:
-    """Levels (n, 3, 3), channel by LED, that the picture at rest has at the gel's nodes over the light of its lamps."""
+    """Compute levels (n, 3, 3), channel by LED, that the picture at rest has at the nodes over its lamps' light."""
     radiance = open_radiance(unit)
     levels = by_led(unit, radiance)
     diagonal = np.arange(3)

@@ -15,6 +15,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..geometry.indenters import Sphere
+from ..geometry.indenters.pose import tangents
 from ..sensors.unrolling import node_normals, roll_up, unrolled_nodes
 from .inverse_contact import pressing_traction
 from .node_areas import node_areas
@@ -50,7 +51,7 @@ class BallContact:
 
 
 def skin_contact(displacement: np.ndarray) -> BallContact:
-    """Find the contact of a BioTac's skin from its displacement (3650, 3) m; 15 ms.
+    """Find the contact of a BioTac's skin from its displacement (3650, 3) m; 4 ms of CPU.
 
     Raises TactileError where nothing is pressed on the pad.
     """
@@ -73,11 +74,10 @@ def skin_contact(displacement: np.ndarray) -> BallContact:
 def leaning(x: float, z: float, force: np.ndarray) -> Placement:
     """Place (x, z) m of a press in the direction of the force (3,) N that it exerts on the BioTac there."""
     _, outward = roll_up(np.array([x, z]))
-    along = np.array([1.0, 0.0, 0.0]) - outward[0] * outward
-    along /= np.linalg.norm(along)
+    along, side = tangents(outward)
     up = -force / np.linalg.norm(force)
     tilt = float(np.arccos(np.clip(up @ outward, -1, 1)))
-    heading = float(np.arctan2(up @ np.cross(along, outward), up @ along))
+    heading = float(np.arctan2(up @ side, up @ along))
     return Placement(x, z, min(tilt, LARGEST_TILT), heading)
 
 
@@ -89,9 +89,7 @@ def patch_radius(points: np.ndarray, outward: np.ndarray) -> float:
     if len(points) < LEAST_NODES:
         return USUAL_RADIUS
     height = outward / np.linalg.norm(outward)
-    along = np.array([1.0, 0.0, 0.0]) - height[0] * height
-    along /= np.linalg.norm(along)
-    axes = np.stack([along, np.cross(along, height), height], axis=1)
+    axes = np.stack([*tangents(height), height], axis=1)
     x, z, y = ((points - points.mean(axis=0)) @ axes).T
     terms = np.stack([np.ones_like(x), x, z, 0.5 * (x * x + z * z)], axis=1)
     curvature = np.linalg.lstsq(terms, y, rcond=None)[0][3]  # 1/m; the ball's deepest point lies lowest

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import ELECTRODES, SAMPLE_RATE
+from ..sensors import ELECTRODES, SAMPLE_RATE, title
 from ..sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
 from .flags import Flag
 from .recording import TRANSLATED, Recording, Truth
@@ -49,7 +49,7 @@ def check_electrodes(path: str, count: int, source: str, sensor: str = TRANSLATE
     if count == wanted:
         return
     if sensor != TRANSLATED:
-        raise TactileError(f"{path}, {source}", f"{count} electrodes", f"the {wanted} electrodes of a BioTac SP")
+        raise TactileError(f"{path}, {source}", f"{count} electrodes", f"the {wanted} electrodes of a {title(sensor)}")
     if count == SP_ELECTRODES:
         raise TactileError(
             f"{path}, {source}",

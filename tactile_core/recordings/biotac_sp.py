@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..sensors import SAMPLE_RATE
+from .formats import HAND
 from .recording import Recording
 from .signal_kind import detect
 
 if TYPE_CHECKING:
     from .electrode_gains import ElectrodeGains
 
-FINGERS = {"ff": "first finger", "mf": "middle finger", "rf": "ring finger", "lf": "little finger", "th": "thumb"}
 NOT_TRANSLATED = "not translated: the weights that ship are of a BioTac with 19 electrodes, none are of a BioTac SP"
 ADVICE = (
     "not known: a recording that begins in contact does not tell it; `tactile adapt RECORDINGS` finds it in several"
@@ -31,7 +31,7 @@ def describe_sp(recording: Recording, unit: ElectrodeGains | None = None) -> str
     kind, evidence = detect(whole) if len(whole) else ("unknown", "no line has a reading of every electrode")
     rows = [
         ("layout", recording.layout),
-        ("sensor", f"BioTac SP, {electrodes.shape[1]} electrodes, {FINGERS[finger]} ({finger})"),
+        ("sensor", f"BioTac SP, {electrodes.shape[1]} electrodes, {HAND[finger]} ({finger})"),
         ("channels", ", ".join(["electrodes", *recording.about["labels"]])),
         ("frames", f"{count} in lines {recording.rows[0]} to {recording.rows[-1]}"),
         ("time", _time(recording)),

@@ -69,18 +69,24 @@ class Pose:
         return self.apex + self.axes @ indenter.support(direction @ self.axes)
 
 
+def tangents(outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the unit tangents (..., 3) of a surface with unit normals ``outward`` (..., 3): along +x of the finger,
+    and to its side (on the pad toward -z).
+    """
+    along = np.array([1.0, 0.0, 0.0]) - outward[..., :1] * outward
+    along /= np.linalg.norm(along, axis=-1, keepdims=True)
+    return along, np.cross(along, outward)
+
+
 def pose_on(
     indenter: Indenter, point: np.ndarray, outward: np.ndarray, tilt: float = 0.0, tilt_heading: float = 0.0
 ) -> Pose:
-    """Return the pose in which the indenter just touches ``point`` (3,) m of a surface with
-    unit normal ``outward`` (3,).
+    """Return the pose in which the indenter just touches ``point`` (3,) m of a surface, unit normal ``outward`` (3,).
 
     tilt : rad, between its axis (the way it moves) and that normal
     tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z
     """
-    along = np.array([1.0, 0.0, 0.0]) - outward[0] * outward
-    along /= np.linalg.norm(along)
-    side = np.cross(along, outward)
+    along, side = tangents(outward)
     axis = np.cos(tilt) * outward + np.sin(tilt) * (np.cos(tilt_heading) * along + np.sin(tilt_heading) * side)
     first = along - axis * (along @ axis)
     first /= np.linalg.norm(first)

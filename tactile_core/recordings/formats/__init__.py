@@ -53,13 +53,8 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
     )
 
 
-HAND = (
-    "ff",
-    "mf",
-    "rf",
-    "lf",
-    "th",
-)  # a hand's fingers in the order of their numbers: first, middle, ring, little, thumb
+# A hand's fingers in the order of their numbers.
+HAND = {"ff": "first finger", "mf": "middle finger", "rf": "ring finger", "lf": "little finger", "th": "thumb"}
 
 
 def share_of_fingers(keys: Collection[str], style: str) -> float:
@@ -90,7 +85,7 @@ def of_finger(table: Table, layout: str, style: str, finger: int, *, snapshots: 
         rows=table.lines,
         problems=[problem for problem in table.essential(names) if problem.essential],
         row_word="line",
-        about={"finger": HAND[finger], "labels": [name for name in table.header if name not in electrodes]},
+        about={"finger": tuple(HAND)[finger], "labels": [name for name in table.header if name not in electrodes]},
         warnings=table.warnings,
         names=names,
         sensor="biotac_sp",
@@ -99,7 +94,7 @@ def of_finger(table: Table, layout: str, style: str, finger: int, *, snapshots: 
 
 
 def _of_finger(style: str, finger: int) -> list[str]:
-    return [style.format(HAND[finger], number) for number in range(1, SP_ELECTRODES + 1)]
+    return [style.format(tuple(HAND)[finger], number) for number in range(1, SP_ELECTRODES + 1)]
 
 
 def electrodes_of(store: Store, name: str) -> np.ndarray:
