@@ -110,6 +110,7 @@ EDGES = {
 }  # fmt: skip
 # addon/process/command_line.py is `tactile` inside Blender.
 EXCEPTIONS = {("addon/process/command_line.py", "cli")}
+VERBS = "tactile_core/cli/verbs"
 MOST_NAMES, MOST_FILES = 16, 25  # at the top of tactile_core, and in any folder
 
 
@@ -182,6 +183,20 @@ def test_rooms_stay_small_enough_to_look_around_in():
     folders = {path.parent for path in sources("tactile_core", "addon", "scripts")}
     crowded = {str(one.relative_to(ROOT)): n for one in folders if (n := len(list(one.glob("*.py")))) > MOST_FILES}
     assert crowded == {}
+
+
+def test_a_file_name_stands_once_but_for_a_verbs():
+    """The command, the work behind it and the add-on's operator may share the verb's name, one file each."""
+    places: dict[str, list[str]] = {}
+    for path in sources("tactile_core", "addon"):
+        places.setdefault(path.stem, []).append(path.parent.relative_to(ROOT).as_posix())
+    del places["__init__"]
+    twice = {
+        name: found
+        for name, found in places.items()
+        if len(found) > (1 if VERBS not in found else 2 + ("addon/operators" in found))
+    }
+    assert twice == {}
 
 
 def lint(path: str, code: str) -> str:

@@ -3,7 +3,7 @@
 import bpy
 
 from ..process.jobs import Job, JobFolder
-from ..process.tracer import close_all
+from ..process.tracer_process import close_all
 from ..ui import preferences
 from ..ui.reports import TactileOperator, require
 

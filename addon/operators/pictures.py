@@ -10,7 +10,7 @@ import numpy as np
 from ...tactile_core.pictures import height_map, shading
 from ...tactile_core.sensors.calibration import Calibration
 from ..objects import digit_objects, digit_unit, images
-from ..process import tracer
+from ..process import tracer_process
 from ..ui import render_settings, reports
 
 FAST = "fast"
@@ -36,14 +36,14 @@ def draw(
     """Draw a gel's picture (H, W, 3) uint8 and heights (H, W) m, (width, height) pixels large, by a preset.
 
     The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba. Raises TactileError, and
-    ``tracer.Stopped`` where stopped() is true.
+    ``tracer_process.Stopped`` where stopped() is true.
     """
     shown = digit_unit.shown_unit(gel, depsgraph, render_settings.calibration_of(depsgraph.scene, size))
     heights = height_map.height_map(digit_objects.displacement_of(gel, depsgraph), shown.unit.camera)
     if preset == FAST:
         return shader_of(shown.unit)(heights), heights
     reports.require("mitsuba")
-    return tracer.tracer_for(preset).draw(shown.unit, shown.around, heights, stopped), heights
+    return tracer_process.tracer_for(preset).draw(shown.unit, shown.around, heights, stopped), heights
 
 
 def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Image:

@@ -7,7 +7,7 @@ from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
 from ..objects import images
-from ..process import tracer
+from ..process import tracer_process
 from ..ui import properties, render_settings, view
 from ..ui.reports import TactileOperator
 from . import pictures
@@ -68,7 +68,7 @@ def switch_off() -> None:
     for handlers, function in _handlers():
         if function in handlers:
             handlers.remove(function)
-    tracer.close_all()
+    tracer_process.close_all()
 
 
 def _handlers() -> list[tuple[list, Callable]]:

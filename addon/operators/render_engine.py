@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ..process import tracer
+from ..process import tracer_process
 from ..ui import properties, render_settings, reports
 from . import pictures
 
@@ -31,8 +31,8 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         except (TactileError, OSError, ModuleNotFoundError) as error:
             self.report({"ERROR"}, _describe_error(error))
             return
-        except tracer.Stopped:
-            tracer.close_all()
+        except tracer_process.Stopped:
+            tracer_process.close_all()
             return
         height, width = picture.shape[:2]
         result = self.begin_result(0, 0, width, height)
@@ -93,5 +93,5 @@ def unregister() -> None:
     """Called by the package."""
     for panel in _panels():
         panel.COMPAT_ENGINES.discard(ID)
-    tracer.close_all()
+    tracer_process.close_all()
     bpy.utils.unregister_class(TactileRenderEngine)

@@ -55,7 +55,7 @@ def simulate(folder: Path, job: dict, progress: Progress) -> None:
     """
     from tactile_core.errors import TactileError
     from tactile_core.mechanics.fast.compliance import compliance_of
-    from tactile_core.simulation.recording import sensors_of, simulate_recording
+    from tactile_core.simulation.scene_recording import sensors_of, simulate_recording
     from tactile_core.simulation.tier_choice import choose_for_scene
 
     by_height, used = (folder / "heights.npz").exists(), sensors_of(job["keep"])

@@ -11,7 +11,7 @@ from ..operators.preview import TACTILE_OT_live_picture
 from ..operators.render_setup import draw_parts, draw_settings
 from ..operators.scene_files import TACTILE_OT_export_scene, TACTILE_OT_import_scene
 from ..operators.simulate import TACTILE_OT_simulate
-from ..operators.translate_recording import TACTILE_OT_translate
+from ..operators.translate_imported import TACTILE_OT_translate
 from . import properties, timeline
 from .add_menu import TACTILE_MT_add
 from .reports import missing

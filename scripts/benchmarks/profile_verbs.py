@@ -26,7 +26,7 @@ import numpy as np
 
 from tactile_core import recordings
 from tactile_core.accuracy import HEADER, Row, line, row
-from tactile_core.files import atomic, png
+from tactile_core.files import atomic, png_writer
 from tactile_core.jobs import live
 from tactile_core.jobs.convert import load_tools
 from tactile_core.recordings import Truth, write_simulated
@@ -211,7 +211,7 @@ def packings() -> list[Row]:
     shader = shading.Shader()
     pictures = [shader(heights) for heights in height_map(truth)]
     ways = {f"level_{level}": {"compress_level": level} for level in (1, 3, 4, 6)}
-    for name, packing in (ways | {"huffman": png.PACKING}).items():
+    for name, packing in (ways | {"huffman": png_writer.PACKING}).items():
         began, size = time.process_time(), 0
         for picture in pictures:
             out = io.BytesIO()

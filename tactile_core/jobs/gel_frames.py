@@ -73,7 +73,7 @@ def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier:
     if path.suffix == ".npz":
         return _of_npz(path)
     if path.suffix == ".exr":
-        from ..files.exr import read_height
+        from ..files.exr_file import read_height
 
         return Frames("height map", np.zeros(1, int), heights=read_height(path)[None])
     if not _is_hdf5(path):
@@ -134,7 +134,7 @@ def _of_npz(path: Path) -> Frames:
 
 
 def _of_scene(path: Path, progress: Progress, tier: str) -> Frames:
-    from ..simulation.recording import simulate_recording
+    from ..simulation.scene_recording import simulate_recording
 
     with tempfile.TemporaryDirectory() as folder, progress() as shown:
         simulated = Path(folder) / "scene.h5"

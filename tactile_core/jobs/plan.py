@@ -115,18 +115,18 @@ def plan(path: str | os.PathLike, keep: str | None, budget: Budget, preset: str 
 
 def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | None) -> Plan:
     """Plan `tactile simulate`, then `tactile convert` for a translation and `tactile render` for pictures."""
-    from ..simulation import recording, tier_choice
+    from ..simulation import scene_recording, tier_choice
     from ..simulation.scene import load_scene
 
     scene, _ = load_scene(path)
-    spec = recording.recording_of(scene, path)
-    time, place, force = recording.motion(spec)
+    spec = scene_recording.recording_of(scene, path)
+    time, place, force = scene_recording.motion(spec)
     frames, pressed = len(time), int((force > 0).sum())
     contacts = len({(*at, newtons) for at, newtons in zip(place.tolist(), force.tolist(), strict=True) if newtons > 0})
-    needed = set(keep) & set(recording.OUTPUTS)
+    needed = set(keep) & set(scene_recording.OUTPUTS)
     needed |= {"electrodes"} if "translation" in keep else set()
     needed |= {"displacement_digit"} if "image" in keep else set()
-    used = recording.sensors_of(needed)
+    used = scene_recording.sensors_of(needed)
     choices = tier_choice.choose_for_scene(path, used, budget.um)
     start, extent = _part("simulate_nothing"), f"{frames} frames, {pressed} in contact; indenter {spec.indenter}"
     parts = [Part("start", "simulate", extent, start["start"], start["mb"])]

@@ -21,7 +21,7 @@ import numpy as np
 from ..accuracy import Budget
 from ..errors import TactileError
 from ..files import atomic, provenance
-from ..files.png import write_png
+from ..files.png_writer import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import digit_mapper, of_unit
 from ..pictures.mitsuba.scene_file import camera_planes, write_scene
@@ -229,13 +229,13 @@ class Pictures:
         write_scene(path, unit, of_unit(height, unit))
 
     def _write_exr(self, path: Path, radiance: np.ndarray, about: dict[str, str]) -> None:
-        from ..files.exr import write_exr
+        from ..files.exr_file import write_exr
 
         write_exr(path, {name: radiance[..., k] for k, name in enumerate("RGB")}, about)
 
     def _write_camera(self, path: Path) -> None:
         """Write the response to each LED's light, and the part of the picture at rest that is not from LEDs."""
-        from ..files.exr import write_exr
+        from ..files.exr_file import write_exr
 
         ambient = self.renderer.background - self.renderer.in_levels(self.renderer.rest_radiance)
         write_exr(path, camera_planes(self.renderer.calibration, ambient), self.about)

@@ -24,7 +24,7 @@ from .engine.recipes import Render
 from .engine.run import Place
 from .frame_range import frames_text
 from .render import Options, Pictures, claimed, note_of, pictures
-from .translate import check_unit
+from .translate_shards import check_unit
 
 GROWS = False
 NUMBERS, VALUES, KIND, HEIGHTS = "numbers", "values", "kind", "heights"  # arrays of a prepared file

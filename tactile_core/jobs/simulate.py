@@ -16,9 +16,9 @@ import msgspec
 from ..files import array_pack, atomic, checksummed
 from ..mechanics.electrodes.law import SHEET
 from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
-from ..simulation.recording import DEFAULT, check_places, recording_of
 from ..simulation.scene import Scene
 from ..simulation.scene_grid import combinations, name_of, with_values
+from ..simulation.scene_recording import DEFAULT, check_places, recording_of
 from ..simulation.scene_text import to_toml
 from .engine import job as jobs
 from .engine import result_parts, scene_input
@@ -96,7 +96,7 @@ def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
 
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
     """Simulate a recording."""
-    from ..simulation.recording import simulate_recording
+    from ..simulation.scene_recording import simulate_recording
 
     one = job.inputs[index]
     file = jobs.shard_file(folder, one.name, number)

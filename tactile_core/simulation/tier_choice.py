@@ -68,7 +68,7 @@ def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: floa
 
     Raises TactileError: a bad scene, a bound that no tier meets.
     """
-    from .recording import check_places, recording_of
+    from .scene_recording import check_places, recording_of
 
     scene, _ = load_scene(path)
     spec = recording_of(scene, path)

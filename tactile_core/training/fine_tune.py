@@ -26,7 +26,7 @@ from ..translation.network_sizes import NETS, PLACE, STATE
 from ..translation.networks import COMPRESSED_LIMIT, Networks
 from ..translation.posterior import FORCE_SCALE
 from ..translation.weights import CARD_NAME, card_bytes, read_bytes, sha256, to_safetensors, write_bytes
-from .export import versions
+from .export_weights import versions
 from .labelled_recording import LabelledRecording, read_labelled
 from .modules import ContactPosterior
 from .stages import FORCE_FLOOR

@@ -24,9 +24,9 @@ from ..translation.contact_frame import ContactFrame, frame_of
 from . import checkpoint
 from .data import Contacts
 from .device import device_of
-from .export import export, versions
+from .error_report import draw_losses, write_log
+from .export_weights import export, versions
 from .options import Options
-from .report import draw_losses, write_log
 from .stages import STAGES, Model, Stage
 from .step_errors import Bodies, our_bodies
 

@@ -82,7 +82,7 @@ class Networks:
     """The trained networks. Arrays are float32, T first; displacements in metres, forces in newtons, changes in counts.
 
     tensors : network -> tensor name -> array
-    card : the model card (see `training/export.py` for its fields)
+    card : the model card (see `training/export_weights.py` for its fields)
     sha256 : hash of the card, which fixes every file; names these weights
     """
 

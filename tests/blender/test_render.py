@@ -165,7 +165,7 @@ def traced(part):
     """A worker as Mitsuba's presets use it, with the one that needs no Mitsuba; and what draws a gel's heights."""
     unit = part("tactile_core.sensors.calibration_file").load_calibration()
     nothing = part("tactile_core.pictures.mitsuba.surroundings").NOTHING
-    tracer = part("addon.process.tracer").Tracer("fast")
+    tracer = part("addon.process.tracer_process").Tracer("fast")
 
     def draw(heights, stopped=lambda: False, unit=unit):
         return tracer.draw(unit, nothing, heights, stopped)
@@ -195,7 +195,7 @@ def test_a_worker_takes_another_unit(traced, part):
 
 
 def test_esc_stops_a_worker(traced, part):
-    with pytest.raises(part("addon.process.tracer").Stopped):
+    with pytest.raises(part("addon.process.tracer_process").Stopped):
         traced[1](traced[2], lambda: True)
 
 

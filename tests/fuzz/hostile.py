@@ -32,7 +32,7 @@ from small_pairs import write_pairs  # noqa: E402
 
 from tactile_core import recordings  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.files import checksummed, exr  # noqa: E402
+from tactile_core.files import checksummed, exr_file  # noqa: E402
 from tactile_core.geometry.indenters import mesh_file  # noqa: E402
 from tactile_core.jobs import gel_frames, prepared_signals  # noqa: E402
 from tactile_core.jobs.engine import dask_cluster, inputs, recipes  # noqa: E402
@@ -154,8 +154,8 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
     Image.fromarray(np.random.default_rng(0).integers(0, 256, (12, 16, 3), np.uint8)).save(photograph, "PNG")
     found: dict[str, tuple[bytes, Loader]] = {}
     if importlib.util.find_spec("OpenEXR"):  # the extra [render] may be absent
-        exr.write_exr(folder / "height.exr", {"height": np.zeros((8, 6), np.float32)}, {"made": "up"})
-        found["exr"] = ((folder / "height.exr").read_bytes(), exr.read_height)
+        exr_file.write_exr(folder / "height.exr", {"height": np.zeros((8, 6), np.float32)}, {"made": "up"})
+        found["exr"] = ((folder / "height.exr").read_bytes(), exr_file.read_height)
     heights = io.BytesIO()
     np.savez_compressed(heights, height_map=np.zeros((2, 8, 6), np.float32))
     return found | {

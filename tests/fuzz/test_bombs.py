@@ -233,7 +233,7 @@ def test_a_photograph_starts_no_program(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("width", "told"), [(10**7, "610 MB of pixels"), (2 * 10**8, "12207 MB"), (100, "damaged")])
 def test_a_wide_exr_picture(width, told, tmp_path):
     pytest.importorskip("OpenEXR", reason="OpenEXR is absent: pip install tactile-core[render]")
-    from tactile_core.files.exr import read_height, write_exr
+    from tactile_core.files.exr_file import read_height, write_exr
 
     write_exr(tmp_path / "a.exr", {"height": np.zeros((16, 8), np.float32)}, {})
     content = bytearray((tmp_path / "a.exr").read_bytes())

@@ -86,7 +86,7 @@ def test_frames_of_a_conversion(render, tmp_path):
 
 
 def test_a_scene_is_simulated_first(render, tmp_path, monkeypatch):
-    from tactile_core.simulation import recording
+    from tactile_core.simulation import scene_recording
 
     asked = []
 
@@ -94,7 +94,7 @@ def test_a_scene_is_simulated_first(render, tmp_path, monkeypatch):
         asked.append((Path(scene), keep, tiers))
         shutil.copy(RECORDING, out)
 
-    monkeypatch.setattr(recording, "simulate_recording", simulated)
+    monkeypatch.setattr(scene_recording, "simulate_recording", simulated)
     assert render(SCENES / "press_roll_slide", "--frames", "300:301")[0] == 0
     assert asked == [(SCENES / "press_roll_slide", ("displacement_digit",), {"digit": "fast"})]
     note = json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))
@@ -110,7 +110,7 @@ def test_another_size(render, tmp_path):
 
 def test_exr_holds_radiance_and_the_picture_follows_from_it(render, heights, tmp_path, small):
     pytest.importorskip("OpenEXR", reason='OpenEXR is missing: pip install "tactile-core[render]"')
-    from tactile_core.files.exr import read_exr
+    from tactile_core.files.exr_file import read_exr
 
     assert render(heights, "--exr")[0] == 0
     planes, about = read_exr(tmp_path / "out" / "exr" / "00002.exr")
@@ -135,7 +135,7 @@ def test_exr_holds_radiance_and_the_picture_follows_from_it(render, heights, tmp
 
 def test_height_maps_come_as_exr_too(render, tmp_path, small, press):
     pytest.importorskip("OpenEXR", reason='OpenEXR is missing: pip install "tactile-core[render]"')
-    from tactile_core.files.exr import write_exr
+    from tactile_core.files.exr_file import write_exr
 
     height = press.on(small.camera)
     for number, channels in enumerate(({"height": height}, {"anything": height}, {"height": height, "Y": 0 * height})):
@@ -257,7 +257,7 @@ def test_bad_options_end_in_one_message(more, words, render, heights, tmp_path):
 def tiers(monkeypatch):
     """The scene goes 8 % deep, where heights between nodes add 1 um; fast is within 30 um, full within 4."""
     from tactile_core.jobs import sampling_error
-    from tactile_core.simulation import recording, tier_choice
+    from tactile_core.simulation import scene_recording, tier_choice
 
     asked = []
 
@@ -274,7 +274,7 @@ def tiers(monkeypatch):
     found = {"digit": choose("digit", 0.08, None)}
     monkeypatch.setattr(tier_choice, "choose_for_scene", lambda path, used, bound: found)
     monkeypatch.setattr(sampling_error, "height_error", lambda share: 1.0 if share < 0.1 else 9.0)
-    monkeypatch.setattr(recording, "simulate_recording", simulated)
+    monkeypatch.setattr(scene_recording, "simulate_recording", simulated)
     return asked
 
 

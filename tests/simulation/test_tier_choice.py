@@ -14,7 +14,7 @@ from tactile_core.errors import TactileError
 from tactile_core.mechanics import error_estimate
 from tactile_core.mechanics.fast import compliance
 from tactile_core.mechanics.thickness import DEPTH_LIMIT
-from tactile_core.simulation import recording, tier_choice
+from tactile_core.simulation import scene_recording, tier_choice
 
 
 def _bins(*errors):
@@ -83,7 +83,7 @@ def simulate(scene, tmp_path, monkeypatch, capsys):
 
     def run(*more):
         asked = {}
-        monkeypatch.setattr(recording, "simulate_recording", lambda *given, **named: asked.update(named))
+        monkeypatch.setattr(scene_recording, "simulate_recording", lambda *given, **named: asked.update(named))
         status = main(["simulate", str(scene), "--out", str(tmp_path / "x.h5"), *more])
         return status, capsys.readouterr().err, asked
 

@@ -9,7 +9,7 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 
 from tactile_core.training import modules  # noqa: E402
 from tactile_core.training.data import Contacts  # noqa: E402
-from tactile_core.training.export import net_sizes, net_tensors  # noqa: E402
+from tactile_core.training.export_weights import net_sizes, net_tensors  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.stages import Model  # noqa: E402
 from tactile_core.training.surface_codec import SurfaceCodec  # noqa: E402

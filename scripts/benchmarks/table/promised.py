@@ -21,8 +21,8 @@ from tactile_core.pictures.presets import measured as measured_presets
 from tactile_core.recordings import prepare, read
 from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.simulation.pairs_file import read_pairs
-from tactile_core.simulation.recording import simulate_recording
 from tactile_core.simulation.scene import load_scene
+from tactile_core.simulation.scene_recording import simulate_recording
 from tactile_core.training.step_errors import error_columns, joined, our_bodies, parts
 from tactile_core.translation.network_sizes import SURFACES
 from tactile_core.translation.translate import Translator, load_translator

@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
             raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
     bound = None if options.error is None else _bound(options.error)
     with bar("simulate", "frame", options.progress) as shown:
-        from ...simulation.recording import simulate_recording
+        from ...simulation.scene_recording import simulate_recording
 
         keep = _keep(options.keep)
         tiers = {} if bound is None else _tiers(options, keep, bound)
@@ -85,7 +85,7 @@ def _keep(text: str | None) -> tuple[str, ...]:
     words.
     """
     from ...jobs import results
-    from ...simulation.recording import DEFAULT, OUTPUTS
+    from ...simulation.scene_recording import DEFAULT, OUTPUTS
 
     if text is None:
         return DEFAULT
@@ -106,7 +106,7 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> 
     """
     from ... import accuracy
     from ...jobs.plan import of_scene
-    from ...simulation.recording import sensors_of
+    from ...simulation.scene_recording import sensors_of
     from ...simulation.tier_choice import choose_for_scene
 
     found = choose_for_scene(options.scene, sensors_of(keep), bound)

@@ -245,7 +245,7 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
     import io
 
     from ...files import atomic
-    from ...files.png import write_png
+    from ...files.png_writer import write_png
 
     def draw(picture: np.ndarray) -> bool:
         out = io.BytesIO()

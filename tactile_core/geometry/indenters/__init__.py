@@ -9,7 +9,7 @@ from .cylinder import Cylinder
 from .edge import Edge
 from .indenter import Indenter
 from .lying_cylinder import LyingCylinder
-from .mesh import MeshIndenter
+from .mesh_indenter import MeshIndenter
 from .pose import Pose, pose_on
 from .ring import Ring
 from .several import Several

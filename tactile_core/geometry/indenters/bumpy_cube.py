@@ -12,7 +12,7 @@ from .box import Box
 from .circle import circle_curvature, circle_distance
 from .indenter import NEAREST, Hull, Indenter, Surface, check_length
 from .pose import Pose
-from .preview import joined
+from .preview_surface import joined
 from .scene_form import SceneForm, Size
 from .several import Several
 from .sphere import Sphere

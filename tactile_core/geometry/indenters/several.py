@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import TactileError
 from .indenter import SQUARE, Hull, Indenter, Surface
 from .pose import Pose
-from .preview import joined
+from .preview_surface import joined
 
 _TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .job import Job
 
 MODULES = {
-    recipes.Translate: "translate", recipes.Pairs: "pairs",
+    recipes.Translate: "translate_shards", recipes.Pairs: "pairs",
     recipes.Simulate: "simulate", recipes.Render: "render_shards",
 }  # fmt: skip
 

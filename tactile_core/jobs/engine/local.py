@@ -22,7 +22,7 @@ from .tasks import Reply, Task
 
 RESTART = 200  # tasks after which a worker is replaced, so that what libraries leak is given back (assumed)
 KILLS = 3  # times that a task may take its worker with it
-WORKER_COMMAND = (sys.executable, "-m", f"{__package__}.worker")
+WORKER_COMMAND = (sys.executable, "-m", f"{__package__}.task_worker")
 Start = Callable[[], "subprocess.Popen[str]"]
 
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...files import atomic
-from ...files.exr import write_exr
+from ...files.exr_file import write_exr
 from ...sensors.calibration import Calibration
 from ...sensors.camera import COLOURS, Camera
 from ..background import by_led

@@ -22,7 +22,7 @@ from tactile_core.jobs import (  # noqa: E402
     convert,
     frame_shard,
 )
-from tactile_core.jobs.engine import local, worker  # noqa: E402
+from tactile_core.jobs.engine import local, task_worker  # noqa: E402
 from tactile_core.translation import translate  # noqa: E402
 
 COMMAND = (sys.executable, str(Path(__file__).resolve()))
@@ -51,4 +51,4 @@ if __name__ == "__main__":
     local.WORKER_COMMAND = COMMAND
     if sys.argv[1] == "batch":
         sys.exit(main())
-    worker.main()
+    task_worker.main()

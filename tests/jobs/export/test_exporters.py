@@ -78,7 +78,7 @@ def test_png_pictures_are_those_of_the_shards(job, tmp_path):
 
 def test_exr_holds_heights_and_pictures(job, tmp_path):
     pytest.importorskip("OpenEXR", reason="OpenEXR is absent: pip install tactile-core[render]")
-    from tactile_core.files.exr import read_exr
+    from tactile_core.files.exr_file import read_exr
 
     source = export.export(job, "exr", tmp_path / "a", silent)
     for one in source.recordings:

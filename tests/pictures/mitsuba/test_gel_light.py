@@ -9,7 +9,7 @@ import pytest
 from gel_pictures import Press, levels, works
 
 from tactile_core.errors import TactileError
-from tactile_core.files.exr import read_exr
+from tactile_core.files.exr_file import read_exr
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.gel_light import GelLight
 from tactile_core.pictures.mitsuba.scene_file import square_pixels, write_scene

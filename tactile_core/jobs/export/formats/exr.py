@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ....errors import TactileError
-from ....files.exr import write_exr
+from ....files.exr_file import write_exr
 from ..finished_job import Finished
 
 BRIEF = "a folder of OpenEXR files a recording: heights, pictures"

@@ -18,7 +18,7 @@ import numpy as np
 
 from ....errors import TactileError
 from ....files import atomic
-from ....files.png import write_png
+from ....files.png_writer import write_png
 from ....sensors import SAMPLE_RATE
 from ..finished_job import Finished, Recorded
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from ....files.png import write_png
+from ....files.png_writer import write_png
 from ..finished_job import Finished
 from ..writers import needed
 

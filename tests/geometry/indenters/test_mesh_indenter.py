@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from tactile_core.files.cache import cache_folder
-from tactile_core.geometry.indenters import Box, MeshIndenter, Sphere, mesh, pose_on
+from tactile_core.geometry.indenters import Box, MeshIndenter, Sphere, mesh_indenter, pose_on
 
 BALL = Sphere(2.5e-3)
 SPACING = 0.2e-3
@@ -90,7 +90,7 @@ def test_any_axis_may_point_up(tmp_path, up, shift):
 def test_up_may_point_down():
     """A cone stands on its base, or, upside down, on its tip."""
     for up, sign in (("z", 1), ("-z", -1)):
-        turn = mesh.mesh_file._turn(up)
+        turn = mesh_indenter.mesh_file._turn(up)
         assert np.linalg.det(turn) == pytest.approx(1)
         np.testing.assert_array_equal(turn @ [0, 0, 1], [0, 0, sign])
 
@@ -123,14 +123,14 @@ def test_the_cache_gives_the_same_bytes(ball, ball_file, caplog):
     (kept,) = [path for path in cache_folder().glob("indenter-*/hull.npy") if len(np.load(path)) == len(ball.hull)]
     kept = kept.with_name("coefficients.npy")
     written, changed = kept.read_bytes(), kept.stat().st_mtime_ns
-    mesh._load.cache_clear()
+    mesh_indenter._load.cache_clear()
     again = MeshIndenter.from_file(ball_file, spacing=SPACING)
     assert kept.stat().st_mtime_ns == changed  # read, not built
     np.testing.assert_array_equal(again.grid.coefficients, ball.grid.coefficients)
     assert again.error == ball.error
     for damaged in (written[: len(written) // 2], written[:-8] + bytes(8)):  # cut, and changed: built again
         kept.write_bytes(damaged)
-        mesh._load.cache_clear()
+        mesh_indenter._load.cache_clear()
         MeshIndenter.from_file(ball_file, spacing=SPACING)
         assert kept.read_bytes() == written
         assert "it is built again" in caplog.text

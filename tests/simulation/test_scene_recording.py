@@ -13,8 +13,8 @@ from tactile_core.recordings import info
 from tactile_core.recordings.simulated import read_truth
 from tactile_core.sensors import PRESSURE_PER_COUNT
 from tactile_core.sensors.readout import Wiring
-from tactile_core.simulation import recording as recording_room
-from tactile_core.simulation.recording import PRESSURE_AT_REST, pdc_counts, sensors_of, simulate_recording
+from tactile_core.simulation import scene_recording as recording_room
+from tactile_core.simulation.scene_recording import PRESSURE_AT_REST, pdc_counts, sensors_of, simulate_recording
 
 SHORT = ball_scene((0.0, -8.0, 0.0, 0.0), (0.4, -8.0, 0.0, 0.0), (0.5, -8.0, 2.0, 0.3), (0.6, -8.0, 2.0, 0.0))
 

@@ -23,7 +23,7 @@ def serve(folder: str, requests: TextIO, replies: TextIO) -> None:
 
 
 def main() -> None:
-    """Serve tasks from stdin: ``python -m tactile_core.jobs.engine.worker FOLDER``."""
+    """Serve tasks from stdin: ``python -m tactile_core.jobs.engine.task_worker FOLDER``."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group: the client decides
     replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
     # What the library warns of frame by frame is in the shards as flags and confidence; thousands of lines help nobody.
