@@ -1,12 +1,14 @@
 """Measure speed against error of every way to draw a DIGIT's picture: ours, stock Mitsuba, a table, simple nulls.
 
-    python scripts/benchmarks/compare_pictures.py PRESSES [--deeper DIR] [--finish] [--json FILE] [--quick]
+    python scripts/benchmarks/compare_pictures.py PRESSES [--background FILE] [--deeper DIR] [--finish] [--every]
+                                                  [--json FILE] [--quick]
 
 On photographs: three fits without a third of PRESSES each, tried on that third; three numbers a press are fitted
 (right, down, depth), by the fast picture; with --deeper, on further photographs of the same unit and ball, too, whose
 drift of the light is taken off. Fits end on the fast picture, with --finish on Mitsuba's; they start from round
 numbers that know nothing of the unit. Nulls: the background alone, and the nearest fitted photograph shifted to the
-place. `through` allows light through the coating where the ball touches it, three more numbers a photograph.
+place. `through` allows light through the coating where the ball touches it, three more numbers a photograph. With
+--every, by `reference`, too (20 s of CPU a photograph), and by the presets without LLVM.
 Times are CPU ms a picture on one core, the least of a few. The presets' own, and their levels from the full model, are
 those of data/optics_presets.json (measure_presets.py). Stock Mitsuba draws the file of `render --scene-out`; its error
 is its noise, of the difference of two renders. Prints rows, then one table. Needs the extra [render]; LLVM's rows only
@@ -40,15 +42,15 @@ from tactile_core.pictures.calibrate.photographs import Photographs, Press, chos
 from tactile_core.pictures.calibrate.press_fit import MODEL_ERROR, Ball, Sight, fit_ball
 from tactile_core.pictures.mitsuba.scene_file import write_scene
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR, activate
-from tactile_core.pictures.presets import NAMES, measured
+from tactile_core.pictures.presets import NAMES, QUALITY, REFERENCE, STANDARD, measured
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
 
 START = Path(__file__).resolve().parents[2] / "scenes/calibrations/start.toml"
 BALL = 3e-3  # m, radius
-SIZES = {(240, 320): (32, 64, 256), (480, 640): (32,)}  # of pictures: samples a pixel of stock Mitsuba, whose time
-# grows as the pixels do
+SIZES = (240, 320), (480, 640)
+SAMPLES = (32, 64, 256)  # a pixel, of stock Mitsuba
 TABLE, STOCK = "taxim_like", "stock_mitsuba"
 TYPICAL = (1e-3, 0.5e-3, 1e-3, BALL)  # right, down, depth, radius, m, of the press whose time is taken
 FLANK = 0.5, 1.0  # of the contact's radius: where the print is steep
@@ -60,14 +62,17 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure and print; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("presses", metavar="PRESSES")
+    parser.add_argument("--background", metavar="FILE", help="photograph of the untouched gel; estimated else")
     parser.add_argument("--deeper", metavar="DIR", help="further photographs, of another day")
     parser.add_argument("--finish", action="store_true", help="finish each fit on Mitsuba's pictures")
+    parser.add_argument("--every", action="store_true", help="by reference and without LLVM as well")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")
     parser.add_argument("--quick", action="store_true", help="one third of the photographs, 240 x 320 at 32 samples")
     options = parser.parse_args(arguments)
     rows = []
     print(HEADER)
-    for found in measure(read_photographs(options.presses), options.deeper, options.finish, options.quick):
+    photographs = read_photographs(options.presses, options.background)
+    for found in measure(photographs, options.deeper, options.finish, options.every, options.quick):
         rows.append(found)
         print(line(found), flush=True)
     if options.json:
@@ -76,17 +81,17 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def measure(photographs: Photographs, deeper: str | None, finish: bool, quick: bool) -> Iterator[Row]:
+def measure(photographs: Photographs, deeper: str | None, finish: bool, every: bool, quick: bool) -> Iterator[Row]:
     """Yield all rows: on photographs, then the table's times, then stock Mitsuba's."""
     variants = working_variants()
     one_thread(variants[0])
     further = [] if deeper is None else _further(Path(deeper), photographs)
-    yield from on_photographs(photographs, further, variants, finish, 1 if quick else FOLDS)
-    for size, samples in [*SIZES.items()][: 1 if quick else None]:
+    yield from on_photographs(photographs, further, variants, finish, every, 1 if quick else FOLDS)
+    for size in SIZES[: 1 if quick else None]:
         unit = load_calibration().at_size(*size)
         yield table_time(unit, photographs)
         if variants[0] == LLVM:
-            yield from stock_mitsuba(unit, samples[: 1 if quick else None])
+            yield from stock_mitsuba(unit, SAMPLES[: 1 if quick else None])
 
 
 def _further(folder: Path, photographs: Photographs) -> list[Press]:
@@ -98,7 +103,7 @@ def _further(folder: Path, photographs: Photographs) -> list[Press]:
 
 
 def on_photographs(
-    photographs: Photographs, further: list[Press], variants: list[str], finish: bool, folds: int
+    photographs: Photographs, further: list[Press], variants: list[str], finish: bool, every: bool, folds: int
 ) -> Iterator[Row]:
     """Rows of every method on photographs that it was not fitted on, and on further ones."""
     names = [press.name for press in photographs.presses]
@@ -108,7 +113,7 @@ def on_photographs(
         fitted = chosen(photographs, [name for name in names if name not in apart])
         unit = calibrate(fitted, 2 * BALL, load_calibration(START), unit="fold", quick=not finish).calibration
         for where, presses in (("apart", chosen(photographs, apart).presses), ("deeper", further)):
-            for name, figures_of in one_fit(unit, fitted, presses, variants):
+            for name, figures_of in one_fit(unit, fitted, presses, variants, every):
                 found.setdefault((where, name), []).append(figures_of)
     for (where, name), each in found.items():
         for figure, unit_ in (("roi_psnr", "dB"), ("roi_l1", "levels"), ("flank_colour", "levels")):
@@ -119,38 +124,45 @@ def on_photographs(
 
 
 def one_fit(
-    unit: Calibration, fitted: Photographs, presses: Sequence[Press], variants: list[str]
+    unit: Calibration, fitted: Photographs, presses: Sequence[Press], variants: list[str], every: bool
 ) -> Iterator[tuple[str, dict[str, float]]]:
     """Figures by every method, by name, of presses that a unit was not fitted on."""
     fast = FastPictures(unit)
     factor = working_factor(unit.camera.width, unit.camera.height)
     working = FastPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
     balls = {press.name: fit_ball(working, Sight(press), BALL)[0] for press in fitted.presses}
-    ways = methods(unit, fitted, fast, variants) | {"null_shifted": lambda ball: shifted(ball, fitted, balls, fast)}
+    ways = methods(unit, fitted, fast, variants, every) | {
+        "null_shifted": lambda ball: shifted(ball, fitted, balls, fast)
+    }
     for press in presses:
         ball, _ = fit_ball(working, Sight(press), BALL)
         seen, _ = fit_ball(working, Sight(press), BALL, opaque=False)
         for name, change in ways.items():
             yield name, compared(change(ball), press, fitted.background, fast, ball)
-            if not name.startswith("null"):
+            if not name.startswith("null") and name != REFERENCE.name:  # whose one picture takes long enough
                 lit = with_light(change(seen), press, fast, seen)
                 yield f"{name}_through", compared(lit, press, fitted.background, fast, seen)
 
 
-def methods(unit: Calibration, fitted: Photographs, fast: FastPictures, variants: list[str]) -> dict[str, Change]:
-    """Ways to draw the change by a press, by name."""
+def methods(
+    unit: Calibration, fitted: Photographs, fast: FastPictures, variants: list[str], every: bool
+) -> dict[str, Change]:
+    """Ways to draw the change by a press, by name; the slower variant's presets carry its name."""
     bench = TableBench(fast, fit_table(unit, fitted, BALL))
     found: dict[str, Change] = {
         "null_background": lambda ball: np.zeros((*unit.camera.shape, 3)),
         TABLE: lambda ball: bench.change(ball.numbers),
         "fast": lambda ball: fast.change(ball.numbers),
     }
-    for variant in variants[:1]:  # the other one's pictures are half a level apart: ``measure_presets``
-        for preset in ("standard", "quality"):
-            renderer = Renderer(unit, preset, variant, rest=fast.rest)
-            found[preset] = lambda ball, renderer=renderer: renderer.in_levels(
-                renderer.radiance(fast.heights(ball.numbers)) - renderer.rest_radiance
-            )
+    drawn = {name: (name, variants[0]) for name in (STANDARD.name, QUALITY.name)}
+    if every:
+        drawn |= {f"{name}_{variant}": (name, variant) for variant in variants[1:] for name in drawn}
+        drawn[REFERENCE.name] = (REFERENCE.name, variants[0])
+    for label, (preset, variant) in drawn.items():
+        renderer = Renderer(unit, preset, variant, rest=fast.rest)
+        found[label] = lambda ball, renderer=renderer: renderer.in_levels(
+            renderer.radiance(fast.heights(ball.numbers)) - renderer.rest_radiance
+        )
     return found
 
 
@@ -260,7 +272,7 @@ def table(rows: list[Row]) -> str:
             )
         ]
         lines.append("| " + " | ".join([label, *times, *seen]) + " |")
-    for count in next(iter(SIZES.values())):
+    for count in SAMPLES:
         times = [_number(value.get(f"{STOCK}_{count}_{size}_ms")) for size in (small, large)]
         noise = _number(value.get(f"{STOCK}_{count}_{small}_noise"))
         cells = [f"stock Mitsuba, {count} samples", *times, f"{noise} (noise)", "", "", ""]

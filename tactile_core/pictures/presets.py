@@ -45,7 +45,13 @@ class Preset:
 
 
 FAST = "fast"  # shading.Shader: numpy alone
-STANDARD = Preset("standard", "direct light of the scene, 4 points an LED", points=4)
+STANDARD = Preset(
+    "standard",
+    "4 points an LED, one coarse bounce",
+    points=4,
+    bounce_step=8,
+    gather=Gather(step=8, azimuths=12, growth=0.3, bounces=1),
+)
 QUALITY = Preset(
     "quality",
     "6 points an LED, one bounce",

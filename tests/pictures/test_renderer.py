@@ -13,6 +13,7 @@ from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR
 from tactile_core.pictures.presets import NAMES, PRESETS, REFERENCE
 from tactile_core.pictures.renderer import MitsubaLight, Renderer
+from tactile_core.sensors.coating import Coating
 
 SHORT = dataclasses.replace(REFERENCE, name="short", passes=2)
 
@@ -98,11 +99,13 @@ def test_repeats_are_bit_equal(variant, small, press, short):
         np.testing.assert_array_equal(one.radiance(height), other.radiance(height))
 
 
-def test_the_number_of_threads_changes_nothing(small, press):
+@pytest.mark.parametrize("coating", [Coating(), Coating("principled", roughness=0.4)], ids=lambda each: each.bsdf)
+def test_the_number_of_threads_changes_nothing(small, press, coating):
     variant = works(LLVM)
     import drjit
 
-    renderer, height = Renderer(small, "standard", variant), press.on(small.camera)
+    unit = dataclasses.replace(small, coating=coating)
+    renderer, height = Renderer(unit, "standard", variant), press.on(small.camera)
     before, found = drjit.thread_count(), []
     try:
         for count in (1, 2, 3):

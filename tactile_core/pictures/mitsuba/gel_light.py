@@ -14,6 +14,7 @@ from .camera_rays import camera_rays
 from .direct_light import evened, lookup
 from .gel_mesh import MM, GelMesh, check_mesh
 from .gel_scene import change_numbers, gel_shape, lamps, plugin_names, walls
+from .highlights import mirrored, narrow_lobe
 from .led_integrator import DIRECTIONS, bounced, direct, register
 from .surroundings import NOTHING, Surroundings
 from .tracer import MOST_MISSED
@@ -100,9 +101,12 @@ class GelLight:
         camera, step = self.unit.camera, self.preset.bounce_step
         self._rays = self._towards(mi, 1)
         self._coarse = self._towards(mi, step, DIRECTIONS) if step else None
+        lobe = narrow_lobe(self.unit.coating) if step else None
+        self._lobe = None if lobe is None else tuple(drjit.opaque(mi.Float, value) for value in lobe)
         # Opaque: as literals, another camera would be other kernels.
         sides = camera.pixel_size[0] * camera.width, -camera.pixel_size[1] * camera.height
         self._per_mm = [drjit.opaque(mi.Float, 1 / (MM * side)) for side in sides]
+        self._height = drjit.opaque(mi.Float, MM * camera.apparent_height)
 
     def _towards(self, mi: Any, step: int, times: int = 1) -> Any:
         """Rays at every step-th pixel, each so many times."""
@@ -172,10 +176,33 @@ class GelLight:
         camera, step = self.unit.camera, self.preset.bounce_step
         shape = camera.height // step, camera.width // step
         hit = self._hit(self._coarse)
-        found = bounced(mi, self._hit, self._scene, self._emitters, hit, self._turned).reshape(*shape, 3)
-        row, column = (np.indices(camera.shape) - (step - 1) / 2) / step
-        at = lookup(row.astype(np.float32), column.astype(np.float32), shape)
-        return np.stack([at(evened(evened(np.ascontiguousarray(found[..., k])))) for k in range(3)], -1)
+        lobe = None if self._lobe is None else self._lobe[1]
+        found = bounced(mi, self._hit, self._scene, self._emitters, hit, self._turned, lobe).reshape(*shape, 3)
+        light = self._finer(evened(evened(found)), step)
+        return light if self._lobe is None else light + self._mirrored(mi, hit)
+
+    def _mirrored(self, mi: Any, hit: Any) -> np.ndarray:
+        """Light (H, W, 3) that narrow highlights throw onto other gel, on cells half as wide as the bounce's."""
+        camera, step = self.unit.camera, self.preset.bounce_step
+        cell = max(step // 2, 1)
+        right, down = self._per_mm
+
+        def to_cell(place: Any) -> Any:
+            nearer = self._height / (self._height - place.z)
+            column = (place.x * nearer * right + 0.5) * (camera.width / cell) - 0.5
+            return mi.Point2f(column, (place.y * nearer * down + 0.5) * (camera.height / cell) - 0.5)
+
+        shape = camera.height // cell, camera.width // cell
+        found = mirrored(
+            mi, self._hit, self._scene, self._emitters, hit, self._turned, self._lobe, self._height, to_cell, shape
+        )
+        return self._finer(evened((found * (step / cell) ** 2).astype(np.float32)), cell)
+
+    def _finer(self, coarse: np.ndarray, step: int) -> np.ndarray:
+        """A coarse grid's (h, w, 3) light at every pixel."""
+        row, column = (np.indices(self.unit.camera.shape) - (step - 1) / 2) / step
+        at = lookup(row.astype(np.float32), column.astype(np.float32), coarse.shape[:2])
+        return np.stack([at(np.ascontiguousarray(coarse[..., k])) for k in range(3)], -1)
 
     def _by_paths(self, mi: Any) -> np.ndarray:
         import drjit as dr

@@ -26,10 +26,13 @@ class Lit(NamedTuple):
     share: Any
 
 
-def direct(mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any) -> list[Lit]:
+def direct(
+    mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any, lobe: Any = None
+) -> list[Lit]:
     """Light of each emitter at surface interactions, by so many points of it.
 
     scene : what stands in the way; phase : 0..1, turns the points, in shares of their distance
+    lobe : cosine of the half vector from which on light is left out, near the mirror's direction; None for none
     """
     import drjit as dr
 
@@ -40,7 +43,10 @@ def direct(mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, 
         count = 1 if delta else points
         for k in range(count):
             toward, weight = emitter.sample_direction(hit, mi.Point2f(RING, (k + phase) / count), True)
-            light = material.eval(mi.BSDFContext(), hit, hit.to_local(toward.d)) * weight / count
+            local = hit.to_local(toward.d)
+            light = material.eval(mi.BSDFContext(), hit, local) * weight / count
+            if lobe is not None:
+                light = dr.select(dr.normalize(local + hit.wi).z < lobe, light, 0)
             blocked = scene.ray_test(hit.spawn_ray_to(toward.p), dr.any(light > 0))
             free += light
             arrived += dr.select(blocked, 0, light)
@@ -50,12 +56,12 @@ def direct(mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, 
 
 
 def bounced(
-    mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any
+    mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
     """Radiance (n, 3) that n surface interactions show of light that came by one other place.
 
     meet : what rays meet; hit : each of them DIRECTIONS times, one behind the other
-    phase : 0..1 of each, turns its directions
+    phase : 0..1 of each, turns its directions; lobe : as ``direct`` has it, of the other place
     """
     import drjit as dr
 
@@ -66,7 +72,7 @@ def bounced(
     own = hit.bsdf().eval(mi.BSDFContext(), hit, local) * (2 * dr.pi)
     far = meet(hit.spawn_ray(hit.to_world(local)))
     light = mi.Color3f(0)
-    for lit in direct(mi, scene, emitters, far, 1, (mi.Float(number) + 0.5) / DIRECTIONS):
+    for lit in direct(mi, scene, emitters, far, 1, (mi.Float(number) + 0.5) / DIRECTIONS, lobe):
         light += dr.select(far.is_valid() & dr.any(own > 0), lit.open * lit.share, 0)
     light *= own
     sums = [dr.block_sum(light[k], DIRECTIONS) for k in range(3)]

@@ -27,7 +27,10 @@ def _llvm() -> None:
     works(LLVM)
 
 
-def drawn(unit, preset=STANDARD, surroundings=NOTHING) -> np.ndarray:
+DIRECT = dataclasses.replace(STANDARD, bounce_step=0)  # linear in each light and in albedo
+
+
+def drawn(unit, preset=DIRECT, surroundings=NOTHING) -> np.ndarray:
     """Radiance (2, H, W, 3), levels, at rest and pressed."""
     rest = rest_height_map(unit.camera)
     light = GelLight(unit, preset, rest, 0, surroundings)
@@ -39,11 +42,12 @@ def test_our_integrator_is_near_mitsubas_paths(small, coating):
     """Means of 10 x 10 pixels, at rest and under a press of 1.2 mm: the paths' noise is 0.1 to 0.2 levels there."""
     unit = dataclasses.replace(small, coating=coating)
     truth, errors = drawn(unit, dataclasses.replace(REFERENCE, paths=16)), []
-    for preset in (STANDARD, QUALITY):
+    for preset in (DIRECT, STANDARD, QUALITY):
         off = np.stack([levels(unit, each) for each in drawn(unit, preset) - truth])
         errors.append(np.sqrt(np.mean(off.reshape(2, 8, 10, 6, 10, 3).mean((2, 4)) ** 2, axis=(1, 2, 3))))
-    assert (errors[1] < (0.8 if coating.bsdf == "diffuse" else 1.2)).all()  # measured 0.2 to 0.5, principled 1.0
-    assert (errors[1] < 0.8 * errors[0]).all()  # a bounce brings it nearer
+    # A bounce brings both nearer, where highlights are narrow too: 0.3 to 0.9 and 0.3 to 0.5, 0.5 to 2.5 without.
+    assert (errors[1] < 0.7 * errors[0]).all()
+    assert (errors[2] < 0.8).all() and (errors[2] < 0.7 * errors[0]).all()
 
 
 @pytest.mark.parametrize("coating", COATINGS, ids=lambda coating: coating.bsdf)
@@ -89,7 +93,7 @@ def test_the_coating_acts(small):
 
     grey = coated()
     np.testing.assert_array_equal(coated(albedo=(0.0, 0.0, 0.0)), 0)
-    np.testing.assert_allclose(coated(albedo=(1.0, 1.0, 1.0)), 2 * grey, rtol=1e-5)  # Lambert's law, one bounce: linear
+    np.testing.assert_allclose(coated(albedo=(1.0, 1.0, 1.0)), 2 * grey, rtol=1e-5)  # Lambert's law, direct: linear
     rough = {"albedo": (0.0, 0.0, 0.0), "bsdf": "roughplastic"}
     matte, glossy = coated(gloss=0.0, **rough), coated(gloss=1.0, **rough)
     np.testing.assert_allclose(matte, 0, atol=1e-4)
@@ -115,7 +119,7 @@ def test_another_lamp_adds_its_light_unless_the_housing_hides_it(small):
         return Surroundings((Lamp(place, 0.0, [9e-3 / np.pi] * 3),))
 
     whole = drawn(small)
-    over, beside = (drawn(small, STANDARD, lamp(place)) for place in ([0, 0, 12e-3], [60e-3, 0, 3e-3]))
+    over, beside = (drawn(small, DIRECT, lamp(place)) for place in ([0, 0, 12e-3], [60e-3, 0, 3e-3]))
     assert ((over - whole).min(-1).mean((1, 2)) > 5).all()
     np.testing.assert_allclose(beside, whole, atol=1e-3)
 
@@ -127,7 +131,7 @@ def test_a_body_between_an_led_and_the_gel_casts_a_shadow(small):
     up = np.array([0, 0, 4e-3])
     corners = np.array([along + a * across + b * up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     body = Surroundings(occluders=(Occluder(corners, np.array([[0, 1, 2], [0, 2, 3]])),))
-    darker = (drawn(small) - drawn(small, STANDARD, body))[0]
+    darker = (drawn(small) - drawn(small, DIRECT, body))[0]
     assert darker[..., 0].max() > 20
     assert np.abs(darker[..., 1]).mean() < 0.2 * darker[..., 0].mean()
 
