@@ -102,7 +102,7 @@ class GelLight:
         self._rays = self._towards(mi, 1)
         self._coarse = self._towards(mi, step, DIRECTIONS) if step else None
         lobe = narrow_lobe(self.unit.coating) if step else None
-        self._lobe = None if lobe is None else tuple(drjit.opaque(mi.Float, value) for value in lobe)
+        self._lobe = None if lobe is None else (drjit.opaque(mi.Float, lobe[0]), drjit.opaque(mi.Float, lobe[1]))
         # Opaque: as literals, another camera would be other kernels.
         sides = camera.pixel_size[0] * camera.width, -camera.pixel_size[1] * camera.height
         self._per_mm = [drjit.opaque(mi.Float, 1 / (MM * side)) for side in sides]
@@ -176,12 +176,12 @@ class GelLight:
         camera, step = self.unit.camera, self.preset.bounce_step
         shape = camera.height // step, camera.width // step
         hit = self._hit(self._coarse)
-        lobe = None if self._lobe is None else self._lobe[1]
-        found = bounced(mi, self._hit, self._scene, self._emitters, hit, self._turned, lobe).reshape(*shape, 3)
+        end = None if self._lobe is None else self._lobe[1]
+        found = bounced(mi, self._hit, self._scene, self._emitters, hit, self._turned, end).reshape(*shape, 3)
         light = self._finer(evened(evened(found)), step)
-        return light if self._lobe is None else light + self._mirrored(mi, hit)
+        return light if self._lobe is None else light + self._mirrored(mi, hit, self._lobe)
 
-    def _mirrored(self, mi: Any, hit: Any) -> np.ndarray:
+    def _mirrored(self, mi: Any, hit: Any, lobe: tuple[Any, Any]) -> np.ndarray:
         """Light (H, W, 3) that narrow highlights throw onto other gel, on cells half as wide as the bounce's."""
         camera, step = self.unit.camera, self.preset.bounce_step
         cell = max(step // 2, 1)
@@ -194,7 +194,7 @@ class GelLight:
 
         shape = camera.height // cell, camera.width // cell
         found = mirrored(
-            mi, self._hit, self._scene, self._emitters, hit, self._turned, self._lobe, self._height, to_cell, shape
+            mi, self._hit, self._scene, self._emitters, hit, self._turned, lobe, self._height, to_cell, shape
         )
         return self._finer(evened((found * (step / cell) ** 2).astype(np.float32)), cell)
 
