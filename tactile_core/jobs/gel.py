@@ -26,6 +26,7 @@ from ..mechanics.fast.active_set import UnsolvedError
 from ..mechanics.fast.compliance import Compliance, compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.first_touch import first_touch
+from ..mechanics.force_search import MOST_FORCE
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import FRICTION
@@ -131,8 +132,8 @@ class Gel:
 
         pose : (4, 4) matrix, or (position (3,) m, quaternion (4,) w, x, y, z), of the indenter's origin and axes
         force : N along +y; with it the indenter moves on along +y, out or in, until it bears that force; 0 lifts it
-        Raises TactileError for what is no pose or force; the contact before then stays. Whatever else happens is
-        said in ``flags``.
+        Raises TactileError for what is no pose or force, and above 500 N; the contact before then stays. Whatever
+        else happens is said in ``flags``.
         """
         return self._step(*_given(pose, force))
 
@@ -348,6 +349,9 @@ def _given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
     """Return where an indenter is to stand, and with which force, N. Raises TactileError for no pose or force."""
     if force is not None:
         force = _not_negative(force, "Gel, force", "newtons, zero or more, and finite")
+        if force > MOST_FORCE:
+            found = f"at most {MOST_FORCE:g} N, more than a plate bears at the greatest depth"
+            raise TactileError("Gel, force", f"{force:g} N", found, "Press less, or to a pose")
     return Pose(*rigid_pose(pose), PUSH), force
 
 

@@ -13,6 +13,9 @@ from .thickness import DEPTH_LIMIT
 # Relative, of the force asked for, in every tier: a twentieth of the error of the fast tier's, a tenth of the full
 # one's. A contact states the force that it has.
 FORCE_TOLERANCE = 1e-3
+# N: a ball of 150 mm radius, nearly a plate, bears 289 N on the DIGIT's gel at the greatest depth and 41 N on the
+# BioTac's skin. A search for more would solve minutes of contacts of the whole gel on its way.
+MOST_FORCE = 500.0
 _STEPS = 30
 _LEAST_SHARE = 1e-3  # of the way between two depths, that a search goes
 

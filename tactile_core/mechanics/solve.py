@@ -17,7 +17,7 @@ from .fast.compliance import compliance_of
 from .fast.contact_state import Contact
 from .fast.press import CorrectedPress
 from .finite_strain.load_path import LoadPath
-from .force_search import UnreachableError, unreachable
+from .force_search import MOST_FORCE, UnreachableError, unreachable
 from .node_areas import traction
 from .placement import FRICTION, Placement, on_gel, pose_at
 from .sharpness import sharpest
@@ -114,6 +114,8 @@ def _check(step: Step, limit: float) -> None:
         raise TactileError(f"solve, {name}", f"{value!r} {unit}", "zero or more, and finite")
     if step.force is not None and 0 < step.force < _LEAST_FORCE:
         raise TactileError("solve, force", f"{step.force:g} N", f"0, or at least {_LEAST_FORCE:g} N", "Press more")
+    if step.force is not None and step.force > MOST_FORCE:
+        raise unreachable("solve", step.force, limit)
     if step.depth is not None and step.depth > limit:
         expected = f"at most {limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
         raise UnreachableError("solve, depth", f"{step.depth * 1e3:g} mm", expected, "Press less")

@@ -21,11 +21,12 @@ def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def doubt(card: Mapping[str, Any]) -> str:
-    """Write a sentence on weights that are hardly better than nothing; "" for those that are."""
+    """Write a sentence on weights that are worse than none, or hardly better; "" for those that translate."""
     found = chain_error(card)
     if found is None or found[0] <= WORSE * found[1]:
         return ""
+    judged = "worse" if found[0] > found[1] else "hardly better"
     return (
-        f"these weights are off by {found[0]:.3g} um (rms of the gel) on presses kept apart from their training, where"
-        f" no displacement at all is off by {found[1]:.3g} um: train on more pairs, or longer"
+        f"these weights are {judged} than none: off by {found[0]:.3g} um (rms of the gel) on presses kept apart from"
+        f" their training, where no displacement at all is off by {found[1]:.3g} um: train on more pairs, or longer"
     )

@@ -17,6 +17,7 @@ from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
 from . import error_bounds, gel_place, networks, plausible
 from .answer import MEAN, Answer
+from .card_errors import doubt
 from .contact_frame import STILL, ContactFrame
 from .contact_track import Evidence, track
 from .error_bounds import KINDS
@@ -202,7 +203,8 @@ class Translator:
         """Confidence (T,): 1 for signals like those of the training, 0 far from them.
 
         Each distance to the training signals counts against its quantiles in validation: it is 1 up to the 95 %
-        quantile, 0 at the outermost, and at most UNTRAINED_CONFIDENCE where a flag says that training did not know it.
+        quantile, 0 at the outermost, and at most UNTRAINED_CONFIDENCE where a flag says that training did not know it,
+        or the card that the networks hardly translate.
         Not a calibrated probability: that is what bounds are for.
         """
         usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))
@@ -215,7 +217,8 @@ class Translator:
             | Flag.OUT_OF_RANGE
             | Flag.UNEXPLAINED
         )
-        confidence = np.where(untrained > 0, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
+        doubted = (untrained > 0) | bool(doubt(self.card))
+        confidence = np.where(doubted, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
         return confidence.astype(np.float32)
 
     def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:

@@ -14,6 +14,7 @@ def card(value, baseline):
 def test_weights_above_four_fifths_of_the_baseline_are_doubted(value, baseline, doubted):
     assert bool(card_errors.doubt(card(value, baseline))) == doubted
     assert f"{value:.3g} um" in card_errors.doubt(card(value, baseline)) or not doubted
+    assert ("worse than none" in card_errors.doubt(card(value, baseline))) == (value > baseline)
 
 
 @pytest.mark.parametrize("spoiled", [{}, {"errors": 3}, {"errors": [3]}, card("x", 1), card(1, None)])

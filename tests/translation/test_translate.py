@@ -204,6 +204,19 @@ def test_a_changed_card_is_refused(tmp_path):
             load(**changes)
 
 
+def test_weights_worse_than_none_give_no_confidence(translator, signals, translation):
+    nets = translator.nets
+    found = translate.Translator(networks.Networks(nets.tensors, worse_than_none(nets.card)))(signals)
+    assert translation.confidence.max() > 0.9
+    assert 0 < found.confidence.max() <= np.float32(translate.UNTRAINED_CONFIDENCE)
+
+
+def worse_than_none(card):
+    """A card whose chain is off by more than no displacement at all."""
+    row = {"name": "chain_rms_um", "set": "test presses", "value": 52.1, "baseline": 51.7}
+    return card | {"errors": [row]}
+
+
 def test_the_shipped_card_is_pinned(monkeypatch):
     monkeypatch.setattr(networks, "SHIPPED_CARD_SHA256", "0" * 64)
     with pytest.raises(TactileError, match="sha256"):
