@@ -13,7 +13,7 @@ from .operators import (
     set_style,
     simulate,
     snap_to_gel,
-    translate_recording,
+    translate_imported,
 )
 from .process import command_line
 from .ui import add_menu, asset_library, panels, preferences, properties, render_settings, workspace
@@ -26,7 +26,7 @@ PARTS = (
     asset_library,
     check_llvm,
     import_recording,
-    translate_recording,
+    translate_imported,
     set_style,
     preview,
     render_engine,

@@ -137,6 +137,35 @@ def sources(*folders: str) -> list[Path]:
     return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
 
 
+def names_in(module: Path) -> set[str]:
+    """What can be imported from a module, without its suffix, or a package: its modules, and names that stand in it."""
+    file = module.with_suffix(".py") if module.with_suffix(".py").is_file() else module / "__init__.py"
+    found = {path.stem for path in module.glob("*")}
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if file.is_file() else ():
+        if isinstance(node, ast.Name):
+            found.add(node.id)
+        elif isinstance(node, ast.alias | ast.FunctionDef | ast.ClassDef):
+            found.add(getattr(node, "asname", None) or node.name)
+    return found
+
+
+def missing(path: Path) -> list[str]:
+    """Modules and names of the project that a file imports, anywhere in it, and that are not there."""
+    return [
+        f"{path.relative_to(ROOT)}:{node.lineno} imports {alias.name}"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.level
+        for alias in node.names
+        if alias.name not in names_in(path.parents[node.level - 1].joinpath(*(node.module or "").split(".")))
+    ]
+
+
+def test_the_extension_imports_what_is_there():
+    """Nothing else tells here, without bpy, that a module was renamed under it."""
+    assert [words for path in sources("addon") for words in missing(path)] == []
+    assert missing(ROOT / "__init__.py") == []
+
+
 def test_each_room_imports_only_what_lies_below_it():
     offenders = [
         f"{path.relative_to(ROOT)} imports {room}"
