@@ -41,7 +41,7 @@ from tactile_core.mechanics.fast.compliance import compliance_of  # noqa: E402
 from tactile_core.mechanics.fast.press import CorrectedPress, FastContact  # noqa: E402
 from tactile_core.mechanics.placement import FRICTION, pose_at  # noqa: E402
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under  # noqa: E402
-from tactile_core.pictures.height_map import digit_mapper, folds_counted  # noqa: E402
+from tactile_core.pictures.height_map import folds_counted, gel_mapper  # noqa: E402
 from tactile_core.pictures.renderer import Renderer  # noqa: E402
 
 STEPS, SEED = 10, 20261125
@@ -147,7 +147,7 @@ def measure(sensor: str, steps: int, count: int) -> tuple[dict[str, Times], list
 def pictures(contacts: list[FastContact]):  # noqa: ANN201
     """Yield the height map's and the fast picture's times and how far the two ways lie apart."""
     renderer = Renderer(preset="fast")
-    mapper = digit_mapper(renderer.camera)
+    mapper = gel_mapper(renderer.camera)
     heights: dict[str, Times] = {how: [] for how in HOW}
     shading: dict[str, Times] = {how: [] for how in HOW}
     apart, levels = [], []

@@ -36,7 +36,7 @@ from tactile_core.mechanics.solve import solve
 from tactile_core.mechanics.thickness import thickness_under
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.coating_spread import CoatingSpread
-from tactile_core.pictures.height_map import digit_mapper, of_unit, rest_height_map
+from tactile_core.pictures.height_map import gel_mapper, of_unit, rest_height_map
 from tactile_core.pictures.mitsuba.gel_light import PATHS_A_PASS, GelLight
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR, choose_variant
 from tactile_core.pictures.presets import FAST, NAMES, PRESETS, QUALITY, REFERENCE, STANDARD, TABLE, Preset
@@ -119,7 +119,7 @@ def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
         share = contact.depth * DEEPEST / DRAWN_TO
         depth = share * thickness_under("digit", contact.indenter, pose)
         displacement = solve("digit", contact.indenter, contact.place, depth=depth).displacement
-        found.append(digit_mapper(camera)(displacement))
+        found.append(gel_mapper(camera)(displacement))
         if len(found) == count:
             break
     return found

@@ -24,7 +24,7 @@ from tactile_core.files.shipped import shipped
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Solution, solve
 from tactile_core.mechanics.thickness import thickness_under
-from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.perspective import bilinear, slopes
 from tactile_core.recordings import prepare, read
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y
@@ -92,7 +92,7 @@ def between_nodes(solution: Solution) -> float:
     solid, state = solution.volume
     rest = solid.mesh.nodes[solid.mesh.surface]
     moved = rest + state.displacement[solid.mesh.surface]
-    mapper = digit_mapper()
+    mapper = gel_mapper()
     camera = mapper.camera
     seen = mapper(solution.displacement)
     row_at = (moved[:, 0] - camera.gel_x[0]) / (camera.gel_x[1] - camera.gel_x[0])

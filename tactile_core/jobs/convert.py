@@ -66,7 +66,7 @@ def load_tools(
     from ..translation import translate
 
     translator, unit = translate.load_translator(weights, answer, target), load_calibration(calibration)
-    mapper = height_map.digit_mapper(unit.camera)
+    mapper = height_map.gel_mapper(unit.camera)
     dots = None
     if preset == "fast" and unit.markers is None:
         shade = shading.Shader(unit)

@@ -31,7 +31,7 @@ from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import FRICTION
 from ..mechanics.thickness import DEPTH_LIMIT, thickness_under
-from ..pictures.height_map import digit_mapper, folds_counted
+from ..pictures.height_map import folds_counted, gel_mapper
 from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
@@ -200,7 +200,7 @@ class Gel:
             found = f"the {sensors.title(self.sensor)}, of which no picture can be drawn"
             raise TactileError("Gel, picture", found, f"a Gel of the {sensors.title(PICTURED)}")
         with folds_counted():
-            return digit_mapper(self._renderer.camera)(self._contact.displacement)
+            return gel_mapper(self._renderer.camera)(self._contact.displacement)
 
     def picture(self) -> np.ndarray:
         """Return the picture (H, W, 3) uint8 that the DIGIT's camera takes of the last contact.

@@ -23,7 +23,7 @@ from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.png_writer import write_png
 from ..files.stopwatch import Stopwatch
-from ..pictures.height_map import digit_mapper, of_unit
+from ..pictures.height_map import gel_mapper, of_unit
 from ..pictures.mitsuba.scene_file import camera_planes, write_scene
 from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, fitting, measured
 from ..pictures.renderer import Renderer
@@ -209,7 +209,7 @@ class Pictures:
     def write_frame(self, folder: Path, number: int, values: np.ndarray) -> None:
         """Write one frame. values : displacement (M, 3) m or heights (H, W) m."""
         with self.clock.stage("height_map"):
-            height = values if self.heights else digit_mapper(self.renderer.camera)(values)
+            height = values if self.heights else gel_mapper(self.renderer.camera)(values)
         with self.clock.stage("radiance"):
             radiance = self.renderer.radiance(height)
         with self.clock.stage("picture"):
@@ -225,7 +225,7 @@ class Pictures:
     def write_scene(self, path: str | os.PathLike, values: np.ndarray) -> None:
         """Write a frame as Mitsuba's file; values : see `write_frame`."""
         unit = self.renderer.calibration
-        height = values if self.heights else digit_mapper(unit.camera)(values)
+        height = values if self.heights else gel_mapper(unit.camera)(values)
         write_scene(path, unit, of_unit(height, unit))
 
     def _write_exr(self, path: Path, radiance: np.ndarray, about: dict[str, str]) -> None:

@@ -1,7 +1,7 @@
 """Displaced gel -> its heights under the camera's pixels.
 
 A height is the position of the coating toward the camera, in metres. It grows with y of the shared frame: an
-indentation raises it. Zero is the plane ``camera.HEIGHT_ZERO_Y``, which touches the resting gel's lowest point, so
+indentation raises it. Zero is the plane ``camera.height_zero_y``, which touches the resting gel's lowest point, so
 the dome is part of the map: about 0 in the middle, up to 1.7 mm where the resting gel falls away. The map follows
 sideways movement too: its value is that of the gel point that has moved there. It is a map of the gel, seen along its
 normal: pixels stand for the places on the plane of height zero where the camera sees them; perspective comes later.
@@ -24,7 +24,7 @@ from ..geometry.cubic_spline import EvenSpline, bspline_weights
 from ..geometry.lattice import Lattice
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import load_calibration
-from ..sensors.camera import HEIGHT_ZERO_Y, Camera
+from ..sensors.camera import Camera
 from .height_loops import heights_above, look_up
 
 _log = logging.getLogger(__name__)
@@ -79,7 +79,7 @@ class HeightMapper:
             _short(self._fine_along.matrix(camera.gel_x)), _short(self._fine_across.matrix(camera.gel_z)).T.copy()
         ]  # fmt: skip
         self._fine_places = np.stack(np.meshgrid(*fine, indexing="ij")).reshape(2, -1)
-        self._rest_y = rest[..., 1] - HEIGHT_ZERO_Y
+        self._rest_y = rest[..., 1] - camera.height_zero_y
         down, right = self._along.matrix(camera.gel_x), self._across.matrix(camera.gel_z)
         self.rest = (down @ self._rest_y @ right.T).astype(np.float32)
         self.rest.flags.writeable = False
@@ -226,35 +226,35 @@ def _axis(nodes: np.ndarray) -> EvenSpline:
     return EvenSpline(nodes[0], (nodes[-1] - nodes[0]) / (len(nodes) - 1), len(nodes))
 
 
-def digit_mapper(camera: Camera | None = None) -> HeightMapper:
-    """Return the mapper of ``sensors.digit_surface()``, made once a camera; None for the shipped calibration's."""
-    return _digit_mapper(camera or load_calibration().camera)
+def gel_mapper(camera: Camera | None = None) -> HeightMapper:
+    """Return the mapper of the gel that a camera looks at, made once a camera; None for the shipped DIGIT's."""
+    return _gel_mapper(camera or load_calibration().camera)
 
 
 @functools.cache
-def _digit_mapper(camera: Camera) -> HeightMapper:
-    return HeightMapper(sensors.digit_surface(), camera)
+def _gel_mapper(camera: Camera) -> HeightMapper:
+    return HeightMapper(sensors.sensor_surface(camera.sensor), camera)
 
 
 def height_map(displacement: np.ndarray, camera: Camera | None = None) -> np.ndarray:
-    """Return the heights (H, W) or (T, H, W) float32, m, of the DIGIT's gel displaced by (n_nodes, 3) or (T,
+    """Return the heights (H, W) or (T, H, W) float32, m, of a camera's gel displaced by (n_nodes, 3) or (T,
     n_nodes, 3) m.
     """
-    return digit_mapper(camera)(displacement)
+    return gel_mapper(camera)(displacement)
 
 
 def rest_height_map(camera: Camera | None = None) -> np.ndarray:
-    """Return the heights (H, W) float32, m, of the undeformed DIGIT: its dome."""
-    return digit_mapper(camera).rest.copy()
+    """Return the heights (H, W) float32, m, of a camera's undeformed gel: its dome."""
+    return gel_mapper(camera).rest.copy()
 
 
 def of_unit(heights: np.ndarray, calibration: Calibration) -> np.ndarray:
-    """Convert heights (H, W) or (T, H, W) m of the DIGIT's gel to float32,
+    """Convert heights (H, W) or (T, H, W) m of a gel to float32,
     of a unit whose dome is higher or flatter at rest.
 
-    What a contact raises stays; the resting dome is that of the public mesh times the calibration's ``dome_scale``.
+    What a contact raises stays; the resting dome is that of the descriptor times the calibration's ``dome_scale``.
     """
     heights = np.asarray(heights, np.float32)
     if calibration.dome_scale == 1:
         return heights
-    return heights - np.float32(1 - calibration.dome_scale) * digit_mapper(calibration.camera).rest
+    return heights - np.float32(1 - calibration.dome_scale) * gel_mapper(calibration.camera).rest

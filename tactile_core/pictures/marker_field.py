@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..sensors.calibration import Calibration
-from .height_map import digit_mapper
+from .height_map import gel_mapper
 
 LEAST_AREA = 1e-3  # px^2, of a dot seen from its edge: none is drawn
 
@@ -20,7 +20,7 @@ class MarkerField:
     def __init__(self, unit: Calibration) -> None:
         if unit.markers is None:
             raise TactileError("calibration, markers", "missing", "a [markers] table", "See docs/calibration.md")
-        self.unit, self._mapper = unit, digit_mapper(unit.camera)
+        self.unit, self._mapper = unit, gel_mapper(unit.camera)
         markers, camera = unit.markers, unit.camera
         self._dark = 1 - markers.albedo  # share of light that ink takes
         down, right = (markers.pitch * (np.arange(n) - (n - 1) / 2) for n in (markers.rows, markers.columns))

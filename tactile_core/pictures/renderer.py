@@ -15,7 +15,7 @@ from ..sensors.calibration_file import load_calibration
 from .background import correction, resting_picture
 from .camera_noise import camera_noise
 from .coating_spread import CoatingSpread
-from .height_map import digit_mapper, of_unit, rest_height_map
+from .height_map import gel_mapper, of_unit, rest_height_map
 from .level_loops import in_picture
 from .marker_field import MarkerField
 from .mitsuba.direct_light import Hits, direct_light
@@ -113,7 +113,7 @@ class Renderer:
         Raises TactileError for another shape or values that are not finite.
         """
         if np.ndim(displacement) != 3:
-            return self(digit_mapper(self.camera)(displacement), self.marks(displacement))
+            return self(gel_mapper(self.camera)(displacement), self.marks(displacement))
         pictures = np.empty((len(displacement), *self.camera.shape, 3), np.uint8)
         for k, frame in enumerate(displacement):
             pictures[k] = self.render(frame)

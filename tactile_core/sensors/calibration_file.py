@@ -19,6 +19,8 @@ from . import digit
 from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
 from .camera import COLOURS, Camera, Led
 from .coating import Coating
+from .descriptor import describe, of_kind
+from .gel_sensor import Gel
 from .markers import Markers
 
 FORMAT, FORMER = "tactile-calibration-3", "tactile-calibration-1"
@@ -27,7 +29,7 @@ SHIPPED = digit.DESCRIPTOR.folder / digit.DESCRIPTOR.camera.calibration
 LARGEST = 1e8  # of a unit's numbers, as the radiance of a spot of 0.05 mm; a fit's errors may be larger
 ADVICE = "Make it again with `tactile calibrate`"
 
-OPTIONAL = ("markers",)  # tables that may be left out
+OPTIONAL = ("sensor", "markers")  # what may be left out: of a DIGIT, without dots
 _TABLES = {
     "": ("format", "unit", "camera", "leds", "response", "ambient", "coating", "gel", "background", "noise", "fit"),
     "camera": ("width_px", "height_px", "px_per_mm_x", "px_per_mm_y", "centre_x_mm", "centre_z_mm",
@@ -44,18 +46,34 @@ _TABLES = {
 }  # fmt: skip
 
 
-def load_calibration(path: str | os.PathLike | None = None) -> Calibration:
-    """Load the calibration in a TOML file; None for the one that ships.
+def load_calibration(path: str | os.PathLike | None = None, sensor: str | None = None) -> Calibration:
+    """Load the calibration in a TOML file; None for the one that ships with a sensor's descriptor, None the DIGIT's.
 
     A background's photograph is looked for beside the file. Raises TactileError naming file and field for what cannot
-    be read, is unknown, missing or out of its range.
+    be read, is unknown, missing or out of its range, and for a file of another sensor.
     """
-    return _shipped() if path is None else _read(Path(path))
+    if path is None:
+        return _read_once(calibration_path(sensor or Camera.sensor))
+    found = _read(Path(path))
+    if sensor not in (None, found.camera.sensor):
+        raise TactileError(
+            f"{os.fspath(path)}, sensor", repr(found.camera.sensor), repr(sensor), "Name one of that gel"
+        )
+    return found
+
+
+def calibration_path(sensor: str) -> Path:
+    """Return the file of the calibration that a gel's descriptor names. Raises TactileError where it names none."""
+    gel = of_kind(sensor, Gel)
+    if not gel.camera.calibration:
+        advice = "Make one: `tactile calibrate --start FILE`, as docs/extend.md says"
+        raise TactileError(f"sensor {sensor!r}, camera, calibration", "none", "a file beside the descriptor", advice)
+    return gel.folder / gel.camera.calibration
 
 
 @functools.cache
-def _shipped() -> Calibration:
-    return _read(SHIPPED)
+def _read_once(file: Path) -> Calibration:
+    return _read(file)
 
 
 def _read(file: Path) -> Calibration:
@@ -157,6 +175,7 @@ class _Reader:
             apparent_height=number["apparent_height_mm"] * 1e-3,
             right_z=_whole("camera, right_z", table["right_z"]),
             down_x=_whole("camera, down_x", table["down_x"]),
+            sensor=_text("sensor", self._content.get("sensor", Camera.sensor)),
         )
 
     def _led(self, colour: str) -> Led:
@@ -261,11 +280,13 @@ def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None
 def _as_text(calibration: Calibration) -> str:
     camera, response, coating = calibration.camera, calibration.response, calibration.coating
     fit = calibration.fit
+    title = describe(camera.sensor).title
     lines = [
-        "# A DIGIT unit: picture = response(right, down) x radiance of the coating + ambient light, 8-bit values.",
+        f"# A {title} unit: picture = response(right, down) x radiance of the coating + ambient light, 8-bit values.",
         "# Image frame: right, down, toward the camera; origin in the picture's middle on the plane of height zero.",
         f"format = {_quoted(FORMAT)}",
         f"unit = {_quoted(calibration.unit)}",
+        *[f"sensor = {_quoted(camera.sensor)}"] * (camera.sensor != Camera.sensor),
         "",
         "[camera]",
         f"width_px = {camera.width}",

@@ -1,7 +1,7 @@
 """Data of a camera and lights: one camera model, used for every step between pixels and gel.
 
 Image frame, used by camera and lights: right and down along the picture, toward the camera as third axis, metres,
-origin in the picture's centre at height zero (``HEIGHT_ZERO_Y``). A unit's own camera and lights are in its
+origin in the picture's centre at height zero (``Camera.height_zero_y``). A unit's own camera and lights are in its
 calibration, see ``calibration_file``.
 """
 
@@ -16,8 +16,7 @@ from ..errors import TactileError
 from .descriptor import of_kind
 from .gel_sensor import Gel
 
-# Plane of height zero, shared frame. Heights grow with y, toward the camera, so that an indentation raises them.
-HEIGHT_ZERO_Y = of_kind("digit", Gel).camera.height_zero_y
+HEIGHT_ZERO_Y = of_kind("digit", Gel).camera.height_zero_y  # of a DIGIT's cameras
 MOST_PIXELS = 10_000_000  # 2.5 GB for a fast picture; the camera has 76,800 (assumed enough)
 FINEST = 1000.0  # pixels a millimetre; the shipped unit's camera has 20 (assumed enough)
 LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a camera that is higher
@@ -35,6 +34,7 @@ class Camera:
     centre_x, centre_z : m, the place on the gel, shared frame, in the middle of the picture
     apparent_height : m, height of the pinhole above the plane of height zero
     right_z, down_x : +1 or -1, the way z goes to the right and x goes down the picture
+    sensor : whose gel it looks at
     """
 
     width: int
@@ -46,6 +46,7 @@ class Camera:
     apparent_height: float
     right_z: int
     down_x: int
+    sensor: str = "digit"
 
     def __post_init__(self) -> None:
         for name in ("width", "height"):
@@ -67,6 +68,12 @@ class Camera:
         if not (math.isfinite(self.apparent_height) and self.apparent_height >= LOWEST_CAMERA):
             expected = f"{LOWEST_CAMERA} m or more, above the gel"
             raise TactileError("camera, apparent_height", repr(self.apparent_height), expected)
+        of_kind(self.sensor, Gel)  # refused where it is none
+
+    @property
+    def height_zero_y(self) -> float:
+        """The plane of height zero, y m. Heights grow with y, toward the camera: an indentation raises them."""
+        return of_kind(self.sensor, Gel).camera.height_zero_y
 
     @property
     def shape(self) -> tuple[int, int]:

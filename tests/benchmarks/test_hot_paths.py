@@ -9,7 +9,7 @@ from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.press import CorrectedPress
 from tactile_core.mechanics.placement import FRICTION, Placement, pose_at
-from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.presets import FAST
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.translation import networks
@@ -47,6 +47,6 @@ def test_fast_contact(benchmark: Callable, sensor: str) -> None:
 
 def test_height_map_and_fast_picture(nets: networks.Networks, benchmark: Callable) -> None:
     moved = nets.decode_digit(np.zeros((1, nets.sizes["MVD"]["latent"]), np.float32))[0]
-    mapper, renderer = digit_mapper(), Renderer(preset=FAST)
+    mapper, renderer = gel_mapper(), Renderer(preset=FAST)
     picture = benchmark.pedantic(lambda: renderer(mapper(moved)), **QUICK)
     assert picture.shape == (320, 240, 3)

@@ -20,7 +20,7 @@ from tactile_core.mechanics.solids.neo_hookean import NeoHookean
 from tactile_core.mechanics.solids.split_bulk_modulus import SplitBulkModulus
 from tactile_core.mechanics.solve import Step, solve, solve_path
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
-from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.sensors import Material, digit
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y
 from tactile_core.translation import networks
@@ -294,7 +294,7 @@ def single_height() -> Found:
     """A dent without sideways movement, whose heights are splines that scipy makes in double precision."""
     from scipy.interpolate import RectBivariateSpline
 
-    gel, mapper = sensors.digit_surface(), digit_mapper()
+    gel, mapper = sensors.digit_surface(), gel_mapper()
     bell = np.exp(-(((gel.rest[:, 0] + 7e-3) / 1.4e-3) ** 2 + (gel.rest[:, 2] / 1.4e-3) ** 2) / 2)
     moved = np.zeros_like(gel.rest)
     moved[:, 1] = 0.8e-3 * bell

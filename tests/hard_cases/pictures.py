@@ -17,7 +17,7 @@ from scipy.ndimage import distance_transform_edt
 
 from tactile_core import sensors
 from tactile_core.geometry.cubic_spline import EvenSpline
-from tactile_core.pictures.height_map import HeightMapper, digit_mapper, rest_height_map
+from tactile_core.pictures.height_map import HeightMapper, gel_mapper, rest_height_map
 from tactile_core.pictures.perspective import bilinear
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.pictures.shading import Shader
@@ -42,7 +42,7 @@ def moved(name: str) -> np.ndarray:
 
 def _heights(name: str) -> Found:
     """At each displaced node, looked up among the pixels, against the node's own height."""
-    mapper, displacement = digit_mapper(), moved(name)
+    mapper, displacement = gel_mapper(), moved(name)
     at = sensors.digit_surface().rest + displacement
     row, column = mapper.camera.to_pixel(at[:, 0], at[:, 2])
     height, width = mapper.camera.shape
@@ -73,8 +73,8 @@ def _compared(unit, heights: np.ndarray, rest: np.ndarray, most: float) -> Found
 
 def _far_off(name: str) -> Found:
     """How much the picture changes away from the contact."""
-    heights = digit_mapper()(moved(name))
-    unit = plain_unit(camera=digit_mapper().camera)
+    heights = gel_mapper()(moved(name))
+    unit = plain_unit(camera=gel_mapper().camera)
     drawn = Shader(unit, background=GREY)
     change = np.abs(drawn(heights).astype(int) - drawn(rest_height_map(unit.camera)))
     dent = heights - rest_height_map(unit.camera) > 20e-6
@@ -101,7 +101,7 @@ for _name, (_hard, *_rest) in CONTACTS.items():
 @case("nothing_touches_heights", "zero contact", HEIGHT_MAP, "exactly the resting gel")
 def still_heights() -> Found:
     """No displacement."""
-    still = digit_mapper()(np.zeros((len(sensors.digit_surface().rest), 3)))
+    still = gel_mapper()(np.zeros((len(sensors.digit_surface().rest), 3)))
     return Found(float(np.abs(still - rest_height_map()).max()) * 1e6, "um", 0.0)
 
 
@@ -254,7 +254,7 @@ def spike() -> Found:
     displacement = np.zeros_like(gel.rest)
     node = int(np.argmin(((gel.rest[:, [0, 2]] - [-7.5e-3, 0.0]) ** 2).sum(axis=1)))
     displacement[node, 1] = 0.5e-3
-    rise = digit_mapper()(displacement) - rest_height_map()
+    rise = gel_mapper()(displacement) - rest_height_map()
     broken = () if np.isfinite(rise).all() and rise.max() < 0.55e-3 else (f"rises to {rise.max() * 1e3:.2f} mm",)
     return Found(100 * float(-rise.min() / 0.5e-3), "percent", 20.0, broken=broken)
 
@@ -272,7 +272,7 @@ def folded() -> Found:
     off = gel.rest[:, [0, 2]] - [-7e-3, 0.0]
     bell = np.exp(-(off**2).sum(axis=1) / (2 * (1.4e-3) ** 2))
     try:
-        heights = digit_mapper()(np.column_stack([-3 * off[:, 0] * bell, 0.1e-3 * bell, -3 * off[:, 1] * bell]))
+        heights = gel_mapper()(np.column_stack([-3 * off[:, 0] * bell, 0.1e-3 * bell, -3 * off[:, 1] * bell]))
     finally:
         log.removeHandler(watch)
     words = heard[0].getMessage() if heard else "nothing was said"

@@ -15,7 +15,7 @@ import numpy as np
 
 from tactile_core import accuracy, recordings
 from tactile_core.jobs.convert import Options, convert, load_tools
-from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.shading import Shader
 from tactile_core.recordings import Recording, Signals
 from tactile_core.recordings.flags import Flag
@@ -202,7 +202,7 @@ def _wild() -> np.ndarray:
 def wild_heights() -> Found:
     """Decoded latents that no training ever made."""
     moved = _wild()
-    heights = digit_mapper()(moved)
+    heights = gel_mapper()(moved)
     words = f"nodes move up to {np.abs(moved).max() * 1e3:.1f} mm"
     return Found(float(np.isfinite(heights).mean() * 100), "percent", 100.0, at_least=True, words=words)
 
@@ -211,7 +211,7 @@ def wild_heights() -> Found:
       "a picture, or a refusal in words where the gel would reach the lights")  # fmt: skip
 def wild_pictures() -> Found:
     """Pictures of the same."""
-    heights = digit_mapper()(_wild())
+    heights = gel_mapper()(_wild())
     shader, words, drawn = Shader(), set(), 0
     for height in heights:
         try:

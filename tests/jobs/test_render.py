@@ -15,7 +15,7 @@ from gel_pictures import NO_MITSUBA, Press
 from tactile_core.accuracy import Candidate, cheapest
 from tactile_core.cli.main import main
 from tactile_core.jobs.frames_file import FramesFile
-from tactile_core.pictures.height_map import digit_mapper
+from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.presets import measured
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors import digit_surface
@@ -82,7 +82,7 @@ def test_frames_of_a_conversion(render, tmp_path):
     unit, images = load_calibration(), tmp_path / "out" / "images"
     renderer = Renderer(unit, "fast")
     np.testing.assert_array_equal(picture(images / "00007.png"), np.rint(renderer.background))
-    np.testing.assert_array_equal(picture(images / "00009.png"), renderer(digit_mapper(unit.camera)(move[1])))
+    np.testing.assert_array_equal(picture(images / "00009.png"), renderer(gel_mapper(unit.camera)(move[1])))
 
 
 def test_a_scene_is_simulated_first(render, tmp_path, monkeypatch):

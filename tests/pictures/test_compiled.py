@@ -3,7 +3,7 @@
 import numpy as np
 
 from tactile_core import sensors
-from tactile_core.pictures.height_map import digit_mapper, folds_counted
+from tactile_core.pictures.height_map import folds_counted, gel_mapper
 from tactile_core.pictures.renderer import Renderer
 
 
@@ -19,7 +19,7 @@ def dents(count: int) -> np.ndarray:
 
 
 def test_heights_and_pictures_are_numpys(compiled_loops):
-    renderer, mapper, found = Renderer(preset="fast"), digit_mapper(), {}
+    renderer, mapper, found = Renderer(preset="fast"), gel_mapper(), {}
     for on in (False, True):
         compiled_loops(on)
         heights = mapper(dents(12))
@@ -40,6 +40,6 @@ def test_a_gel_that_folds_over_itself_is_counted_as_numpy_counts_it(compiled_loo
     for on in (False, True):
         compiled_loops(on)
         with folds_counted() as folds:
-            found[on] = digit_mapper()(folding), folds
+            found[on] = gel_mapper()(folding), folds
     assert found[True][1] == found[False][1] and found[True][1][0] > 100
     assert np.isfinite(found[True][0]).all()

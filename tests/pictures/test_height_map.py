@@ -7,7 +7,7 @@ import pytest
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.lattice import Lattice, grid_faces
-from tactile_core.pictures.height_map import HeightMapper, digit_mapper, folds_counted, height_map, rest_height_map
+from tactile_core.pictures.height_map import HeightMapper, folds_counted, gel_mapper, height_map, rest_height_map
 from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y
 
@@ -134,7 +134,7 @@ def test_bad_displacement_is_refused() -> None:
 def test_picture_beyond_the_window_is_refused() -> None:
     wide = dataclasses.replace(DIGIT_CAMERA, px_per_mm_x=10.0)
     with pytest.raises(TactileError, match="camera, z"):
-        digit_mapper(wide)
+        gel_mapper(wide)
     skin = sensors.biotac_surface()
     with pytest.raises(TactileError, match="window"):
         HeightMapper(skin)

@@ -165,7 +165,7 @@ def test_weights_of_another_pair_of_sensors_are_refused(request, monkeypatch):
     monkeypatch.setenv("TACTILE_SENSORS", str(request.config.rootpath / "scenes/sensors"))
     for target, words in (
         ("flat_gel", "networks of biotac and digit; expected networks that translate to flat_gel"),
-        ("gelsight", "'gelsight'; expected biotac, biotac_sp, digit, flat_gel"),
+        ("gelsight", "'gelsight'; expected biotac, biotac_sp, digit, flat_gel, gelsight_mini"),
         ("biotac", "kind fluid; expected a sensor of kind gel"),
     ):
         with pytest.raises(TactileError, match=words):

@@ -10,7 +10,7 @@ from benchmarks.measure_presets import QUICK_PASSES, one_thread, rms
 from benchmarks.translation.noise import as_read
 from benchmarks.translation.test_set import SEED
 from tactile_core.jobs.frame_pass import CHUNK
-from tactile_core.pictures.height_map import digit_mapper, of_unit, rest_height_map
+from tactile_core.pictures.height_map import gel_mapper, of_unit, rest_height_map
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE
 from tactile_core.pictures.renderer import MitsubaLight, Renderer
@@ -35,7 +35,7 @@ def measure(name: str, quick: bool, truth: str) -> Method | None:
     Raises ModuleNotFoundError where mitsuba is missing.
     """
     unit, pairs = load_calibration(), _contacts(QUICK_CONTACTS if quick else CONTACTS)
-    mapper = digit_mapper(unit.camera)
+    mapper = gel_mapper(unit.camera)
     if name == "truth":
         _draw_truth(unit, mapper, pairs, QUICK_PASSES if quick else PASSES, truth)
         return None

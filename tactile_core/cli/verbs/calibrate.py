@@ -1,4 +1,4 @@
-"""``tactile calibrate``: a DIGIT unit's camera, lights and colours, from photographs of a ball pressed into it."""
+"""``tactile calibrate``: a gel unit's camera, lights and colours, from photographs of a ball pressed into it."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from ...pictures.calibrate.photographs import Photographs
     from ...sensors.calibration import Calibration
 
-BRIEF = "camera, lights and colours of a DIGIT, from presses of a ball"
+BRIEF = "camera, lights and colours of a gel, from presses of a ball"
 TEXT = """\
-Fit a DIGIT unit's calibration to photographs of a ball pressed into it, anywhere and to any depth: positions of camera
+Fit a unit's calibration to photographs of a ball pressed into its gel, anywhere and to any depth: positions of camera
 and lights, their extent, colours, scale. Without a photograph of the untouched gel, its median over the photographs
 takes its place. Ten presses spread over the gel are best; five or even one suffice, since parameters that presses do
 not determine stay near those of --start, and are named. Writes the calibration, and a sheet to look at (.png).
@@ -33,6 +33,7 @@ EPILOG = """\
 examples:
   tactile calibrate presses/ --ball-diameter 6 --out unit.toml
   tactile calibrate presses/ --ball-diameter 6 --background untouched.png --out unit.toml
+  tactile calibrate presses/ --ball-diameter 6 --gel gelsight_mini --out unit.toml
   tactile calibrate --test unit.toml more_presses/ --json trial.json"""
 LEAVES = NOTHING
 TRIED = ("fast", "standard", "quality")  # presets
@@ -44,6 +45,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--out", metavar="FILE", help="new TOML file to write")
     verb.add_argument("--ball-diameter", type=float, metavar="MM", help="of the ball (with --test: as fitted)")
     verb.add_argument("--background", metavar="FILE", help="photograph of the untouched gel (default: estimated)")
+    verb.add_argument("--gel", metavar="SENSOR", help="whose unit it is (default: the one of --start, else digit)")
     verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
     verb.add_argument("--unit", metavar="TEXT", help="the unit's name in the file (default: the file's)")
     verb.add_argument("--only", metavar="NAMES", help="photographs to use, file names separated by commas")
@@ -71,7 +73,7 @@ def _check_options(options: argparse.Namespace) -> None:
     from ...pictures.calibrate.fit import check_diameter
 
     if options.test:
-        for name in ("out", "start", "unit"):
+        for name in ("out", "gel", "start", "unit"):
             if getattr(options, name) is not None:
                 raise TactileError(f"--{name}", "given with --test", "one or the other")
         for path in (options.json, options.sheet):
@@ -105,7 +107,7 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     from ...pictures.calibrate.report import rows_of, write_sheet
     from ...sensors.calibration_file import load_calibration, write_calibration
 
-    start, diameter = load_calibration(options.start), 1e-3 * options.ball_diameter
+    start, diameter = load_calibration(options.start, options.gel), 1e-3 * options.ball_diameter
     check_orientation(photographs, diameter, start)
     with bar("trial on presses kept apart", "third", options.progress) as progress:
         apart = tried_apart(photographs, diameter, start, quick=options.quick, progress=progress)

@@ -1,4 +1,4 @@
-"""``tactile info``: what a recording holds."""
+"""``tactile info``: what a recording holds, and what a sensor is."""
 
 from __future__ import annotations
 
@@ -13,27 +13,32 @@ from .common import NOTHING, columns_of, polarity_argument
 if TYPE_CHECKING:
     from ...recordings.electrode_gains import SensorFile
 
-BRIEF = "what a recording holds"
+BRIEF = "what a recording holds, and what a sensor is"
 TEXT = """\
 Say what recordings hold: sensor, channels, rate, duration, polarity, tare, gaps, bad samples. Of a BioTac SP's CSV,
 which no weights translate: finger, lines, labels and the counts of its 24 electrodes; changes against the unit's rest
 with --sensor, since recordings that begin in contact do not tell it.
 
 A CSV file whose column names are of no known layout needs a map: --columns map.toml writes one, guessed from the
-names of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch."""
+names of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch.
+
+Without a recording, --sensor takes the name of a sensor, one that ships or one of $TACTILE_SENSORS, and tells of it."""
 EPILOG = """\
 examples:
   tactile info results/*.csv
   tactile info own.csv --columns map.toml
-  tactile info slip.csv --sensor rest.toml"""
+  tactile info slip.csv --sensor rest.toml
+  tactile info --sensor gelsight_mini"""
 LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("recordings", nargs="+", metavar="FILE")
+    verb.add_argument("recordings", nargs="*", metavar="FILE")
     polarity_argument(verb)
-    verb.add_argument("--sensor", metavar="FILE", help="rest and gains of the unit, as `tactile adapt` writes them")
+    verb.add_argument(
+        "--sensor", metavar="FILE|NAME", help="rest and gains of the unit, as `tactile adapt` writes them; or a sensor"
+    )
     verb.add_argument(
         "--columns", metavar="MAP.toml", help="which column is what; where there is no such file, it is written"
     )
@@ -44,6 +49,8 @@ def run(options: argparse.Namespace) -> int:
     from ...recordings import PrepareOptions, info
     from ...recordings.readers import each_finger
 
+    if not options.recordings:
+        return _tell_sensor(options.sensor)
     if options.columns is not None and not os.path.lexists(options.columns):
         _write_columns(options)
     unit = None if options.sensor is None else _unit(options.sensor)
@@ -56,6 +63,18 @@ def run(options: argparse.Namespace) -> int:
             complain(str(error))
             failed += 1
     return 2 if failed else 0
+
+
+def _tell_sensor(name: str | None) -> int:
+    """Describe a sensor."""
+    from ...sensors.about import about
+
+    if name is None:
+        raise TactileError(
+            "FILE", "missing", "recordings, or --sensor NAME alone", "`tactile info --help` has examples"
+        )
+    tell(about(name))
+    return 0
 
 
 def _unit(path: str) -> SensorFile:

@@ -7,14 +7,14 @@ import abc
 import numpy as np
 
 from ...sensors.calibration import Calibration
-from ...sensors.camera import HEIGHT_ZERO_Y, Camera
-from ...sensors.digit import BACK_Y, dome_height
+from ...sensors.camera import Camera
+from ...sensors.gel_shape import shape_of
 from ..coating_spread import CoatingSpread
 from ..perspective import Perspective
 from ..shading import Lamp, SeenSurface
 from .ball_print import print_on
 
-WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors down to this width
+WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors down to this short side
 
 
 class BallPictures(abc.ABC):
@@ -24,7 +24,9 @@ class BallPictures(abc.ABC):
         self.calibration = calibration
         self.camera: Camera = calibration.camera
         x, z = np.meshgrid(self.camera.gel_x, self.camera.gel_z, indexing="ij")
-        self.rest = (calibration.dome_scale * (BACK_Y - dome_height(x, z) - HEIGHT_ZERO_Y)).astype(np.float32)
+        shape = shape_of(self.camera.sensor)
+        dome = shape.back_y - shape.dome_height(x, z) - self.camera.height_zero_y
+        self.rest = (calibration.dome_scale * dome).astype(np.float32)
         self.right, self.down = np.meshgrid(self.camera.right, self.camera.down)
         self.spread = CoatingSpread(self.camera, calibration.coating.spread)
         self.gain = np.moveaxis(calibration.gain.matrices(self.camera), (2, 3), (0, 1))
@@ -65,7 +67,7 @@ class FastPictures(BallPictures):
 
 def working_factor(width: int, height: int) -> int:
     """Return the whole factor by which pictures are made smaller for a fit."""
-    wanted = max(width // WORKING_WIDTH, 1)
+    wanted = max(min(width, height) // WORKING_WIDTH, 1)
     return next(factor for factor in range(wanted, 0, -1) if width % factor == 0 and height % factor == 0)
 
 

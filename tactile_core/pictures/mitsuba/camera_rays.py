@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...sensors.calibration import Calibration
-from .window import WINDOW_HEIGHT, air_over_window, tangent
+from .window import air_over_window, tangent, window_height
 
 _SINES = np.linspace(0, 0.999, 2000)  # of rays in air, for the table that inverts Snell's law
 
@@ -23,16 +23,16 @@ def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple
     has none.
     """
     camera, index = unit.camera, unit.gel_index
-    air = air_over_window(camera, index)
+    air, window = air_over_window(camera, index), window_height(camera)
     if air <= 0:
         start = np.zeros((3, len(right)))
         start[2] = camera.apparent_height
     else:
         in_air, in_gel = tangent(_SINES), tangent(_SINES / index)
         distance = np.hypot(right, down)
-        at_window = np.interp(distance, air * in_air + WINDOW_HEIGHT * in_gel, air * in_air)
+        at_window = np.interp(distance, air * in_air + window * in_gel, air * in_air)
         share = np.divide(at_window, distance, out=np.zeros_like(distance), where=distance > 0)
-        start = np.stack([right * share, down * share, np.full_like(right, WINDOW_HEIGHT)])
+        start = np.stack([right * share, down * share, np.full_like(right, window)])
     toward = np.stack([right, down, np.zeros_like(right)]) - start
     toward /= np.sqrt(np.square(toward).sum(0))
     flip = np.array([[1.0], [-1.0], [1.0]])

@@ -11,18 +11,22 @@ from __future__ import annotations
 import numpy as np
 
 from ...sensors.calibration import Calibration
-from ...sensors.camera import HEIGHT_ZERO_Y, Camera
-from ...sensors.digit import BACK_Y
+from ...sensors.camera import Camera
+from ...sensors.gel_shape import shape_of
 
 ACRYLIC = 3e-3  # m, thickness: assumed
-WINDOW_HEIGHT = BACK_Y - HEIGHT_ZERO_Y + ACRYLIC  # m over the plane of height zero
+
+
+def window_height(camera: Camera) -> float:
+    """Return the height of the window's far side, m over the plane of height zero."""
+    return shape_of(camera.sensor).back_y - camera.height_zero_y + ACRYLIC
 
 
 def air_over_window(camera: Camera, index: float) -> float:
     """Return the air, m, between window and pinhole, with which it appears at the camera's
     height on the axis (Snell's law).
     """
-    return (camera.apparent_height - WINDOW_HEIGHT) / index
+    return (camera.apparent_height - window_height(camera)) / index
 
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
@@ -36,7 +40,7 @@ def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.nd
         return np.full(np.shape(distance), camera.apparent_height)
     sine = np.linspace(0, 0.999, 2000)  # of the ray in air
     in_gel = tangent(sine / index)
-    slope = np.interp(distance, air * tangent(sine) + WINDOW_HEIGHT * in_gel, in_gel)
+    slope = np.interp(distance, air * tangent(sine) + window_height(camera) * in_gel, in_gel)
     return np.where(slope > 0, distance / np.where(slope > 0, slope, 1), camera.apparent_height)
 
 

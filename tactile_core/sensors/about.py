@@ -1,0 +1,42 @@
+"""A sensor in words: what its descriptor says, for people."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import sensor_surface, shape_of, skin_of
+from .descriptor import describe
+from .fluid_sensor import Fluid
+from .gel_sensor import Gel
+
+
+def about(name: str) -> str:
+    """Describe a sensor in a few lines: kind, size, material, nodes of its surface, folder, sources.
+
+    Raises TactileError for an unknown name and a descriptor that is not sound.
+    """
+    found, surface = describe(name), sensor_surface(name)
+    size = " x ".join(f"{1e3 * each:.2f}" for each in np.ptp(surface.rest, axis=0)[[0, 2]])
+    lines = [
+        f"{name}: {found.title}",
+        *(_of_gel(name, found) if isinstance(found, Gel) else _of_skin(name, found)),
+        f"size: {size} mm along and across the finger",
+        f"material: Young's modulus {1e-6 * found.material.youngs:g} MPa, Poisson's ratio {found.material.poisson:g}",
+        f"surface: {len(surface.rest)} nodes, {len(surface.faces)} triangles",
+        f"descriptor: {found.folder}",
+        *(f"source: {source}" for source in found.sources),
+    ]
+    return "\n".join(lines)
+
+
+def _of_gel(name: str, gel: Gel) -> list[str]:
+    form = "flat" if gel.dome is None else "domed"
+    picture = f"calibration {gel.camera.calibration}" if gel.camera.calibration else "no calibration"
+    return [f"kind: gel, {form}, {1e3 * shape_of(name).thickness:g} mm thick at its apex; {picture}"]
+
+
+def _of_skin(name: str, skin: Fluid) -> list[str]:
+    words = (
+        f"{1e3 * skin_of(name).thickness:g} mm thick over fluid; {skin.readout.bits} bits at {skin.readout.rate:g} Hz"
+    )
+    return [f"kind: fluid, a skin {words}"]
