@@ -75,20 +75,17 @@ def load_tools(
 
         shade = Renderer(unit, preset, variant)
         dots = shade.dots
+    solve: Solver | None = None
+    if gel == SOLVED:
+        from . import solved_gel
+
+        solved_gel.prepare()
+        solve = solved_gel.solved
     asked = translator.answer
     posterior = translator.posterior if asked.follows else None
     drawn = translator.plausible if asked.samples else None
     named = translator.card, translator.sha256
-    return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked, _solver(gel), dots)
-
-
-def _solver(gel: Gel) -> Solver | None:
-    if gel == TRANSLATED:
-        return None
-    from . import solved_gel
-
-    solved_gel.prepare()
-    return solved_gel.solved
+    return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked, solve, dots)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
+from ..files import outside
 from ..files.hdf5_checked import SIGNATURE
 from ..recordings.array_store import open_hdf5, open_npz
 from ..recordings.simulated import FORMAT as SIMULATED
@@ -118,7 +119,7 @@ def _check_displacement(store: Store, name: str) -> None:
 
 
 def _of_npz(path: Path) -> Frames:
-    with open_npz(os.fspath(path)) as store:
+    with outside.open_file(path, "an NPZ file") as file, open_npz(os.fspath(path), file) as store:
         names = list(store.shapes)
         if "electrodes" in names:
             raise TactileError(path, "a recording's electrodes", EXPECTED, CONVERT)

@@ -7,12 +7,11 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ..errors import TactileError
-from ..files import outside
 from ..files.hdf5_checked import declared, open_checked
 from .assemble import MAX_FRAMES
 
@@ -141,12 +140,12 @@ def _plain(value: Any) -> Any:
 
 
 @contextmanager
-def open_npz(path: str) -> Iterator[Store]:
-    """Open for reading; never unpickles. Sizes come from the arrays' own headers, not from unpacking them."""
+def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
+    """Read an opened file; never unpickles. Sizes come from the arrays' own headers, not from unpacking them."""
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
     with ExitStack() as stack:
         with damage_reported(path, "NPZ"):
-            archive = stack.enter_context(zipfile.ZipFile(stack.enter_context(outside.open_file(path, "an NPZ file"))))
+            archive = stack.enter_context(zipfile.ZipFile(file))
             for member in archive.infolist():
                 if member.filename.endswith(".npy"):
                     _check_packing(path, member)

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ..files import installed, outside
 from ..sensors import ELECTRODES
 from .array_store import damage_reported
 from .assemble import MAX_FRAMES, assemble, check_electrodes
-from .fingers import named, split
+from .fingers import named
 from .recording import Recording
 
 LOOKED_AT = 100  # frames from which the fingers of a hand are recognised
@@ -45,8 +45,21 @@ class Bag:
 
 
 def is_bag_folder(path: str) -> bool:
-    """Return true for the folder of a ROS 2 bag."""
-    return os.path.isfile(os.path.join(path, MARK))
+    """Return true for the folder of a ROS 2 bag.
+
+    Raises TactileError for one that is compressed file by file, or holds links out of its folder.
+    """
+    if not os.path.isfile(os.path.join(path, MARK)):
+        return False
+    with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:
+        metadata = file.read(MAX_METADATA + 1)
+    if len(metadata) > MAX_METADATA or PACKED.search(metadata):
+        advice = "Unpack it: ros2 bag convert"
+        raise TactileError(path, "a bag packed file by file, or with huge metadata", "a plain bag", advice)
+    for name in sorted(os.listdir(path)):
+        if not os.path.isdir(os.path.join(path, name)):
+            outside.check(outside.inside(path, name, "a bag's own file"), "a bag's own file")
+    return True
 
 
 def kind_of(start: bytes) -> str | None:
@@ -55,9 +68,11 @@ def kind_of(start: bytes) -> str | None:
 
 
 @contextmanager
-def open_bag(path: str) -> Iterator[Bag]:
-    """Open for reading; raises TactileError for damage, and for a ROS 2 bag that is compressed file by file,
-    ModuleNotFoundError without the extra [ros].
+def open_bag(path: str, file: BinaryIO, finger: int | None = None) -> Iterator[Bag]:
+    """Open for reading; raises TactileError for damage and what `is_bag_folder` refuses, ModuleNotFoundError without
+    the extra [ros].
+
+    file : the opened file, from its start; any where the bag is a folder
     """
     with installed.needing("ros"):
         from rosbags.rosbag1 import Reader as Reader1
@@ -66,13 +81,7 @@ def open_bag(path: str) -> Iterator[Bag]:
         from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
     _bound_unpacking()
-    path, finger = split(path)
-    kind: str | None = "folder"
-    if is_bag_folder(path):
-        _check_folder(path)
-    else:
-        with outside.open_file(path, "a recording") as file:
-            kind = kind_of(file.read(START_BYTES))
+    kind = "folder" if is_bag_folder(path) else kind_of(file.read(START_BYTES))
     openers: dict[str | None, Any] = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
     with damage_reported(path, "bag"):
         reader = openers[kind](Path(path))
@@ -86,18 +95,6 @@ def open_bag(path: str) -> Iterator[Bag]:
         yield Bag(path, kind == "ros1", finger, topics, reader)
     finally:
         reader.close()
-
-
-def _check_folder(path: str) -> None:
-    """Raise TactileError for a ROS 2 bag that is compressed file by file, or holds links out of its folder."""
-    with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:
-        metadata = file.read(MAX_METADATA + 1)
-    if len(metadata) > MAX_METADATA or PACKED.search(metadata):
-        advice = "Unpack it: ros2 bag convert"
-        raise TactileError(path, "a bag packed file by file, or with huge metadata", "a plain bag", advice)
-    for name in sorted(os.listdir(path)):
-        if not os.path.isdir(os.path.join(path, name)):
-            outside.check(outside.inside(path, name, "a bag's own file"), "a bag's own file")
 
 
 def _bound_unpacking() -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from .array_store import Store, open_hdf5
 from .bag import open_bag, read_bag
 from .column_map import ColumnMap, refuse_other
-from .readers import container_of, layout_of, names, read, reading, table_reader
+from .readers import layout_of, names, opened, read, table_reader
 from .recording import Recording
 from .table import read_header, read_tables
 
@@ -44,18 +44,17 @@ def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None) -
 
 
 def _parts(path: str, columns: ColumnMap | None) -> Iterator[Part]:
-    with reading(path):
-        container = container_of(path)
+    with opened(path) as (container, where, finger, file):
         refuse_other(path, container, columns)
         if container == "csv" and os.path.getsize(path) > TEXT_BYTES:
-            reader = table_reader(path, read_header(path), columns)
-            for table, repeated in read_tables(path, TEXT_BYTES, CONTEXT):
+            reader = table_reader(path, read_header(path, file), columns)
+            for table, repeated in read_tables(path, file, TEXT_BYTES, CONTEXT):
                 yield Part(reader(table), repeated)
         elif container == "hdf5":
             with open_hdf5(path) as store:
                 yield from _of_store(store)
         elif container == "bag":
-            with open_bag(path) as bag:
+            with open_bag(where, file, finger) as bag:
                 layout = layout_of(path, container, bag.topics)
                 for recording, repeated in read_bag(bag, layout, PART_FRAMES, CONTEXT):
                     yield Part(recording, repeated)

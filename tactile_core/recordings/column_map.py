@@ -1,6 +1,6 @@
 """Columns of a CSV file whose names no layout knows: a TOML file that says which column is what.
 
-``guess(path)`` proposes a map from the names in the header; ``write`` and ``read`` keep it in a file; `read_mapped`
+``guess(names)`` proposes a map from the names in the header; ``write`` and ``read`` keep it in a file; `read_mapped`
 makes the recording.
 """
 
@@ -21,7 +21,7 @@ from ..sensors import ELECTRODES
 from ..sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
 from .assemble import assemble, check_electrodes
 from .recording import Recording
-from .table import Table, read_header
+from .table import Table
 
 FORMAT = "tactile-columns-1"
 LAYOUT = "CSV with columns mapped by --columns"
@@ -96,16 +96,15 @@ def write(path: str | os.PathLike, columns: ColumnMap, held: tuple[str, ...]) ->
     atomic.write_bytes(path, "\n".join([*lines, ""]).encode())
 
 
-def guess(path: str) -> tuple[ColumnMap, tuple[str, ...]]:
-    """Guess the map of a CSV file from its header; also returns its columns.
+def guess(names: tuple[str, ...]) -> ColumnMap:
+    """Guess the map of a CSV file from the names in its header, in lower case.
 
-    Electrodes are left out where not 19 columns carry consecutive numbers. Raises TactileError like `read_header`.
+    Electrodes are left out where not 19 columns carry consecutive numbers.
     """
-    names = read_header(path)
     time = next((name for name in names if TIME.search(name)), "")
     unit = UNIT.search(time.replace("_", " "))
     channels = {word: next((name for name in names if word in name), "") for word in CHANNELS}
-    return ColumnMap(_numbered(names), time, unit[1] if unit else "s", **channels), names  # type: ignore[arg-type]
+    return ColumnMap(_numbered(names), time, unit[1] if unit else "s", **channels)  # type: ignore[arg-type]
 
 
 def _numbered(names: tuple[str, ...]) -> tuple[str, ...]:

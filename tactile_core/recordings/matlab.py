@@ -7,12 +7,12 @@ import warnings
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import IO
+from typing import BinaryIO
 
 import numpy as np
 
 from ..errors import TactileError
-from ..files import installed, outside
+from ..files import installed
 from .array_store import Store, damage_reported
 
 START, START_OF_HDF5 = b"MATLAB 5", b"MATLAB 7"
@@ -27,14 +27,16 @@ HEADER, PACKED, STEP = 128, 15, 2**20  # bytes; type of a packed element (MAT-fi
 
 
 @contextmanager
-def open_matlab(path: str) -> Iterator[Store]:
-    """Open for reading. Raises TactileError for MATLAB 7.3, for objects, for damage, and where scipy is missing."""
-    with outside.open_file(path, "a MATLAB file") as file:
-        if file.read(len(START_OF_HDF5)) == START_OF_HDF5:
-            advice = "Save it in MATLAB with save(..., '-v7'), or as CSV"
-            raise TactileError(path, "a MATLAB 7.3 file", "MATLAB 5 to 7", advice)
-        with damage_reported(path, "MATLAB file"):
-            _check_unpacked(path, file)
+def open_matlab(path: str, file: BinaryIO) -> Iterator[Store]:
+    """Read a file opened at its start.
+
+    Raises TactileError for MATLAB 7.3, for objects, for damage, and where scipy is missing.
+    """
+    if file.read(len(START_OF_HDF5)) == START_OF_HDF5:
+        advice = "Save it in MATLAB with save(..., '-v7'), or as CSV"
+        raise TactileError(path, "a MATLAB 7.3 file", "MATLAB 5 to 7", advice)
+    with damage_reported(path, "MATLAB file"):
+        _check_unpacked(path, file)
     try:
         from scipy.io import loadmat, whosmat
     except ModuleNotFoundError as error:
@@ -42,7 +44,7 @@ def open_matlab(path: str) -> Iterator[Store]:
         raise TactileError(path, "a MATLAB file, which scipy reads", "scipy", advice) from error
     with damage_reported(path, "MATLAB file"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of variables that are there twice: the first is read
-        listed = whosmat(path)
+        listed = whosmat(file)
     names = [name for name, _, _ in listed]
     if len(names) > MOST_VARIABLES or len(set(names)) < len(names):
         found = f"{len(names)} variables, {len(names) - len(set(names))} of them twice"
@@ -57,7 +59,7 @@ def open_matlab(path: str) -> Iterator[Store]:
         """Read one array; the others are skipped."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = loadmat(path, variable_names=[name])[name]
+            found = loadmat(file, variable_names=[name])[name]
         if found.shape != shapes[name][0] or found.dtype.kind not in "iufb":
             raise ValueError(f"{found.dtype} of shape {found.shape} where {shapes[name][1]} is declared")
         return found
@@ -65,7 +67,7 @@ def open_matlab(path: str) -> Iterator[Store]:
     yield Store(path, shapes, load)
 
 
-def _check_unpacked(path: str, file: IO[bytes]) -> None:
+def _check_unpacked(path: str, file: BinaryIO) -> None:
     """Raise TactileError for a compressed variable of more than MOST_UNPACKED bytes, which scipy would load."""
     file.seek(0)
     order = {b"IM": "<", b"MI": ">"}[file.read(HEADER)[-2:]]
@@ -77,7 +79,7 @@ def _check_unpacked(path: str, file: IO[bytes]) -> None:
         file.seek(end)
 
 
-def _check_packed(path: str, file: IO[bytes], length: int) -> None:
+def _check_packed(path: str, file: BinaryIO, length: int) -> None:
     unpacker, total = zlib.decompressobj(), 0
     while length > 0 and (data := file.read(min(length, STEP))):
         length -= len(data)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import os
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from types import ModuleType
+from typing import BinaryIO, NamedTuple
 
 from ..errors import TactileError
 from ..files import outside
+from ..files.hdf5_checked import SIGNATURE
 from ..files.registry import modules_of
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
@@ -26,6 +29,18 @@ from .truncated_cell import shown
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
+
+
+class Opened(NamedTuple):
+    """Open file of recordings. container : csv, hdf5, npz, mat or bag; path : the file's; finger : requested, or None
+
+    file : its bytes from the start; none of a bag that is a folder
+    """
+
+    container: str
+    path: str
+    finger: int | None
+    file: BinaryIO
 
 
 @cache
@@ -51,25 +66,22 @@ def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor:
     path = os.fspath(path)
     if sensor != TRANSLATED:
         return _read_sp(path, columns, sensor)
-    with reading(path):
-        container = container_of(path)
+    with opened(path) as (container, where, finger, file):
         refuse_other(path, container, columns)
         if container == "hdf5":
-            with open_hdf5(path) as store:
-                return layout_of(path, container, names(store)).read(store)
+            with open_hdf5(where) as store:
+                return layout_of(where, container, names(store)).read(store)
         if container == "npz":
-            with open_npz(path) as store:
-                return layout_of(path, container, store.shapes).read(store)
+            with open_npz(where, file) as store:
+                return layout_of(where, container, store.shapes).read(store)
         if container == "bag":
-            with open_bag(path) as bag:
-                return next(read_bag(bag, layout_of(path, container, bag.topics)))[0]
+            with open_bag(where, file, finger) as bag:
+                return next(read_bag(bag, layout_of(where, container, bag.topics)))[0]
         if container == "mat":
-            file, finger = split(path)
-            with open_matlab(file) as store:
-                return _read_finger(layout_of(file, container, store.shapes), store, store.shapes, finger)
-        file, finger = split(path)
-        reader = table_reader(file, read_header(file), columns)
-        found = reader(read_table(file))
+            with open_matlab(where, file) as store:
+                return _read_finger(layout_of(where, container, store.shapes), store, store.shapes, finger)
+        reader = table_reader(where, read_header(where, file), columns)
+        found = reader(read_table(where, file))
         if finger is not None:
             raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
         return found
@@ -81,11 +93,10 @@ def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) ->
     Raises TactileError for what is no recording.
     """
     path = os.fspath(path)
-    with reading(path):
-        if columns is not None or container_of(path) != "csv":
+    with opened(path) as (container, where, _, file):
+        if columns is not None or container != "csv":
             return TRANSLATED
-        file = split(path)[0]
-        return _sensor(layout_of(file, "csv", read_header(file)))
+        return _sensor(layout_of(where, "csv", read_header(where, file)))
 
 
 def _sensor(layout: ModuleType) -> str:
@@ -99,10 +110,9 @@ def _read_sp(path: str, columns: ColumnMap | None, sensor: str) -> Recording:
     if sensor_of(path, columns) != sensor:
         found = read(path, columns)
         check_electrodes(path, found.electrodes.shape[1], "a BioTac's recording", sensor)
-    with reading(path):
-        file, finger = split(path)
-        table = read_table(file)
-        return _read_finger(layout_of(file, "csv", table.header), table, table.header, finger)
+    with opened(path) as (_, where, finger, file):
+        table = read_table(where, file)
+        return _read_finger(layout_of(where, "csv", table.header), table, table.header, finger)
 
 
 def _read_finger(layout: ModuleType, store: Store | Table, held: Collection[str], finger: int | None) -> Recording:
@@ -128,19 +138,31 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
     path = os.fspath(path)
     if split(path)[1] is not None:
         return [path]
-    with reading(path):
-        container = container_of(path)
+    with opened(path) as (container, _, _, file):
         known: tuple[int, ...] = ()
         if container == "csv":
-            known = _fingers_of_table(read_header(path))
+            known = _fingers_of_table(read_header(path, file))
         if container == "mat":
-            with open_matlab(path) as store:
+            with open_matlab(path, file) as store:
                 known = layout_of(path, container, store.shapes).fingers(store.shapes)
         elif container == "bag":
-            with open_bag(path) as bag:
+            with open_bag(path, file) as bag:
                 known = fingers_of(bag, layout_of(path, container, bag.topics))
     alone = len(known) < 2 and (container != "mat" or known == (0,))
     return [path] if alone else [f"{path}#{finger}" for finger in known]
+
+
+def list_fingers(paths: Iterable[str | os.PathLike[str]]) -> list[str]:
+    """List the recordings of each file as `each_finger` does; what is no recording stands for itself, and is refused
+    when it is read.
+    """
+    found = []
+    for path in paths:
+        try:
+            found += each_finger(path)
+        except TactileError:
+            found.append(os.fspath(path))
+    return found
 
 
 def _fingers_of_table(header: tuple[str, ...]) -> tuple[int, ...]:
@@ -155,7 +177,7 @@ def names(store: Store) -> set[str]:
 
 
 @contextmanager
-def reading(path: str) -> Iterator[None]:
+def _reading(path: str) -> Iterator[None]:
     """Turn errors of the operating system into a TactileError."""
     try:
         yield
@@ -167,11 +189,33 @@ def reading(path: str) -> Iterator[None]:
         raise TactileError(path, "too large for this machine's memory", advice="Split the recording") from error
 
 
+@contextmanager
+def opened(path: str) -> Iterator[Opened]:
+    """Open a file of recordings once, and detect what it is from its first bytes.
+
+    Raises TactileError for what is no file, and for errors of the operating system while it is open.
+    """
+    with _reading(path):
+        file, finger = split(path)
+        if is_bag_folder(file):
+            yield Opened("bag", file, finger, io.BytesIO())
+            return
+        _check_file(file)
+        with outside.open_file(file, "a recording") as stream:
+            container = _container(stream.read(START_BYTES))
+            if finger is not None and container in ("hdf5", "npz"):
+                raise TactileError(file, f"finger {finger} of a file of one", "one recording", "Leave out the #")
+            stream.seek(0)
+            yield Opened(container, file, finger, stream)
+
+
 def container_of(path: str) -> str:
     """Detect the container: csv, hdf5, npz, mat or bag. Raises TactileError for what is no file."""
-    path, finger = split(path)
-    if is_bag_folder(path):
-        return "bag"
+    with opened(path) as found:
+        return found.container
+
+
+def _check_file(path: str) -> None:
     if os.path.isdir(path):
         scene = os.path.isfile(os.path.join(path, "scene.toml"))
         advice = "Simulate it first: tactile simulate" if scene else "Name the recording inside the folder"
@@ -180,16 +224,17 @@ def container_of(path: str) -> str:
         raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT or bag)", "Check the path")
     if not os.path.isfile(path):
         raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT or bag)")
-    with outside.open_file(path, "a recording") as file:
-        start = file.read(START_BYTES)
+
+
+def _container(start: bytes) -> str:
+    """Return the container that begins with these bytes; anything but a known signature is a table of text."""
     if kind_of(start) is not None:
         return "bag"
     if start.startswith((START, START_OF_HDF5)):
         return "mat"
-    arrays = start.startswith(b"\x89HDF\r\n\x1a\n"), start.startswith(ZIP_STARTS)
-    if finger is not None and any(arrays):
-        raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
-    return "hdf5" if arrays[0] else "npz" if arrays[1] else "csv"
+    if start.startswith(SIGNATURE):
+        return "hdf5"
+    return "npz" if start.startswith(ZIP_STARTS) else "csv"
 
 
 def table_reader(path: str, header: Collection[str], columns: ColumnMap | None) -> Callable[[Table], Recording]:

@@ -11,7 +11,6 @@ from typing import BinaryIO
 import numpy as np
 
 from ..errors import TactileError
-from ..files import outside
 from .assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from .truncated_cell import doubt_last_cell, shown
 
@@ -91,22 +90,22 @@ def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | N
     return _parsed(path, header.names, header.separator, lines[skipped:], before + skipped, last=False)
 
 
-def read_header(path: str) -> tuple[str, ...]:
+def read_header(path: str, file: BinaryIO) -> tuple[str, ...]:
     """Read the lower-case column names of the first line that is not empty, in the file's first megabyte."""
-    with outside.open_file(path, "a recording") as file:
-        lines = _text(path, _whole_lines(path, file, file.read(MAX_LINE)))
+    file.seek(0)
+    lines = _text(path, _whole_lines(path, file, file.read(MAX_LINE)))
     if not any(line.strip() for line in lines):
         raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
     return _header(path, lines)[0]
 
 
-def read_table(path: str) -> Table:
+def read_table(path: str, file: BinaryIO) -> Table:
     """Parse the file, a block at a time. Raises TactileError: not text, empty, no header, no data, twin columns."""
-    size = os.stat(path).st_size
+    size = os.fstat(file.fileno()).st_size
     if size > MAX_BYTES:
         found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split the recording"
         raise TactileError(path, found, "a recording of some hours", advice)
-    blocks = read_tables(path, BLOCK, OVERLAP)
+    blocks = read_tables(path, file, BLOCK, OVERLAP)
     first, _ = next(blocks)
     return first if size <= BLOCK else _joined(first, blocks, size)
 
@@ -161,26 +160,26 @@ def _check_problems(path: str, problems: list[Problem], line: int) -> None:
         )
 
 
-def read_tables(path: str, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
+def read_tables(path: str, file: BinaryIO, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
     """Read the file in parts of about `part_bytes` of text; each begins with the last `context` rows of the one before.
 
     Yields each part and how many of its rows were in the one before. Raises TactileError like `read_table`.
     """
-    with outside.open_file(path, "a recording") as file:
+    file.seek(0)
+    data = _whole_lines(path, file, file.read(part_bytes))
+    lines = _text(path, data)
+    header, first, separator = _header(path, lines)
+    lines, repeated = lines[first:], 0
+    while True:
         data = _whole_lines(path, file, file.read(part_bytes))
-        lines = _text(path, data)
-        header, first, separator = _header(path, lines)
-        lines, repeated = lines[first:], 0
-        while True:
-            data = _whole_lines(path, file, file.read(part_bytes))
-            last = not data
-            table = _parsed(path, header, separator, lines, first, last)
-            yield table, repeated
-            if last:
-                return
-            repeated = min(context, len(table.lines))
-            kept = int(table.lines[-repeated]) - first - 1
-            lines, first = lines[kept:-1] + _text(path, data), first + kept
+        last = not data
+        table = _parsed(path, header, separator, lines, first, last)
+        yield table, repeated
+        if last:
+            return
+        repeated = min(context, len(table.lines))
+        kept = int(table.lines[-repeated]) - first - 1
+        lines, first = lines[kept:-1] + _text(path, data), first + kept
 
 
 def _whole_lines(path: str, file: BinaryIO, data: bytes) -> bytes:

@@ -124,7 +124,7 @@ def write_container(layout: str, folder: Path, press: SimpleNamespace) -> Path:
         path.write_text("\n".join(slide_rows(press)) + "\n")
     elif layout == "csv_31":
         path.write_text("\n".join(rows_31(press)) + "\n")
-    elif layout == "npz":
+    elif layout == "npz_electrodes":
         with open(path, "wb") as file:
             np.savez(file, electrodes=press.electrodes, time=press.time, pdc=press.pdc, pac=np.zeros((count, 22)))
     elif layout == "hdf5_electrode_vals":

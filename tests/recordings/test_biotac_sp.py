@@ -91,11 +91,11 @@ def test_nineteen_of_its_columns_are_no_biotac(stem, counts, write):
 
 
 def test_a_biotac_is_no_biotac_sp(press, in_layout):
-    for layout in ("csv_slide", "npz"):
+    for layout in ("csv_slide", "npz_electrodes"):
         with pytest.raises(TactileError, match="19 electrodes; expected the 24 electrodes of a BioTac SP"):
             read_sp(in_layout(layout, press))
     with pytest.raises(TactileError, match="read, sensor: 'digit'; expected biotac or biotac_sp"):
-        recordings.read(in_layout("npz", press), sensor="digit")
+        recordings.read(in_layout("npz_electrodes", press), sensor="digit")
 
 
 def test_rest_is_found_in_recordings_that_begin_in_contact(counts, write, tmp_path, capsys):
@@ -128,7 +128,7 @@ def test_a_rest_serves_its_own_sensor_alone(counts, write, tmp_path, press, in_l
     path, out = written(write, GRASP, [["ball", 1, *row, *row, *row] for row in counts]), str(tmp_path / "rest.toml")
     assert main(["adapt", path, "--out", out]) == 0
     assert list(electrode_gains.read(out).sections()) == ["finger0", "finger1", "finger4"]
-    touch = in_layout("npz", press)
+    touch = in_layout("npz_electrodes", press)
     assert main(["convert", touch, "--out", str(tmp_path / "o"), "--sensor", out]) == 2
     assert "24 electrodes, 'biotac_sp'; expected one of 19" in capsys.readouterr().err
     assert main(["adapt", path, touch, "--out", str(tmp_path / "both.toml")]) == 2

@@ -84,13 +84,14 @@ def test_names_from_a_stranger_stay_in_their_comment(own, tmp_path):
     text = own.read_text(encoding="utf-8").replace("PDC raw", "x\x1b\u2028=1]")
     own.write_text(text, encoding="utf-8")
     map_file = tmp_path / "map.toml"
-    columns, held = column_map.guess(str(own))
+    held = tuple(text.splitlines()[0].lower().split(";"))
+    columns = column_map.guess(held)
     column_map.write(map_file, columns, held)
     assert column_map.read(map_file) == columns
 
 
 def test_a_map_is_for_csv_alone(own, tmp_path):
-    columns, _ = column_map.guess(str(own))
+    columns = column_map.guess(tuple(own.read_text(encoding="utf-8").splitlines()[0].lower().split(";")))
     np.savez(tmp_path / "arrays.npz", electrodes=np.full((50, 19), 3300.0))
     with pytest.raises(TactileError, match="a CSV recording"):
         recordings.read(tmp_path / "arrays.npz", columns)

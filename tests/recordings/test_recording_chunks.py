@@ -34,7 +34,7 @@ def test_parts_join_to_the_whole(layout, make, in_layout, monkeypatch):
 
 
 def test_short_recordings_and_npz_are_one_part(make, in_layout):
-    for layout in ("csv_slide", "npz", "hdf5_simulated"):
+    for layout in ("csv_slide", "npz_electrodes", "hdf5_simulated"):
         (part,) = chunks.read_parts(in_layout(layout, make(frames=60)))
         assert part.repeated == 0 and len(part.recording) == 60
 

@@ -83,7 +83,7 @@ def test_mutated_cells(cells, slide_lines, tmp_path):
     survives(tmp_path / "thing.csv", "\n".join(",".join(row) for row in table).encode())
 
 
-@pytest.mark.parametrize("layout", ["npz", "hdf5_electrode_vals", "hdf5_simulated"])
+@pytest.mark.parametrize("layout", ["npz_electrodes", "hdf5_electrode_vals", "hdf5_simulated"])
 @settings(FEW, max_examples=60)
 @given(
     flips=st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=8),

@@ -11,7 +11,7 @@ from tactile_core.recordings.formats import csv_31
 LAYOUTS = [
     ("csv_slide", True, {"pdc", "tac", "tdc", "pac"}),
     ("csv_31", True, {"pdc", "tac", "tdc", "pac", "position", "force"}),
-    ("npz", True, {"pdc", "pac"}),
+    ("npz_electrodes", True, {"pdc", "pac"}),
     ("hdf5_electrode_vals", False, {"position", "force"}),
     ("hdf5_simulated", True, {"pdc", "tac", "tdc"}),
     ("mat_phac", False, {"pdc"}),

@@ -92,15 +92,16 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs import convert, frame_range, results
     from ...pictures import presets
     from ...recordings import PrepareOptions, electrode_gains
+    from ...recordings.readers import list_fingers
     from ...translation.answer import parse_answer
 
     prepare = PrepareOptions(**prepare_words(options))
     keep, frames = results.parse_keep(options.keep), frame_range.parse_frames(options.frames)
     answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
+    paths, failed = list_fingers(options.recordings), 0
     budget = None if options.error is None else accuracy.parse_budget(options.error)
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
-    paths, failed = _fingers(options.recordings), 0
     levels = None if budget is None else budget.levels
     preset = presets.FAST if levels is None else presets.fitting(levels)
     made = not os.path.lexists(options.out)
@@ -133,18 +134,3 @@ def run(options: argparse.Namespace) -> int:
     if failed and len(folders) > 1:
         complain(f"{failed} of {len(folders)} recordings were not converted")
     return 2 if failed else 0
-
-
-def _fingers(recordings: list[str]) -> list[str]:
-    """List each recording, or each finger of those that hold a hand; a file that is no recording is reported
-    when its turn comes.
-    """
-    from ...recordings.readers import each_finger
-
-    found = []
-    for path in recordings:
-        try:
-            found += each_finger(path)
-        except TactileError:
-            found.append(path)
-    return found

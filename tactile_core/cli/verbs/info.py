@@ -86,13 +86,13 @@ def _unit(path: str) -> SensorFile:
 def _write_columns(options: argparse.Namespace) -> None:
     """Write the map that the first recording's column names suggest."""
     from ...recordings import column_map
-    from ...recordings.readers import container_of, reading
+    from ...recordings.readers import opened
+    from ...recordings.table import read_header
 
     path = options.recordings[0]
-    with reading(path):
-        container = container_of(path)
+    with opened(path) as (container, where, _, file):
         if container != "csv":
             raise TactileError("--columns", f"given for {path} ({container})", "a CSV recording", "Leave it out")
-        columns, held = column_map.guess(path)
-    column_map.write(options.columns, columns, held)
+        held = read_header(where, file)
+    column_map.write(options.columns, column_map.guess(held), held)
     say(f"{options.columns}: written, guessed from the names of the columns; check it")

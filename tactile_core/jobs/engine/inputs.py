@@ -18,7 +18,7 @@ from ...files import provenance
 from ...files.text_file import read_small
 from ...recordings.bag import MARK
 from ...recordings.fingers import name_of, split
-from ...recordings.readers import each_finger
+from ...recordings.readers import list_fingers
 from ...sensors.calibration_file import load_calibration
 
 log = logging.getLogger(__name__)
@@ -137,19 +137,11 @@ def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[
     found: list[Input] = []
     for done, path in enumerate(paths, 1):
         digest, size = content_hash(path)
-        for finger in _fingers(path):
+        for finger in list_fingers([path]):
             name = f"{len(found):05d}_{re.sub(r'[^A-Za-z0-9._-]', '_', name_of(finger))[:80]}"
             found.append(Input(name, finger, digest, size))
         progress(done, len(paths))
     return found
-
-
-def _fingers(path: Path) -> list[str]:
-    """List each finger of a file of several; a file that is no readable recording is reported when its turn comes."""
-    try:
-        return each_finger(path)
-    except TactileError:
-        return [str(path)]
 
 
 def unit_hash(calibration: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import io
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -72,7 +73,7 @@ def a_press(frames: int) -> SimpleNamespace:
 
 def messages_of(press, folder, kind, layout, finger):
     write_bag(folder / "touch", press, "mcap", kind, finger=finger)
-    with bag.open_bag(str(folder / "touch")) as opened:
+    with bag.open_bag(str(folder / "touch"), io.BytesIO()) as opened:
         return [message for _, message in bag._messages(opened, layout, opened.topics[layout.MESSAGE])]
 
 
