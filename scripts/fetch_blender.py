@@ -47,8 +47,9 @@ done
 mkdir -p {tree}/proc
 mount -t proc proc {tree}/proc
 if [ "$1" = --inside ]; then shift; else set -- blender "$@"; fi
+if [ ! -d {tree}"$PWD" ]; then cd /; fi
 # Not by exec: an X server signals its parent that it is ready, unless that is process 1.
-chroot {tree} /usr/bin/env LIBGL_ALWAYS_SOFTWARE=1 "$@"
+chroot {tree} /usr/bin/env --chdir="$PWD" LIBGL_ALWAYS_SOFTWARE=1 "$@"
 """
 
 

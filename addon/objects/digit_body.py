@@ -12,7 +12,7 @@ from ...tactile_core.sensors import digit
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from ...tactile_core.sensors.camera import HEIGHT_ZERO_Y, Camera, Led
 from ..ui import properties
-from . import digit_materials, held_light, image_frame, surfaces
+from . import digit_materials, held_light, image_frame, led_receivers, surfaces
 
 CAMERA = "DIGIT camera"
 _CHIP = np.array([1.6e-3, 0.8e-3, 0.6e-3])  # m, sides of an LED package (0603)
@@ -54,6 +54,7 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
         place_camera(lens, gel, unit.camera)
     if held_light.NODE not in coating_of(gel).node_tree.nodes:
         _hold_light(gel, unit)
+    led_receivers.link(gel, leds_of(gel))
 
 
 def reset(gel: bpy.types.Object, unit: Calibration) -> None:
@@ -63,6 +64,7 @@ def reset(gel: bpy.types.Object, unit: Calibration) -> None:
         thing = leds_of(gel).get(led.colour) or _add_led(gel, led)
         thing.animation_data_clear(), thing.data.animation_data_clear()
         _place_led(thing, gel, led, unit)
+    led_receivers.link(gel, leds_of(gel))
     lens = camera_of(gel)
     lens.animation_data_clear(), lens.data.animation_data_clear()
     place_camera(lens, gel, unit.camera)
@@ -110,7 +112,7 @@ def place_camera(lens: bpy.types.Object, gel: bpy.types.Object, camera: Camera) 
 def _child(gel: bpy.types.Object, name: str, data: bpy.types.ID, role: str) -> bpy.types.Object:
     thing = bpy.data.objects.new(name, data)
     properties.set_up(thing, role, gel.tactile.per_metre)
-    gel.users_collection[0].objects.link(thing)
+    properties.home_of(gel).objects.link(thing)
     thing.parent = gel
     return thing
 
@@ -126,7 +128,7 @@ def _add_led(gel: bpy.types.Object, led: Led) -> bpy.types.Object:
     faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     chip = surfaces.new_mesh_object(f"{name} package", corners, faces, smooth=False)
     properties.set_up(chip, "BODY", gel.tactile.per_metre)
-    gel.users_collection[0].objects.link(chip)
+    properties.home_of(gel).objects.link(chip)
     chip.parent, chip.hide_select = thing, True
     chip.visible_shadow = False  # it stands inside its lamp
     chip.data.materials.append(digit_materials.glow())
@@ -181,7 +183,7 @@ def _add_solid(gel, name: str, mesh: tuple[np.ndarray, np.ndarray], material: bp
     nodes, faces = mesh
     thing = surfaces.new_mesh_object(name, axes.to_blender(nodes, gel.tactile.per_metre), faces, smooth=False)
     properties.set_up(thing, "BODY", gel.tactile.per_metre)
-    gel.users_collection[0].objects.link(thing)
+    properties.home_of(gel).objects.link(thing)
     thing.parent, thing.hide_select = gel, True
     thing.data.materials.append(material)
     thing.color = material.diffuse_color

@@ -45,7 +45,7 @@ def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str,
     nodes = _corner(thing, unit) + unit * ((flat[:, :1] - middle) * along + flat[:, 1:] * up)
     legend = surfaces.new_mesh_object(f"{thing.name} legend", nodes, faces, smooth=False)
     properties.set_up(legend, "LEGEND", thing.tactile.per_metre)
-    thing.users_collection[0].objects.link(legend)
+    properties.home_of(thing).objects.link(legend)
     legend.parent, legend.hide_select = thing, True
     legend["text"] = [title, *(ends or ())]
     styles.make_colour_active(legend.data)

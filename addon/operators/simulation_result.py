@@ -84,7 +84,7 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
     twin = context.scene.objects.get(name)
     if twin is None:
         twin = bpy.data.objects.new(name, thing.data)
-        thing.users_collection[0].objects.link(twin)
+        properties.home_of(thing).objects.link(twin)
     twin.tactile.role = "TWIN"
     twin.parent, twin.rotation_mode, thing.hide_render = sensor, "QUATERNION", True
     # A few thin lines and a body that is seen through: twin and dent stay in view.

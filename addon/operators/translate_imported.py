@@ -36,7 +36,7 @@ class TACTILE_OT_translate(TactileOperator):
             path = bpy.path.abspath(about.recording)
             found = recording_data.load(path, about.tare, about.frames, progress, about.polarity)
         frames = about.first_frame + found.chosen.astype(float)
-        group = skin.users_collection[0]
+        group = properties.home_of(skin)
         # A gel that is there keeps its LEDs, coating and camera as the user has set them.
         there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")
         gel = next(there, None) or digit_objects.add_gel(group, about.per_metre, skin)

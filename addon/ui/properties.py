@@ -101,6 +101,12 @@ def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = N
     return next((thing for thing in scene.objects if thing.tactile.role == role), None)
 
 
+def home_of(thing: bpy.types.Object) -> bpy.types.Collection:
+    """Return the collection that shows an object in a scene; those of light linking show none."""
+    shown = {group for scene in bpy.data.scenes for group in (scene.collection, *scene.collection.children_recursive)}
+    return next((group for group in thing.users_collection if group in shown), thing.users_collection[0])
+
+
 def check_format(thing: bpy.types.Object) -> None:
     """Raise TactileError for an object that a newer version of the add-on made."""
     if thing.tactile.format > FORMAT:

@@ -10,6 +10,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from . import properties
+
 # Of a new file of Blender's (File > New > General): name, type and place.
 _UNTOUCHED = (
     ("Cube", "MESH", (0.0, 0.0, 0.0)),
@@ -38,7 +40,7 @@ def _add_sun(light: bpy.types.Object) -> None:
     sun = bpy.data.objects.new("Tactile sun", bpy.data.lights.new("Tactile sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 3.0, (0.6, 0.35, 0.0)  # W/m2; from above, the base and one side
     sun.tactile.role = "LEGEND"
-    light.users_collection[0].objects.link(sun)
+    properties.home_of(light).objects.link(sun)
 
 
 def is_new(scene: bpy.types.Scene) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 
 import bpy
 import numpy as np
@@ -89,6 +90,30 @@ def test_cycles_sees_the_picture_through_the_camera(drawn, by_cycles, off):
     small = drawn().reshape(40, 8, 30, 8, 3).mean((1, 3))
     # Of 64 paths' noise about 5; without the light held in gel and acrylic it is 80.
     assert np.sqrt(np.square(by_cycles() - small).mean()) < 9
+
+
+def test_leds_light_the_gel_and_not_a_wall_beside_it(gel, by_cycles):
+    bpy.ops.mesh.primitive_plane_add(size=60, location=(0, 25, 30), rotation=(math.pi / 2, 0, 0))
+    eye = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))
+    bpy.context.scene.collection.objects.link(eye)
+    eye.location, eye.rotation_euler = (0, -60, 15), (math.pi / 2, 0, 0)
+    eye.data.type, eye.data.ortho_scale = "ORTHO", 10
+    bpy.context.scene.camera = eye
+    linked = by_cycles().mean()
+    for colour in ("red", "green", "blue"):
+        lamp(colour).light_linking.receiver_collection = None
+    unlinked = by_cycles().mean()
+    assert linked < 0.02 * unlinked and unlinked > 1  # level; what is left is thrown on by the gel's rim
+
+
+def test_parts_made_later_stand_in_the_scenes_collection(gel):
+    bpy.data.objects.remove(lamp("red"))
+    bpy.ops.tactile.reset_to_calibration()
+    bpy.ops.tactile.set_style(style="DISPLACEMENT")
+    lit = lamp("red").light_linking.receiver_collection
+    assert gel.name in lit.objects and lit == lamp("blue").light_linking.receiver_collection
+    shown = set(bpy.context.scene.objects)
+    assert {lamp("red"), *gel.children_recursive} <= shown and lamp("red").name not in lit.objects
 
 
 def test_a_file_without_held_light_is_given_it(gel, part):
