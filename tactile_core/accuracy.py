@@ -53,8 +53,7 @@ def height(displacement: np.ndarray) -> np.ndarray:
 
 
 def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
-    """Return the RMS error (C,) m of the depth over the core, the nodes above 30 % of the true peak;
-    NaN without contact.
+    """Return the RMS error (C,) m of the depth over the core, nodes above 30 % of the true peak; NaN without contact.
 
     depth : function that gives the depth: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved
     """
@@ -73,8 +72,7 @@ def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = hei
 
 
 def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return the centre (C, 2) = (x, z) m of the dent, depth-weighted mean position of its core;
-    NaN where no node moves 10 um.
+    """Return the centre (C, 2) = (x, z) m of the dent, its core's depth-weighted mean; NaN where none moves 10 um.
 
     displacement : (C, n, 3) m
     rest : (n, 3) m
@@ -83,9 +81,7 @@ def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) -> np.ndarray:
-    """Return the depth-weighted mean (C, 2) of the places (n, 2) of a dent's core; NaN if no depth (C,
-    n) m is above least.
-    """
+    """Return the mean (C, 2) of the places (n, 2) of a dent's core, by depth (C, n) m; NaN if none exceeds least."""
     peak = depth.max(-1, keepdims=True)
     weight = np.where((depth > CORE * peak) & (peak > least), depth, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -85,9 +85,7 @@ def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Return the triangles (m, 3, 3) in Blender units, all modifiers applied, in the sensor's axes,
-    from the object's origin.
-    """
+    """Return triangles (m, 3, 3), Blender units, modifiers applied, in the sensor's axes, from the object's origin."""
     mesh = thing.evaluated_get(depsgraph).data
     mesh.calc_loop_triangles()
     nodes, corners = np.empty(len(mesh.vertices) * 3, np.float32), np.empty(len(mesh.loop_triangles) * 3, np.int32)
@@ -107,9 +105,7 @@ def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.D
 
 
 def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Return the vector from the object's origin to its point of first touch, (3,) Blender units:
-    zero for a spec's body.
-    """
+    """Return the vector (3,), Blender units, from the object's origin to its first touch; zero for a spec's body."""
     if thing.tactile.spec:
         return np.zeros(3)
     nodes = triangles_of(thing, relative, depsgraph).reshape(-1, 3)

@@ -30,8 +30,7 @@ def write_absolute(thing: bpy.types.Object, rest: np.ndarray, displacement: np.n
 
 
 def write_compact(thing: bpy.types.Object, displacement: np.ndarray, frames: np.ndarray, tolerance: float) -> float:
-    """Write few keys whose weighted sum is the displacement (proper orthogonal decomposition);
-    return the largest error.
+    """Write few keys whose weighted sum is the displacement (proper orthogonal decomposition); return the error.
 
     displacement : (T, n, 3) in the object's own units; tolerance : the error aimed at, in the same
     """
@@ -49,8 +48,7 @@ def write_compact(thing: bpy.types.Object, displacement: np.ndarray, frames: np.
 
 
 def decompose(rows: np.ndarray, tolerance: float, most: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """Decompose rows (T, m) into weights (T, k), each within -1..1, times shapes (k, m);
-    also return a vertex's largest error.
+    """Decompose rows (T, m) into weights (T, k) in -1..1 times shapes (k, m); also return a vertex's largest error.
 
     Enough shapes to bring that error below ``tolerance``, at most ``most``.
     """

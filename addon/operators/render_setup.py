@@ -74,9 +74,7 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
 
 
 def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the LEDs and coating of the DIGIT as they stand, and what puts them back or keeps them;
-    nothing without a DIGIT.
-    """
+    """Draw the DIGIT's LEDs and coating, and what puts them back or keeps them; nothing without a DIGIT."""
     gel = properties.of_role(context.scene, "DIGIT", context.object)
     if gel is None:
         return

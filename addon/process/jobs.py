@@ -21,8 +21,9 @@ _PATIENCE = 5.0  # s that a cancelled job has to end by itself
 
 
 class Job:
-    """A worker and its folder. ``done`` of ``total`` is its reported progress, in the ``stage`` of that name;
-    ``finished`` : whether it ended well.
+    """Worker and its folder.
+
+    ``done`` of ``total`` is its reported progress, in the ``stage`` of that name; ``finished`` : whether it ended well
     """
 
     def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:

@@ -47,8 +47,7 @@ def say(**message: Any) -> None:
 
 
 def simulate(folder: Path, job: dict, progress: Progress) -> None:
-    """Simulate FOLDER/scene.toml into recording.h5, and result.npz: its truth,
-    and where the indenter stands on each frame.
+    """Simulate FOLDER/scene.toml into recording.h5 and result.npz: its truth, and the indenter's place on each frame.
 
     job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None.
     With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
@@ -186,8 +185,9 @@ def _result(folder: Path, picked: list[str]) -> None:
 
 
 def render(folder: Path, job: dict, progress: Progress) -> None:
-    """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8, by the unit and
-    surroundings in the folder, which are read where the line names others than the one before.
+    """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8.
+
+    Unit and surroundings are those in the folder, read when the line names others than the one before.
     """
     renderer, known = None, None
     for line in sys.stdin:
@@ -227,9 +227,7 @@ def variant(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def read(folder: Path, job: dict, progress: Progress) -> None:
-    """Read the recording at job["path"] into arrays.npz and about.json,
-    of which ``recording_reader`` makes it again.
-    """
+    """Read the recording at job["path"] into arrays.npz and about.json, for ``recording_reader``."""
     from tactile_core import recordings
 
     found = recordings.read(job["path"])

@@ -20,9 +20,7 @@ def say(text: str) -> None:
 
 
 def printable(text: str) -> str:
-    """Return the text with control characters as escapes: in a file's name they could move the cursor or change the
-    title.
-    """
+    """Return the text with control characters as escapes, which in a file's name could move the cursor."""
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
 
 
@@ -59,9 +57,7 @@ def agree(cost: str, seconds: float, agreed: bool) -> None:
 
 @contextmanager
 def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], None]]:
-    """Return a callback (done, in all) that draws a bar: on a terminal, for work of over two seconds;
-    or when forced.
-    """
+    """Return a callback (done, in all) that draws a bar: on a terminal, for over two seconds of work, or if forced."""
     if not forced and not sys.stderr.isatty():
         yield lambda done, total: None
         return

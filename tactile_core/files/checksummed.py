@@ -25,9 +25,7 @@ def write_checksum(path: Path) -> str:
 
 
 def verified_checksum(path: Path) -> str | None:
-    """Return the hash of a file that matches its checksum; None for one that is missing, cut, changed or without
-    checksum.
-    """
+    """Return the hash of a file that matches its checksum; None for one that is missing, cut or changed."""
     try:
         digest = stated_checksum(path)
         return digest if digest is not None and _digest(path) == digest else None

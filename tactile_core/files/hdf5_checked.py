@@ -50,8 +50,7 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
 
 
 def check_before_opening(path: str | os.PathLike) -> None:
-    """Raise TactileError for a file on which the HDF5 library would use up all memory, and OSError. Fuzzing found two
-    kinds.
+    """Raise TactileError for a file on which the HDF5 library would use up all memory, and OSError. Fuzzing found two.
 
     The first begins with a driver's information, for which the library takes up to 4 GB whatever the file holds; only
     files in several parts have it. The second has an endless free list, see ``hdf5_free_lists``.
@@ -131,9 +130,7 @@ def _check(path: str | os.PathLike, name: str | bytes, data: h5py.Dataset) -> No
 
 
 def _check_chunk(path, name, data, chunk, size: int, filters: list[int]) -> None:  # noqa: ANN001
-    """Raise TactileError for a packed chunk that unpacks to more than its size; those small enough to be
-    harmless pass.
-    """
+    """Raise TactileError for a packed chunk that unpacks to more than its size, unless it is small enough."""
     if MAX_RATIO * chunk.size <= MAX_CHUNK:
         return
     if chunk.size > size + size // 8 + STEP:  # packing makes hardly more of what it cannot pack

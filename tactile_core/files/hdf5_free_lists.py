@@ -34,8 +34,7 @@ def check_free_lists(path: str | os.PathLike, start: int, width: int, length: in
 
 
 def _free_places(data: mmap.mmap, place: int, start: int, width: int, length: int) -> int:
-    """Count the free places that a heap lists, up to MOST_OF_HEAP; an entry that the library itself refuses ends the
-    list.
+    """Count the free places that a heap lists, up to MOST_OF_HEAP; an entry that the library refuses ends the list.
 
     The header: signature, version, three bytes, size of the heap's data, first free place in them, their address. A
     free place: the next one, its own size.
@@ -58,7 +57,5 @@ def _free_places(data: mmap.mmap, place: int, start: int, width: int, length: in
 
 
 def _named(data: mmap.mmap, address: int, width: int) -> bool:
-    """Return whether the file contains this address, as a group does its heap's; else the heap is of a file within the
-    values.
-    """
+    """Return true if the file contains this address, as a group names its heap's; other heaps are part of values."""
     return address < 256**width and data.find(address.to_bytes(width, "little")) >= 0

@@ -48,9 +48,7 @@ def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -
 
 
 def inside(folder: str | os.PathLike, name: str, expected: str = "a regular file") -> Path:
-    """Return the path of a file in a third-party folder; it need not exist. Raises TactileError for a link out of the
-    folder.
-    """
+    """Return the path of a file in a third-party folder, there or not. Raises TactileError for a link out of it."""
     path = Path(folder) / name
     try:
         within = path.resolve().is_relative_to(Path(folder).resolve())

@@ -22,9 +22,7 @@ def sha256(path: str | os.PathLike) -> str:
 
 
 def versions(*more: str) -> dict[str, str]:
-    """Return versions that can change the bytes of a result, besides its input and the weights; more : further
-    libraries.
-    """
+    """Return versions that can change a result's bytes, besides its input and the weights; more : further libraries."""
     import importlib
     import platform
 

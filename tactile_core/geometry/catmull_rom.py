@@ -11,8 +11,7 @@ _STEPS = np.arange(-1, 3)[:, None]
 
 
 def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray:
-    """Return the points (n, 3) m of the surface through nodes ``axes`` (3, rows, columns) m at (row,
-    column) places (2, n).
+    """Return points (n, 3) m of the surface through nodes ``axes`` (3, rows, columns) m at (row, column) places (2, n).
 
     axes : contiguous; sums over many places at a time are faster axis by axis
     closed : whether the last column joins the first; places beyond other ends lie on them
@@ -24,9 +23,7 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
 
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes (4, 4, n), as row * columns + column, whose weighted sum gives each place (2, n),
-    and their weights.
-    """
+    """Return the nodes (4, 4, n), as row * columns + column, and weights that give each place (2, n)."""
     rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)

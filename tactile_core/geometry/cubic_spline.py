@@ -29,17 +29,13 @@ class EvenSpline:
         return EvenSpline(self.start, self.step / factor, (self.count - 1) * factor + 1)
 
     def cells(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first of the four coefficients that matter at each position,
-        and the place 0..1 in its interval.
-        """
+        """Return the first of the four coefficients that matter at each position, and the place 0..1 between nodes."""
         place = np.clip((position - self.start) / self.step, 0, self.count - 1)
         cell = np.minimum(place.astype(np.intp), self.count - 2)
         return cell, place - cell
 
     def matrix(self, position: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Return the matrix (n, count) that takes values at nodes to the spline, or its first derivative,
-        at positions (n,).
-        """
+        """Return the matrix (n, count) from values at nodes to the spline, or its derivative, at positions (n,)."""
         cell, place = self.cells(position)
         basis = np.zeros((len(cell), self.count + 2))
         weights = bspline_slopes(place) / self.step if derivative else bspline_weights(place)

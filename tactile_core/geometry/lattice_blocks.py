@@ -29,9 +29,7 @@ class LatticeBlocks:
         ])  # fmt: skip
 
     def near(self, indenter: Indenter, pose: Pose, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Find the nodes (k,), sorted, inside an indenter or less than ``reach`` m outside, and their distances
-        (k,) m.
-        """
+        """Find the nodes (k,), sorted, inside an indenter or nearer than ``reach`` m, and their distances (k,) m."""
         close = pose.distance(indenter, self._centre)[0] < reach + _STEEPEST * self._radius
         nodes = np.flatnonzero(close.take(self._label))
         gap = pose.distance(indenter, self._rest.take(nodes, axis=0))[0]

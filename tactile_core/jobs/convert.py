@@ -148,9 +148,7 @@ def convert(
 
 
 def _added(options: Options, made: FramePass) -> str:
-    """Describe the toolkit's own error in displacements or heights; raises TactileError where that is more than
-    allowed.
-    """
+    """Describe the toolkit's own error in displacements or heights; raises TactileError for more than is allowed."""
     if options.error is None or options.error.um is None:
         return ""
     from . import sampling_error
@@ -163,9 +161,7 @@ def _silent(done: int, total: int) -> None:
 
 
 def note(recording: Recording, made: FramePass, options: Options, tools: Tools) -> dict:
-    """Return the origin of a result, fit for JSON: only what the same input reproduces, so no paths and no time
-    of day.
-    """
+    """Return the origin of a result for JSON: what the same input reproduces, so no paths and no time of day."""
     prepare = None if options.prepare is None else dataclasses.asdict(options.prepare)
     return {
         "format": results.FORMAT,

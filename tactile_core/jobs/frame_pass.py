@@ -81,9 +81,7 @@ class Tools:
         return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
 
     def marker_motion(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the array of frames.h5 of gels displaced by (T, M, 3) m.
-        Raises TactileError for a unit without dots.
-        """
+        """Return gels' array of frames.h5, displaced by (T, M, 3) m; TactileError for a unit without dots."""
         return {"marker_motion": self.needed_dots().motion(displacement)}
 
     def needed_dots(self) -> MarkerField:
@@ -95,9 +93,7 @@ class Tools:
         return self.dots
 
     def tracked(self, read: Callable[[int, int], tuple[np.ndarray, Signals]], count: int) -> Tracked | None:
-        """Track the contact's state in a recording of `count` frames, of which `read` gives some,
-        with their times, s.
-        """
+        """Track the contact through a recording of `count` frames, of which `read` gives some, with their times, s."""
         if self.posterior is None:
             return None
 

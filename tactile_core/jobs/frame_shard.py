@@ -65,9 +65,7 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
 
 
 def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
-    """Return true if a whole shard is shard `number` of recording `index`, with this number of frames, and no
-    other under its name.
-    """
+    """Return true if a whole shard is shard `number` of recording `index`, alone under its name, with these frames."""
     import h5py
 
     try:

@@ -210,8 +210,7 @@ class Gel:
         return self._renderer(self.height_map(), self._renderer.marks(self._contact.displacement))
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
-        """Return the pose (4, 4) in which the indenter, its own z out of the sensor,
-        stands ``depth`` m past first touch.
+        """Return the pose (4, 4) of the indenter, its own z out of the sensor, ``depth`` m past first touch.
 
         x, z : m, place of its origin in the sensor's frame. Raises TactileError where it passes the sensor by.
         """

@@ -59,8 +59,7 @@ def is_scene(path: Path) -> bool:
 
 
 def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier: str = "fast") -> Frames:
-    """Read the frames of a file or folder; a scene is simulated, under `progress`, which yields a callback (done, in
-    all).
+    """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
 
     tier : of a scene's contacts
 

@@ -15,9 +15,7 @@ _MOST_FORCE, _MOST_MOTION = 100.0, 5e-3  # N, m: beyond what a gel bears and mov
 
 
 def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarray:
-    """Return the surface nodes (rows, columns) nearest to an even grid of markers over the camera's
-    picture, tip first.
-    """
+    """Return the nodes (rows, columns) nearest to an even grid of markers over the camera's picture, tip first."""
     camera = load_calibration().camera
     x = np.linspace(camera.gel_x.min(), camera.gel_x.max(), rows + 2)[1:-1]
     z = np.linspace(camera.gel_z.min(), camera.gel_z.max(), columns + 2)[1:-1]
@@ -27,8 +25,7 @@ def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarr
 
 
 def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str, np.ndarray]:
-    """Return the last contact as arrays: force (3,) N; markers (rows, columns, 2) m, their motion along x and z;
-    the picture.
+    """Return the last contact as arrays: force (3,) N, motion of markers (rows, columns, 2) m along x, z, and picture.
 
     markers : from ``marker_nodes``; picture : whether to take one, the dearest part
     """

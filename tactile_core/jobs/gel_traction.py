@@ -11,8 +11,7 @@ from ..translation.contact_patch import contact_patch
 
 
 def gel_traction(displacement: np.ndarray, touched: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the arrays of frames.h5: ``traction_digit`` (T, M, 3) Pa of gels displaced by (T, M,
-    3) m, ``traction_force`` (T, 3) N.
+    """Return arrays ``traction_digit`` (T, M, 3) Pa, ``traction_force`` (T, 3) N of gels displaced by (T, M, 3) m.
 
     touched : (T,) bool, frames in contact; the others are zero
     """

@@ -82,9 +82,7 @@ def plan(
     electrodes: str = SHEET,
     pair: tuple[str, str] = SENSORS,
 ) -> tuple[jobs.Job, list[str], str]:
-    """Return the job, the names of the indenters and the scene's text;
-    raises what ``make_pairs`` raises before it begins.
-    """
+    """Return the job, the names of the indenters and the scene's text; raises what ``make_pairs`` raises at first."""
     source, target = pair
     of_kind(source, Fluid), of_kind(target, Gel)
     scene, text, inputs, files = scene_input.read_inputs(scene_path, ["presses"])

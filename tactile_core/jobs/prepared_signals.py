@@ -230,9 +230,7 @@ class Prepared:
         return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
     def rows(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
-        """Return the times (T,) s and signals of the frames from `start` up to `stop`;
-        `rest` is that of the first of them.
-        """
+        """Return the times (T,) s and signals of the frames from `start` up to `stop`, with the first one's `rest`."""
 
         def read(file: h5py.File) -> tuple[np.ndarray, Signals]:
             """Read times (T,) s and signals of frames `start` to `stop` of an open file."""

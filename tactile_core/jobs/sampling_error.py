@@ -22,9 +22,7 @@ def measured() -> dict[str, Any]:
 
 
 def height_error(share: float) -> float:
-    """Bound, um rms, on the error of a height map between nodes for 95 of 100 contacts, up to a depth over the
-    thickness.
-    """
+    """Bound, um rms, for 95 of 100 contacts on a height map's error between nodes, up to a depth over thickness."""
     bins = measured()["bins"]
     reached = [each for each in bins if each["depth_share_to"] < share] + [_bin_of(share)]
     return 1e6 * max(each["rms_95_m"] for each in reached)

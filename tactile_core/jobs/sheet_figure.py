@@ -95,9 +95,7 @@ class SheetFigure:
         self.top += ELECTRODES + TIME_AXIS
 
     def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray | None) -> None:
-        """Draw lines of the fluid's pressure (T,) Pa over (T,) s, as translated and, where there is one,
-        as measured.
-        """
+        """Draw lines of the fluid's pressure (T,) Pa over (T,) s: as translated, and as measured where it was."""
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, PRESSURE)
         if measured is not None and np.isfinite(measured).any():
             axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")

@@ -34,9 +34,7 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
-    """Return the errors of a contact ``depth`` m from first touch, of touching nodes, under an indenter as sharp as
-    ``radius`` m.
-    """
+    """Return the errors of a contact ``depth`` m deep, of touching nodes, by an indenter as sharp as ``radius`` m."""
     if not nodes:
         return _of_nothing(depth)
     sharper = max(LEARNED_RADIUS / radius, 1.0)
@@ -66,15 +64,12 @@ def _of_nothing(depth: float) -> Errors:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Read the table of measured errors: how they were measured, and by tier and sensor ms and
-    errors in bins of depth.
-    """
+    """Read the table of measured errors: how it was made, and ms and errors by tier, sensor and depth."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
 def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
-    """Return the shape error, m rms, and relative force error that 95 of 100 contacts at a
-    depth over thickness stay below.
+    """Return the shape error, m rms, and relative force error of 95 of 100 contacts at a depth over thickness.
 
     The fast tier's are from the full tier, whose own come on top; deeper than measured: those of the deepest bin.
     NaN for a sensor whose errors nobody has measured.

@@ -29,8 +29,7 @@ _MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
 
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
-    """Find the additional distance, m, to first touch of an indenter that has slid from ``pose``,
-    itself at first touch.
+    """Find the additional distance, m, to first touch after an indenter has slid from ``pose``, itself at first touch.
 
     Where it has slid off the sensor, as far as its motion is followed.
     """
@@ -99,8 +98,7 @@ def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> t
 
 
 def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
-    """The pose that just touches the first of the nodes, or of ``more`` points (j, 3) m, and those that are close then,
-    nearest first."""
+    """Find the pose at first touch of nodes or ``more`` points (j, 3) m, and those close then, nearest first."""
     rest = np.concatenate([lattice.rest, more]) if len(more) else lattice.rest
     for clear in _CLEAR:
         away, reach = pose.moved(-clear), 2 * clear

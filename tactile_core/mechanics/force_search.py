@@ -44,8 +44,7 @@ def touch_at_force(
     guess: float | None = None,
     slid_to: float | None = None,
 ) -> _Found:
-    """Find the contact at a force, N, along ``direction`` (3,), by secants of F^(2/3),
-    nearly straight in the depth, and halving.
+    """Find the contact at a force, N, along ``direction`` (3,), by secants of F^(2/3) over depth, and halving.
 
     move : the contact at a depth, m, from one before; last : where the search begins; limit : greatest depth, m
     guess : m, a depth near the one sought

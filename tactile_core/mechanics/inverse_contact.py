@@ -22,8 +22,7 @@ _LAYER = 1e-3
 
 
 def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) -> np.ndarray:
-    """Return the traction (n, 3) Pa on a sensor's resting surface, displaced by (n,
-    3) m and touched in ``patch`` (n,) bool.
+    """Return the traction (n, 3) Pa on a resting surface displaced by (n, 3) m and touched in ``patch`` (n,) bool.
 
     sensor : its name; nodes of the patch that cannot be touched carry none. Linear elasticity, the
     BioTac's fluid included, its core left out.

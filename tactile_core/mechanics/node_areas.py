@@ -34,8 +34,7 @@ def node_areas(sensor: str) -> np.ndarray:
 
 
 def traction(sensor: str, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the traction (n, 3) Pa on a resting surface whose ``nodes`` (k,) carry forces (k, 3) N;
-    zero at the others.
+    """Return the traction (n, 3) Pa on a resting surface with forces (k, 3) N on ``nodes`` (k,); zero elsewhere.
 
     Times ``node_areas`` and added up it is the sum of the forces.
     """

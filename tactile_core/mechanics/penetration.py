@@ -33,8 +33,7 @@ class PenetrationError(TactileError):
 def penetration_between(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool, share: float = _SHARE
 ) -> float:
-    """Return the penetration, m, of a surface (rows, columns, 3) m into a body halfway between nodes,
-    wherever some are near it.
+    """Return the penetration, m, of a surface (rows, columns, 3) m into a near body, halfway between nodes.
 
     Raises PenetrationError for a body ``depth`` m in, where that is too much: also more than a share of the depth.
     """
@@ -53,9 +52,7 @@ def penetration_between(
 
 
 def penetration(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> float:
-    """Return the depth, m, of a body's foremost point under a surface (rows, columns, 3) m;
-    0 where that says nothing.
-    """
+    """Return the depth, m, of a body's foremost point under a surface (rows, columns, 3) m; 0 if it lies apart."""
     foremost = pose.support(indenter, pose.direction)
     met = None
     if abs(pose.distance(indenter, foremost[None])[0][0]) < _ON_BODY:

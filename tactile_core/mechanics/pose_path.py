@@ -22,9 +22,7 @@ def same_line(first: Pose, second: Pose) -> bool:
 
 
 def between(first: Pose, second: Pose, share: float) -> Pose:
-    """Return the pose at a share 0..1 of the way: apex on a straight line,
-    axes turned evenly about one axis (Rodrigues).
-    """
+    """Return the pose at a share 0..1 of the way: apex on a straight line, axes turned about one axis (Rodrigues)."""
     apex = first.apex + share * (second.apex - first.apex)
     turn = second.axes @ first.axes.T
     twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])

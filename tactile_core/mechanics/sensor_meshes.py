@@ -24,9 +24,7 @@ def check_suffix(path: str | os.PathLike) -> None:
 
 
 def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
-    """Write the resting sensor: ``.vtu`` its volume, ``.ply`` and ``.stl`` its surface.
-    Raises what the writers raise.
-    """
+    """Write the resting sensor: ``.vtu`` its volume, ``.ply`` and ``.stl`` its surface. Raises as the writers do."""
     check_suffix(path)
     if Path(path).suffix.lower() == ".vtu":
         mesh_files.write_vtu(path, solid_mesh(sensor))
@@ -63,9 +61,7 @@ def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) 
 
 
 def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mesh nodes (n,) of the touchable side, and triangles (m, 3) of them, outward:
-    eight a quadratic face.
-    """
+    """Return the touchable side's mesh nodes (n,) and triangles (m, 3), outward: eight a quadratic face."""
     faces = mesh.cells[:, 18:][np.isin(mesh.cells[:, 18:], mesh.surface).all(axis=1)].reshape(-1, 3, 3)
     quads = [faces[:, i : i + 2, j : j + 2].reshape(-1, 4) for i in (0, 1) for j in (0, 1)]
     a, b, d, c = np.concatenate(quads).T

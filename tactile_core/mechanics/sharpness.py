@@ -17,9 +17,7 @@ _NEAR = 0.5e-3  # m, from the indenter: farther off it may be as sharp as it lik
 
 
 def sharpest(indenter: Indenter, pose: Pose, points: np.ndarray) -> float:
-    """Return the least radius of curvature, m, of an indenter at its tip and near points (n,
-    3) m that lie outside it.
-    """
+    """Return an indenter's least radius of curvature, m, at its tip and near those points (n, 3) m outside it."""
     points = np.concatenate([points, pose.support(indenter, pose.direction)[None]])  # no node may be near a blade's
     gap, _ = pose.distance(indenter, points)
     near = (gap > -_LEAST_RADIUS) & (gap < _NEAR)

@@ -13,9 +13,7 @@ GRAIN = 4
 
 
 def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
-    """Draw noise (H, W, 3) float32 grey levels, as large as measured on the unit: white noise, averaged over
-    squares of GRAIN px.
-    """
+    """Draw noise (H, W, 3) float32 levels as measured on the unit: white, averaged over squares of GRAIN px."""
     camera = unit.camera
     width = max(GRAIN * camera.width // 240, 1)
     white = random.standard_normal((camera.height + width, camera.width + width, len(COLOURS)), np.float32)

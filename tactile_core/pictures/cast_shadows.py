@@ -78,8 +78,7 @@ class ShadowCaster:
         return self.distance * np.sqrt(rise @ rise - part) / self.led.radius
 
     def sight(self, height: np.ndarray, box: tuple[slice, slice]) -> tuple[np.ndarray, tuple[slice, slice]]:
-        """Return the height of the LED's centre above the horizon, in LED radii, clipped to -1 (hidden) ..
-        1 (all seen).
+        """Return the height of the LED's centre above the horizon, in LED radii, from -1 (hidden) to 1 (all seen).
 
         height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may throw shadows Returns
             sight (h, w) and the box of pixels it is for; it is 1 everywhere else.
@@ -138,9 +137,7 @@ def march_steps(reach: int) -> tuple[int, ...]:
 
 
 def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | None:
-    """Return the rows and columns that enclose what is true in mask (h, w), margin further within the mask;
-    None for nothing.
-    """
+    """Return rows and columns that enclose a mask's true part, ``margin`` further within (h, w); None for nothing."""
     box = []
     for axis in (1, 0):
         found = np.flatnonzero(mask.any(axis))
@@ -166,8 +163,7 @@ def _disc_tables() -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the visible area, and its first moment upward, of a disc of radius 1 cut by a
-    horizon `sight` below its centre.
+    """Return the visible area, and its upward moment, of a unit disc cut by a horizon `sight` below its centre.
 
     Both over the whole disc's area (circular segment): share 1/2 + (t sqrt(1 - t^2) + asin t) / pi,
     moment 2 (1 - t^2)^(3/2) / (3 pi).

@@ -142,8 +142,7 @@ class HeightMapper:
         return height.reshape(len(down), len(right)) - down @ self._rest_y @ right.T
 
     def _moved_heights(self, move: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, int]:
-        """Heights (n,) m of the gel points that have moved to the nodes of the refined grid, and how many of these
-        were not found.
+        """Heights (n,) m of the gel points that have moved to the refined grid's nodes, and how many were not found.
 
         move : (2, rows, columns) sideways displacement x, z at the window's nodes
         coefficients : (3, rows + 2, columns + 2), of its splines and the height's
@@ -163,8 +162,7 @@ class HeightMapper:
     def _source(
         self, coefficients: np.ndarray, to_x: np.ndarray, to_z: np.ndarray, miss: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, int]:
-        """Rest places (n,) x, z m of the gel points that have moved to the nodes of the refined grid, and how many of
-        these were not found.
+        """Rest places (n,) x, z m of gel points that moved to the refined grid's nodes, and how many were not found.
 
         Newton's method for X + u(X) = x from X = x, with the Jacobian kept: u changes little over a displacement.
         coefficients : (2, rows + 2, columns + 2), of the splines of u; to_x, to_z : (2, n), rows of the Jacobian's
@@ -237,9 +235,7 @@ def _gel_mapper(camera: Camera) -> HeightMapper:
 
 
 def height_map(displacement: np.ndarray, camera: Camera | None = None) -> np.ndarray:
-    """Return the heights (H, W) or (T, H, W) float32, m, of a camera's gel displaced by (n_nodes, 3) or (T,
-    n_nodes, 3) m.
-    """
+    """Return heights (H, W) or (T, H, W) float32 m of a camera's gel displaced by (n_nodes, 3) or (T, n_nodes, 3) m."""
     return gel_mapper(camera)(displacement)
 
 
@@ -249,8 +245,7 @@ def rest_height_map(camera: Camera | None = None) -> np.ndarray:
 
 
 def of_unit(heights: np.ndarray, calibration: Calibration) -> np.ndarray:
-    """Convert heights (H, W) or (T, H, W) m of a gel to float32,
-    of a unit whose dome is higher or flatter at rest.
+    """Convert heights (H, W) or (T, H, W) m of a gel to float32, of a unit whose dome is higher or flatter at rest.
 
     What a contact raises stays; the resting dome is that of the descriptor times the calibration's ``dome_scale``.
     """

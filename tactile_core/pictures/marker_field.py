@@ -41,9 +41,7 @@ class MarkerField:
         self.rest = self._seen(still)[0]
 
     def motion(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the motion (T, n, 2) float32, px to the right and down, of the dots on gels displaced by (T,
-        M, 3) m.
-        """
+        """Return the motion (T, n, 2) float32, px right and down, of the dots on gels displaced by (T, M, 3) m."""
         moved = [self._seen(frame)[0] - self.rest for frame in displacement]
         return np.stack(moved).astype(np.float32) if moved else np.zeros((0, *self.rest.shape), np.float32)
 

@@ -120,9 +120,7 @@ class Renderer:
         return pictures
 
     def marks(self, displacement: np.ndarray) -> np.ndarray | None:
-        """Return the share (H, W) of light that the dots of a gel displaced by (n_nodes, 3) m leave;
-        None without dots.
-        """
+        """Return the share (H, W) of light that dots of a gel displaced by (n_nodes, 3) m leave; None without dots."""
         return None if self.dots is None else self.dots.marks(displacement)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
@@ -136,8 +134,7 @@ class Renderer:
     def picture(
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None
     ) -> np.ndarray:
-        """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest),
-        times the dots' share.
+        """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times dots' share.
 
         noise : makes the camera's noise, as measured on the unit; None for none
         marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them.
@@ -171,9 +168,7 @@ class Renderer:
         return heights
 
     def in_levels(self, radiance: np.ndarray) -> np.ndarray:
-        """Convert radiance (H, W, 3) to grey levels float32: the response times it,
-        what the camera's channels make of it.
-        """
+        """Convert radiance (H, W, 3) to grey levels float32 by the response, as the camera's channels see it."""
         levels = np.empty_like(radiance)
         for channel, row in enumerate(self._response):
             levels[..., channel] = sum(part * radiance[..., led] for led, part in enumerate(row))
@@ -194,9 +189,7 @@ class MitsubaLight:
         return self.completed(height, *self.direct(height))
 
     def direct(self, height: np.ndarray) -> tuple[np.ndarray, Hits]:
-        """Return the radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W) float32,
-        and what the first pass saw.
-        """
+        """Return the radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W), and what the first pass saw."""
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
         total, first = self._one_pass(0, tilt)

@@ -73,9 +73,7 @@ class Shader:
         return picture
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3) float32, levels, of the coating that each pixel sees, by LED; height_map :
-        (H, W) m.
-        """
+        """Return the radiance (H, W, 3) float32, levels, of each pixel's coating, by LED; height_map : (H, W) m."""
         return np.moveaxis(self._radiance(height_map), 0, -1)
 
     def _radiance(self, height_map: np.ndarray) -> np.ndarray:
@@ -133,9 +131,7 @@ class Lamp:
         self._over_picture = camera.right.astype(np.float32) * right + (camera.down.astype(np.float32) * down)[:, None]
 
     def radiance(self, surface: SeenSurface) -> np.ndarray:
-        """Return the radiance (H, W) float32, in what the LED gives on a coating that faces
-        it from the picture's middle.
-        """
+        """Return the radiance (H, W) float32, relative to a coating that faces the LED in the picture's middle."""
         if available():
             return self._compiled_radiance(surface)
         right, down, up = np.asarray(self.led.position, np.float32)

@@ -160,9 +160,7 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
 
 
 def _check_packing(path: str, member: zipfile.ZipInfo) -> None:
-    """Refuse compression other than deflate, which unpacks all at once whatever size is declared, or takes
-    gigabytes.
-    """
+    """Refuse compression other than deflate, which unpacks all at once at any declared size, or takes gigabytes."""
     if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         found = f"packed by method {member.compress_type}"
         raise TactileError(f"{path}, {member.filename}", found, "stored or deflated, as numpy does", "Save it again")

@@ -69,8 +69,7 @@ def kind_of(start: bytes) -> str | None:
 
 @contextmanager
 def open_bag(path: str, file: BinaryIO, finger: int | None = None) -> Iterator[Bag]:
-    """Open for reading; raises TactileError for damage and what `is_bag_folder` refuses, ModuleNotFoundError without
-    the extra [ros].
+    """Open for reading; raises TactileError for damage and what `is_bag_folder` refuses, and without the extra [ros].
 
     file : the opened file, from its start; any where the bag is a folder
     """
@@ -122,8 +121,7 @@ def _bound_unpacking() -> None:
 def read_bag(
     bag: Bag, layout: ModuleType, frames: int = MAX_FRAMES + 1, context: int = 0
 ) -> Iterator[tuple[Recording, int]]:
-    """Yield recordings of `frames` frames, each starting with the last `context` frames of the one before, and their
-    count.
+    """Yield recordings of `frames` frames, and how many of these, `context` or none, the one before ended with.
 
     Reads the requested finger, or the first that is not all zeros; a warning names the others.
     """
@@ -190,9 +188,7 @@ def _messages(bag: Bag, layout: ModuleType, connections: list[Any]) -> Iterator[
 
 
 def _decoder(bag: Bag, layout: ModuleType, connection: Any) -> Callable[[bytes], Any]:
-    """Return the decoder of a connection's messages: the version of the project's definitions with the
-    connection's hash.
-    """
+    """Return the decoder of a connection's messages, by that of the project's definitions whose hash it has."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     stores = []

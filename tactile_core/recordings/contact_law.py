@@ -22,9 +22,7 @@ LEFT, MORE = 0.1856, 0.2076
 
 
 def unexplained_share(change: np.ndarray) -> tuple[float, int]:
-    """Return the share of changes in contact (n, 19) counts, of a typical unit, that simulated contacts do not
-    explain, the mean over different contacts, and their number; (0, 0) without contacts.
-    """
+    """Return the mean share of changes (n, 19) counts that no simulated contact explains, and of how many contacts."""
     if not len(change):
         return 0.0, 0
     change = change[spread_out(len(change), MOST)]

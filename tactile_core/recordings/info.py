@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 def describe(
     path: str | os.PathLike[str], options: PrepareOptions | None = None, unit: SensorFile | None = None
 ) -> str:
-    """Describe sensor, channels, rate, duration, tare state, gaps and suspicious samples with their lines, as a short
-    table.
+    """Describe sensor, channels, rate, duration, tare, gaps and suspicious samples with their lines, as a short table.
 
     A BioTac SP's, which cannot be translated, is described too. unit : rest and gains, of `tactile adapt`
     Raises TactileError where the file is no recording, or of another sensor than the unit's.

@@ -37,9 +37,7 @@ SCALE = 15.0  # counts, of the arcsinh that the networks see changes through
 
 @dataclass(frozen=True)
 class Polarity:
-    """Polarity of a recording: name "falls" or "rises"; evidence in words; sure : true if the recording shows
-    it, or it is known.
-    """
+    """Polarity of a recording: name "falls" or "rises"; evidence in words; sure : shown by the recording, or known."""
 
     name: str
     evidence: str
@@ -111,9 +109,7 @@ def polarity_of(
 
 
 def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float) -> Polarity:
-    """Decide by the change of the electrodes, (19,) counts, that correlates with a swing of the fluid's
-    pressure, counts.
-    """
+    """Decide by the electrodes' change (19,) counts that goes with a swing of the fluid's pressure, counts."""
     centred = pdc - pdc.mean()
     slope = (electrodes - electrodes.mean(axis=0)).T @ centred / (centred @ centred)
     return _decided(slope[None] * swing, "the change that goes with the fluid's pressure")
@@ -153,9 +149,7 @@ def _apart(less: float, more: float) -> bool:
 
 
 def likeness(changes: np.ndarray) -> float:
-    """Return the mean over changes (n, 19) counts of the cosine to the nearest simulated contact,
-    in the networks' scale.
-    """
+    """Return the mean cosine of changes (n, 19) counts to the nearest simulated contact, in the networks' scale."""
     return float((unit(changes) @ patterns().T).max(axis=1).mean())
 
 

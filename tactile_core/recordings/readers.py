@@ -153,9 +153,7 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
 
 
 def list_fingers(paths: Iterable[str | os.PathLike[str]]) -> list[str]:
-    """List the recordings of each file as `each_finger` does; what is no recording stands for itself, and is refused
-    when it is read.
-    """
+    """List the recordings of each file as `each_finger` does; what is none stands for itself, to be refused."""
     found = []
     for path in paths:
         try:

@@ -110,9 +110,7 @@ def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np
 
 
 def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
-    """Return true if a run between first and last leaves the level of the second around it; a gap between two
-    glitches does not.
-    """
+    """Return true if a run leaves the level of its samples around; a gap between two glitches does not."""
     samples = column[first : last + 1]
     jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
     usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])

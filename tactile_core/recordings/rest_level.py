@@ -80,9 +80,7 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
 
 
 def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:
-    """Return the window to estimate rest from where nothing is quiet: lowest PDC if there is one, else least
-    movement.
-    """
+    """Return the window for rest where nothing is quiet: of lowest PDC if there is one, else of least movement."""
     n = min(window_frames(rate), len(electrodes))
     windows = _running(electrodes, pdc if pdc is not None and np.isfinite(pdc).all() else None, n, rate)
     if windows.pdc is not None:
@@ -107,9 +105,7 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
-    """Return PDC at rest, counts: 0 for a tared file; else from the quiet frames,
-    or the lowest where there are none.
-    """
+    """Return PDC at rest, counts: 0 for a tared file; else the quiet frames', or the lowest where there are none."""
     finite = pdc[np.isfinite(pdc)]
     if not len(finite) or (kind != "raw" and np.median(finite) < TARED_PDC):
         return 0.0
@@ -118,9 +114,7 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 
 
 def level(samples: np.ndarray) -> np.ndarray:
-    """Return the mean (19,) of the middle half of (n, 19) samples:
-    robust as a median, but not rounded to whole counts.
-    """
+    """Return the mean (19,) of the middle half of (n, 19) samples: robust as a median, but no whole counts."""
     cut = len(samples) // 4
     return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0)
 

@@ -40,8 +40,7 @@ class Rest:
     pdc: float | None = None
 
     def agrees(self, level: np.ndarray, pdc: float) -> bool:
-        """Return true if a calm level (19,) counts with this PDC, counts, is a rest of this unit: PDC near that at
-        rest.
+        """Return true if a calm level (19,) counts with this PDC, counts, is a rest of this unit, by its PDC at rest.
 
         Where either has no PDC, or PDC of another zero, the level must be near the unit's counts at rest.
         """
@@ -252,9 +251,7 @@ def _smoothed_over(options: PrepareOptions, kind: str) -> int:
 def _counts_per_unit(
     recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions, warnings: list[str]
 ) -> float:
-    """Return the factor to counts: 1, the user's, or for scaled recordings one that gives the usual size of a
-    press (assumed).
-    """
+    """Return the factor to counts: 1, the user's, or one that gives scaled recordings a usual press (assumed)."""
     if options.counts_per_unit is not None:
         return float(options.counts_per_unit)
     if kind != "scaled":

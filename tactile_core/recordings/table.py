@@ -24,9 +24,11 @@ MAX_BLANK = 8  # blank lines that a message names
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Parsed table; header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, header is
-    line 1; exact : (T,) float64 of the columns that values, if float32, would round, such as time stamps; start : line
-    after which the rows begin
+    """Parsed table of a text.
+
+    header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, header is line 1
+    exact : (T,) float64 of the columns that values, if float32, would round, such as time stamps
+    start : line after which the rows begin
     """
 
     path: str
@@ -67,9 +69,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Header:
-    """Header of a table; names : of the columns, lower case; lines : up to and with the header; separator :
-    between cells
-    """
+    """Header of a table; names : of the columns, lower case; lines : up to and with it; separator : of cells."""
 
     names: tuple[str, ...]
     lines: int

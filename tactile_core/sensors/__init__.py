@@ -51,9 +51,7 @@ def electrodes(sensor: str = "biotac") -> np.ndarray:
 
 
 def excitation_electrodes(sensor: str = "biotac") -> np.ndarray:
-    """Positions (4, 3) m of the excitation electrodes X1..X4 in the shared frame, the BioTac's read from a drawing
-    (docs/sources.md, BioTac electrodes).
-    """
+    """Positions (4, 3) m of the excitation electrodes X1..X4; the BioTac's are from a drawing (docs/sources.md)."""
     frame = skin_of(sensor).descriptor.frame
     x, y, z = places_of(sensor).excitation.T
     return 1e-3 * np.column_stack([-x - 1e3 * frame.shift_x, z + 1e3 * frame.shift_y, frame.lateral_sign * y])

@@ -155,15 +155,11 @@ class Calibration:
 
     @property
     def gain(self) -> Response:
-        """Response to radiance in units of ``facing``, in levels: each LED's column of the response times its
-        ``facing``.
-        """
+        """Response, in levels, to radiance in units of ``facing``: each LED's column times its ``facing``."""
         return self.response.times(self.facing)
 
     def with_gain(self, gain: Response) -> Calibration:
-        """Return the unit with LEDs bright enough for this ``gain``; each LED's own channel responds 1 in the
-        middle.
-        """
+        """Return the unit with LEDs of this ``gain``; each LED's own channel responds 1 in the middle."""
         if not min(self.coating.albedo) > 0:
             raise TactileError("coating, albedo", "0", "more than 0, or no LED's light is seen")
         own = np.diag(gain.centre)

@@ -365,9 +365,7 @@ def _named(values: Mapping[str, float]) -> list[str]:
 
 
 def _quoted(text: str) -> str:
-    """Quote text as a TOML basic string: JSON's escapes are valid in TOML, its ASCII keeps file names that are no
-    UTF-8.
-    """
+    """Quote text as a TOML basic string: JSON's escapes are valid there, its ASCII keeps names that are no UTF-8."""
     return json.dumps(text.encode(errors="replace").decode())
 
 

@@ -18,23 +18,18 @@ _RESTS = 500.0, 3900.0
 
 
 def reading(growth: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
-    """Return the counts (..., 19), not rounded, after impedances have grown by factors (..., 19) since rest, counts at
-    rest (19,).
-    """
+    """Return the counts (..., 19), not rounded, after impedances grew by factors (..., 19) from rest counts (19,)."""
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 
 
 def growth(counts: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
-    """Return the factors (..., 19) by which impedances have grown since counts at rest (19,);
-    inverse of ``reading``.
-    """
+    """Return the factors (..., 19) by which impedances grew from rest counts (19,): the inverse of ``reading``."""
     now, before = np.clip(counts, *_ENDS), np.clip(rest, *_ENDS)
     return (COUNT_MAX / now - 1) / (COUNT_MAX / before - 1)
 
 
 def typical(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of a unit that rests at
-    ``REST_COUNTS``.
+    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one at ``REST_COUNTS``.
 
     A unit at 3,500 counts responds to a contact with four fifths, one at 2,800 with seven fifths of the latter's
     change.
@@ -44,8 +39,6 @@ def typical(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Convert changes of a unit that rests at ``REST_COUNTS`` to one at rest counts (19,): the inverse of
-    ``typical``.
-    """
+    """Convert changes of a unit at ``REST_COUNTS`` to one at rest counts (19,): the inverse of ``typical``."""
     rest = np.clip(rest, *_RESTS)
     return reading(growth(REST_COUNTS + change, REST_COUNTS), rest) - rest

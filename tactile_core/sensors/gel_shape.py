@@ -118,9 +118,7 @@ class GelShape:
         return (1 - u) * u_zero + u * u_one + (1 - v) * v_zero + v * v_one - bilinear
 
     def plan_grid(self) -> np.ndarray:
-        """Return the places (rows, columns, 2) = (x, z) m of the gel's lattice: even window,
-        rim that follows the outline.
-        """
+        """Return places (rows, columns, 2) = (x, z) m of the gel's lattice: even window, rim along the outline."""
         lattice = self._lattice
         x = np.linspace(*lattice.window_x, lattice.window_nodes[0])
         z = np.linspace(*lattice.window_z, lattice.window_nodes[1])

@@ -104,9 +104,7 @@ class SkinShape:
         return np.stack([x, self.axis_y - r * np.cos(theta), r * np.sin(theta)], -1)
 
     def core_radius(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """Radius of the rigid core, m, about the axis at stations x (n,) m and angles theta (n,) rad; nan off the
-        core.
-        """
+        """Radius of the rigid core, m, at stations x (n,) m and angles theta (n,) rad; NaN off the core."""
         return self._radius("core", x, theta)
 
     def _radius(self, layer: str, x: np.ndarray, theta: np.ndarray) -> np.ndarray:

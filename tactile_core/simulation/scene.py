@@ -21,9 +21,7 @@ LARGEST = 1e9  # of any number: none that means something comes near, squares of
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Distribution of paired contacts: places evenly over the gel, tilts evenly over a cone, force growing by a
-    ratio.
-    """
+    """Distribution of paired contacts: places even over the gel, tilts over a cone, force growing by a ratio."""
 
     force_min_n: Positive = 0.02
     force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5

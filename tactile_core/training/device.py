@@ -14,9 +14,7 @@ _REPEATABLE = ("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
 
 
 def device_of(name: str) -> torch.device:
-    """Return the device of one of DEVICES. Raises TactileError for another name,
-    and for a GPU that torch does not see.
-    """
+    """Return one of DEVICES. Raises TactileError for another name, and for a GPU that torch does not see."""
     if name not in DEVICES:
         raise TactileError("device", repr(name), ", ".join(DEVICES))
     there = torch.cuda.is_available()

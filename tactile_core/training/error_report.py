@@ -80,9 +80,7 @@ def direct_columns(model: Model, measure: Measure) -> Columns:
 
 
 def signal_rows(measure: Measure) -> list[Row]:
-    """Make the rows of SVB: rms over electrodes of its reconstruction against the signal as read,
-    averaged over contacts.
-    """
+    """Make the rows of SVB: its reconstruction's rms over electrodes against the signal as read, mean over contacts."""
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
     value, baseline = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
@@ -121,8 +119,7 @@ def quantiles(values: np.ndarray) -> list[float]:
 
 
 def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
-    """Return the quantiles at QUANTILES of `Networks.signal_distance` on validation presses,
-    signed and rectified apart.
+    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses, signed and rectified apart.
 
     Rectified signals scatter more: quantiles of both together would hide what is strange among signed ones.
     """
@@ -137,9 +134,7 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """Fit the numbers of `error_bounds.fit` on the validation presses; signed and rectified apart.
-    silence : the card's
-    """
+    """Fit `error_bounds.fit` on the validation presses, signed and rectified apart; silence : the card's."""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():

@@ -17,9 +17,7 @@ BASELINES = {"MVB": "baseline_biotac", "S2MPN": "baseline_biotac", "D2B": "basel
 
 
 def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median: bool = False) -> float | None:
-    """Return the mean over depth bins of the mean over indenters of the mean (or median) over contacts;
-    None without any.
-    """
+    """Return the mean over depths of the mean over indenters of contacts' mean (or median); None without any."""
     middle = np.median if median else np.mean
     bins = []
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):
@@ -67,9 +65,7 @@ def figure_row(name: str, value: float | None, baseline: float | None, target: f
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
-    """Yield subsets of contacts for rows of their own: light ones, each depth bin, deeper and sliding ones; name,
-    mask over ``rows``.
-    """
+    """Yield name and mask over ``rows`` of contacts with rows of their own: light, of each depth, deeper, sliding."""
     depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
     yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

@@ -113,9 +113,7 @@ def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
 
 
 def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, np.ndarray]:
-    """Compute the inputs of `Networks.signal_distance`: mean and whitening of training latents, SVB's residual
-    an electrode.
-    """
+    """Compute `Networks.signal_distance`'s inputs: training latents' mean and whitening, SVB's residuals."""
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)

@@ -164,9 +164,7 @@ class MeshVae(Vae):
         return torch.cat([latent, self.surface.cells(latent[:, :PLACE])[1]], -1)
 
     def loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Compute the error of what the latent (B, L) decodes to against the contacts of these rows:
-        see `Surface.loss`.
-        """
+        """Compute the error of the decoded latent (B, L) against the contacts of these rows: see `Surface.loss`."""
         cell, left = self.surface.cells(latent[:, :PLACE])
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
 

@@ -12,8 +12,7 @@ from .options import Options
 def measured(
     change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0, unit: float = 0.0
 ) -> np.ndarray:
-    """Simulate a sensor's reading (B, 20) of true changes (B, 19) counts: changes in counts,
-    and whether they are rectified.
+    """Simulate a sensor's reading (B, 20) of true changes (B, 19) counts: changes, and whether they are rectified.
 
     Rectified changes are given with the sign of a thinning film, as the networks read them.
 

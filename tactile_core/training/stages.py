@@ -54,9 +54,7 @@ class Model(nn.Module):
         return biotac, self.to_digit(state, biotac)
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20) and its contact's state (B, STATE) to latent_biotac, and the surprise (B,) at the
-        state.
-        """
+        """Map signal (B, 20) and contact's state (B, STATE) to latent_biotac, and the surprise (B,) at the state."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, ELECTRODES:] > 0
         biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
         surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))
@@ -126,8 +124,7 @@ def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the negative log likelihood of the contact, nats, and errors of a frozen
-    autoencoder's code and of the signal.
+    """Compute the negative log likelihood of the contact, nats, and errors of the frozen codes and of the signal.
 
     By likelihood alone a contact is never estimated fainter than it may be. SVB learns along: it keeps of a signal
     then what separates contacts.
@@ -176,9 +173,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the force, from the BioTac's latent of a mesh,
-    or of one estimated from a signal and a contact's state.
-    """
+    """Compute the loss of the force, from the BioTac's latent, a mesh's or estimated from signal and contact."""
     with torch.no_grad():
         latent = torch.cat([model.MVB.mean(batch.biotac), model.given(batch.signal, batch.state)[0]])
     true = batch.force.repeat(2, 1)
@@ -189,8 +184,7 @@ def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 def pressure_loss(
     model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator
 ) -> Tensor:
-    """Compute the loss of the fluid's pressure, from the signal as read with its sign, on the head's scale,
-    nearly a logarithm.
+    """Compute the loss of the fluid's pressure, on the head's scale, from the signal as read with its sign.
 
     Relative errors in its place biased uncertain pressures low: the estimates for slides were a sixth lower still.
     """
@@ -205,9 +199,7 @@ def length(vectors: Tensor) -> Tensor:
 
 
 def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the expected largest node error, in its logarithm:
-    the mean absolute deviation is least at the median.
-    """
+    """Compute the loss of log largest node error: the mean absolute deviation, which is least at the median."""
     with torch.no_grad():
         biotac, digit = model.from_signal(batch.signal)
         answers = (model.MVB, biotac), (model.MVD, digit)

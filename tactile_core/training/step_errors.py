@@ -128,9 +128,7 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
-    """Return the RMS over moving nodes, largest node error, error of the core's height (um),
-    error of the peak (per cent).
-    """
+    """Return RMS over moving nodes, largest node error, error of the core's height (all um), of the peak (%)."""
     figures = accuracy.mesh_figures(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
     figures["peak_depth_percent"] = np.where(deep, figures["peak_depth_percent"], np.nan)

@@ -90,17 +90,13 @@ class SurfaceCodec:
         return torch.stack([squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()], -1)
 
     def inputs(self, rows: np.ndarray) -> Tensor:
-        """Return the input (B, K + K' + 4) of the encoder: coefficients, place, what is left of it;
-        zero for silent ones.
-        """
+        """Return the encoder's input (B, K + K' + 4): coefficients, place, remainder; zero for silent ones."""
         at = np.maximum(rows, 0)
         place = torch.from_numpy(np.concatenate([self.place[at], self.left[at]], -1))
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """Compute `MovingFrame.cells`: whole cells (B, 2) and what is left, through which gradients flow to the
-        place.
-        """
+        """Compute `MovingFrame.cells`: whole cells (B, 2) and the remainder, through which the place has gradients."""
         middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
         at = place * PLACE_UNIT + middle
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
@@ -116,8 +112,7 @@ class SurfaceCodec:
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
-        """Compute the mean over contacts of the rms error over moving nodes, for coefficients (B,
-        K + K') round cells (B, 2).
+        """Compute the mean of contacts' rms error over moving nodes, for (B, K + K') coefficients round cells (B, 2).
 
         1 for no displacement. The root is taken contact by contact, as in the figure we report: deep contacts do not
         drown shallow ones. The bases being orthonormal, an error in coefficients is one of nodes; what no coefficients
@@ -132,9 +127,7 @@ class SurfaceCodec:
         return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.baseline
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
-        """Decode coefficients (B, K + K') around cells (B, 2) to displacement (B, n, 3) m in the nodes' own frames,
-        in the host's memory.
-        """
+        """Decode coefficients (B, K + K') around cells (B, 2) to displacement (B, n, 3) m in nodes' frames, in RAM."""
         metres, wide, width = modes.cpu() * self.scale, len(self.wide), self.frame.width
         whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
         near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()
@@ -159,9 +152,7 @@ class SurfaceCodec:
 
 
 def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Displacements (C, n, 3) int16 in the nodes' own frames; where none is turned the data themselves, which
-    are large.
-    """
+    """Displacements (C, n, 3) int16 in the nodes' own frames; where none is turned the (large) data themselves."""
     if not frame.turn.any():
         return data
     local = np.empty_like(data)

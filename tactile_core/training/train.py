@@ -83,9 +83,7 @@ def quiet(share: float, text: str) -> None:
 
 
 def without(split: Split, pairs: Pairs, options: Options, path: str | os.PathLike) -> Split:
-    """Return the split less the contacts kept from training; raises TactileError for an
-    indenter that the pairs do not know.
-    """
+    """Return the split less the contacts kept from training; raises TactileError for an unknown indenter."""
     names = pairs.indenter_names
     for name in options.without:
         if name not in names:

@@ -204,9 +204,7 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Replace gains that the frames do not determine by 1; returns gains, which were fitted, and warnings for
-    the others.
-    """
+    """Replace gains that the frames do not determine by 1; returns gains, which were fitted, warnings for others."""
     wild = touched & ~((gain >= LEAST) & (gain <= MOST))
     warnings = []
     if not touched.all():

@@ -89,9 +89,7 @@ class ContactFrame:
         return np.array([self.rows - 1, self.columns - 1], np.float32) / 2
 
     def fade(self) -> np.ndarray:
-        """Return the weights (width, width) float32: 1 in the window's middle,
-        falling over FADE cells to 0 beyond its edge.
-        """
+        """Return weights (width, width) float32: 1 in the window's middle, falling over FADE cells to 0 outside."""
         inside = 1 + self.half - np.abs(np.arange(-self.half, self.half + 1))
         along = 0.5 - 0.5 * np.cos(np.pi * np.minimum(inside / (FADE + 1), 1))
         return np.outer(along, along).astype(np.float32)

@@ -71,9 +71,7 @@ class _Course(NamedTuple):
 
 
 def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
-    """Estimate the state (T, STATE) float32 of the contact in T frames at times (T,) s from their posterior,
-    smoothed both ways.
-    """
+    """Estimate the contact's state (T, STATE) float32 at times (T,) s from posteriors, smoothed both ways."""
     if len(time) == 0:
         return np.zeros(evidence.mean.shape[::2], np.float32)
     steps = _steps(time, evidence.rectified)
@@ -113,9 +111,7 @@ class Tracked:
         self._kept: tuple[int, np.ndarray] | None = None
 
     def __call__(self, frames: np.ndarray) -> np.ndarray:
-        """States (n, STATE) of frames (n,), in rising order; a frame's state does not depend on the other
-        frames requested.
-        """
+        """States (n, STATE) of rising frames (n,); a frame's state does not depend on which others are asked for."""
         blocks = frames // BLOCK
         parts = [self._block(int(block))[frames[blocks == block] - block * BLOCK] for block in np.unique(blocks)]
         return np.concatenate(parts)
@@ -199,8 +195,7 @@ def _steps(time: np.ndarray, rectified: np.ndarray) -> np.ndarray:
 
 
 def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Negative cost (..., C, C) of the step from each component of one frame to each of the next, and true where it is
-    free.
+    """Negative cost (..., C, C) of each component's step to each of the next frame, and true where it is free.
 
     The cost is half the squared distance in standard deviations, without a density's normalisation: neighbours err
     together, by gains and rest, so that two frames that agree prove less than with independent errors (with it, the 90

@@ -16,16 +16,12 @@ SMALL = 1e-3  # cells, over which a slope is taken
 
 
 def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
-    """Return the positions (T, 2) = (x, z) m on the resting gel of places (T, 2) of a latent,
-    by bilinear interpolation.
-    """
+    """Return positions (T, 2) = (x, z) m on the resting gel of places (T, 2) of a latent, bilinearly."""
     return between_nodes(_grid(frame.rows, frame.columns), place)
 
 
 def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
-    """Return the places (T, 2) of points (T, 2) m, inverse of `on_gel`;
-    points beside the gel have places at its rim.
-    """
+    """Return the places (T, 2) of points (T, 2) m, inverse of `on_gel`; points beside the gel have rim places."""
     grid = _grid(frame.rows, frame.columns)
     size = np.array(grid.shape[:2])
     apart = np.square(grid.reshape(-1, 2)[None] - point[:, None]).sum(axis=-1).argmin(axis=1)

@@ -99,9 +99,7 @@ class Networks:
         return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"])
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Encode change (T, 19) counts against rest, falling (`sensors.COUNT_SIGN`), rectified (T,) or one, as
-        SVB's mean (T, K).
-        """
+        """Encode change (T, 19) counts from rest, as `sensors.COUNT_SIGN`, rectified or not, to SVB's mean (T, K)."""
         return self._blocks(self._encode_signal, *_signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
@@ -133,9 +131,7 @@ class Networks:
     def latents(
         self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Map latent_signal (T, K), states of contacts (T, STATE), rectified (T,) or one, to latent_biotac (T, L) and
-        latent_digit (T, L').
-        """
+        """Map latent_signal (T, K), states (T, STATE), rectified (T,) or one, to latent_biotac and latent_digit."""
         latent_biotac = self.given(latent_signal, state, rectified)
         return latent_biotac, self.to_digit(state, latent_biotac)
 
@@ -160,8 +156,9 @@ class Networks:
         return self._map_placed("B2SPN", "MVB", latent_biotac)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return the expected largest node error (T, 2) m on BioTac and DIGIT, of change (T, 19) counts,
-        rectified (T,) or one.
+        """Return the expected largest node errors (T, 2) m of BioTac and DIGIT, of change (T, 19) counts.
+
+        rectified : (T,) bool, or one for all
         """
         return self._blocks(self._expected_error, *_signal(change, rectified), "expected_error")
 
@@ -201,9 +198,7 @@ class Networks:
         return self._blocks(self._pressure, *_signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
-        """Return the distances of each frame from the training signals, of change (T, 19) counts,
-        rectified (T,) or one.
-        """
+        """Return each frame's distances from the training signals, of change (T, 19) counts, rectified (T,) or one."""
         distances = self._blocks(self._distance, *_signal(change, rectified), "signal_distance")
         return SignalDistance(*np.ascontiguousarray(distances.T))
 
@@ -263,9 +258,7 @@ class Networks:
         return self._blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
 
     def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Append to a latent the remainder of its place after rounding to cells: (B, L + 2); also returns the
-        cells (B, 2).
-        """
+        """Append to a latent its place's remainder after rounding to cells: (B, L + 2); also returns the cells."""
         cells, left = self.frames[net].cells(latent[:, :PLACE])
         return np.concatenate([latent, left], -1), cells
 

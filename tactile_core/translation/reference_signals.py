@@ -30,8 +30,7 @@ TRIES = 2_000  # readings made up to find the match's own bias
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSignals:
-    """Typical signals (P, 19) counts, signed; bias : log gain (19,) that a match of the simulated signals themselves
-    gives.
+    """Typical signals (P, 19) counts, signed; bias : log gain (19,) by which simulated signals match themselves.
 
     There is a bias for signed and for rectified readings: a typical signal is a mean of signals, so it is smaller.
     """
@@ -71,9 +70,7 @@ def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
 
 
 def _k_means(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Centres (p, 19) of points (n, 19) by Lloyd's k-means, started at some of them; at most COUNT, and half
-    the points.
-    """
+    """Centres (p, 19) of points (n, 19) by Lloyd's k-means from some of them; at most COUNT, and half the points."""
     count = min(COUNT, len(points) // 2)
     centres = points[random.choice(len(points), count, replace=False)]
     for _ in range(TURNS):

@@ -31,8 +31,7 @@ FIRST = 64  # patterns, the likest to the signal, that one of the two is looked 
 
 
 def residual_shares(change: np.ndarray, rectified: np.ndarray) -> np.ndarray:
-    """Return the shares (T, 2) of the changes (T, 19) counts of a typical unit that one and
-    two simulated contacts leave.
+    """Return the shares (T, 2) of a typical unit's changes (T, 19) counts that one and two simulated contacts leave.
 
     rectified : (T,) bool; these frames and those that hardly change are not judged: NaN
     """

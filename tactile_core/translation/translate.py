@@ -77,25 +77,19 @@ def _rectified(signals: Signals) -> np.ndarray:
 
 
 def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
-    """Return the 99 % quantile of a quantity of a card's ``silence``: its value over frames of noise without
-    contact.
-    """
+    """Return the 99 % quantile of a quantity in a card's ``silence``, frames of noise without contact."""
     return float(np.interp(0.99, silence["levels"], silence[quantity]))
 
 
 def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
-    """Return the centre (T, 2) = (x, z) float32 m of the dent in a gel at ``rest``;
-    NaN where no node moves by ``silent`` m.
-    """
+    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN where no node moves by ``silent`` m."""
     center = accuracy.dent_center(displacement, rest).astype(np.float32)
     center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
     return center
 
 
 def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Return the share (T,) of the posterior in contacts whose place on the gel is ``APART``
-    m and more from that of states (T, STATE).
-    """
+    """Return the posterior's share (T,) in contacts ``APART`` m and more on the gel from states (T, STATE)."""
     place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
     points = gel_place.on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
     far = accuracy.lengths(points - gel_place.on_gel(frame, place)[:, None]) > APART
@@ -113,9 +107,7 @@ class Translator:
         self._unrolled = surface.unrolled_nodes()
 
     def posterior(self, signals: Signals) -> Evidence:
-        """Return each frame's posterior of its contact, from that frame alone, and what ``contact_track`` needs
-        beside it to track the contact through time.
-        """
+        """Return each frame's own posterior of its contact, and what ``contact_track`` needs beside it."""
         latent, unsigned = self._latent_signal(signals)
         size = np.sqrt(np.square(signals.typical).mean(axis=1))
         return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, rectified=_rectified(signals))
@@ -181,9 +173,7 @@ class Translator:
         return silent_level(self.card["silence"], quantity)
 
     def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
-        """Compute expected largest errors and their bounds, by the names of `Translation`; x : (T,) m of the
-        contact's middle.
-        """
+        """Compute expected largest errors and their bounds, by `Translation`'s names; x : (T,) m, of the contact."""
         expected, found = self.nets.expected_error(change, rectified), {}
         for index, name in enumerate(SURFACES):
             kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
@@ -227,9 +217,7 @@ class Translator:
         return np.stack([getattr(distance, name) for name in networks.DISTANCES])
 
     def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
-        """Quantiles (distances, T) or (distances, 1) at each distance's level over validation frames of the same
-        kind.
-        """
+        """Quantiles (distances, T) or (distances, 1) at each distance's level over like validation frames."""
         table = self.card["distance"]
         limits = {
             kind: np.array(

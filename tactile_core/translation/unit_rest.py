@@ -21,8 +21,9 @@ SPREAD_OVER = 0.5  # share of the recordings whose range estimates the error of 
 
 @dataclass(frozen=True)
 class UnitRest:
-    """Rest of a unit; counts : (19,); spread : (19,) counts, half the range of the less pressed half of the recordings'
-    levels, or of their middle half.
+    """Rest of a unit; counts : (19,); spread : (19,) counts, half the range of recordings' levels.
+
+    The range is that of their less pressed half, or of their middle half.
 
     pdc : counts, None where the recordings have none; recordings : number that rest was averaged over
     """

@@ -196,8 +196,7 @@ def card_bytes(card: dict) -> bytes:
 
 
 def read_card(folder: str | os.PathLike) -> tuple[dict, str]:
-    """Read the model card of a weights folder and the SHA-256 of its bytes (it pins every file, so it names the
-    weights).
+    """Read a weights folder's model card and the SHA-256 of its bytes, which pins every file and so names the weights.
 
     raises: TactileError if it is missing, not JSON, or of another format
     """

@@ -29,9 +29,7 @@ WHOLE = np.array([[0.0, 1.0, 1.0]])  # all of what is predicted is trusted
 
 
 class Known(NamedTuple):
-    """Samples, n of them: features x (n, f), logarithms of the forces' ratios (n,), fields (n, g, 3), folds
-    (n,) and whether they rub (n,).
-    """
+    """Samples: features x (n, f), logarithms of force ratios (n,), fields (n, g, 3), folds (n,), rubbing (n,)."""
 
     x: np.ndarray
     log_ratio: np.ndarray
@@ -51,9 +49,7 @@ def mirrored(field: np.ndarray) -> np.ndarray:
 
 
 class Choice(NamedTuple):
-    """Parameters of a kernel regression: width in standard deviations of a feature, ridge over the kernel's
-    mean diagonal.
-    """
+    """Kernel regression's width in standard deviations of a feature, and ridge over the kernel's mean diagonal."""
 
     width: float
     ridge: float
@@ -94,8 +90,9 @@ def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
 
 
 def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
-    """Choose the parameters of least error on held-out presses of one kind, for forces by all features and by
-    the essential ones, whose mean counts, and for fields.
+    """Choose the parameters of least error on held-out presses of one kind.
+
+    For forces by all features and by the essential ones, whose mean counts, and for fields.
     """
     coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
     forces = np.clip(known.log_ratio, -MOST, MOST)[:, None]

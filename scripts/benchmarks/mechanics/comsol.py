@@ -51,8 +51,7 @@ def published_volume(intervals: tuple[int, int, int] = INTERVALS) -> Row:
 
 @dataclasses.dataclass(frozen=True)
 class Press:
-    """Data of one case. point : (3,) m of the plate at the first step; into : (3,) its normal; advances : (steps,) m
-        along it.
+    """Data of one case. point : (3,) m of the plate at the first step; into : (3,) normal; advances : (steps,) m.
 
     force : (steps,) N; electrodes : (steps, 24, 3) m, the outer skin on their rays; skin : (steps, rays, 3) m
     """
@@ -203,9 +202,7 @@ def _cut(press: Press, points: np.ndarray) -> np.ndarray:
 
 
 def _volume(points: np.ndarray) -> float:
-    """Volume of the pyramids between the origin and a grid of points, ``_RAYS_DOWN`` of them a meridian, closed
-    around.
-    """
+    """Volume of pyramids from the origin to a grid of points, ``_RAYS_DOWN`` a meridian, closed around."""
     grid = points.reshape(-1, _RAYS_DOWN, 3)
     grid = np.concatenate([grid, grid[:1]])
     a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]

@@ -39,9 +39,7 @@ def turned(rotation: np.ndarray, place: np.ndarray = _PLACE, friction: float = 0
 
 
 def turning_error(friction: float = 0.0) -> tuple[float, float]:
-    """Largest difference between the result of the turned problem and the turned result: displacement over
-    depth, force relative.
-    """
+    """Largest difference of a turned problem's result to the turned result: displacement over depth, force relative."""
     cosine, sine = np.cos(0.7), np.sin(0.7)
     about_x = np.array([[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]])
     rotation = about_x @ np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])

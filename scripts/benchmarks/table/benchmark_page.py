@@ -90,9 +90,7 @@ def same_pairs() -> str:
 
 
 def plot(methods: Sequence[Method]) -> bytes:
-    """Draw a PNG: error over time, both logarithmic, one panel a stage; the Pareto front, and doing nothing, as
-    lines.
-    """
+    """Draw a PNG, a panel a stage: error over time, logarithmic; the Pareto front, and doing nothing, as lines."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -64,9 +64,7 @@ def _solved(sensor, contact, tier):  # noqa: ANN001, ANN202 (as `solved`)
 
 
 def _reference(sensor: str, quick: bool) -> Method:
-    """Return the results of `measure_tiers.py`, for a contact takes a minute or more; a whole run solves the
-    quickest.
-    """
+    """Return `measure_tiers.py`'s results: a contact takes a minute or more, so a whole run solves the quickest."""
     truths = read_truth(TRUTH, sensor)
     if not quick:
         _solved(sensor, min(truths, key=lambda truth: truth.seconds).contact, "reference")
@@ -78,9 +76,7 @@ def _reference(sensor: str, quick: bool) -> Method:
 
 
 def _in_the_loop(sensor: str, quick: bool) -> list[Row]:
-    """Times of random contacts with friction, alone and on paths, by numpy and compiled; none without the extra
-    [fast].
-    """
+    """Times of random contacts with friction, alone and on paths, by numpy and compiled (with the extra [fast])."""
     from benchmarks import measure_loop
 
     if not compiled.available():

@@ -87,9 +87,7 @@ def _numpy_solved() -> Surfaces:
 
 
 def _numpy_confidence() -> Surfaces:
-    """Translate with force, contact place, expected errors, confidence and flags: everything that `tactile
-    convert` uses.
-    """
+    """Translate with force, place, expected errors, confidence and flags: everything that `tactile convert` uses."""
     translator = load_translator()
 
     def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:

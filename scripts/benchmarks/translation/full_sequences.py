@@ -46,8 +46,9 @@ def described(pairs: Pairs) -> Arrays:
 
 
 def left_by_interpolation(pairs: Pairs) -> dict[str, float]:
-    """Median error at the middle contact of each press, drawn from those on either side of it, which lie twice as far
-    apart as those that frames are drawn from: place mm, signal and peak %.
+    """Median error at each press's middle contact, drawn from those beside it: place mm, signal and peak %.
+
+    Those lie twice as far apart as the contacts that frames are drawn from.
     """
     contacts, missed = described(pairs), []
     for rows in presses(pairs):

@@ -82,9 +82,7 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
 
 
 def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
-    """Measure how many changes of a grip are called unexplained where rest was taken in the grip; baseline: with the
-    unit's own rest, where none should be.
-    """
+    """Measure a grip's unexplained changes with rest taken in the grip; baseline: with the unit's own rest, none."""
     loaded = [prepare_unit(recordings.read(one), None, None) for one, _ in held]
     of = f"{len(held)} grips of hard flat objects, rest taken during the grip; baseline: with the unit's rest"
     return row("grip_unexplained", unexplained(loaded), "1", 0.9, baseline=unexplained(known), of=of, at_least=True)

@@ -56,8 +56,7 @@ def find(folder: str | os.PathLike) -> list[Path]:
 
 
 def reporting(folder: str | os.PathLike) -> list[Path]:
-    """List the recordings of `find` by which nothing is chosen: all but sample 7 of each material; these too where
-    there is no other.
+    """List the recordings of `find` by which nothing is chosen: all but sample 7 of each material, or all of one.
 
     Raises TactileError where there is none.
     """

@@ -81,9 +81,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _keep(text: str | None) -> tuple[str, ...]:
-    """Return the words of ``recording.OUTPUTS``; ``traction`` is that of both sensors. Raises TactileError for other
-    words.
-    """
+    """Return the words of ``recording.OUTPUTS``; ``traction`` is both sensors'. Raises TactileError for other words."""
     from ...jobs import results
     from ...simulation.scene_recording import DEFAULT, OUTPUTS
 

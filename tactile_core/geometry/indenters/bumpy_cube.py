@@ -100,9 +100,7 @@ class BumpyCube(Indenter):
         return Box((self.size, self.size, 2 * self.size), self.edge), Pose(apex, np.eye(3))
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Find the nearest part (n,), its distance (n,) m and gradient (n, 3); and points in the nearest bump's frame
-        (n, 3).
-        """
+        """Find the nearest part (n,), distance (n,) m and gradient (n, 3), and points (n, 3) in its bump's frame."""
         outer = np.copysign(self.spacing, points[:, :2])
         outer[np.abs(points[:, 0]) + np.abs(points[:, 1]) <= self.spacing] = 0.0
         at_bump = points.copy()

@@ -23,9 +23,7 @@ class Indenter(Protocol):
     """A rigid body given by its signed distance. Shapes inherit from it."""
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the signed distance (n,) m, positive outside, and its gradient (n, 3), at points (n,
-        3) m in the own frame.
-        """
+        """Return the signed distance (n,) m, positive outside, and its gradient (n, 3), at points (n, 3) m."""
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """Return the symmetric second derivatives (n, 3, 3) 1/m of the distance at points (n, 3) m in the own frame.
@@ -46,9 +44,7 @@ class Indenter(Protocol):
         return np.array(lower), np.array(upper)
 
     def preview(self, hull: Hull) -> Surface:
-        """Return the nodes (n, 3) m in the own frame and triangles (m, 3) that show the body;
-        a convex one is its hull.
-        """
+        """Return the nodes (n, 3) m and triangles (m, 3) that show the body; those of a convex one are its hull's."""
         return hull(self.support)
 
     @functools.cached_property
@@ -59,9 +55,7 @@ class Indenter(Protocol):
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """Return the lengths (n,) of vectors (n, 3); ``np.linalg.norm`` takes twice as long
-    for the few vectors of a contact.
-    """
+    """Return the lengths (n,) of vectors (n, 3), in half of ``np.linalg.norm``'s time where they are few."""
     return np.sqrt(np.einsum("ai,ai->a", vectors, vectors))
 
 

@@ -11,8 +11,7 @@ _COARSER = 4
 
 
 def signed(triangles: np.ndarray, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
-    """Return the signed distance (shape) mm of grid nodes at ``origin`` + spacing * (i, j, k) to triangles (m, 3,
-    3) mm.
+    """Return the signed distance (shape) mm of nodes at ``origin`` + spacing * (i, j, k) to triangles (m, 3, 3) mm.
 
     within : bool (shape), true for nodes inside
     Triangles are cut into pieces of two spacings; a node looks at the triangles of its nearest pieces. Beyond 2 mm a
@@ -58,9 +57,7 @@ def _unsigned(triangles, tree, owner, origin, spacing, shape, bound: float) -> n
 
 
 def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Halve triangles across their longest edge until it is short; returns middles (k, 3) and each one's
-    triangle (k,).
-    """
+    """Halve triangles across their longest edge until it is short; returns middles (k, 3) and triangles (k,)."""
     owner, middles, owners = np.arange(len(triangles)), [], []
     while len(triangles):
         sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)

@@ -52,8 +52,7 @@ class MeshIndenter(Indenter):
     def from_file(
         cls, path: str | os.PathLike, scale: float = 1e-3, up: str = "z", spacing: float = 0.1e-3
     ) -> MeshIndenter:
-        """Load the body in an STL, PLY, OBJ or OFF file; its grid is built once (seconds to a minute) and cached on
-        disk.
+        """Load the body in an STL, PLY, OBJ or OFF file; its grid is built once (up to a minute) and cached on disk.
 
         scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
         spacing : m, of the grid; the body's lowest point, or the middle of its lowest flat, becomes the own origin.

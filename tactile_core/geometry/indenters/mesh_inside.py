@@ -13,8 +13,7 @@ class OverlapError(Exception):
 
 
 def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]) -> np.ndarray:
-    """Mark (shape) bool the grid nodes at ``origin`` + spacing * (i, j, k) inside the mesh of triangles (m, 3, 3), one
-    unit.
+    """Mark (shape) bool the nodes at ``origin`` + spacing * (i, j, k) inside the mesh of triangles (m, 3, 3), one unit.
 
     Along each column the crossings must alternate between entering and leaving. Raises OverlapError where they do not;
     where a column grazes an edge, others beside it are tried first.

@@ -46,9 +46,7 @@ def _near_pairs(mesh: Any):  # noqa: ANN202 (batches of two arrays of face numbe
 
 
 def _goes_through(start: np.ndarray, end: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Mark the segments (n, 3), (n, 3) that pass strictly through the inside of triangles (n, 3, 3), by signed
-    volumes.
-    """
+    """Mark the segments (n, 3), (n, 3) that pass strictly through triangles (n, 3, 3), by signed volumes."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     longest = np.max([np.linalg.norm(v, axis=1) for v in (end - start, b - a, c - b, a - c)], axis=0)
     least = _FLAT * longest**3

@@ -70,9 +70,7 @@ class Pose:
 
 
 def tangents(outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the unit tangents (..., 3) of a surface with unit normals ``outward`` (..., 3): along +x of the finger,
-    and to its side (on the pad toward -z).
-    """
+    """Return the unit tangents (..., 3) of a surface with normals (..., 3): along +x, and aside (pad: toward -z)."""
     along = np.array([1.0, 0.0, 0.0]) - outward[..., :1] * outward
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     return along, np.cross(along, outward)

@@ -50,9 +50,7 @@ class SplineGrid:
         return np.where(beyond == 0, inner, beyond / np.where(away > 0, away, 1)[:, None])
 
     def _split(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Nearest place (n, 3) in the box of definition, in spacings; vector (n, 3) m and distance (n,) m from
-        there.
-        """
+        """Nearest place (n, 3) in the box, in spacings; from there vector (n, 3) m and distance (n,) m."""
         place = (points - self.origin) / self.spacing
         known = np.clip(place, 1, np.array(self.coefficients.shape) - 2)
         beyond = (place - known) * self.spacing

@@ -9,9 +9,7 @@ from ...files.compiled import Loop
 
 @Loop
 def spline_sums(coefficients, place, cell, weights, orders):  # noqa: ANN001, ANN201
-    """Sum the spline's derivatives (n, orders, orders, orders) at places in cells (n, 3); weights : (n, 3, orders,
-    4) by axis.
-    """
+    """Sum the spline's derivatives (n, orders, orders, orders) in cells (n, 3); weights : (n, 3, orders, 4) by axis."""
     sums = np.zeros((len(place), orders, orders, orders))
     along, flat = np.zeros(3), np.zeros((3, 3))
     for p in range(len(place)):

@@ -192,9 +192,7 @@ def _start(wanted: QueueFile, options: dict[str, Any]) -> Any:
 
 
 def wait() -> float:
-    """Return how many seconds to wait for a loop or a scheduler;
-    DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s asks for more.
-    """
+    """Return how long to wait for loop or scheduler, s; DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s sets it."""
     import dask
     import distributed  # noqa: F401 - brings its settings
     from dask.utils import parse_timedelta

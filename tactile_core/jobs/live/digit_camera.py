@@ -55,8 +55,7 @@ class DigitCamera:
             self._ended.wait(self._pause)
 
     def picture(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the newest picture, as (H, W, 3) uint8 of that shape; black where none has come yet,
-        or none comes any more.
+        """Return the newest picture, as (H, W, 3) uint8 of that shape; black before the first and after the last.
 
         What is wider than high is turned a quarter to the left, as digit-interface turns it.
         """

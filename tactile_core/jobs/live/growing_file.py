@@ -34,8 +34,7 @@ class Growing:
         self._file = _identity(self._path.stat())
 
     def poll(self) -> Recording | None:
-        """Return the rows that came since the last call; None where none did, or where too many are bad and all are
-        skipped.
+        """Return the rows that came since the last call; None where none did, or where too many are bad.
 
         Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row that
         names another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN.
@@ -85,9 +84,7 @@ def _identity(found: os.stat_result) -> tuple[int, int]:
 
 
 def newest(recording: Recording) -> np.ndarray:
-    """Return the counts (19,) of the last row that is whole; its NaN cells filled from the rows before,
-    0 where there are none.
-    """
+    """Return the counts (19,) of the last whole row; NaN cells are filled from rows before, with 0 where none are."""
     found = np.full(recording.electrodes.shape[1], np.nan)
     for row in recording.electrodes[::-1]:
         found = np.where(np.isfinite(found), found, row)

@@ -73,9 +73,7 @@ class View:
         return self._signals.found
 
     def show(self, rows: Recording, came: float) -> Shown | None:
-        """Translate and draw the last of some rows that came at `came` (time.perf_counter);
-        None before rest is known.
-        """
+        """Translate and draw the last row that came at `came` (time.perf_counter); None before rest is known."""
         began = time.thread_time()
         self.frames += len(rows)
         if not self._signals.learn(rows.electrodes, rows.pdc, rows.about.get("polarity", AUTO)):

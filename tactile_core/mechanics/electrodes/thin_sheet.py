@@ -44,9 +44,7 @@ class ThinSheet:
         return self.patches[1:].T @ answer
 
     def matrix(self, film: np.ndarray, conductivity: float = 1.0):  # noqa: ANN201 (scipy is imported where it is needed)
-        """Assemble the currents out of the nodes per potential, S, sparse (n_fine, n_fine):
-        sum of sigma h grad N_i . grad N_j.
-        """
+        """Assemble the currents per potential, sparse (n_fine, n_fine) S: sum of sigma h grad N_i . grad N_j."""
         if not (film > 0).all():  # false for NaN too
             raise ValueError("a film without thickness does not conduct")
         thickness = (self.prolong @ film)[self.faces].mean(1)  # exact for a film that is linear in each triangle
@@ -59,8 +57,7 @@ class ThinSheet:
         return (self.prolong @ film) @ self.patches
 
     def unresolved(self, refine: int) -> np.ndarray:
-        """Return the error of each electrode's own resistance on this grid against a refined one,
-        (k,) ohm for 1 m and 1 S/m.
+        """Return each electrode's error of resistance on this grid against a refined one, (k,) ohm at 1 m and 1 S/m.
 
         Near an electrode the current spreads in a film of nearly one thickness h, so the miss is this over sigma h.
         """
@@ -85,8 +82,7 @@ class ThinSheet:
 
 
 def resistances(potentials: np.ndarray, sensing: int) -> np.ndarray:
-    """Return the resistance (sensing,) ohm between each of the first ``sensing`` electrodes and all others,
-    joined by a wire.
+    """Return the resistances (sensing,) ohm between each of the first electrodes and all others, joined by a wire.
 
     potentials : (k, k), of ``ThinSheet.potentials``. The currents of the joined ones share out so that they are at one
     potential: a bordered system with one unknown a joined electrode and their potential.

@@ -32,9 +32,7 @@ class Candidates:
 
     @property
     def faced(self) -> np.ndarray:
-        """Mark (k,) bool the nodes that need no further check: they are doubled, or ``split`` found only one
-        face each time.
-        """
+        """Mark (k,) bool the nodes that need no further check: doubled ones, or ``split`` found one face alone."""
         return self.looks >= _MOST_LOOKS
 
     def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:

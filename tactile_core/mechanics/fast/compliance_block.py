@@ -45,15 +45,12 @@ class ComplianceBlock:
             self.matrix[size:, size:] = compliance.inner_watch[np.ix_(inner, inner)]
 
     def respond(self, force: np.ndarray, pressing_core: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the displacement (k, 3) m and motion of the inner points (c,) m, away from the core,
-        under forces (k, 3), (c,) N."""
+        """Return displacement (k, 3) m and motion (c,) m of inner points off the core, by forces (k, 3), (c,) N."""
         answer = np.concatenate([force.ravel(), pressing_core]).astype(np.float32) @ self.matrix
         return answer[: 3 * self.k].reshape(self.k, 3).astype(float), answer[3 * self.k :].astype(float)
 
     def along(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-        """Return the compliance (k, k) m/N between forces along ``right`` (k,
-        3) and displacement along ``left`` (k, 3).
-        """
+        """Return the compliance (k, k) m/N from forces along ``right`` (k, 3) to displacement along ``left``."""
         size = 3 * self.k
         return _contract(self.matrix[:size, :size], left.astype(np.float32), right.astype(np.float32)).astype(float)
 
@@ -86,9 +83,7 @@ class ComplianceBlock:
 
 
 def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Contract sum over axes i, j of source[a, i] block[a i, b j] target[b, j]; sums over strides are faster
-    than einsum here.
-    """
+    """Contract sum over i, j of source[a, i] block[a i, b j] target[b, j]; by strides, faster than einsum here."""
     half = block[:, 0::3] * target[:, 0]
     half += block[:, 1::3] * target[:, 1]
     half += block[:, 2::3] * target[:, 2]

@@ -32,8 +32,7 @@ class ComplianceRows:
         return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return the displacement (n, 3) m of the near nodes under forces (k, 3) N at sorted,
-        single near ones and (c,) N at sensing points."""
+        """Return near nodes' displacements (n, 3) m by forces (k, 3) N at sorted ones, (c,) N at sensing points."""
         moved = np.zeros(3 * len(self.near), np.float32)
         if len(nodes):
             moved += force.ravel().astype(np.float32) @ self._rows(nodes)

@@ -72,9 +72,7 @@ class ContactProblem:
         return self._walk(self.pose.moved(depth), None, start)
 
     def at_force(self, axial_force: float, start: Contact) -> Contact:
-        """Solve the contact whose force along the motion is ``axial_force`` N,
-        in or out from where ``start`` stands.
-        """
+        """Solve the contact whose force along the motion is ``axial_force`` N, in or out from where it stands."""
         return self._walk(start.pose, axial_force, start)
 
     def at_pose(self, pose: Pose, start: Contact | None = None, axial_force: float | None = None) -> Contact:
@@ -222,9 +220,7 @@ class ContactProblem:
         return Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
 
     def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
-        """Sticking points (k, 3) m of nodes (k,), in the indenter's frame: their old ones, or where they meet
-        the indenter.
-        """
+        """Sticking points (k, 3) m of nodes (k,) in the indenter's frame: the old ones, or where they first meet it."""
         points = self._rest[nodes] + moved[np.searchsorted(self.near, nodes)]
         spots, new = before.pose.to_own(points), ~_among(nodes, before.nodes)
         if pose is not before.pose:

@@ -93,9 +93,7 @@ class Learned:
 
 @dataclasses.dataclass(frozen=True)
 class Correction:
-    """Correction of one sensor: ``still`` without friction, ``rubbing`` with the coefficient of 0.78,
-    interpolated between.
-    """
+    """Correction of one sensor: ``still`` without friction, ``rubbing`` with a coefficient of 0.78; else between."""
 
     still: Learned
     rubbing: Learned

@@ -184,9 +184,7 @@ class Friction:
         return _Guess(force, core, guess.active, guess.slips, guess.shift + step)
 
     def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap, beyond):  # noqa: ANN001, ANN202
-        """Update which points (k + c,) touch and which nodes (k,) slip after a step; also returns whether
-        either changed.
-        """
+        """Update which points (k + c,) touch and which nodes (k,) slip; returns true if either changed."""
         k = len(gap)
         pressing = dot(guess.force, seen.normal)
         opening = np.concatenate([gap, core_gap])

@@ -56,9 +56,7 @@ def reduce_to_law(force, core, active, slips, normal, friction, lean):  # noqa: 
 
 @Loop
 def linearise(moved, place, off, gap, normal, moves, slip, gap_then):  # noqa: ANN001, ANN201
-    """Compute the motion from the place (k, 3), slip from the spots (k,
-    3) and gaps (k,) m that the moved nodes then have.
-    """
+    """Compute motion from the place (k, 3), slip from the spots (k, 3) and gaps (k,) m of the moved nodes."""
     for a in range(place.shape[0]):
         onto, along = 0.0, 0.0
         for i in range(3):
@@ -207,9 +205,7 @@ def advance(  # noqa: ANN201
     force, core, answer, step, stuck, core_at, slipping, normal, lean, across, pressing, curved, bend, friction, least,  # noqa: ANN001
     largest_turn, largest_tilt,  # noqa: ANN001
 ):  # fmt: skip
-    """Compute forces (k, 3), (c,) N after a Newton step; answer : (j, 2), its solution,
-    at rest and a metre of ``step``.
-    """
+    """Compute forces (k, 3), (c,) N after a Newton step; answer : (j, 2), for rest and for a metre of ``step``."""
     t, d, s = len(stuck), len(core_at), len(slipping)
     n = 3 * t + d
     new, new_core = force.copy(), core.copy()

@@ -280,7 +280,6 @@ class Frictionless:
 
 
 def _stiffness(mode: np.ndarray) -> np.ndarray:
-    """1 - mode, by which Newton's step divides; beyond 1 a mode runs away from its equilibrium, and the step goes
-    that way."""
+    """1 - mode, Newton's divisor; a mode above 1 runs away from equilibrium, and the step goes that way."""
     away = np.minimum(mode - 1, _SLOPE_STIFFNESS)
     return np.maximum(np.where(mode < 1, 1 - mode, away), _LEAST_STIFFNESS)

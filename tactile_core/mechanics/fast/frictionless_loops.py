@@ -31,8 +31,10 @@ def normal_compliance(matrix, normal, c, ridge):  # noqa: ANN001, ANN201
 
 @Loop
 def tangent_response(matrix, k, nodes, tangent, normal, touching, core):  # noqa: ANN001, ANN201
-    """Compute the motion under unit forces along weighted tangents (q, 3) at ``nodes`` (q,): along them (q, q), and of
-    the gaps (q, t + d) of the touching nodes (t,) and the points (d,) that press on the core.
+    """Compute what unit forces along weighted tangents (q, 3) at ``nodes`` (q,) move.
+
+    Returns the motion along them (q, q), and of the gaps (q, t + d) of the touching nodes (t,) and of the points
+    (d,) that press on the core.
     """
     q, t, d = len(nodes), len(touching), len(core)
     among, onto_gaps = np.empty((q, q)), np.empty((q, t + d))

@@ -13,8 +13,7 @@ from .compliance_rows import ComplianceRows
 
 
 class InterpolatedPoints(NamedTuple):
-    """Points of the surface's cubic interpolation. nodes, weights : (v, 16), touchable nodes whose weighted sums they
-    are."""
+    """Points of the surface's cubic interpolation; nodes, weights : (v, 16), of the sums of nodes that they are."""
 
     nodes: np.ndarray
     weights: np.ndarray
@@ -52,9 +51,7 @@ class SpringRows:
         self._weights = np.concatenate([_alone(np.ones(len(nodes))), points.weights[number]])
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among sorted numbers (k,), all of them near ones,
-        with their springs.
-        """
+        """Return the compliance (3 k, 3 k) float32 m/N among sorted, near numbers (k,), with their springs."""
         used, sums = self._sums(numbers)
         among = self._rows.block(used)
         block = np.empty((3 * len(numbers), 3 * len(numbers)), np.float32)
@@ -73,16 +70,12 @@ class SpringRows:
         return (sums @ felt.reshape(len(used), -1)).reshape(3 * len(numbers), len(inner))
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return the displacement (n, 3) m of the surface at the near numbers;
-        forces as ``NearRows.moved`` takes them.
-        """
+        """Return the surface's displacement (n, 3) m at the near numbers; forces as in ``NearRows.moved``."""
         moved = self._rows.moved(nodes, force, inner, inner_force)
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sorted nodes (j,) that carry forces (k, 3) N at sorted, single numbers (k,),
-        and theirs (j, 3) N.
-        """
+        """Return sorted nodes (j,) and their forces (j, 3) N, from forces (k, 3) N at sorted, single numbers (k,)."""
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
         np.add.at(loads, self._nodes[at], self._weights[at][:, :, None] * force[:, None])

@@ -18,8 +18,7 @@ class MirrorSymmetry:
         self.sign = np.tile([1.0, 1.0, -1.0], len(half)).astype(np.float32)
 
     def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Return the motion (w, 3 n) of all nodes from the halves' (3 k, v): load i is load ``column[i]``,
-        its image for sign -1."""
+        """Return the motion (w, 3 n) from the halves' (3 k, v): load i is ``column[i]``, mirrored for sign -1."""
         even, odd = even.T[column], odd.T[column] * sign[:, None]
         answer = np.empty((len(column), 3 * len(self.image)))
         answer[:, axes_of(self.image[self.half])] = (even - odd) * self.sign
@@ -27,9 +26,7 @@ class MirrorSymmetry:
         return answer
 
     def forces(self, even: np.ndarray, odd: np.ndarray, answered: np.ndarray) -> np.ndarray:
-        """Return the motion (3 r, 3 n) float32 of all nodes under unit forces on ``answered``
-        (r,) from the halves' (3 k, 3 k).
-        """
+        """Return the motion (3 r, 3 n) float32 under unit forces on ``answered`` (r,), from the halves' (3 k, 3 k)."""
         here, there = axes_of(self.half), axes_of(self.image[self.half])
         move = np.empty((3 * len(answered), 3 * len(self.image)), np.float32)
         for i, node in enumerate(np.searchsorted(self.half, answered)):

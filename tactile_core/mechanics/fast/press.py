@@ -69,9 +69,7 @@ class CorrectedPress:
         return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
 
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
-        """Solve the contact whose corrected force along the motion is ``force`` N; None beyond the limit,
-        or if not found.
-        """
+        """Solve the contact whose corrected force along the motion is ``force`` N; None beyond the limit or if lost."""
         there = pose or self.pose
         fall = self._surface_drop(there, touches=touches)
         try:
@@ -80,8 +78,7 @@ class CorrectedPress:
             return None
 
     def _guarded_if_needed(self, solve: Callable[[], FastContact | None]) -> FastContact | None:
-        """Solve; where frictionless nodes do not hold the indenter, solve again from the start with points between
-        them, kept from then on.
+        """Solve, again with points between nodes where the frictionless nodes alone do not hold the indenter.
 
         between them, solved from the start, and from then on.
         """

@@ -14,8 +14,7 @@ _SPOT_STEPS = 20  # where a node sticks matters, so its spot is found to well be
 
 
 def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> np.ndarray:
-    """Return the displacements (n, 3) m along the motion that bring points (n,
-    3) m to the front of an indenter standing at ``pose``.
+    """Return the displacements (n, 3) m along the motion that bring points (n, 3) m to an indenter's front at ``pose``.
 
     far : m, how deep points may lie in the indenter. Points that lie in front of it already stay.
     """
@@ -32,8 +31,7 @@ def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
 
 
 def first_contact(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Return the points (n, 3) where nodes that move straight from ``first`` to ``last`` (n,
-    3) m first meet an indenter, in its frame.
+    """Return where (n, 3), in its frame, nodes that move from ``first`` to ``last`` (n, 3) m first meet an indenter.
 
     Points that it does not meet are given as they stand at the end.
     """

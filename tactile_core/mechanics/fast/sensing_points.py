@@ -69,9 +69,7 @@ class ElectrodeFeet:
 
 @functools.cache
 def electrode_feet(sensor: str = "biotac") -> ElectrodeFeet:
-    """The nearest point of the resting inner skin to each electrode; the BioTac's gaps are 0.49 to 1.76 mm (published:
-    0.51 to 1.76).
-    """
+    """Nearest point of the resting inner skin to each electrode; gaps are 0.49 to 1.76 mm (published: 0.51 to 1.76)."""
     positions = sensors.electrodes(sensor)
     face, weights, place = unrolling.closest_on_triangles(sensors.skin_of(sensor).skin_surface("inner"), positions)
     gap = np.linalg.norm(place - positions, axis=1)
@@ -79,8 +77,7 @@ def electrode_feet(sensor: str = "biotac") -> ElectrodeFeet:
 
 
 def _over_core(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes under the pad that face the core: node, the core's normal there (n, 3), gap (n,) m; even in
-    z."""
+    """Free inner nodes under the pad that face the core: node, its normal there (n, 3), gap (n,) m; even in z."""
     nodes = facing_nodes(sensor, mesh)
     mirrored, right = _right_images(sensor, nodes)
     gap, outward = Core(sensor).distance(_inner(sensor)[right])
@@ -88,8 +85,7 @@ def _over_core(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def _beside_core(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes that never meet the core: node, direction from its nearest point (n, 3), gap (n,) m; even in
-    z."""
+    """Free inner nodes that never meet the core: node, direction from its nearest point (n, 3), gap (n,) m."""
     nodes = _beside(sensor, mesh)
     mirrored, right = _right_images(sensor, nodes)
     outward, gap = above_core(sensor)
@@ -124,9 +120,7 @@ def facing_nodes(sensor: str, mesh: HexMesh) -> np.ndarray:
 
 
 def images(sensor: str, mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Index, for each of ``count`` watched points, of the one whose mirror image it is, else itself; true for
-    images.
-    """
+    """Index, for each of ``count`` sensing points, of its mirror image, else itself; and true for the images."""
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count
     for nodes in (_beside(sensor, mesh), facing_nodes(sensor, mesh)) if count else ():

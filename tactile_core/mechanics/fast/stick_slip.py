@@ -53,9 +53,7 @@ class Slipping:
         return self.friction * np.maximum(self.pressing, LEAST_FORCE)
 
     def turning(self) -> np.ndarray:
-        """Return the change of the forces of the curved nodes (c, 3, 3) N/m with their motion,
-        at the same normal forces.
-        """
+        """Return the change (c, 3, 3) N/m of curved nodes' forces with their motion, at the same normal forces."""
         at = self.curved
         follows = np.eye(3) - self.friction * self.normal[at][:, :, None] * self.lean[at][:, None, :]
         return self.pressing[at, None, None] * (follows @ self.bend)
@@ -109,17 +107,14 @@ class Step:
         self._answer = solved(matrix, right, symmetric=not s)
 
     def step_for(self, missing: float) -> float:
-        """Return the distance, m, that the indenter moves for ``missing`` N more along its motion.
-        Raises UnsolvedError.
-        """
+        """Return how far, m, the indenter moves for ``missing`` N more along its motion. Raises UnsolvedError."""
         carried, per_step = self._carry @ self._answer
         if not per_step > 0:
             raise UnsolvedError("no node can carry the force")
         return float((missing - carried) / per_step)
 
     def change(self, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the changes of the forces of sticking nodes (t, 3) N and of the core (d,) N
-        as the indenter moves by ``step`` m, and new forces (s, 3) N of slipping nodes."""
+        """Return force changes of sticking nodes (t, 3) N and core (d,) N, and slipping nodes' new forces (s, 3) N."""
         found = self._answer[:, 0] + step * self._answer[:, 1]
         slipping = self._slipping
         s, unknown = len(slipping.at), found[self._whole :]
@@ -158,9 +153,7 @@ class Step:
         return among[:total], reduced, carry
 
     def _add_motion(self, among: np.ndarray, on_slips: np.ndarray) -> None:
-        """Add the effect of the motion of curved nodes, by the turn of their forces, as the last columns of
-        ``among``.
-        """
+        """Add what the motion of curved nodes does by turning their forces, as the last columns of ``among``."""
         at, turning = self._slipping.curved, self._slipping.turning()
         felt = weighted(on_slips[:, :, at, None], turning.swapaxes(0, 1)[:, None])
         among[: on_slips.shape[1], -3 * len(at) :].reshape(-1, len(at), 3)[:] = felt

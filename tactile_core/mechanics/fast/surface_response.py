@@ -12,9 +12,7 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 
 def runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """Find stretches of consecutive numbers in sorted ``indices``:
-    (start, stop) there, and first and last + 1 number.
-    """
+    """Find stretches of consecutive numbers in sorted ``indices``: (start, stop) there, and the numbers' own."""
     cuts = np.flatnonzero(np.diff(indices) != 1) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
     return list(
@@ -25,8 +23,7 @@ def runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
 def displacement(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
 ) -> np.ndarray:
-    """Return the displacement (n, 3) float32, m, of the surface under forces (k, 3) N at sorted,
-    single touchable ``nodes`` and (c,) N at sensing points."""
+    """Return the surface's motion (n, 3) float32 m by forces (k, 3) N at sorted ``nodes``, (c,) at sensing points."""
     rows, mirror, image = compliance.answers
     row, mirrored = rows[nodes], mirror[nodes]
     if available():

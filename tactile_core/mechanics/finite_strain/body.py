@@ -70,9 +70,7 @@ class Body:
         return faces[np.isin(faces, near).all(axis=1)]
 
     def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
-        """Penetration, m, of the surface into the indenter between nodes; raises PenetrationError where it does not
-        follow it.
-        """
+        """Return the surface's penetration, m, between nodes. Raises PenetrationError where it strays too far."""
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)

@@ -149,8 +149,7 @@ class ContactSet:
         return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips
 
     def slide_share(self, move: np.ndarray, force: float, stiffness: float) -> float:
-        """Return the share of a step at which friction balances the rest along it;
-        1 where the whole step is good enough.
+        """Return the share of a step at which friction balances the rest along it; 1 where the whole step will do.
 
         move : (k, 3) m, of the nodes, in the frames of ``begin``; force : N m, of all other forces times the step, at
         its start; stiffness : N m, what the whole step adds to them and to friction as linearised by ``gripping``.
@@ -187,8 +186,7 @@ class ContactSet:
         )
 
     def gripping(self, along: float) -> np.ndarray:
-        """Return the stiffness (k, 3, 3) N/m of friction: all of the springs that hold,
-        across their pull of those that slip.
+        """Return the stiffness (k, 3, 3) N/m of friction: all of holding springs, slipping ones across their pull.
 
         along : 0 for Newton's method; more of the secant's stiffness along the pull keeps nodes from swinging to and
         fro between stick and slip.
@@ -206,9 +204,7 @@ class ContactSet:
         return self._gripping
 
     def prescribe(self, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return held degrees of freedom and their steps, both (k, 3) in the frames of ``begin``;
-        fixed ones do not move.
-        """
+        """Return held degrees of freedom and their steps, both (k, 3) in ``begin``'s frames; fixed ones stay."""
         held, step = fixed.copy(), np.zeros(fixed.shape)
         if len(fixed):
             held[:, 0] = True

@@ -185,9 +185,7 @@ class FiniteStrainContact:
         raise _NotConvergedError
 
     def _share(self, state: State, step: np.ndarray) -> float:
-        """Share of a step that leaves every Gauss point a good part of its volume; FloatingPointError where
-        none does.
-        """
+        """Share of a step that leaves every Gauss point a good part of its volume; else FloatingPointError."""
         before = self.solid.deformation(state.displacement)[1]
         for share in _SHARES:
             if (self.solid.deformation(state.displacement + share * step)[1] > _KEPT_VOLUME * before).all():
@@ -223,8 +221,11 @@ class FiniteStrainContact:
     def _newton(
         self, state: State, outer: ContactSet, inner: ContactSet, fluid: float, push: Push, unrest: float
     ) -> tuple[np.ndarray, float, float, np.ndarray, float]:
-        """Steps of displacement (n, 3), the fluid's pressure and the cells' (n_cells, 4); the imbalance before them,
-        and the share of the step that friction allows."""
+        """Solve for a Newton step.
+
+        Returns the steps of displacement (n, 3), of the fluid's pressure and the cells' (n_cells, 4), the imbalance
+        before them, and the share of the step that friction allows.
+        """
         lines = self.solid.linearise(state)
         largest = np.abs(lines.internal_force(condensed=False)).max()
         pattern, at = self.solid.pattern, self._at(state)

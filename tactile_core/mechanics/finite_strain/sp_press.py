@@ -40,8 +40,7 @@ class Plate(Indenter):
 
 @dataclasses.dataclass(frozen=True)
 class Pressed:
-    """Step of a press. advance : m, of the plate past the place where it first touches the resting skin (negative:
-        before).
+    """Step of a press. advance : m, of the plate past first touch of the resting skin (negative: before it).
 
     skin : (k, 3) m, nodes of the whole deformed outer skin; force : N, normal, ``FORCE_SCALE`` in it
     pressure : Pa, of the fluid, likewise; volume : m3, of the fluid; core_gap : m, least between inner skin and core

@@ -68,8 +68,7 @@ class BlockPattern:
         return rows[keep], columns[keep], keep, starts
 
     def upper(self, blocks: np.ndarray, held: np.ndarray):  # noqa: ANN201
-        """Assemble the upper triangle of the free degrees of freedom, scipy CSR;
-        rows and columns of ``held`` are the identity's.
+        """Assemble the free degrees of freedom's upper triangle, scipy CSR, with the identity's rows for ``held`` ones.
 
         held : (n_free,) bool. The pattern is the same every time: a solver may keep its analysis.
         """

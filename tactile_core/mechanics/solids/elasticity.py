@@ -65,9 +65,7 @@ def cell_stiffness(corners: np.ndarray, material: Material) -> np.ndarray:
 
 
 def assemble(mesh: HexMesh, material: Material):  # noqa: ANN201 (scipy is imported only where it is needed)
-    """Assemble the global stiffness, scipy CSC (3 n, 3 n), N/m, degree of freedom = 3 node + axis,
-    nothing clamped yet.
-    """
+    """Assemble the global stiffness, scipy CSC (3 n, 3 n) N/m, degree of freedom 3 node + axis, nothing clamped."""
     import scipy.sparse
 
     local = cell_stiffness(mesh.nodes[mesh.cells], material)

@@ -33,9 +33,7 @@ class FluidCavity:
         return gradient.ravel()
 
     def hessian(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the Hessian d2V / d(node)2: node pairs (k,), (k,) and the 3 x 3 blocks (k, 3, 3), m, of each; repeated
-        pairs add up.
-        """
+        """Return d2V / d(node)2: pairs of nodes (k,), (k,) and blocks (k, 3, 3) m; repeated pairs add up."""
         arms = self._arms(nodes[self.faces])
         rows, columns = np.repeat(self.faces, 9, axis=1).ravel(), np.tile(self.faces, (1, 9)).ravel()
         return rows, columns, -6 * _cross_matrix(arms.reshape(-1, 3))

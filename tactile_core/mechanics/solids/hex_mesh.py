@@ -110,9 +110,7 @@ def gel_mesh(sensor: str = "digit") -> HexMesh:
 
 @functools.cache
 def skin_mesh(sensor: str = "biotac") -> HexMesh:
-    """A sensor's skin on its lattice, clamped where its inner side lies on or in the rigid core; the BioTac's has
-    18,200 nodes.
-    """
+    """A sensor's skin on its lattice, clamped where its inner side meets the core; the BioTac's has 18,200 nodes."""
     skin = sensors.skin_of(sensor)
     return skin_solid(skin.skin_grid("outer"), skin.skin_grid("inner"), glued_skin(sensor))
 

@@ -17,14 +17,10 @@ class Law(Protocol):
     bulk: float  # Pa
 
     def energy(self, f: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """Return the isochoric energy density (...,) J/m3 of deformation gradients f (..., 3,
-        3) with determinants j (...,).
-        """
+        """Return the isochoric energy density (...,) J/m3 of gradients f (..., 3, 3) with determinants j (...,)."""
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, p J F^-T included, and d(stress)/dF (..., 3, 3,
-        3, 3).
-        """
+        """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, with p J F^-T, and its derivative by F."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,9 +35,7 @@ class NeoHookean:
 
     @classmethod
     def from_material(cls, material: Material) -> NeoHookean:
-        """Return the material with mu = E / (2 (1 + nu)), kappa = E / (3 (1 - 2 nu)): the linear one at small
-        strain.
-        """
+        """Return mu = E / (2 (1 + nu)) and kappa = E / (3 (1 - 2 nu)), linear elasticity at small strain."""
         shear = material.youngs / (2 * (1 + material.poisson))
         return cls(shear, material.youngs / (3 * (1 - 2 * material.poisson)))
 

@@ -23,8 +23,7 @@ _BATCH = 128  # right-hand sides cholespy takes at once
 
 
 def factor(matrix) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy sparse, imported lazily)
-    """Return a function that solves ``matrix @ x = b`` for b (n, k), float64. ``matrix``:
-    symmetric positive definite CSC.
+    """Return a function that solves ``matrix @ x = b``, b (n, k) float64, for a symmetric positive definite CSC matrix.
 
     Raises NotPositiveDefiniteError where cholespy finds that it is not; SuperLU does not look.
     """

@@ -57,9 +57,7 @@ def tried_apart(
     quick: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Evaluate each press with a calibration fitted on the others, by thirds; none for a single press.
-    ball_diameter : m.
-    """
+    """Evaluate each press with a calibration of the others, by thirds; none for a single press. ball_diameter : m."""
     names = [press.name for press in photographs.presses]
     folds = min(FOLDS, len(names))
     tried = []

@@ -18,9 +18,7 @@ class Problem(Protocol):
         """Return half the sum of squares at x; infinity where x is meaningless."""
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return Gauss-Newton's matrix (n, n) and the gradient (n,) of the cost,
-        at the x of the last cost that was taken.
-        """
+        """Return Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at the last accepted x."""
 
 
 def minimise(

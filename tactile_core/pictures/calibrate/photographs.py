@@ -124,8 +124,7 @@ def turned(press: Press, rows: bool, columns: bool) -> Press:
 
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
-    """Estimate the untouched gel (H, W, 3) float32 out of pictures (n, H, W, 3),
-    where presses cover less than half of them.
+    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) that presses cover by less than half.
 
     The median at each pixel of those that differ from the median of all by CHANGE at most: presses that cover a third
     of the pictures pull the plain median by up to that much.
@@ -137,8 +136,7 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
-    """Measure the standard deviation (3,) of the camera's noise, grey levels: of what changes outside the presses,
-    less its means.
+    """Measure the standard deviation (3,) of the camera's noise, grey levels, outside the presses and less its means.
 
     Means over NOISE_WINDOW hold drift of the light. A photographed background adds noise of its own.
     """
@@ -155,9 +153,7 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """Return the mask (H, W) bool where some channel differs by more than 18 levels within 9 px;
-    from the photograph alone.
-    """
+    """Return the mask (H, W) bool of changes over 18 levels in a channel within 9 px; from the photograph alone."""
     changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
     return dilated(changed, DILATION)
 

@@ -50,9 +50,7 @@ class Sight:
         self.counts = dilated(self.region, MARGIN) & ~spoilt
 
     def guesses(self, bench: BallPictures) -> list[tuple[float, float]]:
-        """Return the right and down, m, of the change's middle, and of where it is largest over about a
-        ball's print.
-        """
+        """Return right and down, m, of the change's middle, and of where it is largest over about a ball's print."""
         weight = np.abs(self.change).max(-1) * self.region
         width = round(PRINT / bench.camera.pixel_size[0]) | 1
         largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)
@@ -64,8 +62,7 @@ class Sight:
 def fit_ball(
     bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, opaque: bool = True
 ) -> tuple[Ball, float]:
-    """Fit the ball whose picture is nearest the photograph's; returns it and the mean squared residual, grey levels
-    squared.
+    """Fit the ball whose picture is nearest the photograph's; returns it and the mean squared residual, levels squared.
 
     bench : in working pixels; radius : m, the ball's, or where its search starts
     opaque : whether no light comes through the coating; else it is fitted as well (``contact_light``)
@@ -97,9 +94,7 @@ class _PressProblem:
         return missed.ravel()
 
     def cost(self, x: np.ndarray) -> float:
-        """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off the picture
-        and the table.
-        """
+        """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off picture and table."""
         radius = x[3] if len(x) > 3 else self._radius
         inside = np.abs(x[0]) < -2 * self._bench.right[0, 0] and np.abs(x[1]) < -2 * self._bench.down[0, 0]
         if not (inside and SHALLOWEST <= x[2] <= DEEPEST * radius / 3e-3 and SMALLEST_BALL <= radius <= LARGEST_BALL):

@@ -43,9 +43,7 @@ def rows_by_press(tried: list[Evaluation]) -> list[Row]:
 
 
 def write_sheet(path: str | os.PathLike, tried: list[Evaluation]) -> None:
-    """Write the photograph, render and difference (twice, on grey) of each press as a PNG;
-    equal input makes equal bytes.
-    """
+    """Write each press's photograph, render and difference (twice, on grey) as a PNG; equal input, equal bytes."""
     from PIL import Image, ImageDraw
 
     shown = tried[:LARGEST_SHEET]

@@ -104,9 +104,7 @@ class UnitResiduals:
         return np.array([np.square(missed).sum() / np.square(seen).sum() for missed, seen in pairs])
 
     def gain_errors(self) -> tuple[float, float, float]:
-        """Return the standard errors of the gain and its two slopes, root mean squares over LEDs,
-        at the last cost's presses.
-        """
+        """Return the standard errors of the gain and its two slopes, rms over LEDs, at the last cost's presses."""
         matrix = np.diag(self._gain_weight)
         for lights in self._last:
             matrix = matrix + lights.terms @ lights.terms.T

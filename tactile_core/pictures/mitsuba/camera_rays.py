@@ -16,8 +16,7 @@ _SINES = np.linspace(0, 0.999, 2000)  # of rays in air, for the table that inver
 
 
 def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the starts and directions (3, n) float32 of rays, right, up, toward the camera, mm,
-    that look at places (n,) m.
+    """Return starts and directions (3, n) float32 of rays, right, up, toward the camera, mm, looking at places (n,) m.
 
     right, down : on the plane of height zero. Rays start under the window. A camera too near for its window to fit in
     has none.

@@ -37,9 +37,7 @@ class Hits:
 
     @classmethod
     def on_map(cls, place: np.ndarray, slopes: tuple[np.ndarray, np.ndarray], camera: Camera) -> Hits:
-        """Make hits on a height map; place : (H, W, 3) m, image frame; slopes : (H, W) each, by
-        ``perspective.slopes``.
-        """
+        """Make hits on a height map; place : (H, W, 3) m, image frame; slopes : (H, W), by ``perspective.slopes``."""
         look_up = map_lookup(place[..., 0], place[..., 1], camera)
         return cls.from_slopes(place, look_up(slopes[0]), look_up(slopes[1]))
 

@@ -46,9 +46,7 @@ class GelMesh:
         return self._plan.reshape(-1, 3).copy()
 
     def normals(self, height: np.ndarray) -> np.ndarray:
-        """Return the unit normals (n, 3) float32 of the vertices, of the map's own slopes; in real,
-        unscaled space alone.
-        """
+        """Return the vertices' unit normals (n, 3) float32, of the map's own slopes; in real, unscaled space alone."""
         right, down = (each[np.ix_(self._rows, self._columns)] for each in slopes(height, self.camera))
         found = np.stack([-right, down, np.ones_like(right)], -1)
         found /= np.linalg.norm(found, axis=-1, keepdims=True)

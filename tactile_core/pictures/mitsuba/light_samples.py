@@ -11,8 +11,7 @@ _GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
 
 
 def light_points(led: Led, count: int) -> np.ndarray:
-    """Return the points (count, 3) m, image frame, round the light's middle,
-    in the plane that faces the picture's middle.
+    """Return points (count, 3) m, image frame, round the light's middle, in the plane that faces the picture's middle.
 
     A ring with the second moments of an even disc, the best of a few points: radius sqrt(1/2).
     """

@@ -27,8 +27,7 @@ class Tracer(Protocol):
         """Give the gel other heights (H, W) m."""
 
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places (H, W, 3) float32 m, image frame, that pixels see, and what they see of points (n, 3) m,
-        1 <= n <= 32.
+        """Return the places (H, W, 3) float32 m that pixels see, and what these see of points (n, 3) m, 1 <= n <= 32.
 
         shift : pixels to the right and down from each pixel's middle
         Returns the places and seen (H, W) uint32, bit k for point k: nothing in the way, and on the gel's front.

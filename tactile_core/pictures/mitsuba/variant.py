@@ -65,9 +65,7 @@ def choose_variant(wanted: str | None = None) -> Choice:
 
 
 def variant_for(preset: str, wanted: str | None = None) -> str:
-    """Return the variant that all workers of a job use, so that their pictures agree; "" for fast ones,
-    which need none.
-    """
+    """Return the variant that all workers of a job use, so that pictures agree; "" for fast ones, which need none."""
     return "" if preset == "fast" else choose_variant(wanted).name
 
 
@@ -91,9 +89,7 @@ def llvm_trouble(library: str) -> str:
 
 
 def _too_old(message: str) -> str:
-    """Describe an LLVM that is too old, from the probe's lines, as "LLVM 19 /usr/lib/libLLVM.so"; a major
-    version of 0 is older than 16.
-    """
+    """Describe an LLVM older than 16, from the probe's lines, as "LLVM 14 /usr/lib/libLLVM.so"; 0 counts as old."""
     for line in message.splitlines():
         word, _, rest = line.partition(" ")
         major, _, file = rest.partition(" ")

@@ -23,15 +23,12 @@ def window_height(camera: Camera) -> float:
 
 
 def air_over_window(camera: Camera, index: float) -> float:
-    """Return the air, m, between window and pinhole, with which it appears at the camera's
-    height on the axis (Snell's law).
-    """
+    """Return the air, m, between window and pinhole that puts it at the camera's height on the axis (Snell's law)."""
     return (camera.apparent_height - window_height(camera)) / index
 
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
-    """Return the apparent height of the pinhole, m above height zero, for pixels that look at that plane a distance,
-    m, off its axis.
+    """Return the pinhole's apparent height, m above height zero, for pixels that look a distance, m, off its axis.
 
     Snell's law through a flat window. A camera too near for its window to fit in keeps its height.
     """

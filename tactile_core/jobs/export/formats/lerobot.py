@@ -45,9 +45,7 @@ PLAIN = {
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write the data set. Needs pyarrow, of the extra [batch]; raises TactileError for one
-    that this numpy does not load.
-    """
+    """Write the data set; needs pyarrow of the extra [batch]. Raises TactileError where numpy does not fit it."""
     try:
         import pyarrow  # noqa: F401
     except ModuleNotFoundError:
