@@ -58,19 +58,11 @@ class HeightMapper:
     """
 
     def __init__(self, surface: Lattice, camera: Camera | None = None) -> None:
-        if surface.window is None:
-            raise TactileError("surface", "no evenly spaced window", "one", "Use sensors.digit_surface()")
         camera = camera or load_calibration().camera
         self.surface, self.camera = surface, camera
+        check_covered(surface, camera)
         rest = surface.grid(surface.rest)[surface.window]
         self._along, self._across = _axis(rest[:, 0, 0]), _axis(rest[0, :, 2])
-        for name, spline, seen in (("x", self._along, camera.gel_x), ("z", self._across, camera.gel_z)):
-            low, high = spline.nodes[0], spline.nodes[-1]
-            if seen.min() < low - BEYOND_WINDOW or seen.max() > high + BEYOND_WINDOW:
-                raise TactileError(
-                    f"camera, {name}", f"picture {seen.min() * 1e3:.2f}..{seen.max() * 1e3:.2f} mm",
-                    f"inside the surface's even window {low * 1e3:.2f}..{high * 1e3:.2f} mm", "Raise its px/mm",
-                )  # fmt: skip
         self._fine_along, self._fine_across = self._along.refined(REFINEMENT), self._across.refined(REFINEMENT)
         fine = self._fine_along.nodes, self._fine_across.nodes
         # [order of the derivative][along x, across z]
@@ -202,6 +194,25 @@ def _say_folded(count: int, places: int) -> None:
         _log.warning("gel surface folds over itself at %d of %d places: height there is a guess", count, places)
     else:
         folded.append(count)
+
+
+def check_covered(surface: Lattice, camera: Camera) -> None:
+    """Raise TactileError for a surface without an evenly spaced window, and for a picture that reaches past it."""
+    if surface.window is None:
+        raise TactileError("surface", "no evenly spaced window", "one", "Use sensors.digit_surface()")
+    rest = surface.grid(surface.rest)[surface.window]
+    across, down = camera.pixel_size
+    for name, nodes, seen, pixel in (
+        ("x", rest[:, 0, 0], camera.gel_x, down),
+        ("z", rest[0, :, 2], camera.gel_z, across),
+    ):
+        low, high = seen.min() - pixel / 2, seen.max() + pixel / 2  # edges, alike at every number of pixels
+        if low < nodes[0] - BEYOND_WINDOW or high > nodes[-1] + BEYOND_WINDOW:
+            raise TactileError(
+                f"camera, {name}", f"picture {low * 1e3:.2f}..{high * 1e3:.2f} mm",
+                f"inside the surface's even window {nodes[0] * 1e3:.2f}..{nodes[-1] * 1e3:.2f} mm",
+                "Raise its px/mm",
+            )  # fmt: skip
 
 
 def _short(matrix: np.ndarray) -> np.ndarray:

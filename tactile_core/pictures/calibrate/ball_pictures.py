@@ -6,10 +6,12 @@ import abc
 
 import numpy as np
 
+from ...sensors import digit_surface
 from ...sensors.calibration import Calibration
 from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of
 from ..coating_spread import CoatingSpread
+from ..height_map import check_covered
 from ..perspective import Perspective
 from ..shading import Lamp, SeenSurface
 from .ball_print import print_on
@@ -18,9 +20,13 @@ WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors d
 
 
 class BallPictures(abc.ABC):
-    """Gel and camera of one calibration under a ball; what makes the light is the subclass's."""
+    """Gel and camera of one calibration under a ball; what makes the light is the subclass's.
+
+    Raises TactileError for a camera that sees past the gel's window.
+    """
 
     def __init__(self, calibration: Calibration) -> None:
+        check_covered(digit_surface(), calibration.camera)
         self.calibration = calibration
         self.camera: Camera = calibration.camera
         x, z = np.meshgrid(self.camera.gel_x, self.camera.gel_z, indexing="ij")

@@ -87,7 +87,7 @@ class UnitResiduals:
             return np.inf
         try:
             bench = self._pictures(self.unit(x))
-        except TactileError:  # an LED over the picture or as high as the camera
+        except TactileError:  # an LED over the picture or as high as the camera, gel that ends in the picture
             return np.inf
         lights = [self._lights(bench, ball, sight) for ball, sight in zip(self.balls(x), self._sights, strict=True)]
         self._bench, self._last, self._balls_now = bench, lights, self.balls(x)

@@ -15,12 +15,24 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.pictures.calibrate.evaluate import FIGURES, evaluate_unit, mean_figures
 from tactile_core.pictures.calibrate.fit import Calibrated, calibrate
+from tactile_core.pictures.calibrate.parameters import NAMES
 from tactile_core.pictures.calibrate.photographs import chosen, read_photographs
+from tactile_core.pictures.calibrate.residuals import UnitResiduals
 from tactile_core.sensors.calibration import Calibration, Response
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
 # Presses that were kept from the fit of the calibration that ships.
 KEPT_APART = ["0003.png", "0018.png", "0033.png", "0036.png", "0039.png"]
+
+
+def test_no_fit_leaves_the_gel_that_pictures_are_drawn_of():
+    """At the working size as at the whole one: a fit that ends at the limit makes a unit that can be rendered."""
+    whole = plain_unit()
+    for unit in (whole, whole.at_size(120, 160)):
+        scale = unit.camera.width / whole.camera.width
+        problem = UnitResiduals(unit, [], BALL, np.arange(len(NAMES)) == 1)
+        assert np.isfinite(problem.cost(np.array([16.8 * scale])))
+        assert problem.cost(np.array([16.4 * scale])) == np.inf
 
 
 def other_unit() -> Calibration:
