@@ -11,18 +11,18 @@ import numpy as np
 
 from ..geometry.lattice import Lattice
 from . import biotac, digit
-from .descriptor import describe
+from .descriptor import describe, of_kind
 from .descriptor_fields import Material
 from .electrodes import Places, places_of
-from .fluid_sensor import FALLS
+from .fluid_sensor import FALLS, Fluid
 from .gel_sensor import Gel
 from .gel_shape import shape_of
 from .skin_shape import skin_of
 
 __all__ = [
     "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PRESSURE_PER_COUNT", "REST_COUNTS",
-    "SAMPLE_RATE", "Lattice", "Material", "biotac_surface", "describe", "digit_surface", "electrodes",
-    "excitation_electrodes", "from_maker", "from_syntouch", "is_gel", "places_of", "sensor_surface", "shape_of",
+    "SAMPLE_RATE", "Lattice", "Material", "biotac_surface", "describe", "digit_surface", "electrode_count",
+    "electrodes", "excitation_electrodes", "from_maker", "from_syntouch", "is_gel", "places_of", "sensor_surface", "shape_of",
     "skin_of", "thickness", "title",
 ]  # fmt: skip
 
@@ -30,7 +30,7 @@ BIOTAC_SKIN, DIGIT_GEL = biotac.DESCRIPTOR.material, digit.DESCRIPTOR.material
 
 _PLACES: Places = places_of("biotac")
 _READOUT = biotac.DESCRIPTOR.readout
-ELECTRODES = len(_PLACES.sensing)
+ELECTRODES = biotac.DESCRIPTOR.electrodes.count
 SAMPLE_RATE = _READOUT.rate  # Hz, one frame of all electrodes
 COUNT_MAX = 2**_READOUT.bits - 1
 # Counts of a typical unit without contact: mean impedance of two real units, made even across the finger
@@ -38,6 +38,11 @@ COUNT_MAX = 2**_READOUT.bits - 1
 REST_COUNTS = _PLACES.rest_counts
 COUNT_SIGN = -1.0 if _READOUT.polarity == FALLS else 1.0  # of a change where the film over an electrode thins
 PRESSURE_PER_COUNT = _READOUT.pressure  # Pa a count of PDC
+
+
+def electrode_count(sensor: str) -> int:
+    """How many electrodes of a fluid sensor are read. Raises TactileError for another kind of sensor."""
+    return of_kind(sensor, Fluid).electrodes.count
 
 
 def electrodes(sensor: str = "biotac") -> np.ndarray:

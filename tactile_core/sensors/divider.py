@@ -28,14 +28,14 @@ def growth(counts: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
     return (COUNT_MAX / now - 1) / (COUNT_MAX / before - 1)
 
 
-def typical(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one at ``REST_COUNTS``.
+def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) -> np.ndarray:
+    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one at counts ``to`` (19,).
 
     A unit at 3,500 counts responds to a contact with four fifths, one at 2,800 with seven fifths of the latter's
     change.
     """
     rest = np.clip(rest, *_RESTS)
-    return reading(growth(rest + change, rest), REST_COUNTS) - REST_COUNTS
+    return reading(growth(rest + change, rest), to) - to
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray) -> np.ndarray:

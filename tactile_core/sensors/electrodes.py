@@ -52,7 +52,11 @@ def places_of(name: str) -> Places:
             path, "there is no such file", f"the places of the electrodes of a {found.title}",
             f"Put {table} ({found.sources[0]}) into the folder {name} of a folder that ${OWN} names",
         )  # fmt: skip
-    return read_places(path)
+    places = read_places(path)
+    if len(places.sensing) != found.electrodes.count:
+        expected = f"the {found.electrodes.count} of the descriptor of {name!r}"
+        raise TactileError(path, f"{len(places.sensing)} electrodes that are read", expected)
+    return places
 
 
 def read_places(path: Path) -> Places:

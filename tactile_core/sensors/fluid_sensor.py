@@ -7,6 +7,7 @@ from pathlib import Path
 
 from .descriptor_fields import MOST_NODES, Material, file_beside, number, one_of
 
+MOST_ELECTRODES = 1000  # of a finger (assumed)
 FALLS, RISES = POLARITIES = ("falls", "rises")
 
 
@@ -85,9 +86,13 @@ class FluidFilm:
 
 @dataclasses.dataclass(frozen=True)
 class Electrodes:
-    """The electrodes on the core. places : table of names, places and counts at rest, see ``electrodes``; radius : m"""
+    """The electrodes on the core. places : table of names, places and counts at rest, see ``electrodes``; radius : m
+
+    count : of those that are read, which signals are as wide as
+    """
 
     places: str = file_beside()
+    count: int = number(above=0, below=MOST_ELECTRODES)
     radius: float = number("mm", above=0)
 
 
