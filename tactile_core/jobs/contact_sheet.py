@@ -12,8 +12,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..files import atomic
+from ..sensors import title
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import Camera
+from ..translation.card_sensors import SOURCE
 from .sheet_figure import FRAMES, LOW_CONFIDENCE, SheetFigure, scale
 
 WARNING_LINES, WARNING_WIDTH = 5, 200
@@ -32,6 +34,7 @@ class Contents:
     force : (k, 3) N; confidence : (k,) 0..1; expected_error_digit : (k,) m, of the largest node
     contact_center : (k, 2) m = (x, z) on the DIGIT, NaN without contact; mount_shift : (2,) m, of a mount in it
     true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
+    source : the sensor that was read, whose skin is drawn
     """
 
     name: str
@@ -51,6 +54,7 @@ class Contents:
     simulated: bool = False
     mount_shift: np.ndarray | float = 0.0
     warnings: Sequence[str] = ()
+    source: str = SOURCE
 
     def __post_init__(self) -> None:
         for what in COLUMNS:
@@ -120,11 +124,12 @@ def _drawn(shown: Contents, camera: Camera) -> SheetFigure:
         figure.pressure(shown.time, shown.pressure, shown.pressure_measured)
     figure.headings(shown.time[shown.frames])
     largest = scale(displacement, truth)
-    label = "BioTac, unrolled\n" + ("translated" if shown.simulated else "displacement")
+    name = title(shown.source)
+    label = f"{name}, unrolled\n" + ("translated" if shown.simulated else "displacement")
     center = None if shown.contact_center is None else shown.contact_center - shown.mount_shift
-    figure.biotac_row(label, displacement, largest, center)
+    figure.skin_row(label, displacement, largest, center, shown.source)
     if truth is not None:
-        figure.biotac_row("BioTac, unrolled\ntrue (simulated)", truth, largest, None)
+        figure.skin_row(f"{name}, unrolled\ntrue (simulated)", truth, largest, None, shown.source)
     figure.digit_row("DIGIT gel\ndisplacement", shown.displacement_digit, shown.contact_center)
     figure.picture_row("DIGIT picture", shown.pictures)
     figure.captions(shown.force, shown.confidence, shown.expected_error_digit)

@@ -8,9 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.stopwatch import Stopwatch
+from ..translation.card_sensors import SOURCE
 from . import results
 from .frame_pass import FramePass, Solver, Tools
 from .frame_range import frames_text, select
@@ -51,13 +54,15 @@ def load_tools(
     answer: Answer | None = None,
     gel: Gel = TRANSLATED,
     target: str | None = None,
+    source: str | None = SOURCE,
 ) -> Tools:
     """Load the weights, shipped or of a folder, and the camera and lights of a DIGIT, the shipped unit's or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
     answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``
     gel : the networks', or the found contact solved on the DIGIT (``solved_gel``)
-    target : the sensor that the weights must translate to; None for whichever they do
+    target : the sensor that the weights must translate to; None for the DIGIT
+    source : the sensor whose recordings they must translate; None for whichever they do
     Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
     ``renderer.Renderer`` raises.
     """
@@ -65,7 +70,7 @@ def load_tools(
     from ..sensors.calibration_file import load_calibration
     from ..translation import translate
 
-    translator, unit = translate.load_translator(weights, answer, target), load_calibration(calibration)
+    translator, unit = translate.load_translator(weights, answer, target, source), load_calibration(calibration)
     mapper = height_map.gel_mapper(unit.camera)
     dots = None
     if preset == "fast" and unit.markers is None:
@@ -85,7 +90,8 @@ def load_tools(
     posterior = translator.posterior if asked.follows else None
     drawn = translator.plausible if asked.samples else None
     named = translator.card, translator.sha256
-    return Tools(translator, *named, mapper, shade, preset, unit.camera, posterior, drawn, asked, solve, dots)
+    drawing = mapper, shade, preset, unit.camera
+    return Tools(translator, *named, *drawing, posterior, drawn, asked, solve, dots, translator.source)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,11 +128,17 @@ def convert(
 
     clock = Stopwatch()
     with clock.stage("read"):
-        recording = recordings.read(recording_path, None if options.prepare is None else options.prepare.columns)
+        columns = None if options.prepare is None else options.prepare.columns
+        recording = recordings.read(recording_path, columns, tools.source)
+        _check_order(recording, tools)
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
         finger = split(os.fspath(recording_path))[1]
-        unit = None if options.sensor is None else options.sensor.gains_for(recording_path, finger, "--sensor")
+        unit = (
+            None
+            if options.sensor is None
+            else options.sensor.gains_for(recording_path, finger, "--sensor", recording.sensor)
+        )
         signals = electrode_gains.prepare_unit(recording, options.prepare, unit)
     try:
         with atomic.new_folder(folder, overwrite=options.overwrite) as partial:
@@ -145,6 +157,13 @@ def convert(
         found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
     return Done(Path(folder), made.warnings(), added, made.describe_expected_error(), made.describe_traction())
+
+
+def _check_order(recording: Recording, tools: Tools) -> None:
+    """Raise TactileError for snapshots through which a contact is to be followed."""
+    if tools.answer.follows and np.isnan(recording.time).all():
+        found = "snapshots, which do not follow each other"
+        raise TactileError(recording.path, found, "frames in order", "Translate each alone: --frames-apart")
 
 
 def _added(options: Options, made: FramePass) -> str:

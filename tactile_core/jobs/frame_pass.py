@@ -19,6 +19,7 @@ from ..sensors import PRESSURE_PER_COUNT
 from ..sensors.camera import Camera
 from ..translation.answer import Answer
 from ..translation.card_errors import doubt
+from ..translation.card_sensors import SOURCE
 from ..translation.contact_track import Evidence, Tracked
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet
@@ -61,6 +62,7 @@ class Tools:
     answer : what the translator was asked for
     solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
     dots : on the gel that is drawn; None: it has none
+    source : the sensor whose recordings are translated
     """
 
     translate: Callable[..., Translation]
@@ -75,6 +77,7 @@ class Tools:
     answer: Answer = dataclasses.field(default_factory=Answer)
     solve: Solver | None = None
     dots: MarkerField | None = None
+    source: str = SOURCE
 
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """Draw the picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
@@ -157,7 +160,8 @@ class FramePass:
             (folder / results.IMAGES).mkdir()
         name = self.recording.name.encode(errors="replace").decode()  # HDF5 text is UTF-8, file names need not be
         about = {"recording": name, "simulated": self.recording.simulated}
-        with FramesFile(folder / results.FRAMES, len(self.frames), kept(self.keep, self.tools.answer), about) as file:
+        keep, source = kept(self.keep, self.tools.answer), self.tools.source
+        with FramesFile(folder / results.FRAMES, len(self.frames), keep, about, source=source) as file:
             for start in range(0, len(self.frames), CHUNK):
                 frames = self.frames[start : start + CHUNK]
                 arrays = self._translate(frames)
@@ -284,6 +288,7 @@ class FramePass:
             pressure=np.concatenate(self._pressure),
             pressure_measured=PRESSURE_PER_COUNT * self.signals.pdc[self.frames],
             warnings=self.warnings(),
+            source=self.tools.source,
             **columns,
         )
         contact_sheet(path, contents)

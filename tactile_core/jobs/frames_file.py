@@ -8,9 +8,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import sensors
 from ..files.hdf5_writer import Disk
 from ..files.version import __version__
 from ..recordings import flags
+from ..translation.card_sensors import SOURCE
 
 if TYPE_CHECKING:
     import h5py
@@ -83,6 +85,24 @@ def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]
     return {name: meaning for about in (ALWAYS, *kept) for name, meaning in about.items()}
 
 
+def named(name: str, source: str) -> str:
+    """Return the name of a dataset of frames of another source than a BioTac."""
+    return f"{name.removesuffix(SOURCE)}{source}" if name.endswith(f"_{SOURCE}") else name
+
+
+def described(meaning: str, source: str) -> str:
+    """Return a dataset's meaning in frames of another source than a BioTac."""
+    if source == SOURCE:
+        return meaning
+    count = sensors.electrode_count(source)
+    for word, other in (
+        ("biotac_surface()", f"sensor_surface({source!r})"), ("BioTac", sensors.title(source)),
+        ("(T, 19) E1..E19", f"(T, {count}) E1..E{count}"),
+    ):  # fmt: skip
+        meaning = meaning.replace(word, other)
+    return meaning
+
+
 class FramesFile:
     """Writer of ``frames.h5``, some frames at a time; it holds the kept arrays alone.
 
@@ -90,9 +110,12 @@ class FramesFile:
     """
 
     def __init__(
-        self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0
-    ) -> None:
+        self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0,
+        source: str = SOURCE,
+    ) -> None:  # fmt: skip
         """Create the file.
+
+        source : the sensor that was read, after which its datasets are named
 
         path : new file; count : T; attributes : of the file itself, beside format and version.
 
@@ -102,7 +125,7 @@ class FramesFile:
         import h5py
 
         self._about = arrays_of(keep, shard=bool(room))
-        self._count, self._framed = count, bool(room)
+        self._count, self._framed, self._source = count, bool(room), source
         self._disk = Disk(path)
         self._file = h5py.File(self._disk, "w", userblock_size=room)
         self._file.attrs.update({"format": FORMAT, "tactile_core": __version__, **attributes})
@@ -132,7 +155,8 @@ class FramesFile:
         with self._checked():
             for name, array in arrays.items():
                 if name in self._about:
-                    data = self._file[name] if name in self._file else self._create(name, array)
+                    own = named(name, self._source)
+                    data = self._file[own] if own in self._file else self._create(name, array)
                     data[start : start + len(array)] = array
 
     def annotate(self, name: str, **attributes: Any) -> None:
@@ -146,9 +170,10 @@ class FramesFile:
         large = self._framed and array[0].size >= LARGE
         chunks = (1, *array.shape[1:]) if packing or large else None
         shape = (self._count, *array.shape[1:])
-        data = self._file.create_dataset(name, shape, kind, chunks=chunks, track_times=False, **packing)
+        own = named(name, self._source)
+        data = self._file.create_dataset(own, shape, kind, chunks=chunks, track_times=False, **packing)
         unit, meaning = self._about[name]
-        data.attrs.update({"unit": unit, "description": meaning})
+        data.attrs.update({"unit": unit, "description": described(meaning, self._source)})
         if name == "flags":
             data.attrs["names"] = json.dumps(flags.names())
         return data

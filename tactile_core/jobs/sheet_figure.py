@@ -112,11 +112,11 @@ class SheetFigure:
             self._text(self._middle(k), 0.17, f"{k + 1}:  {at:.2f} s", size=10, weight="bold", ha="center", va="center")
         self.top += HEADING
 
-    def biotac_row(
-        self, label: str, displacement: np.ndarray, largest: float, contact_center: np.ndarray | None
+    def skin_row(
+        self, label: str, displacement: np.ndarray, largest: float, contact_center: np.ndarray | None, sensor: str
     ) -> None:
         """Draw maps of (k, N, 3) m on the unrolled skin; largest : m where colours end; contact_center : (k, 2) m."""
-        plan, faces = unrolling.unrolled_nodes(), sensors.biotac_surface().faces
+        plan, faces = unrolling.unrolled_nodes(sensor), sensors.sensor_surface(sensor).faces
         faces = faces[np.isfinite(plan[faces]).all((1, 2))]
         self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, contact_center)
 

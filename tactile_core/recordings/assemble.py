@@ -53,9 +53,9 @@ def check_electrodes(path: str, count: int, source: str, sensor: str = TRANSLATE
     if count == SP_ELECTRODES:
         raise TactileError(
             f"{path}, {source}",
-            "24 electrodes: a BioTac SP, for which no weights ship",
+            "24 electrodes: a BioTac SP",
             "the 19 electrodes of a BioTac",
-            "Use a recording of one; `tactile info` and `tactile adapt` take a CSV file of a BioTac SP",
+            "Translate it with weights of a BioTac SP: tactile convert --weights (docs/extend.md)",
         )
     raise TactileError(
         f"{path}, {source}",

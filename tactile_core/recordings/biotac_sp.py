@@ -1,4 +1,4 @@
-"""Describe recordings of a BioTac SP, 24 electrodes a finger; no weights that translate them ship."""
+"""Describe recordings of a BioTac SP, 24 electrodes a finger."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .signal_kind import detect
 if TYPE_CHECKING:
     from .electrode_gains import ElectrodeGains
 
-NOT_TRANSLATED = "not translated: the weights that ship are of a BioTac with 19 electrodes, none are of a BioTac SP"
+TRANSLATED_BY = "`tactile convert --weights DIR --sensor FILE`, with weights of a BioTac SP (docs/extend.md)"
 ADVICE = (
     "not known: a recording that begins in contact does not tell it; `tactile adapt RECORDINGS` finds it in several"
 )
 
 
 def describe_sp(recording: Recording, unit: ElectrodeGains | None = None) -> str:
-    """Describe sensor, channels, frames, rest and counts as a short table, and that it is not translated.
+    """Describe sensor, channels, frames, rest and counts as a short table.
 
     unit : with the rest against which changes are taken
     """
@@ -37,7 +37,7 @@ def describe_sp(recording: Recording, unit: ElectrodeGains | None = None) -> str
         ("time", _time(recording)),
         ("kind", f"{kind}: {evidence}"),
         ("rest", ADVICE if unit is None else unit.note),
-        ("use", NOT_TRANSLATED),
+        ("use", TRANSLATED_BY),
     ]
     lines = [recording.path, *(f"  {label:<11}{text}" for label, text in rows), ""]
     lines += _counts(electrodes) if unit is None else _changes(electrodes, np.array(unit.rest_counts))

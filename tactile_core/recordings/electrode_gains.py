@@ -15,7 +15,7 @@ from msgspec import Meta
 from ..errors import TactileError
 from ..files import atomic
 from ..files.text_file import read_toml_text
-from ..sensors import COUNT_MAX, ELECTRODES, divider
+from ..sensors import COUNT_MAX, divider
 from .assemble import COUNTS
 from .fingers import FINGERS
 from .recording import TRANSLATED, Recording
@@ -105,10 +105,10 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
 
     The report records it. A rectified change has lost offset and sign: it is only divided by the gain.
     """
-    offset = np.zeros(ELECTRODES) if signals.kind == "rectified" else np.array(sensor.offset_counts)
+    offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
     change = (signals.typical - offset) / np.array(sensor.gain)
-    if signals.kind == "raw":
+    if signals.kind == "raw" and signals.sensor == TRANSLATED:  # another's changes are its own, see `Signals.typical`
         change = divider.of_unit(change, signals.rest)
     return doubt_law(dataclasses.replace(signals, change=change, report={**signals.report, "sensor": applied}))
 

@@ -25,7 +25,7 @@ def describe(
 ) -> str:
     """Describe sensor, channels, rate, duration, tare, gaps and suspicious samples with their lines, as a short table.
 
-    A BioTac SP's, which cannot be translated, is described too. unit : rest and gains, of `tactile adapt`
+    A BioTac SP's is described by its readings alone. unit : rest and gains, of `tactile adapt`
     Raises TactileError where the file is no recording, or of another sensor than the unit's.
     """
     columns = None if options is None else options.columns

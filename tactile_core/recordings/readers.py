@@ -54,7 +54,7 @@ def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor:
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
     columns : which column of a CSV file is what, where no known layout has its names; see ``column_map.read``
-    sensor : ``"biotac"``, or ``"biotac_sp"`` for one of 24 electrodes, which no weights translate yet
+    sensor : ``"biotac"``, or ``"biotac_sp"`` for one of 24 electrodes
 
     Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19 or 24) counts, ``pdc``, ``pac``, ``tac``,
     ``tdc`` where the file has them, ``warnings`` for what is odd in it. Nothing is resampled, repaired or dropped.

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import divider
-from ..sensors.fluid_sensor import FALLS, POLARITIES
+from ..sensors import divider, title
+from ..sensors.descriptor import of_kind
+from ..sensors.fluid_sensor import FALLS, POLARITIES, Fluid
 from . import contact_law
 from .assemble import check_electrodes
 from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
 from .polarity import AUTO, BLOCK, Polarity, choose, polarity_of, spread_out, touching
-from .recording import Recording
+from .recording import TRANSLATED, Recording
 from .repair import fill, find_glitches, is_time_series
 from .rest_level import TARED_PDC, Quiet, baseline, calmest, find_quiet, level, pressure_rest, window_frames
 from .signal_kind import KINDS, detect
@@ -102,6 +103,7 @@ class Signals:
     pdc : (T,) float, counts, the fluid's pressure over its level at rest; NaN where the recording has none
     warnings : the recording's and those found here
     report : what was found and done, fit for JSON
+    sensor : whose they are; 19 is of a BioTac
     """
 
     change: np.ndarray
@@ -114,30 +116,37 @@ class Signals:
     pdc: np.ndarray
     warnings: tuple[str, ...]
     report: dict[str, Any]
+    sensor: str = TRANSLATED
 
     @property
     def typical(self) -> np.ndarray:
         """Change (T, 19) counts, converted to a unit that rests at ``sensors.REST_COUNTS``, the networks' input.
 
-        Only raw readings show their unit's rest counts; other changes are not converted.
+        Only raw readings show their unit's rest counts; other changes are not converted, nor are those of a sensor of
+        which no unit has been seen at rest: see `relative_to`.
         """
-        if self.kind != "raw":
+        if self.kind != "raw" or self.sensor != TRANSLATED:
             return self.change
         found = np.empty(self.change.shape)
         for start in range(0, len(found), BLOCK):
             found[start : start + BLOCK] = self.typical_of(slice(start, start + BLOCK))
         return found
 
+    def relative_to(self, rest: np.ndarray) -> np.ndarray:
+        """Change (T, e) counts, converted to a unit that rests at counts (e,); of raw readings alone."""
+        return divider.typical(self.change, self.rest, rest) if self.kind == "raw" else self.change
+
     def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
         """Change (n, 19) counts of some frames alone, as ``typical`` has them."""
-        return divider.typical(self.change[rows], self.rest) if self.kind == "raw" else self.change[rows]
+        own = self.kind != "raw" or self.sensor != TRANSLATED
+        return self.change[rows] if own else divider.typical(self.change[rows], self.rest)
 
 
 def prepare(recording: Recording, options: PrepareOptions | None = None) -> Signals:
     """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet."""
     options = options or PrepareOptions()
     options.check()
-    check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes")
+    check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes", recording.sensor)
     flags, warnings = recording.flags.copy(), list(recording.warnings)
     readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = _kind(recording, readings, options)
@@ -171,14 +180,17 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     signals = Signals(
         change=change, rest=rest[0].copy(), drift=slope, electrodes=readings, kind=kind,
         quiet=quiet.mask, flags=flags, pdc=_pressure_change(recording, kind, quiet, unit_rest),
-        warnings=tuple(warnings), report=report,
+        warnings=tuple(warnings), report=report, sensor=recording.sensor,
     )  # fmt: skip
     return doubt_law(signals)
 
 
 def doubt_law(signals: Signals) -> Signals:
-    """Flag the frames in contact, and warn, where together they resemble no simulated ones; undoes an older doubt."""
-    if signals.kind not in ("raw", "tared"):
+    """Flag the frames in contact, and warn, where together they resemble no simulated ones; undoes an older doubt.
+
+    Simulated ones of other sensors than a BioTac come with their weights: their law is not judged.
+    """
+    if signals.kind not in ("raw", "tared") or signals.sensor != TRANSLATED:
         return signals
     contact = ~signals.quiet
     for start in range(0, len(contact), BLOCK):
@@ -238,8 +250,19 @@ def _polarity(
 ) -> Polarity:  # fmt: skip
     if kind == "rectified":
         return Polarity(FALLS, "the sign is lost", True)
+    if recording.sensor != TRANSLATED:
+        return choose(
+            _polarity_of_sensor(recording.sensor, kind), options.polarity, recording.about.get("polarity", "")
+        )
     shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known)
     return choose(shown, options.polarity, recording.about.get("polarity", ""))
+
+
+def _polarity_of_sensor(sensor: str, kind: str) -> Polarity:
+    """The polarity of a sensor's raw readings, as its descriptor has it; of other kinds assumed."""
+    reading = of_kind(sensor, Fluid).readout.polarity
+    raw = f"raw counts of a {title(sensor)}"
+    return Polarity(reading, raw, True) if kind == "raw" else Polarity(reading, f"assumed: as {raw}", False)
 
 
 def _smoothed_over(options: PrepareOptions, kind: str) -> int:

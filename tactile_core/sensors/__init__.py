@@ -22,8 +22,8 @@ from .skin_shape import skin_of
 __all__ = [
     "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PRESSURE_PER_COUNT", "REST_COUNTS",
     "SAMPLE_RATE", "Lattice", "Material", "biotac_surface", "describe", "digit_surface", "electrode_count",
-    "electrodes", "excitation_electrodes", "from_maker", "from_syntouch", "is_gel", "places_of", "sensor_surface", "shape_of",
-    "skin_of", "thickness", "title",
+    "electrodes", "excitation_electrodes", "from_maker", "from_syntouch", "is_gel", "places_of", "sensor_surface",
+    "shape_of", "skin_of", "thickness", "title",
 ]  # fmt: skip
 
 BIOTAC_SKIN, DIGIT_GEL = biotac.DESCRIPTOR.material, digit.DESCRIPTOR.material

@@ -18,19 +18,20 @@ from ..files.hdf5_checked import declared, open_checked
 from ..files.hdf5_writer import Disk
 from ..files.version import __version__
 from ..mechanics.electrodes.law import LAWS, SHEET
+from ..sensors.descriptor import OWN
+from ..sensors.descriptor import names as known_sensors
 from ..sensors.fluid_sensor import FALLS
 
 FORMAT = "tactile-pairs-2"
 ADVICE = "Make the file again with `tactile pairs`"
-ATTRIBUTES = (
-    "biotac_nodes_sha256", "digit_nodes_sha256", "electrodes", "indenters", "polarity", "scene", "seed", "version"
-)  # fmt: skip
+ATTRIBUTES = ("electrodes", "indenters", "polarity", "scene", "seed", "version")  # and two of ``_NODES``
 MIN_PRESSES = 5  # at least three to train on, one to validate, one to test
-# dataset -> trailing shape and kind of numbers (i whole, f real, b yes or no); None: as many nodes as the surface has
+# dataset of the pair that ships -> trailing shape and kind of numbers (i whole, f real, b yes or no); None: as many
+# nodes as the surface has, or electrodes as the source has
 DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
     "displacement_biotac": ((None, 3), "i"),
     "displacement_digit": ((None, 3), "i"),
-    "signal": ((sensors.ELECTRODES,), "f"),
+    "signal": ((None,), "f"),
     "force": ((3,), "f"),
     "pressure": ((), "f"),
     "contact_center": ((2,), "f"),
@@ -66,6 +67,9 @@ def units(source: str = SOURCE, target: str = TARGET) -> dict[str, str]:
 class Pairs:
     """Paired contacts, C of them. Displacements stay in the file's whole numbers; times their scale they are metres.
 
+    Fields are named after the pair that ships; of another ``pair``, source and target, they hold what theirs are, and
+    signals are as wide as the source has electrodes.
+
     displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
     scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change against rest
     force : (C, 3) float32 N                         contact_center : (C, 2) float32 m, (x, z) on the DIGIT
@@ -94,6 +98,7 @@ class Pairs:
     indenter: np.ndarray
     attributes: dict[str, str]
     sha256: str
+    pair: tuple[str, str] = SENSORS
 
     def select_rows(self, rows: np.ndarray) -> Pairs:
         """Select the contacts of these rows alone."""
@@ -124,14 +129,12 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
             found = str(file.attrs.get("format", ""))
             if found != FORMAT:
                 raise TactileError(path, f"format {found!r}", f"format {FORMAT!r}", ADVICE)
-            of = sorted(name.removesuffix(_NODES) for name in file.attrs if name.endswith(_NODES))
-            if len(of) == 2 and of != sorted(SENSORS):
-                expected = f"pairs of {' and '.join(SENSORS)}, which networks are made for"
-                raise TactileError(path, f"pairs of {' and '.join(of)}", expected)
-            missing = [name for name in ATTRIBUTES if name not in file.attrs]
+            pair = _pair(file, path)
+            wanted = sorted((*ATTRIBUTES, *(f"{sensor}{_NODES}" for sensor in pair)))
+            missing = [name for name in wanted if name not in file.attrs]
             if missing:
-                raise TactileError(path, f"no attribute {missing[0]}", ", ".join(ATTRIBUTES), ADVICE)
-            attributes = {name: str(file.attrs[name]) for name in ATTRIBUTES}
+                raise TactileError(path, f"no attribute {missing[0]}", ", ".join(wanted), ADVICE)
+            attributes = {name: str(file.attrs[name]) for name in wanted}
             if attributes["polarity"] != FALLS:
                 expected = f"{FALLS!r}, as raw counts do where a film thins"
                 raise TactileError(f"{os.fspath(path)}, polarity", repr(attributes["polarity"]), expected, ADVICE)
@@ -139,8 +142,10 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
                 raise TactileError(
                     f"{os.fspath(path)}, electrodes", repr(attributes["electrodes"]), ", ".join(LAWS), ADVICE
                 )
-            arrays = {name: _dataset(file, name, path) for name in DATASETS}
-            scales = {name: _scale(file[name], f"{os.fspath(path)}, {name}") for name in SCALED}
+            names = _named(pair)
+            shapes = DATASETS | {"signal": ((sensors.electrode_count(pair[0]),), "f")}
+            arrays = {name: _dataset(file, shapes[name], names, names[name], path) for name in DATASETS}
+            scales = {name: _scale(file[names[name]], f"{os.fspath(path)}, {names[name]}") for name in SCALED}
     except TactileError:
         raise
     except Exception as error:  # h5py raises a dozen types on damaged bytes
@@ -148,22 +153,53 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
         raise TactileError(path, found, "a whole HDF5 file of pairs", ADVICE) from error
     _check_values(arrays, path)
     _check_names(attributes["indenters"], arrays["indenter"], path)
-    digest = _content_hash(arrays, scales, attributes)
+    digest = _content_hash(
+        {names[name]: array for name, array in arrays.items()},
+        {names[name]: scale for name, scale in scales.items()}, attributes,
+    )  # fmt: skip
     return Pairs(
         scale_biotac=scales["displacement_biotac"],
         scale_digit=scales["displacement_digit"],
         attributes=attributes,
         sha256=digest,
+        pair=pair,
         **arrays,
     )
 
 
-def _dataset(file: object, name: str, path: str | os.PathLike) -> np.ndarray:
-    """Read one dataset, and check its kind and trailing shape."""
+def _pair(file: object, path: str | os.PathLike) -> tuple[str, str]:
+    """Source and target of the pairs: the sensors whose nodes the file names, first the one of skin and fluid.
+
+    Of a file that names no two sensors they are those that ship.
+    """
+    of = sorted(name.removesuffix(_NODES) for name in file.attrs if name.endswith(_NODES))
+    if len(of) != 2:
+        return SENSORS
+    unknown = [name for name in of if name not in known_sensors()]
+    if unknown:
+        expected = f"known ones: {', '.join(known_sensors())}"
+        raise TactileError(path, f"pairs of {' and '.join(of)}", expected, f"Name the folder of {unknown[0]} in ${OWN}")
+    source, target = sorted(of, key=sensors.is_gel)
+    if sensors.is_gel(source) or not sensors.is_gel(target):
+        raise TactileError(path, f"pairs of {' and '.join(of)}", "a sensor of skin and fluid, and a gel", ADVICE)
+    return source, target
+
+
+def _named(pair: tuple[str, str]) -> dict[str, str]:
+    """Names in the file of ``DATASETS``, which are named after both sensors."""
+    of = dict(zip(SENSORS, pair, strict=True))
+    parts = {name: name.rpartition("_") for name in DATASETS}
+    return {name: f"{stem}_{of[role]}" if role in of else name for name, (stem, _, role) in parts.items()}
+
+
+def _dataset(
+    file: object, form: tuple[tuple[int | None, ...], str], names: dict[str, str], name: str, path: str | os.PathLike
+) -> np.ndarray:
+    """Read one dataset, and check its kind and trailing shape. form : of ``DATASETS``; names : of all in the file"""
     place = f"{os.fspath(path)}, {name}"
     if name not in file:
-        raise TactileError(place, "no such dataset", f"the datasets {', '.join(DATASETS)}", ADVICE)
-    data, (shape, kind) = file[name], DATASETS[name]
+        raise TactileError(place, "no such dataset", f"the datasets {', '.join(names.values())}", ADVICE)
+    data, (shape, kind) = file[name], form
     expected = "(C, " + ", ".join("n" if size is None else str(size) for size in shape) + ")"
     fits = len(data.shape) == len(shape) + 1 and all(
         size in (None, found) and found > 0 for size, found in zip(shape, data.shape[1:], strict=True)

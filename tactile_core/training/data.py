@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..sensors import ELECTRODES
+from ..mechanics.electrodes.law import rest_counts
 from ..simulation.pairs_file import Pairs, Split
 from ..translation.contact_frame import ContactFrame
 from ..translation.posterior import DEPTH_SCALE, FORCE_SCALE
@@ -41,6 +41,7 @@ class Batch:
 class Contacts:
     """Contacts with their split and both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror.
 
+    electrodes : how many a signal has; rest : (e,) counts that their changes are those of
     device : where batches go; the contacts themselves stay in the host's memory
     """
 
@@ -51,6 +52,7 @@ class Contacts:
         self.pairs, self.split, self.options = pairs, split, options
         self.device = device or torch.device("cpu")
         self.depth = _depth(pairs)
+        self.electrodes, self.rest = pairs.signal.shape[1], rest_counts(pairs.pair[0])
         self.biotac, self.digit = (
             SurfaceCodec(
                 getattr(pairs, f"displacement_{name}"), getattr(pairs, f"scale_{name}"), split.train, frames[name],
@@ -74,8 +76,8 @@ class Contacts:
         """Simulate signals (B, 20) of the contacts as a sensor reads them: see `noise_model.measured`."""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
-        true[turned] = true[turned][:, image_of_electrodes()]
-        return measured(true, rng, self.options, rectified, unit)
+        true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]
+        return measured(true, rng, self.options, rectified, unit, self.rest)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
         """Return the contacts of these rows with these signals."""
@@ -88,7 +90,7 @@ class Contacts:
         strength = torch.from_numpy(np.arcsinh(scaled).astype(np.float32)) * touching(rows)
         state = torch.cat([self.digit.true_place(rows), strength], -1)
         read = torch.from_numpy(signal), self.biotac.inputs(rows), self.digit.inputs(rows), load, pressure, state
-        signed = np.where(signal[:, ELECTRODES] > 0, SILENT, rows)
+        signed = np.where(signal[:, -1] > 0, SILENT, rows)
         return Batch(rows, signed, *(each.to(self.device) for each in read))
 
     def _which(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,9 +9,10 @@ import numpy as np
 import torch
 
 from ..files.version import __version__
-from ..sensors import ELECTRODES
+from ..sensors import places_of
 from ..sensors.fluid_sensor import FALLS
 from ..translation import reference_signals
+from ..translation.card_sensors import NODES, REST
 from ..translation.network_sizes import ERROR_FEATURES, NETS, PLACE, POSTERIORS, SURFACES
 from ..translation.networks import Networks, load
 from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
@@ -60,8 +61,8 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
         "options": contacts.options.settings(),
         "versions": versions(contacts.device),
         "pairs": pairs_entry(contacts),
-        "biotac_nodes_sha256": contacts.pairs.attributes["biotac_nodes_sha256"],
-        "digit_nodes_sha256": contacts.pairs.attributes["digit_nodes_sha256"],
+        **{f"{sensor}{NODES}": contacts.pairs.attributes[f"{sensor}{NODES}"] for sensor in contacts.pairs.pair},
+        **_rest_entry(contacts),
         "distance": {"levels": list(QUANTILES), **distance_quantiles(measure)},
         "silence": silence,
         "error_bounds": fit_error_bounds(measure, silence),
@@ -70,6 +71,12 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
     write_bytes(folder / CARD_NAME, card_bytes(card))
     load(folder)  # what was written can be read
     return card
+
+
+def _rest_entry(contacts: Contacts) -> dict[str, list[float]]:
+    """Return the counts at rest that changes are those of, where the sensor's own table does not hold them."""
+    known = places_of(contacts.pairs.pair[0]).rest_counts
+    return {} if np.isfinite(known).all() else {REST: [round(float(value), 2) for value in contacts.rest]}
 
 
 def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndarray]:
@@ -100,7 +107,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
         "D2BPN": {"inputs": digit + PLACE, "outputs": biotac, **common},
         "B2SPN": {"inputs": biotac + PLACE, "outputs": signal, **common},
         "force": {"inputs": biotac, "outputs": 3, **head},
-        "pressure": {"inputs": ELECTRODES, "outputs": 1, **head},
+        "pressure": {"inputs": contacts.electrodes, "outputs": 1, **head},
         "error": {"inputs": signal + ERROR_FEATURES, "outputs": len(SURFACES), **head},
     }
 
@@ -121,7 +128,7 @@ def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, 
     with torch.no_grad():
         latent = model.SVB.mean(compress(torch.from_numpy(contacts.read(rows, rng, *shares)))).double().numpy()
         signal = compress(torch.from_numpy(contacts.read(left, rng, *shares)))
-        error = model.SVB.decoder(model.SVB.mean(signal)) - signal[:, :ELECTRODES]
+        error = model.SVB.decoder(model.SVB.mean(signal)) - signal[:, :-1]
         residual = error.double().square().mean(0).sqrt().numpy()
     variances, axes = np.linalg.eigh(np.atleast_2d(np.cov(latent.T)))
     spread = np.sqrt(np.maximum(variances, COLLAPSED * variances.max()))
@@ -138,7 +145,7 @@ def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
     rows = contacts.split.train
     rows = rows[contacts.pairs.pressure[rows] > PRESSURE_FROM]
     signal = contacts.read(rows, np.random.default_rng([seed, 7]), rectified=1.0)
-    total = np.abs(signal[:, :ELECTRODES]).sum(1, dtype=np.float64)
+    total = np.abs(signal[:, :-1]).sum(1, dtype=np.float64)
     ratio = contacts.pairs.pressure[rows] / np.maximum(total, 1.0)
     return np.array([np.median(ratio) if len(rows) else 0.0], np.float32)
 

@@ -31,9 +31,9 @@ def image_of_nodes(frame: ContactFrame) -> np.ndarray:
 
 
 @functools.cache
-def image_of_electrodes() -> np.ndarray:
+def image_of_electrodes(sensor: str = "biotac") -> np.ndarray:
     """Mirror image (19,) of each electrode."""
-    at = electrodes()
+    at = electrodes(sensor)
     return np.square(at[:, None] * [1, 1, -1] - at).sum(-1).argmin(axis=1)
 
 

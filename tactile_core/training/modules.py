@@ -183,18 +183,18 @@ class MeshVae(Vae):
             return self.surface.field(self.decoder(torch.cat([latent, left], -1)), cell)
 
 
-def signal_vae(latent: int) -> Vae:
+def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
     """Make SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (ACROSS: docs/sources.md, Networks).
 
-    The twentieth input says whether the signals are rectified.
+    The twentieth input, the last, says whether the signals are rectified.
     """
-    encoder = Plain((ELECTRODES + 1, *SIGNAL_HIDDEN, 2 * latent))
-    return Vae(encoder, Plain((latent, *SIGNAL_HIDDEN[::-1], ELECTRODES)))
+    encoder = Plain((electrodes + 1, *SIGNAL_HIDDEN, 2 * latent))
+    return Vae(encoder, Plain((latent, *SIGNAL_HIDDEN[::-1], electrodes)))
 
 
 def compress(signal: Tensor) -> Tensor:
     """Convert changes in counts and whether they are rectified, (B, 20), to SVB's input; see `networks.compress`."""
-    return torch.cat([torch.asinh(signal[:, :ELECTRODES] / COUNT_SCALE), signal[:, ELECTRODES:]], -1)
+    return torch.cat([torch.asinh(signal[:, :-1] / COUNT_SCALE), signal[:, -1:]], -1)
 
 
 def initialise(module: nn.Module, generator: torch.Generator) -> None:

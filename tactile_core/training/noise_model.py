@@ -10,14 +10,15 @@ from .options import Options
 
 
 def measured(
-    change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0, unit: float = 0.0
-) -> np.ndarray:
+    change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0, unit: float = 0.0,
+    rest_counts: np.ndarray = REST_COUNTS,
+) -> np.ndarray:  # fmt: skip
     """Simulate a sensor's reading (B, 20) of true changes (B, 19) counts: changes, and whether they are rectified.
 
     Rectified changes are given with the sign of a thinning film, as the networks read them.
 
     Gain error a channel, noise, whole counts, the ends of 12 bits. The rest lies near that of a typical unit
-    (``sensors.REST_COUNTS``) and between whole counts, as the mean of many readings does.
+    (``rest_counts``, (19,)) and between whole counts, as the mean of many readings does.
     unit : share of frames read as a real unit is known: its gains spread more, its rest is off
     rectified : share of frames that lose their sign. They stand for recordings of unknown units, whose tare cannot be
         mended once folded: gains spread more, rest is off, channels may be missing
@@ -25,7 +26,7 @@ def measured(
     """
     folded = rng.random((len(change), 1)) < rectified
     gain = 1.0 + options.gain * rng.standard_normal(change.shape)
-    rest = REST_COUNTS + rng.random(change.shape)
+    rest = rest_counts + rng.random(change.shape)
     noise = options.noise * rng.standard_normal(change.shape)
     real = rng.random((len(change), 1)) < unit
     if unit:

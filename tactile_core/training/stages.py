@@ -9,7 +9,6 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..sensors import ELECTRODES
 from ..translation.network_sizes import ERROR_FEATURES, PLACE, SURFACES
 from ..translation.networks import ERROR_UNIT, PRESSURE_SCALE
 from ..translation.posterior import FORCE_SCALE
@@ -31,31 +30,31 @@ class Model(nn.Module):
         super().__init__()
         width, blocks = options.width, options.blocks
         signal, biotac, digit = options.latent_signal, options.latent_biotac, options.latent_digit
-        self.SVB = signal_vae(signal)
+        self.SVB = signal_vae(signal, contacts.electrodes)
         self.MVB = MeshVae(contacts.biotac, biotac, width, blocks)
         self.MVD = MeshVae(contacts.digit, digit, width, blocks)
         self.S2MPN = ContactPosterior(signal, biotac, width, blocks, options.components)
         self.R2MPN = ContactPosterior(signal, biotac, width, blocks, options.components)
         self.M2MPN = Residual(biotac + PLACE, digit, width, blocks)
         self.force = Residual(biotac, 3, FORCE_WIDTH, FORCE_BLOCKS)
-        self.pressure = Residual(ELECTRODES, 1, FORCE_WIDTH, FORCE_BLOCKS)
+        self.pressure = Residual(contacts.electrodes, 1, FORCE_WIDTH, FORCE_BLOCKS)
         self.error = Residual(signal + ERROR_FEATURES, len(SURFACES), FORCE_WIDTH, FORCE_BLOCKS)
         self.D2BPN = Residual(digit + PLACE, biotac, width, blocks)
         self.B2SPN = Residual(biotac + PLACE, signal, width, blocks)
-        self.direct = Residual(ELECTRODES + 1, digit, width, blocks)
+        self.direct = Residual(contacts.electrodes + 1, digit, width, blocks)
         self.direct_decoder = MeshVae(contacts.digit, digit, width, blocks)
         initialise(self, generator)
 
     def from_signal(self, signal: Tensor) -> tuple[Tensor, Tensor]:
         """Map signal (B, 20) to latent_biotac and latent_digit of the most plausible contact."""
-        latent, rectified = self.SVB.mean(compress(signal)), signal[:, ELECTRODES:] > 0
+        latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         state = torch.where(rectified, self.R2MPN.contact(latent), self.S2MPN.contact(latent))
         biotac, _ = self.given(signal, state)
         return biotac, self.to_digit(state, biotac)
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """Map signal (B, 20) and contact's state (B, STATE) to latent_biotac, and the surprise (B,) at the state."""
-        latent, rectified = self.SVB.mean(compress(signal)), signal[:, ELECTRODES:] > 0
+        latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
         surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))
         return biotac, torch.where(rectified[:, 0], *surprises)
@@ -80,10 +79,10 @@ class Model(nn.Module):
         """Map signal (B, 20) to the logarithm (B, 2) of the largest node error on BioTac and DIGIT, over ERROR_UNIT."""
         seen = compress(signal)
         latent = self.SVB.mean(seen)
-        change = seen[:, :ELECTRODES]
+        change = seen[:, :-1]
         left = (self.SVB.decoder(latent) - change).square().mean(-1, keepdim=True).sqrt()
         size = change.square().mean(-1, keepdim=True).sqrt()
-        return self.error(torch.cat([latent, left, size, seen[:, ELECTRODES:]], -1))
+        return self.error(torch.cat([latent, left, size, seen[:, -1:]], -1))
 
     def directly(self, signal: Tensor) -> Tensor:
         """Map signal (B, 20) to the latent of `direct_decoder`, bypassing the physical latents."""
@@ -106,7 +105,7 @@ def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
     """Compute the loss of the signal's reconstruction, as read, over its mean square, and KL."""
     signal = compress(batch.signal)
     latent, divergence = model.SVB.sample(signal, generator)
-    change = signal[:, :ELECTRODES]
+    change = signal[:, :-1]
     error = (model.SVB.decoder(latent) - change).square().mean()
     return error / change.square().mean() + options.beta * divergence
 
@@ -188,8 +187,8 @@ def pressure_loss(
 
     Relative errors in its place biased uncertain pressures low: the estimates for slides were a sixth lower still.
     """
-    signed = batch.signal[:, ELECTRODES:] == 0
-    error = model.pressure(compress(batch.signal)[:, :ELECTRODES]) - torch.asinh(batch.pressure / PRESSURE_SCALE)
+    signed = batch.signal[:, -1:] == 0
+    error = model.pressure(compress(batch.signal)[:, :-1]) - torch.asinh(batch.pressure / PRESSURE_SCALE)
     return (signed * error.square()).sum() / signed.sum().clamp(min=1)
 
 
@@ -217,8 +216,8 @@ def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, 
     """Compute the loss of the way back: DIGIT mesh to BioTac mesh, BioTac mesh to the signal as read."""
     with torch.no_grad():
         biotac, digit = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
-    signed = batch.signal[:, ELECTRODES:] == 0
-    change = compress(batch.signal)[:, :ELECTRODES]
+    signed = batch.signal[:, -1:] == 0
+    change = compress(batch.signal)[:, :-1]
     error = ((model.to_signal(biotac) - change).square() * signed).mean()
     found = model.back(digit)
     return (

@@ -10,7 +10,7 @@ import numpy as np
 from .. import accuracy, sensors
 from ..geometry.lattice import Lattice
 from ..sensors import unrolling
-from ..simulation.pairs_file import Pairs
+from ..simulation.pairs_file import SOURCE, TARGET, Pairs
 from ..translation.contact_patch import contact_patch
 from ..translation.network_sizes import SURFACES
 from ..translation.networks import Networks
@@ -23,15 +23,15 @@ Columns = dict[str, np.ndarray]  # name of a metric -> (C,) a number a contact; 
 
 @dataclass(frozen=True)
 class Bodies:
-    """The DIGIT's surface, and where the BioTac's nodes come to lie on its plane, (N, 2) m."""
+    """The gel's surface, as the DIGIT's, and where the skin's nodes come to lie on its plane, (N, 2) m."""
 
     digit: Lattice
     unrolled: np.ndarray
 
 
-def our_bodies() -> Bodies:
+def our_bodies(source: str = SOURCE, target: str = TARGET) -> Bodies:
     """Return the bodies of this version's sensors."""
-    return Bodies(sensors.digit_surface(), unrolling.unrolled_nodes())
+    return Bodies(sensors.sensor_surface(target), unrolling.unrolled_nodes(source))
 
 
 def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:

@@ -21,6 +21,7 @@ from ..errors import TactileError
 from ..sensors import sensor_surface
 from ..simulation.pairs_file import Pairs, Split, read_pairs, split_presses
 from ..translation.contact_frame import ContactFrame, frame_of
+from ..translation.network_sizes import SURFACES
 from . import checkpoint
 from .data import Contacts
 from .device import device_of
@@ -62,11 +63,14 @@ def train(
     split = without(split_presses(pairs.press, seed, pairs_path), pairs, options, pairs_path)
     if bodies is None:
         check_surfaces(pairs, pairs_path)
-        bodies = our_bodies()
+        bodies = our_bodies(*pairs.pair)
     prepare_folder(out, overwrite)
     with deterministic():
         generator = torch.Generator().manual_seed(seed)
-        frames = {name: frame(name, getattr(options, f"half_{name}")) for name in ("biotac", "digit")}
+        frames = {
+            role: frame(sensor, getattr(options, f"half_{role}"))
+            for role, sensor in zip(SURFACES, pairs.pair, strict=True)
+        }
         contacts = Contacts(pairs, split, options, frames, generator, where)
         model = Model(options, contacts, generator).to(where)
         history = run_stages(model, contacts, seed, out / "checkpoint.npz", progress or quiet)
@@ -100,10 +104,10 @@ def without(split: Split, pairs: Pairs, options: Options, path: str | os.PathLik
 
 def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
     """Raise TactileError if the pairs were made on other surfaces than this version's."""
-    for sensor in ("biotac", "digit"):
+    for role, sensor in zip(SURFACES, pairs.pair, strict=True):
         surface, key = sensor_surface(sensor), f"{sensor}_nodes_sha256"
         found = pairs.attributes[key]
-        if found != surface.sha256 or len(surface.rest) != getattr(pairs, f"displacement_{sensor}").shape[1]:
+        if found != surface.sha256 or len(surface.rest) != getattr(pairs, f"displacement_{role}").shape[1]:
             advice = "Make the pairs again with this version"
             raise TactileError(f"{os.fspath(path)}, {key}", found, surface.sha256, advice)
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from .. import sensors
 from ..accuracy import CORE
-from ..sensors import biotac
 
 STILL = 1e-9  # m: below, there is no dent to follow and the frame stays in the middle
 FADE = 5  # cells (assumed)
@@ -122,12 +121,12 @@ class ContactFrame:
 
 
 def frame_of(sensor: str, half: int) -> ContactFrame:
-    """Return the moving frame of a sensor's surface; the BioTac's nodes are turned with their angle round its axis."""
+    """Return the moving frame of a sensor's surface; a skin's nodes are turned with their angle round its axis."""
     lattice = sensors.sensor_surface(sensor)
     turn = np.zeros(len(lattice.rest), np.float32)
     if not sensors.is_gel(sensor):
         rows, columns = lattice.shape
-        turn[: rows * columns] = np.tile(biotac.angles(), rows)
+        turn[: rows * columns] = np.tile(sensors.skin_of(sensor).angles(), rows)
     return ContactFrame(*lattice.shape, half, turn)
 
 

@@ -8,12 +8,10 @@ closely: there signs would hop from frame to frame, and nearly all frames are le
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 
-from ..recordings.polarity import contact_signals
 from .networks import compress
+from .simulated_likeness import Patterns, shipped_patterns
 
 # Of the size of a signal on the networks' scale, the most that the nearest simulated one may leave of it. Chosen on
 # sample 7 of the slides (2 frames in 1,000 within): at .25 the rank of force stays .908 (quartile .879); with a fifth
@@ -22,26 +20,24 @@ from .networks import compress
 LEFT = 0.25
 
 
-def recovered(change: np.ndarray, rectified: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def recovered(
+    change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Give changes (T, 19) counts their signs where they are plain; returns them and which (T,) are left rectified.
 
-    rectified : (T,) bool, those that have lost their signs
+    rectified : (T,) bool, those that have lost their signs; patterns : of the sensor, None for a BioTac's
     """
     change, rectified = np.array(change, np.float32), np.array(rectified, bool)
     rows = np.flatnonzero(rectified)
-    patterns, signs = _patterns()
-    sizes = compress(np.abs(change[rows]))
+    if not len(rows):
+        return change, rectified
+    known = (patterns or shipped_patterns()).signals
+    signs = np.where(known > 0, np.float32(1), np.float32(-1))
+    sizes, known = compress(np.abs(change[rows])), compress(np.abs(known))
     # |a - b|^2 of all pairs; a signal of zeros resembles none
-    apart = np.square(sizes).sum(1)[:, None] - 2 * sizes @ patterns.T + np.square(patterns).sum(1)
+    apart = np.square(sizes).sum(1)[:, None] - 2 * sizes @ known.T + np.square(known).sum(1)
     nearest, size = apart.argmin(1), np.square(sizes).sum(1)
-    plain = apart.min(1, initial=np.inf) < LEFT**2 * size
+    plain = apart.min(1) < LEFT**2 * size
     change[rows[plain]] = np.abs(change[rows[plain]]) * signs[nearest[plain]]
     rectified[rows[plain]] = False
     return change, rectified
-
-
-@functools.cache
-def _patterns() -> tuple[np.ndarray, np.ndarray]:
-    """Return sizes (P, 19) of simulated contacts' changes on the networks' scale, and their signs."""
-    patterns = contact_signals()
-    return compress(np.abs(patterns)), np.where(patterns > 0, np.float32(1), np.float32(-1))

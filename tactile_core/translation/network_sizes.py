@@ -20,14 +20,14 @@ POSTERIORS = ("S2MPN", "R2MPN")
 MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small enough to refuse a damaged number
 
 
-def tensor_shapes(net: str, sizes: dict[str, int]) -> dict[str, tuple[int, ...]]:
-    """Return the tensor names and shapes of one network from the sizes in its card."""
+def tensor_shapes(net: str, sizes: dict[str, int], electrodes: int = ELECTRODES) -> dict[str, tuple[int, ...]]:
+    """Return the tensor names and shapes of one network from the sizes in its card; electrodes : how many are read."""
     if net == "SVB":
         latent, hidden = sizes["latent"], SIGNAL_HIDDEN
-        shapes = plain_shapes("encoder", (ELECTRODES + 1, *hidden, 2 * latent))
-        shapes |= plain_shapes("decoder", (latent, *hidden[::-1], ELECTRODES))
+        shapes = plain_shapes("encoder", (electrodes + 1, *hidden, 2 * latent))
+        shapes |= plain_shapes("decoder", (latent, *hidden[::-1], electrodes))
         shapes |= {"distance.mean": (latent,), "distance.whitening": (latent, latent)}
-        return shapes | {"distance.residual": (ELECTRODES,)}
+        return shapes | {"distance.residual": (electrodes,)}
     width, blocks = sizes["width"], sizes["blocks"]
     if net in POSTERIORS:
         shapes = residual_shapes("posterior", sizes["inputs"], sizes["components"] * (1 + 2 * STATE), width, blocks)
@@ -65,7 +65,7 @@ def card_entry(card: dict, net: str, path: Path) -> dict:
     return entry
 
 
-def check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
+def check_chain(sizes: dict[str, dict[str, int]], path: Path, electrodes: int = ELECTRODES) -> None:
     """Check that the networks fit together: each latent's size is the same in all networks that share it."""
     links = [
         ("S2MPN", "inputs", sizes["SVB"]["latent"]),
@@ -83,7 +83,7 @@ def check_chain(sizes: dict[str, dict[str, int]], path: Path) -> None:
         ("error", "outputs", len(SURFACES)),
         ("force", "inputs", sizes["MVB"]["latent"]),
         ("force", "outputs", 3),
-        ("pressure", "inputs", ELECTRODES),
+        ("pressure", "inputs", electrodes),
         ("pressure", "outputs", 1),
     ]
     for net, size, expected in links:

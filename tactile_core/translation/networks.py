@@ -25,7 +25,8 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.shipped import shipped
-from ..sensors import ELECTRODES
+from ..sensors import electrode_count
+from .card_sensors import pair_of
 from .contact_frame import ContactFrame
 from .layers import Tensors, plain, residual
 from .network_sizes import NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, tensor_shapes
@@ -82,13 +83,16 @@ class Networks:
     """The trained networks. Arrays are float32, T first; displacements in metres, forces in newtons, changes in counts.
 
     tensors : network -> tensor name -> array
-    card : the model card (see `training/export_weights.py` for its fields)
+    card : the model card (see `training/export_weights.py` for its fields); source, target : the sensors that it names
+    electrodes : of the source; 19 where a shape says so is of a BioTac
     sha256 : hash of the card, which fixes every file; names these weights
     """
 
     def __init__(self, tensors: dict[str, Tensors], card: dict, sha256: str = "") -> None:
         self.card, self.sha256 = card, sha256
+        self.source, self.target = pair_of(card, CARD_NAME)
         self.sizes: dict[str, dict[str, int]] = {net: card["nets"][net]["sizes"] for net in NETS}
+        self.electrodes = self.sizes["pressure"]["inputs"]
         self.tensors = {
             net: {name: np.ascontiguousarray(array, np.float32) for name, array in tensors[net].items()} for net in NETS
         }
@@ -100,7 +104,7 @@ class Networks:
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Encode change (T, 19) counts from rest, as `sensors.COUNT_SIGN`, rectified or not, to SVB's mean (T, K)."""
-        return self._blocks(self._encode_signal, *_signal(change, rectified), "encode_signal")
+        return self._blocks(self._encode_signal, *self._signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
         """Decode latent_signal (T, K) to change (T, 19) counts: SVB's reconstruction."""
@@ -160,7 +164,7 @@ class Networks:
 
         rectified : (T,) bool, or one for all
         """
-        return self._blocks(self._expected_error, *_signal(change, rectified), "expected_error")
+        return self._blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
 
     def encode_biotac(self, displacement: np.ndarray) -> np.ndarray:
         """Encode displacement (T, N, 3) m of the BioTac's outer skin as latent_biotac (T, L)."""
@@ -195,15 +199,15 @@ class Networks:
         Rectified ones' is proportional to the sum of their changes: where the gains are not known and a real finger
         shares its changes out among the electrodes otherwise than a simulated one, their pattern misleads.
         """
-        return self._blocks(self._pressure, *_signal(change, rectified), "pressure")[:, 0]
+        return self._blocks(self._pressure, *self._signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
         """Return each frame's distances from the training signals, of change (T, 19) counts, rectified (T,) or one."""
-        distances = self._blocks(self._distance, *_signal(change, rectified), "signal_distance")
+        distances = self._blocks(self._distance, *self._signal(change, rectified), "signal_distance")
         return SignalDistance(*np.ascontiguousarray(distances.T))
 
     def _encode_signal(self, signal: np.ndarray) -> np.ndarray:
-        seen = np.concatenate([compress(signal[:, :ELECTRODES]), signal[:, ELECTRODES:]], -1)
+        seen = np.concatenate([compress(signal[:, :-1]), signal[:, -1:]], -1)
         hidden = plain(seen, self.tensors["SVB"], "encoder", len(SIGNAL_HIDDEN) + 1)
         return hidden[:, : self.sizes["SVB"]["latent"]]
 
@@ -211,17 +215,17 @@ class Networks:
         return plain(latent, self.tensors["SVB"], "decoder", len(SIGNAL_HIDDEN) + 1)
 
     def _distance(self, signal: np.ndarray) -> np.ndarray:
-        tensors, latent, change = self.tensors["SVB"], self._encode_signal(signal), signal[:, :ELECTRODES]
+        tensors, latent, change = self.tensors["SVB"], self._encode_signal(signal), signal[:, :-1]
         steps = (latent - tensors["distance.mean"]) @ tensors["distance.whitening"]
         left = (self._decode_signal(latent) - compress(change)) / tensors["distance.residual"]
         largest = np.abs(change).max(-1)
         return np.stack([np.sqrt(np.square(steps).sum(-1)), np.sqrt(np.square(left).mean(-1)), largest], -1)
 
     def _expected_error(self, signal: np.ndarray) -> np.ndarray:
-        latent, change = self._encode_signal(signal), compress(signal[:, :ELECTRODES])
+        latent, change = self._encode_signal(signal), compress(signal[:, :-1])
         rest = self._decode_signal(latent) - change
         features = [np.sqrt(np.square(each).mean(-1, keepdims=True)) for each in (rest, change)]
-        seen = np.concatenate([latent, *features, signal[:, ELECTRODES:]], -1)
+        seen = np.concatenate([latent, *features, signal[:, -1:]], -1)
         head = residual(seen, self.tensors["error"], "map", self.sizes["error"]["blocks"])
         return np.float32(ERROR_UNIT) * np.exp(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
@@ -230,11 +234,11 @@ class Networks:
         return np.float32(FORCE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
 
     def _pressure(self, signal: np.ndarray) -> np.ndarray:
-        change, tensors = signal[:, :ELECTRODES], self.tensors["pressure"]
+        change, tensors = signal[:, :-1], self.tensors["pressure"]
         head = residual(compress(change), tensors, "map", self.sizes["pressure"]["blocks"])
         signed = np.float32(PRESSURE_SCALE) * np.sinh(np.clip(head, -COMPRESSED_LIMIT, COMPRESSED_LIMIT))
         rectified = tensors["rectified"] * np.abs(change).sum(-1, keepdims=True)
-        return np.where(signal[:, ELECTRODES:] > 0, rectified, signed)
+        return np.where(signal[:, -1:] > 0, rectified, signed)
 
     def _either(self, part: str, seen: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
         """Apply a part of S2MPN, or of R2MPN to rectified frames."""
@@ -291,6 +295,16 @@ class Networks:
 
         return self._blocks(decode, latent, (sizes["latent"],), f"{net} decoder")
 
+    def _signal(self, change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarray, tuple[int]]:
+        """Build SVB's input (T, 20) and the shape of one frame of it; `_blocks` reports wrong shapes."""
+        change = np.asarray(change, np.float32)
+        if change.shape[1:] != (self.electrodes,):
+            return change, (self.electrodes,)
+        mark = np.broadcast_to(np.asarray(rectified, np.float32), len(change))[:, None]
+        # A rectified change is read as one that falls, as most do; less its level at rest it may lie below zero.
+        change = np.where(mark > 0, -np.abs(change), change)
+        return np.concatenate([change, mark], -1), (self.electrodes + 1,)
+
     def _blocks(self, function: Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
         """Apply a function in padded blocks, or to one frame alone; raises TactileError if x is not (T, *shape)."""
         x = np.asarray(x, np.float32)
@@ -311,17 +325,6 @@ class Networks:
         return out
 
 
-def _signal(change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarray, tuple[int]]:
-    """Build SVB's input (T, 20) and the shape of one frame of it; `_blocks` reports wrong shapes."""
-    change = np.asarray(change, np.float32)
-    if change.shape[1:] != (ELECTRODES,):
-        return change, (ELECTRODES,)
-    mark = np.broadcast_to(np.asarray(rectified, np.float32), len(change))[:, None]
-    # A rectified change is read as one that falls, as most do; less its level at rest it may lie below zero.
-    change = np.where(mark > 0, -np.abs(change), change)
-    return np.concatenate([change, mark], -1), (ELECTRODES + 1,)
-
-
 def load(folder: str | os.PathLike | None = None) -> Networks:
     """Read and verify a weights folder; None: the weights that ship with the package.
 
@@ -332,9 +335,10 @@ def load(folder: str | os.PathLike | None = None) -> Networks:
     card, digest = read_card(folder)
     if shipped and digest != SHIPPED_CARD_SHA256:
         raise TactileError(folder / CARD_NAME, f"sha256 {digest}", SHIPPED_CARD_SHA256, ADVICE)
-    tensors = {}
+    tensors, electrodes = {}, electrode_count(pair_of(card, folder / CARD_NAME)[0])
     for net in NETS:
         entry = card_entry(card, net, folder / CARD_NAME)
-        tensors[net] = read_verified(folder / f"{net}.safetensors", entry["sha256"], tensor_shapes(net, entry["sizes"]))
-    check_chain({net: card["nets"][net]["sizes"] for net in NETS}, folder / CARD_NAME)
+        shapes = tensor_shapes(net, entry["sizes"], electrodes)
+        tensors[net] = read_verified(folder / f"{net}.safetensors", entry["sha256"], shapes)
+    check_chain({net: card["nets"][net]["sizes"] for net in NETS}, folder / CARD_NAME, electrodes)
     return Networks(tensors, card, digest)

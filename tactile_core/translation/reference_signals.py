@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import ELECTRODES
+from ..sensors import electrode_count
 from ..sensors.readout import NOISE
 from . import weights
+from .card_sensors import pair_of
 from .gain_matching import match
 from .networks import compress, expand
 
@@ -61,7 +62,7 @@ def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
         raise TactileError("typical signals", f"{len(signal)} contacts", f"at least {2 * FEWEST}", "Make more pairs")
     chosen = compress(signal[random.permutation(len(signal))[:MOST]]).astype(np.float64)
     typical = expand(_k_means(chosen, random)).astype(np.float16).astype(np.float64)
-    read = signal[random.integers(len(signal), size=TRIES)] + NOISE * random.standard_normal((TRIES, ELECTRODES))
+    read = signal[random.integers(len(signal), size=TRIES)] + NOISE * random.standard_normal((TRIES, signal.shape[1]))
     bias = [
         match(np.abs(read) if rectified else read, typical, rectified, prior=0.01).log_gain
         for rectified in (False, True)
@@ -105,7 +106,8 @@ def read(folder: str | os.PathLike) -> ReferenceSignals:
     if not whole or type(entry.get("count")) is not int or not 0 < entry["count"] <= MOST:
         where = f"{Path(folder) / weights.CARD_NAME}, signals"
         raise TactileError(where, "no typical signals", "their count and sha256", weights.ADVICE)
-    shapes = {"typical": (entry["count"], ELECTRODES), "bias.signed": (ELECTRODES,), "bias.rectified": (ELECTRODES,)}
+    electrodes = electrode_count(pair_of(card, Path(folder) / weights.CARD_NAME)[0])
+    shapes = {"typical": (entry["count"], electrodes), "bias.signed": (electrodes,), "bias.rectified": (electrodes,)}
     arrays = weights.read_verified(Path(folder) / FILE, entry["sha256"], shapes)
     for name, array in arrays.items():
         if not np.isfinite(array).all():

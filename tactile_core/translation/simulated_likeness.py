@@ -13,6 +13,7 @@ Rectified signals are not judged: without signs, two contacts look like one (5 %
 from __future__ import annotations
 
 import functools
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,15 +31,37 @@ ALIKE = 0.6
 FIRST = 64  # patterns, the likest to the signal, that one of the two is looked for among: an eighth of the work
 
 
-def residual_shares(change: np.ndarray, rectified: np.ndarray) -> np.ndarray:
+@dataclass(frozen=True)
+class Patterns:
+    """Simulated contacts: signals (P, e) float64 counts; units (P, e), of length one; alike (P, P), their cosines."""
+
+    signals: np.ndarray
+    units: np.ndarray
+    alike: np.ndarray
+
+
+def patterns_of(signals: np.ndarray) -> Patterns:
+    """Return what signals are compared with, from signals (P, e) counts of simulated contacts."""
+    units = signals / np.linalg.norm(signals, axis=1, keepdims=True)
+    return Patterns(signals, units, units @ units.T)
+
+
+@functools.cache
+def shipped_patterns() -> Patterns:
+    """Return those of a BioTac that ship."""
+    return patterns_of(contact_signals())
+
+
+def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None) -> np.ndarray:
     """Return the shares (T, 2) of a typical unit's changes (T, 19) counts that one and two simulated contacts leave.
 
+    patterns : of the sensor; None for a BioTac's
     rectified : (T,) bool; these frames and those that hardly change are not judged: NaN
     """
     found = np.full((len(change), 2), np.nan)
     length = np.sqrt(np.square(change, dtype=np.float64).sum(axis=1))
     rows = np.flatnonzero((length >= TOUCHING) & ~rectified)
-    found[rows] = np.stack(residual_lengths(change[rows] / length[rows, None]), axis=1)
+    found[rows] = np.stack(residual_lengths(change[rows] / length[rows, None], patterns), axis=1)
     return found
 
 
@@ -53,13 +76,13 @@ def unlike(shares: np.ndarray) -> np.ndarray:
     return shares[:, 0] > UNLIKE
 
 
-def residual_lengths(signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def residual_lengths(signals: np.ndarray, patterns: Patterns | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return the length (T,) of what the best single pattern, and the best two, leave of signals (T, 19) of length one.
 
     Two are sought where one leaves enough for them to matter; elsewhere they count as leaving as much.
     """
-    patterns, alike = _patterns()
-    near = signals @ patterns.T
+    patterns = patterns or shipped_patterns()
+    alike, near = patterns.alike, signals @ patterns.units.T
     one = np.sqrt(np.maximum(1 - np.square(near.max(axis=1, initial=0)), 0))
     two = one.copy()
     for row in np.flatnonzero(one > MORE_BY_ONE):
@@ -71,11 +94,3 @@ def residual_lengths(signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         onto = (a * a + b * b - 2 * cosine * a * b) / (1 - np.square(np.clip(cosine, -1, ALIKE)))
         two[row] = min(np.sqrt(max(1 - onto.max(where=some, initial=0), 0)), one[row])
     return one, two
-
-
-@functools.cache
-def _patterns() -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (P, 19) of simulated contacts, and their cosines (P, P)."""
-    patterns = contact_signals()
-    patterns /= np.linalg.norm(patterns, axis=1, keepdims=True)
-    return patterns, patterns @ patterns.T

@@ -15,9 +15,10 @@ from ..recordings import Signals
 from ..recordings.flags import Flag
 from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
-from . import error_bounds, gel_place, networks, plausible
+from . import error_bounds, gel_place, networks, plausible, reference_signals
 from .answer import MEAN, Answer
 from .card_errors import doubt
+from .card_sensors import NODES, REST, SOURCE, TARGET, pair_of
 from .contact_frame import STILL, ContactFrame
 from .contact_track import Evidence, track
 from .error_bounds import KINDS
@@ -25,7 +26,7 @@ from .lost_signs import recovered
 from .network_sizes import PLACE, SURFACES
 from .networks import Networks
 from .posterior import Posterior, touches
-from .simulated_likeness import residual_shares, two_contacts, unlike
+from .simulated_likeness import Patterns, patterns_of, residual_shares, two_contacts, unlike
 from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
@@ -37,7 +38,6 @@ UNTRAINED_CONFIDENCE = 0.2  # assumed
 IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
 # A place is undecided where more than this share of the posterior lies as far away, m, as two contacts are told apart.
 UNDECIDED, APART = 0.3, 3e-3  # assumed
-_NODES = "_nodes_sha256"  # after a sensor's name in a card, the hash of its surface
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -99,17 +99,19 @@ def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> n
 class Translator:
     """Verified networks, ready to translate. card : their model card; sha256 : of the card, which names all weights."""
 
-    def __init__(self, nets: Networks, answer: Answer | None = None) -> None:
+    def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
+        """Take patterns : simulated contacts of the source; None for a BioTac's, which ship."""
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
+        self.source, self._patterns = nets.source, patterns
         self.answer = answer or Answer()
         moved = self.answer.mount_shift
         self._shift = gel_place.Shift(nets.frames["MVD"], moved) if moved.any() else None
-        self._unrolled = surface.unrolled_nodes()
+        self._unrolled = surface.unrolled_nodes(self.source)
 
     def posterior(self, signals: Signals) -> Evidence:
         """Return each frame's own posterior of its contact, and what ``contact_track`` needs beside it."""
         latent, unsigned = self._latent_signal(signals)
-        size = np.sqrt(np.square(signals.typical).mean(axis=1))
+        size = np.sqrt(np.square(self._typical(signals)).mean(axis=1))
         return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, rectified=_rectified(signals))
 
     def followed(self, signals: Signals, time: np.ndarray) -> Translation:
@@ -123,8 +125,16 @@ class Translator:
 
     def _latent_signal(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
         """Latents (T, K) of the signals, and which (T,) of them have no sign, lost and not recovered."""
-        change, unsigned = recovered(signals.typical, _rectified(signals))
+        change, unsigned = recovered(self._typical(signals), _rectified(signals), self._patterns)
         return self.nets.encode_signal(change, unsigned), unsigned
+
+    def _typical(self, signals: Signals) -> np.ndarray:
+        """Changes (T, e) counts of the unit that the networks know. Raises TactileError for another sensor's."""
+        if signals.sensor != self.source:
+            found = f"signals of a {sensors.title(signals.sensor)}"
+            raise TactileError("translation", found, f"those of a {sensors.title(self.source)}, as the weights")
+        rest = self.card.get(REST)
+        return signals.typical if rest is None else signals.relative_to(np.array(rest))
 
     def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
         """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours.
@@ -134,7 +144,7 @@ class Translator:
         """
         nets = self.nets
         rectified = _rectified(signals)
-        change = np.asarray(signals.typical, np.float32)
+        change = np.asarray(self._typical(signals), np.float32)
         latent_signal, unsigned = self._latent_signal(signals)
         alone = state is None
         posterior = nets.posterior(latent_signal, unsigned)
@@ -153,7 +163,7 @@ class Translator:
         silent = np.isnan(center[:, 0])
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
-        shares = residual_shares(change, rectified)
+        shares = residual_shares(change, rectified, self._patterns)
         flags[unlike(shares)] |= np.uint16(Flag.UNEXPLAINED)
         confidence = self._confidence(change, flags, rectified)
         flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
@@ -263,20 +273,32 @@ def _grows(values: Any) -> bool:
     return numbers and all(0 <= v <= sys.float_info.max for v in values) and values == sorted(values)
 
 
-def _check_target(card: dict[str, Any], target: str, where: str) -> None:
-    """Check that a card's networks, which its hashes of surfaces name, end in the gel of a sensor."""
-    sensors.shape_of(target)  # raises for a name that is none, and for a sensor without a gel
-    known = sorted(key.removesuffix(_NODES) for key in card if key.endswith(_NODES))
-    if target not in known:
-        raise TactileError(where, f"networks of {' and '.join(known)}", f"networks that translate to {target}")
+def _check_pair(card: dict[str, Any], source: str | None, target: str | None, where: str) -> None:
+    """Check that a card's networks, which its hashes of surfaces name, lead from a sensor to the gel of another.
+
+    Pictures and places know the DIGIT's lattice alone, so that networks to another gel are refused.
+    """
+    if target is not None:
+        sensors.shape_of(target)  # raises for a name that is none, and for a sensor without a gel
+    known = pair_of(card, where)
+    if source not in (None, known[0]):
+        advice = "`tactile convert` takes them, with recordings of that sensor"
+        expected = f"networks that translate recordings of {source}"
+        raise TactileError(where, f"networks of {' and '.join(known)}", expected, advice)
+    if known[1] != (target or TARGET):
+        raise TactileError(
+            where, f"networks of {' and '.join(known)}", f"networks that translate to {target or TARGET}"
+        )
 
 
 def load_translator(
-    folder: str | os.PathLike | None = None, answer: Answer | None = None, target: str | None = None
-) -> Translator:
+    folder: str | os.PathLike | None = None, answer: Answer | None = None, target: str | None = None,
+    source: str | None = SOURCE,
+) -> Translator:  # fmt: skip
     """Load the networks of a weights folder, the shipped ones by default, with options of the estimate.
 
-    target : the gel that they must translate to; None for whichever they do
+    target : the gel that they must translate to; None for the DIGIT
+    source : the sensor whose recordings they must translate; None for whichever they do
     Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces, and for
     a target that is no sensor or not theirs.
     """
@@ -284,12 +306,14 @@ def load_translator(
     card_file = f"{folder or networks.WEIGHTS_FOLDER}, card.json"
     _check_quantiles(nets.card, card_file)
     error_bounds.check(nets.card, card_file)
-    if target is not None:
-        _check_target(nets.card, target, card_file)
-    for key, here in ((f"{sensor}{_NODES}", sensors.sensor_surface(sensor).sha256) for sensor in SURFACES):
+    _check_pair(nets.card, source, target, card_file)
+    pair = nets.source, nets.target
+    for key, here in ((f"{sensor}{NODES}", sensors.sensor_surface(sensor).sha256) for sensor in pair):
         if nets.card.get(key) != here:
             raise TactileError(
                 f"{card_file}, {key}", f"{str(nets.card.get(key))[:12]}...",
                 f"{here[:12]}..., the surface of this version", "Use weights trained with this version of the sensors",
             )  # fmt: skip
-    return Translator(nets, answer)
+    if nets.source == SOURCE:
+        return Translator(nets, answer)
+    return Translator(nets, answer, patterns_of(reference_signals.read(folder or networks.WEIGHTS_FOLDER).typical))

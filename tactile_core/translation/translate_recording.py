@@ -28,7 +28,9 @@ def translate(
     weights: str | os.PathLike[str] | None = None,
     answer: Answer | None = None,
 ) -> Translation:
-    """Translate a BioTac recording to skin deformation, DIGIT gel deformation and force, as `tactile convert` does.
+    """Translate a recording to skin deformation, DIGIT gel deformation and force, as `tactile convert` does.
+
+    Recordings are of a BioTac, or of the sensor that the weights are for.
 
     recording : of ``tactile.read``
     frames : part of the recording to translate, such as ``slice(100, 200)``; the contact is tracked through all
@@ -66,14 +68,14 @@ def translate(
 @lru_cache(maxsize=2)
 def _shared_translator(weights: str | None, answer: Answer) -> Translator:
     """Load networks once a process: 13 MB, a quarter of a second."""
-    return load_translator(weights, answer)
+    return load_translator(weights, answer, source=None)
 
 
 def _prepared(recording: Recording, options: PrepareOptions | None, sensor: str | os.PathLike[str] | None) -> Signals:
     """Prepare the signals, with the unit's rest and gains where a sensor file is given."""
     if sensor is None:
         return electrode_gains.prepare_unit(recording, options, None)
-    unit = electrode_gains.read(sensor).gains_for(recording.path, split(recording.path)[1], sensor)
+    unit = electrode_gains.read(sensor).gains_for(recording.path, split(recording.path)[1], sensor, recording.sensor)
     return electrode_gains.prepare_unit(recording, options, unit)
 
 

@@ -32,7 +32,7 @@ def read_sp(path):
     return recordings.read(path, sensor="biotac_sp")
 
 
-def test_a_slip_recording_is_told_and_not_translated(counts, write, capsys):
+def test_a_slip_recording_is_told_and_prepared(counts, write, capsys):
     path = written(write, SLIP, counts)
     assert sensor_of(path) == "biotac_sp" and each_finger(path) == [path]
     recording = read_sp(path)
@@ -42,13 +42,15 @@ def test_a_slip_recording_is_told_and_not_translated(counts, write, capsys):
         and recording.rate == pytest.approx(100)
         and recording.duration == pytest.approx(0.29)
     )
-    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP"):
-        recordings.prepare(recording)
+    signals = recordings.prepare(recording)
+    assert signals.sensor == "biotac_sp" and signals.report["polarity_evidence"] == "raw counts of a BioTac SP"
+    np.testing.assert_array_equal(signals.typical, signals.change)  # of no unit but this one anything is known
+    np.testing.assert_allclose(signals.relative_to(signals.rest), signals.change, atol=1e-6)
     assert main(["info", path]) == 0
     text = capsys.readouterr().out
     for part in (
         "BioTac SP, 24 electrodes, first finger (ff)", "30 in lines 2 to 31", "0.30 s", "100 Hz (assumed)",
-        "raw: whole numbers", "none are of a BioTac SP", "rest       not known",
+        "raw: whole numbers", "weights of a BioTac SP", "rest       not known",
     ):  # fmt: skip
         assert part in text, part
     largest = next(line for line in text.splitlines() if "largest" in line).split()[1:]
@@ -84,9 +86,9 @@ def test_nineteen_of_its_columns_are_no_biotac(stem, counts, write):
     names = [f"{stem}{number}" for number in range(1, 25)]
     path = written(write, names, counts)
     columns = ColumnMap(electrodes=tuple(names[:19]))
-    with pytest.raises(TactileError, match=r"24 electrodes: a BioTac SP, for which no weights ship"):
+    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19"):
         recordings.read(path, columns)
-    with pytest.raises(TactileError, match="for which no weights ship"):
+    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19"):
         info.describe(path, PrepareOptions(columns=columns))
 
 
@@ -145,4 +147,4 @@ def test_public_recordings_are_described(outside_data):
     for path in paths:
         for finger in each_finger(path):
             text = info.describe(finger)
-            assert "raw: whole numbers" in text and "none are of a BioTac SP" in text
+            assert "raw: whole numbers" in text and "weights of a BioTac SP" in text

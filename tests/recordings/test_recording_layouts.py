@@ -64,7 +64,7 @@ def test_every_layout_has_a_row_here():
 )
 def test_a_biotac_sp_is_recognised_and_refused(header, write):
     path = write([header, ",".join("1" * (header.count(",") + 1))])
-    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP, for which no weights ship"):
+    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19"):
         recordings.read(path)
 
 

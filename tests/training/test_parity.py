@@ -45,7 +45,7 @@ def random_surface(name, rng):
 def contacts():
     rng = np.random.default_rng(5)
     contacts = Contacts.__new__(Contacts)
-    contacts.options = OPTIONS
+    contacts.options, contacts.electrodes = OPTIONS, 19
     contacts.biotac, contacts.digit = (random_surface(name, rng) for name in SURFACES)
     return contacts
 

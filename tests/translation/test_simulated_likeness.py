@@ -23,7 +23,8 @@ def signed(count):
 
 
 def test_two_patterns_are_two_and_each_alone_is_one():
-    patterns, alike = module._patterns()
+    known = module.shipped_patterns()
+    patterns, alike = known.units, known.alike
     first = 0
     second = int(alike[first].argmin())
     change = 100 * np.stack([patterns[first], patterns[second], patterns[first] + 0.7 * patterns[second]])
@@ -33,7 +34,8 @@ def test_two_patterns_are_two_and_each_alone_is_one():
 
 
 def test_what_is_not_judged_is_not_marked():
-    patterns, alike = module._patterns()
+    known = module.shipped_patterns()
+    patterns, alike = known.units, known.alike
     both = patterns[0] + patterns[int(alike[0].argmin())]
     light = both * (0.9 * module.TOUCHING / np.linalg.norm(both))
     assert not two_contacts(residual_shares(np.stack([light, 100 * both]), np.array([False, True]))).any()

@@ -107,7 +107,13 @@ def run(options: argparse.Namespace) -> int:
     made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(
-        options.weights, options.calibration, preset, answer=answer, gel=options.gel, target=options.target
+        options.weights,
+        options.calibration,
+        preset,
+        answer=answer,
+        gel=options.gel,
+        target=options.target,
+        source=None,
     )
     if levels is not None:
         why = presets.describe_choice(preset, levels)
