@@ -94,7 +94,7 @@ def mean(values: np.ndarray) -> float | None:
     return float(values.mean()) if len(values) else None
 
 
-def mesh_figures(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
+def mesh_metrics(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
     """Compute the four metrics of a mesh for each contact: micrometres, and per cent for the peak."""
     return {
         "rms_um": 1e6 * rms_in_contact(predicted, true),

@@ -22,7 +22,7 @@ def dent(depth: float, node: int) -> np.ndarray:
 
 def test_perfect_answer_has_no_error():
     true = dent(1e-3, 7)
-    for value in accuracy.mesh_figures(true, true).values():
+    for value in accuracy.mesh_metrics(true, true).values():
         assert value == [0.0]
 
 

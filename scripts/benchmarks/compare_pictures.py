@@ -1,4 +1,4 @@
-"""Measure speed against error of every way to draw a DIGIT's picture: ours, stock Mitsuba, a table, simple nulls.
+"""Measure speed against error of every way to draw a DIGIT's picture: ours, stock Mitsuba, a table, simple baselines.
 
     python scripts/benchmarks/compare_pictures.py PRESSES [--background FILE] [--deeper DIR] [--finish] [--every]
                                                   [--json FILE] [--quick]
@@ -37,7 +37,7 @@ from tactile_core.pictures.calibrate.ball_pictures import FastPictures, working_
 from tactile_core.pictures.calibrate.contact_light import contact_disc, contact_radius, fitted_light
 from tactile_core.pictures.calibrate.fit import calibrate
 from tactile_core.pictures.calibrate.kept_apart import FOLDS
-from tactile_core.pictures.calibrate.photo_metrics import figures
+from tactile_core.pictures.calibrate.photo_metrics import metrics
 from tactile_core.pictures.calibrate.photographs import Photographs, Press, chosen, press_of, read_photographs
 from tactile_core.pictures.calibrate.press_fit import MODEL_ERROR, Ball, Sight, fit_ball
 from tactile_core.pictures.mitsuba.scene_file import write_scene
@@ -113,33 +113,33 @@ def on_photographs(
         fitted = chosen(photographs, [name for name in names if name not in apart])
         unit = calibrate(fitted, 2 * BALL, load_calibration(START), unit="fold", quick=not finish).calibration
         for where, presses in (("apart", chosen(photographs, apart).presses), ("deeper", further)):
-            for name, figures_of in one_fit(unit, fitted, presses, variants, every):
-                found.setdefault((where, name), []).append(figures_of)
+            for name, metrics_of in one_fit(unit, fitted, presses, variants, every):
+                found.setdefault((where, name), []).append(metrics_of)
     for (where, name), each in found.items():
-        for figure, unit_ in (("roi_psnr", "dB"), ("roi_l1", "levels"), ("flank_colour", "levels")):
-            value = float(np.mean([one[figure] for one in each]))
-            null = float(np.mean([one[figure] for one in found[where, "null_background"]]))
+        for metric, unit_ in (("roi_psnr", "dB"), ("roi_l1", "levels"), ("flank_colour", "levels")):
+            value = float(np.mean([one[metric] for one in each]))
+            nothing = float(np.mean([one[metric] for one in found[where, "baseline_background"]]))
             of = f"{len(each)} photographs {'not fitted' if where == 'apart' else 'of another day, deeper'}"
-            yield row(f"{where}_{name}_{figure}", value, unit_, baseline=null, of=of)
+            yield row(f"{where}_{name}_{metric}", value, unit_, baseline=nothing, of=of)
 
 
 def one_fit(
     unit: Calibration, fitted: Photographs, presses: Sequence[Press], variants: list[str], every: bool
 ) -> Iterator[tuple[str, dict[str, float]]]:
-    """Figures by every method, by name, of presses that a unit was not fitted on."""
+    """Metrics by every method, by name, of presses that a unit was not fitted on."""
     fast = FastPictures(unit)
     factor = working_factor(unit.camera.width, unit.camera.height)
     working = FastPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
     balls = {press.name: fit_ball(working, Sight(press), BALL)[0] for press in fitted.presses}
     ways = methods(unit, fitted, fast, variants, every) | {
-        "null_shifted": lambda ball: shifted(ball, fitted, balls, fast)
+        "baseline_shifted": lambda ball: shifted(ball, fitted, balls, fast)
     }
     for press in presses:
         ball, _ = fit_ball(working, Sight(press), BALL)
         seen, _ = fit_ball(working, Sight(press), BALL, opaque=False)
         for name, change in ways.items():
             yield name, compared(change(ball), press, fitted.background, fast, ball)
-            if not name.startswith("null") and name != REFERENCE.name:  # whose one picture takes long enough
+            if not name.startswith("baseline") and name != REFERENCE.name:  # whose one picture takes long enough
                 lit = with_light(change(seen), press, fast, seen)
                 yield f"{name}_through", compared(lit, press, fitted.background, fast, seen)
 
@@ -150,7 +150,7 @@ def methods(
     """Ways to draw the change by a press, by name; the slower variant's presets carry its name."""
     bench = TableBench(fast, fit_table(unit, fitted, BALL))
     found: dict[str, Change] = {
-        "null_background": lambda ball: np.zeros((*unit.camera.shape, 3)),
+        "baseline_background": lambda ball: np.zeros((*unit.camera.shape, 3)),
         TABLE: lambda ball: bench.change(ball.numbers),
         "fast": lambda ball: fast.change(ball.numbers),
     }
@@ -194,10 +194,10 @@ def with_light(change: np.ndarray, press: Press, fast: FastPictures, ball: Ball)
 def compared(
     change: np.ndarray, press: Press, background: np.ndarray, fast: FastPictures, ball: Ball
 ) -> dict[str, float]:
-    """Figures of a change against a photograph, and the error of the flanks' mean colours."""
+    """Metrics of a change against a photograph, and the error of the flanks' mean colours."""
     untouched = background + press.drift
     picture = np.rint(untouched + change).clip(0, 255)
-    return figures(picture, press.picture, background, press.region) | {
+    return metrics(picture, press.picture, background, press.region) | {
         "flank_colour": flank_colour(picture - press.picture, fast, ball)
     }
 
@@ -256,7 +256,7 @@ def table(rows: list[Row]) -> str:
         "| flanks' colour | deeper: dB, levels |",
         "|---|---|---|---|---|---|---|",
     ]
-    ways = [("null_background", "background alone"), ("null_shifted", "nearest fitted photograph, shifted")]
+    ways = [("baseline_background", "background alone"), ("baseline_shifted", "nearest fitted photograph, shifted")]
     for name, label in (*ways, (TABLE, "table after Taxim"), *((preset, f"`{preset}`") for preset in NAMES)):
         found = presets.get(name)
         if found:
@@ -264,8 +264,8 @@ def table(rows: list[Row]) -> str:
         else:
             times = [_number(value.get(f"{name}_{size}_ms")) for size in (small, large)] + [""]
         seen = [
-            _numbers(value, f"{where}_{name}", figures_)
-            for where, figures_ in (
+            _numbers(value, f"{where}_{name}", metrics_)
+            for where, metrics_ in (
                 ("apart", ("roi_psnr", "roi_l1")),
                 ("apart", ("flank_colour",)),
                 ("deeper", ("roi_psnr", "roi_l1")),
@@ -285,8 +285,8 @@ def _times(ms: dict[str, float]) -> str:
     return _number(ms["numpy"]) if "numpy" in ms else _joined([ms.get(variant) for variant in (LLVM, SCALAR)])
 
 
-def _numbers(value: dict[str, float], name: str, figures_: Sequence[str]) -> str:
-    return _joined([value.get(f"{name}_{figure}") for figure in figures_])
+def _numbers(value: dict[str, float], name: str, metrics_: Sequence[str]) -> str:
+    return _joined([value.get(f"{name}_{metric}") for metric in metrics_])
 
 
 def _joined(values: Sequence[float | None]) -> str:

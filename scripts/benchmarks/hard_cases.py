@@ -87,8 +87,8 @@ def markdown(rows: list[Row]) -> str:
 
 
 def _line(row: Row) -> str:
-    figure = f"{row['value']:.3g} {row['unit']}"
-    found = row["words"] if row["unit"] == "said" else figure + (f": {row['words']}" if row["words"] else "")
+    number = f"{row['value']:.3g} {row['unit']}"
+    found = row["words"] if row["unit"] == "said" else number + (f": {row['words']}" if row["words"] else "")
     found += f". Limit: {row['limit']}" if row["limit"] else ""
     cells = [row["set"], row["name"], row["expected"], found, "ok" if row["ok"] else "**MISSED**"]
     return "| " + " | ".join(cell.replace("|", "/").replace("\n", " ") for cell in cells) + " |"

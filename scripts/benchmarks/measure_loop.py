@@ -71,7 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     for name, times, error in all_measured(options.count):
         for how in HOW:
-            middle = figures(times[how])
+            middle = quantiles(times[how])
             table.append(f"| {name} | {how} | {' | '.join(f'{each:.3g}' for each in middle)} | {error[how]} |")
         rows += as_rows(name, times, error)
     print("\n".join([HEADER, *map(line, rows)]))
@@ -83,7 +83,7 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def figures(times: Times) -> list[float]:
+def quantiles(times: Times) -> list[float]:
     """Median, 95 and 99 % of CPU, then of wall ms."""
     return [float(np.quantile(each, level)) for each in np.array(times).T for level in LEVELS]
 
@@ -95,7 +95,7 @@ def as_rows(name: str, times: dict[str, Times], error: dict[str, str]) -> list[R
         key = f"loop_{name.replace(', ', '_').replace(' ', '_')}_{how}"
         of = f"{len(times[how])} contacts, one core; error {error[how]}"
         labels = [f"{kind}{level}" for kind in ("cpu", "wall") for level in ("", "_95", "_99")]
-        for label, value in zip(labels, figures(times[how]), strict=True):
+        for label, value in zip(labels, quantiles(times[how]), strict=True):
             rows.append(row(f"{key}_{label}", value, "ms", of=of))
     return rows
 

@@ -18,7 +18,7 @@ from ..translation.networks import DISTANCES, Networks
 from ..translation.translate import silent_level
 from ..translation.weights import write_bytes
 from .data import Contacts
-from .error_summary import figure_row, figure_rows
+from .error_summary import metric_row, metric_rows
 from .stages import Model
 from .step_errors import (
     Bodies,
@@ -27,7 +27,7 @@ from .step_errors import (
     joined,
     mesh_columns,
     parts,
-    translation_figures,
+    translation_metrics,
     true_displacement,
 )
 from .surface_codec import SILENT
@@ -55,14 +55,14 @@ class Measure:
 def error_rows(measure: Measure, model: Model) -> list[Row]:
     """Make all rows of the card: each step of the chain, the chain, the direct network, each beside its baseline."""
     pairs, rows = measure.contacts.pairs, measure.rows
-    columns = translation_figures(measure.networks, pairs, rows, measure.change, measure.bodies)
+    columns = translation_metrics(measure.networks, pairs, rows, measure.change, measure.bodies)
     columns |= direct_columns(model, measure)
-    found = [*signal_rows(measure), *figure_rows(columns, pairs, rows, "test presses", {}), *silence_rows(measure)]
+    found = [*signal_rows(measure), *metric_rows(columns, pairs, rows, "test presses", {}), *silence_rows(measure)]
     among = np.isin(np.array(pairs.indenter_names)[pairs.indenter[rows]], PROTOTYPE)
     if not among.any():
         return found
     few = {name: np.where(among, column, np.nan) for name, column in columns.items()}
-    return [*found, *figure_rows(few, pairs, rows, "test presses, shapes of the prototype", {})]
+    return [*found, *metric_rows(few, pairs, rows, "test presses, shapes of the prototype", {})]
 
 
 def direct_columns(model: Model, measure: Measure) -> Columns:
@@ -84,7 +84,7 @@ def signal_rows(measure: Measure) -> list[Row]:
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
     value, baseline = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
-    return [figure_row("SVB_rms_counts", value, baseline, None, "test presses")]
+    return [metric_row("SVB_rms_counts", value, baseline, None, "test presses")]
 
 
 def silence(measure: Measure) -> dict[str, np.ndarray]:
@@ -105,7 +105,7 @@ def silence_rows(measure: Measure) -> list[Row]:
     values = silence(measure)
     largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
     named = [*largest, ("silence_force_N", values["force_N"])]
-    return [figure_row(name, accuracy.mean(value), 0.0, None, "noise alone") for name, value in named]
+    return [metric_row(name, accuracy.mean(value), 0.0, None, "noise alone") for name, value in named]
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:

@@ -28,7 +28,7 @@ def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median:
     return float(np.mean(bins)) if bins else None
 
 
-def figure_rows(
+def metric_rows(
     columns: Columns, pairs: Pairs, rows: np.ndarray, set_name: str, targets: dict[str, float]
 ) -> list[Row]:
     """Make a row for each metric over the contacts in these rows that press without sliding, averaged as `in_bins`."""
@@ -40,7 +40,7 @@ def figure_rows(
             at = np.where(still, values, np.nan)
             value = in_bins(at, depth, indenter, is_median(name))
             baseline = in_bins(np.where(still, _baseline(columns, name), np.nan), depth, indenter, is_median(name))
-            found.append(figure_row(name, value, baseline, targets.get(name), set_name))
+            found.append(metric_row(name, value, baseline, targets.get(name), set_name))
     return found
 
 
@@ -50,14 +50,14 @@ def is_median(name: str) -> bool:
 
 
 def _baseline(columns: Columns, name: str) -> np.ndarray:
-    step, figure = name.split("_", 1)
+    step, metric = name.split("_", 1)
     nothing = columns.get(
-        "baseline_counts" if figure == "counts" else f"{BASELINES.get(step, 'baseline_digit')}_{figure}"
+        "baseline_counts" if metric == "counts" else f"{BASELINES.get(step, 'baseline_digit')}_{metric}"
     )
     return np.full(len(columns[name]), np.nan) if nothing is None else nothing
 
 
-def figure_row(name: str, value: float | None, baseline: float | None, target: float | None, set_name: str) -> Row:
+def metric_row(name: str, value: float | None, baseline: float | None, target: float | None, set_name: str) -> Row:
     """Make one row of a report; the unit is the name's last word. Larger is better for an intersection over union."""
     unit = name.rsplit("_", 1)[1].replace("percent", "%").replace("iou", "1")
     target = None if value is None else target

@@ -41,7 +41,7 @@ def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray
     )
 
 
-def translation_figures(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
+def translation_metrics(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
     """Return the errors of every step for the contacts in these rows, read as ``change`` (C, 19) counts.
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
@@ -129,10 +129,10 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
     """Return RMS over moving nodes, largest node error, error of the core's height (all um), of the peak (%)."""
-    figures = accuracy.mesh_figures(found, true, depth)
+    metrics = accuracy.mesh_metrics(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
-    figures["peak_depth_percent"] = np.where(deep, figures["peak_depth_percent"], np.nan)
-    return {f"{name}_{figure}": values for figure, values in figures.items()}
+    metrics["peak_depth_percent"] = np.where(deep, metrics["peak_depth_percent"], np.nan)
+    return {f"{name}_{metric}": values for metric, values in metrics.items()}
 
 
 def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodies) -> Columns:

@@ -114,7 +114,7 @@ class SurfaceCodec:
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
         """Compute the mean of contacts' rms error over moving nodes, for (B, K + K') coefficients round cells (B, 2).
 
-        1 for no displacement. The root is taken contact by contact, as in the figure we report: deep contacts do not
+        1 for no displacement. The root is taken contact by contact, as in the metric we report: deep contacts do not
         drown shallow ones. The bases being orthonormal, an error in coefficients is one of nodes; what no coefficients
         reach is added, and only the product of errors in both bases is left out (near fields hold next to nothing of
         the wide ones, from which they are what is left).

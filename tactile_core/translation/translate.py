@@ -36,7 +36,7 @@ UNTRAINED_CONFIDENCE = 0.2  # assumed
 # The largest change is another matter: signals of deep contacts at the tip are three times those that 99 % of the
 # contacts stay below, and training knows them. What exceeds all but one in a thousand is out of its range.
 IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
-# A place is undecided where more than this share of the posterior lies as far away, m, as two contacts are told apart.
+# A place is undecided where more than this share of the posterior lies as far away, m, as two contacts must lie apart.
 UNDECIDED, APART = 0.3, 3e-3  # assumed
 
 

@@ -76,8 +76,8 @@ def test_the_report_that_ships_can_be_read_and_draws(script):
     from benchmarks.table.benchmark_page import plot
     from benchmarks.table.method import Method
 
-    told = json.loads((SCRIPTS.parent / "docs" / "benchmark.json").read_text())
-    names = [row["name"] for row in told["rows"]]
+    said = json.loads((SCRIPTS.parent / "docs" / "benchmark.json").read_text())
+    names = [row["name"] for row in said["rows"]]
     assert {f"{name}_ms" for name in ("mechanics_digit_fast", "translation_numpy_1", "pictures_fast", "chain_fast")} < {
         *names
     }

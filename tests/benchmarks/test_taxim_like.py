@@ -11,7 +11,7 @@ from benchmarks.competitors.taxim_like import TableBench, fit_table, try_table
 
 from tactile_core.accuracy import HEADER, line, row
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures
-from tactile_core.pictures.calibrate.evaluate import evaluate_unit, mean_figures
+from tactile_core.pictures.calibrate.evaluate import evaluate_unit, mean_metrics
 from tactile_core.pictures.calibrate.photographs import Photographs, chosen, read_photographs
 from tactile_core.sensors.calibration_file import load_calibration
 
@@ -29,7 +29,7 @@ def test_shipped_calibration_beats_a_table_fitted_on_the_same_presses(photograph
     test = chosen(photographs, KEPT_APART)
     table = fit_table(unit, chosen(photographs, list(unit.fit.photographs)), BALL)
     rows_of_table = try_table(table, unit, test, BALL)
-    ours, baseline = mean_figures(evaluate_unit(unit, test, BALL, search_radius=False))
+    ours, baseline = mean_metrics(evaluate_unit(unit, test, BALL, search_radius=False))
     theirs = {name: float(np.mean([found[name] for found in rows_of_table])) for name in rows_of_table[0]}
     units = {"roi_l1": "levels", "roi_psnr": "dB", "roi_ssim": "", "frame_l1": "levels", "lobe_iou": ""}
     print("\n" + HEADER)

@@ -24,7 +24,7 @@ def main() -> int:
 
 
 if "BLENDER_USER_RESOURCES" not in os.environ:
-    # Too late for this process: Blender has read its folders. Start it anew with a user folder of its own.
+    # Too late for this process: Blender has read its folders. Start it again with a user folder of its own.
     import subprocess
 
     import bpy

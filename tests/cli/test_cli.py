@@ -307,5 +307,5 @@ def test_each_warning_is_one_line(tactile, slide_csv, tmp_path):
 def test_progress_is_silent_without_a_terminal_unless_asked(tactile, slide_csv, tmp_path):
     path = slide_csv(frames=5)
     _, _, quiet = tactile("convert", path, "--out", tmp_path / "a", "--keep", "")
-    _, _, told = tactile("convert", path, "--out", tmp_path / "b", "--keep", "", "--progress")
-    assert "5/5" in told and "5/5" not in quiet
+    _, _, said = tactile("convert", path, "--out", tmp_path / "b", "--keep", "", "--progress")
+    assert "5/5" in said and "5/5" not in quiet

@@ -13,9 +13,9 @@ def test_every_library_is_named(capsys, monkeypatch):
     few = [library for library in doctor.LIBRARIES if library.module in ("numpy", "h5py", "mitsuba")]
     monkeypatch.setattr(doctor, "LIBRARIES", few)  # torch alone takes seconds
     assert main(["doctor"]) == 0
-    told = capsys.readouterr().out
-    assert all(library.package in told for library in doctor.LIBRARIES)
-    assert "pictures: " in told
+    said = capsys.readouterr().out
+    assert all(library.package in said for library in doctor.LIBRARIES)
+    assert "pictures: " in said
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_a_path_to_nothing_is_trouble(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("told", "words"),
+    ("said", "words"),
     [
         ("LLVM 19 /usr/lib/libLLVM.so.19.1\n", ""),
         ("", ""),
@@ -59,9 +59,9 @@ def test_a_path_to_nothing_is_trouble(monkeypatch):
         ("LLVM 0 /usr/lib/my libLLVM-15.so\n", "my libLLVM-15.so is LLVM before 16"),
     ],
 )
-def test_an_old_llvm_is_not_trusted(told, words):
-    assert words in variant._too_old(told)
-    assert bool(variant._too_old(told)) == bool(words)
+def test_an_old_llvm_is_not_trusted(said, words):
+    assert words in variant._too_old(said)
+    assert bool(variant._too_old(said)) == bool(words)
 
 
 def test_nothing_is_imported_from_the_current_folder(tmp_path, monkeypatch):

@@ -14,9 +14,9 @@ REQUIRED = [
 
 
 def test_a_checkout_is_installed_from():
-    told = installed.advice("fem")
-    assert told.startswith('python -m pip install -c constraints.txt -e ".[fem]"')
-    assert installed.PACKAGE not in told
+    said = installed.advice("fem")
+    assert said.startswith('python -m pip install -c constraints.txt -e ".[fem]"')
+    assert installed.PACKAGE not in said
 
 
 @pytest.fixture
@@ -28,8 +28,8 @@ def test_a_wheel_s_libraries_are_named_one_by_one(no_checkout, monkeypatch):
     monkeypatch.setattr(metadata, "requires", lambda package: REQUIRED)
     assert installed.advice("fem") == "python -m pip install scipy trimesh"
     assert installed.advice("mkl") == "python -m pip install scipy trimesh pypardiso"
-    told = installed.advice("train")
-    assert told.startswith('python -m pip install "torch==2.13.0" (') and "CUDA" in told
+    said = installed.advice("train")
+    assert said.startswith('python -m pip install "torch==2.13.0" (') and "CUDA" in said
 
 
 def test_without_metadata_the_extra_is_named(no_checkout, monkeypatch):

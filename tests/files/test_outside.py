@@ -27,11 +27,11 @@ def device(path):
     path.symlink_to("/dev/zero")
 
 
-@pytest.mark.parametrize(("make", "told"), [(pipe, "a named pipe"), (bound_socket, "a socket"), (device, "a device")])
-def test_what_is_no_regular_file_is_refused(make, told, tmp_path):
+@pytest.mark.parametrize(("make", "said"), [(pipe, "a named pipe"), (bound_socket, "a socket"), (device, "a device")])
+def test_what_is_no_regular_file_is_refused(make, said, tmp_path):
     make(tmp_path / "a")
     for ask in (outside.check, outside.open_file, lambda path: outside.read(path, 10)):
-        with pytest.raises(TactileError, match=told):
+        with pytest.raises(TactileError, match=said):
             ask(tmp_path / "a")
 
 

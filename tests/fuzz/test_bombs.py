@@ -230,8 +230,8 @@ def test_a_photograph_starts_no_program(tmp_path, monkeypatch):
     assert not (tmp_path / "started").exists()
 
 
-@pytest.mark.parametrize(("width", "told"), [(10**7, "610 MB of pixels"), (2 * 10**8, "12207 MB"), (100, "damaged")])
-def test_a_wide_exr_picture(width, told, tmp_path):
+@pytest.mark.parametrize(("width", "said"), [(10**7, "610 MB of pixels"), (2 * 10**8, "12207 MB"), (100, "damaged")])
+def test_a_wide_exr_picture(width, said, tmp_path):
     pytest.importorskip("OpenEXR", reason="OpenEXR is absent: pip install tactile-core[render]")
     from tactile_core.files.exr_file import read_height, write_exr
 
@@ -241,7 +241,7 @@ def test_a_wide_exr_picture(width, told, tmp_path):
     assert struct.unpack_from("<4i", content, window) == (0, 0, 7, 15)
     struct.pack_into("<4i", content, window, 0, 0, width, 15)
     (tmp_path / "a.exr").write_bytes(content)
-    refused(read_height, tmp_path / "a.exr", told)
+    refused(read_height, tmp_path / "a.exr", said)
 
 
 def test_lists_of_inputs(tmp_path):

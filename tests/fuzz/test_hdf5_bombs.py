@@ -116,7 +116,7 @@ def endless_list(path):
 def test_hdf5(make, words, load, tmp_path):
     make(tmp_path / "a.h5")
     if make is huge_shape and load is not prepare:
-        words = ""  # told of its names first
+        words = ""  # reported of its names first
     elif make is huge_shape:
         words = "0 stored bytes"
     refused(load, tmp_path / "a.h5", words)

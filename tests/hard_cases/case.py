@@ -15,7 +15,7 @@ FAST_PICTURE, MITSUBA = "fast picture", "Mitsuba's picture"
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """One figure and whether it will do: |value| <= target, or value >= target for ``at_least``.
+    """One metric and whether it will do: |value| <= target, or value >= target for ``at_least``.
 
     words : what was said or seen; broken : invariants that do not hold, in words; one is enough to fail
     """

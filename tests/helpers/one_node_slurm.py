@@ -82,8 +82,8 @@ def slurm(folder: Path) -> Iterator[dict[str, str]]:
 
 
 def _idle(environment: dict[str, str]) -> bool:
-    told = subprocess.run(["sinfo", "-h", "-o", "%t"], env=environment, capture_output=True, text=True, timeout=60)
-    return told.stdout.strip() == "idle"
+    said = subprocess.run(["sinfo", "-h", "-o", "%t"], env=environment, capture_output=True, text=True, timeout=60)
+    return said.stdout.strip() == "idle"
 
 
 def wait(ready: Callable[[], bool], most: float = 300.0) -> None:

@@ -57,10 +57,10 @@ def test_shards_are_the_same_as_a_conversion(root, tmp_path, whole):
 
 def test_following_steadies_the_place_and_finds_the_touched_frames(root, whole, apart):
     force = np.linalg.norm(recordings.read(root / RECORDING).truth.force, axis=1)
-    told = [np.isfinite(each["contact_center"][:, 0]) for each in (whole, apart)]
-    wrong = [np.mean(np.where(force > 0.1, ~each, each & (force == 0))) for each in told]
+    said = [np.isfinite(each["contact_center"][:, 0]) for each in (whole, apart)]
+    wrong = [np.mean(np.where(force > 0.1, ~each, each & (force == 0))) for each in said]
     assert wrong[0] <= wrong[1] and wrong[0] < 0.005
-    both = told[0] & told[1]
+    both = said[0] & said[1]
     pairs = both[1:] & both[:-1]
     steps = [np.linalg.norm(np.diff(each["contact_center"], axis=0)[pairs], axis=1) for each in (whole, apart)]
     assert np.median(steps[0]) < 0.5 * np.median(steps[1])

@@ -20,9 +20,9 @@ def test_noise_has_the_unit_s_size_and_grain():
     noise = camera_noise(unit, np.random.default_rng(3))
     assert noise.shape == (*unit.camera.shape, 3)
     np.testing.assert_allclose(noise.std((0, 1)), NOISE, rtol=0.05)  # 4,800 independent squares: 1 %
-    for step, told in enumerate(MEASURED, 1):
+    for step, said in enumerate(MEASURED, 1):
         for values in (noise[..., 2], noise[..., 2].T):
-            assert correlation(values, step) == pytest.approx(told, abs=0.05)
+            assert correlation(values, step) == pytest.approx(said, abs=0.05)
     channels = np.corrcoef(noise.reshape(-1, 3).T)
     assert np.abs(channels - np.eye(3)).max() < 0.06  # each channel has its own
 

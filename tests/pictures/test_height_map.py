@@ -117,7 +117,7 @@ def test_folded_surface_is_said_and_finite(caplog: pytest.LogCaptureFixture) -> 
         with folds_counted() as folds:
             height_map(np.stack([20 * dent(gel.rest[:, 0], gel.rest[:, 2]) * [share, 0.1, share] for share in (0, -1)]))
     assert f"folds over itself at {folds[0]} of" in said
-    assert len(folds) == 1 and caplog.text == said  # told to the one who counts, not logged
+    assert len(folds) == 1 and caplog.text == said  # reported to the one who counts, not logged
     assert np.isfinite(heights).all()
 
 

@@ -118,7 +118,7 @@ def write_container(layout: str, folder: Path, press: SimpleNamespace) -> Path:
 
     from tactile_core import recordings
 
-    path = folder / f"{layout}.dat"  # the name tells nothing: layouts are told from the content
+    path = folder / f"{layout}.dat"  # the name tells nothing: layouts are said from the content
     count = len(press.time)
     if layout == "csv_slide":
         path.write_text("\n".join(slide_rows(press)) + "\n")

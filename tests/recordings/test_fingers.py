@@ -68,8 +68,8 @@ def test_what_is_no_plain_hand_is_refused_in_words(hand, tmp_path, press):
         "24 electrodes: a BioTac SP": {"F0Electrodes": np.zeros((24, 700))},
         "values of type": {"F0Electrodes": np.full((19, 700), "a", dtype=object)},
     }
-    for told, arrays in cases.items():
-        with pytest.raises(TactileError, match=told):
+    for said, arrays in cases.items():
+        with pytest.raises(TactileError, match=said):
             recordings.read(hand(**arrays))
     with pytest.raises(TactileError, match="finger 4; expected one that it holds: 0, 1"):
         recordings.read(hand() + "#4")

@@ -52,7 +52,7 @@ def test_what_shows_nothing_is_taken_to_fall_and_flagged():
 
 
 def test_a_steady_grip_decides_nothing():
-    """Its electrodes creep by more than its pressure changes, and look like rest: real ones were told the wrong way."""
+    """Its electrodes creep by more than its pressure changes, and look like rest: real ones were misread."""
     recording = pressed(1.0, pdc=True)
     recording = dataclasses.replace(recording, pdc=np.full(400, 1000.0) + np.arange(400) % 3)
     evidence = recordings.prepare(recording).report["polarity_evidence"]

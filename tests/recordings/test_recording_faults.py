@@ -88,9 +88,9 @@ def test_blank_lines_are_no_frames_and_keep_the_numbering(slide_lines, write):
 def test_blank_lines_in_place_of_frames_are_told_and_those_at_the_end_are_not(slide_lines, write):
     for line in range(20, 30):
         slide_lines[line] = " "
-    told = recordings.read(write([*slide_lines, "", ""])).warnings
-    assert told[0] == "lines 21, 22, 23, 24, 25, 26, 27, 28 …: blank (10 in all); no frames are made of them"
-    assert not any("blank" in warning for warning in told[1:])
+    reported = recordings.read(write([*slide_lines, "", ""])).warnings
+    assert reported[0] == "lines 21, 22, 23, 24, 25, 26, 27, 28 …: blank (10 in all); no frames are made of them"
+    assert not any("blank" in warning for warning in reported[1:])
 
 
 def test_too_many_bad_rows_are_an_error(slide_lines, write):

@@ -111,8 +111,8 @@ def test_scaled_recordings_say_that_their_unit_is_unknown(press):
     recording = make_recording(press, as_kind(press, "scaled"))
     signals = recordings.prepare(recording)
     assert any("counts_per_unit" in warning for warning in signals.warnings)
-    told = recordings.prepare(recording, PrepareOptions(counts_per_unit=300))
-    assert error_of(told, press) < NOISE and not told.warnings
+    said = recordings.prepare(recording, PrepareOptions(counts_per_unit=300))
+    assert error_of(said, press) < NOISE and not said.warnings
 
 
 def test_tare_frames_can_be_told(press):

@@ -1,4 +1,4 @@
-"""Smoothing: a mean round each frame, no delay, nothing lost at the ends, asked for and told."""
+"""Smoothing: a mean round each frame, no delay, nothing lost at the ends, asked for and said."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def test_what_changes_evenly_stays_and_noise_falls_by_its_root():
 
 def test_rectified_recordings_are_smoothed_others_when_told(slide_csv):
     recording = read(slide_csv())
-    plain, told = prepare(recording), prepare(recording, PrepareOptions(smooth=5))
-    assert plain.report["smoothed_frames"] == 1 and told.report["smoothed_frames"] == 5
-    np.testing.assert_allclose(told.change, smooth(plain.change, 5))
-    np.testing.assert_array_equal(told.electrodes, plain.electrodes)
+    plain, said = prepare(recording), prepare(recording, PrepareOptions(smooth=5))
+    assert plain.report["smoothed_frames"] == 1 and said.report["smoothed_frames"] == 5
+    np.testing.assert_allclose(said.change, smooth(plain.change, 5))
+    np.testing.assert_array_equal(said.electrodes, plain.electrodes)
     folded = prepare(recording, PrepareOptions(kind="rectified", tare="none"))
     assert folded.report["smoothed_frames"] == 3
 

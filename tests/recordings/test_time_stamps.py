@@ -27,5 +27,5 @@ def test_stamps_that_are_no_times_are_told(stamp, tmp_path):
 @pytest.mark.parametrize("rate", [25, 50, 90, 100, 150, 1000])
 def test_other_rates_are_told(rate, tmp_path):
     found = read(tmp_path, np.arange(200) / rate)
-    told = any(f"{rate} frames a second" in text for text in found.warnings)
-    assert told == (not 62.5 <= rate <= 160)
+    reported = any(f"{rate} frames a second" in text for text in found.warnings)
+    assert reported == (not 62.5 <= rate <= 160)

@@ -132,7 +132,7 @@ def test_old_pythons_can_read_the_script_far_enough_to_be_told():
 
 
 @pytest.mark.parametrize(
-    ("said", "told"),
+    ("said", "reported"),
     [
         ("WARNING: Retrying ... NewConnectionError(...)\nERROR: No matching distribution found", "cannot be reached"),
         ("ERROR: [Errno 28] No space left on device", "disk is full"),
@@ -140,8 +140,8 @@ def test_old_pythons_can_read_the_script_far_enough_to_be_told():
         ("", "no reason"),
     ],
 )
-def test_the_failures_of_pip_are_told_in_a_sentence(said, told, dev):
-    assert told in dev.why_pip_failed(said, Path("log"))
+def test_the_failures_of_pip_are_told_in_a_sentence(said, reported, dev):
+    assert reported in dev.why_pip_failed(said, Path("log"))
 
 
 def test_pip_without_a_network_is_told_in_one_line(dev, tmp_path, monkeypatch):

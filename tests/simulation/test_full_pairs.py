@@ -79,8 +79,8 @@ def test_a_scene_without_the_indenters_to_keep_apart_is_refused():
 
 
 def test_both_sensors_bear_the_same_force(solved, ball_press):
-    rows, told = solved
-    assert told["wanted"] == len(rows) == 4 and not told["lost"]
+    rows, said = solved
+    assert said["wanted"] == len(rows) == 4 and not said["lost"]
     for row in rows:
         along = [
             row[name] @ pose_at(sensor, BALL, PLACE).direction
@@ -150,9 +150,9 @@ def test_what_the_gel_cannot_bear_ends_the_press(monkeypatch, smooth, ball_press
     depth_at = full_pairs.depth_at
     monkeypatch.setattr(full_pairs, "depth_at", lambda share, *rest: depth_at(share / 15, *rest))
     monkeypatch.setattr(full_pairs, "SHARES", (0.25, 1.0))
-    rows, told = full_rows(smooth, dataclasses.replace(ball_press, slide=None))
-    assert len(rows) == 1 and told["wanted"] == 2
-    assert "60% of the thickness" in str(told["lost"])
+    rows, said = full_rows(smooth, dataclasses.replace(ball_press, slide=None))
+    assert len(rows) == 1 and said["wanted"] == 2
+    assert "60% of the thickness" in str(said["lost"])
 
 
 @pytest.fixture

@@ -21,8 +21,8 @@ def test_a_card_counts_every_contact_once(tmp_path):
         "depth_digit": random.uniform(0, 2e-3, count), "beyond_digit": np.arange(count) < 3,
     }  # fmt: skip
     with h5py.File(path, "w") as file:
-        told = {"scene": "text", "seed": 4, "version": "0", "electrodes": "sheet"}
-        file.attrs.update(told | {"indenters": json.dumps(["ball", "box"])})
+        said = {"scene": "text", "seed": 4, "version": "0", "electrodes": "sheet"}
+        file.attrs.update(said | {"indenters": json.dumps(["ball", "box"])})
         for name, values in columns.items():
             file[name] = values
     made = card(path)

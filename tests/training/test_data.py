@@ -163,7 +163,7 @@ def test_signals_without_their_sign_tell_no_place(contacts):
     assert 5 < lost.sum() < 35
     batch = contacts.batch(rows, signal)
     assert (batch.signed[lost] == SILENT).all() and (batch.signed[~lost] == rows[~lost]).all()
-    assert (batch.rows == rows).all()  # what they decode to is still told
+    assert (batch.rows == rows).all()  # what they decode to is still said
 
 
 def test_statistics_come_from_the_training_presses_alone(contacts):

@@ -1,4 +1,4 @@
-"""Networks on another device than the contacts: no step mixes the two, and a GPU that is not there is told."""
+"""Networks on another device than the contacts: no step mixes the two, and a GPU that is not there is said."""
 
 from __future__ import annotations
 

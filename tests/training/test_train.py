@@ -146,8 +146,8 @@ def test_a_foreign_or_damaged_checkpoint_is_refused(pairs, tmp_path):
     with pytest.raises(TactileError, match="options"):
         train(pairs, tmp_path, 3, replace(QUICK, beta=0.1), **SURFACES)
     whole = path.read_bytes()
-    told = [b"[" * 100_000, b"[]", b'{"identity": 1, "stage": 0, "epoch": 0, "log": []}']
-    for data in (whole[:1000], b"", b"no archive", *map(archive, told)):
+    said = [b"[" * 100_000, b"[]", b'{"identity": 1, "stage": 0, "epoch": 0, "log": []}']
+    for data in (whole[:1000], b"", b"no archive", *map(archive, said)):
         path.write_bytes(data)
         with pytest.raises(TactileError, match="cannot be read"):
             read(path, {})

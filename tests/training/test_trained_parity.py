@@ -67,10 +67,10 @@ def same(found, expected):
 @pytest.mark.parametrize("rectified", [False, True])
 def test_the_chain(nets, change, rectified):
     svb = filled(modules.signal_vae(nets.sizes["SVB"]["latent"]), nets, "SVB")
-    told = np.full((len(change), 1), rectified, np.float32)
+    said = np.full((len(change), 1), rectified, np.float32)
     change = -np.abs(change) if rectified else change
     latent = nets.encode_signal(change, rectified)
-    same(latent, svb.mean(modules.compress(torch.from_numpy(np.concatenate([change, told], -1)))))
+    same(latent, svb.mean(modules.compress(torch.from_numpy(np.concatenate([change, said], -1)))))
     biotac, _ = nets.likely_latents(latent, rectified)
     same(biotac, posterior(nets, "R2MPN" if rectified else "S2MPN")(torch.from_numpy(latent)))
     digit = nets.m2m(biotac)

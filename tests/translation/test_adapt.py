@@ -52,7 +52,7 @@ def rms(values: np.ndarray) -> float:
 
 
 def error(found: adapt.Adapted, gain: np.ndarray) -> float:
-    """Scatter of the gains' error: a factor common to all cannot be told from harder presses."""
+    """Scatter of the gains' error: a factor common to all cannot be said from harder presses."""
     left = np.log(found.sensor.gain) - np.log(gain)
     return rms(left - left.mean())
 
@@ -236,7 +236,7 @@ def test_a_sensor_file_comes_back(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "said"),
     [
         ({"format": "tactile-sensor-9"}, "tactile-sensor-2"),
         ({"format": "tactile-sensor-1"}, "counts that rise where a film thins"),
@@ -250,13 +250,13 @@ def test_a_sensor_file_comes_back(tmp_path):
         ({"rest_pdc": -1.0}, r"unit\.rest_pdc: -1"),
     ],
 )
-def test_a_bad_sensor_file_is_refused_by_field(change, told, tmp_path):
+def test_a_bad_sensor_file_is_refused_by_field(change, said, tmp_path):
     fields = {"note": "", "gain": ONES, "offset_counts": ZEROS, **change}
     lines = [f'format = "{fields.pop("format", FORMAT)}"', "[unit]"]
     lines += [f"{name} = {json.dumps(value).replace('NaN', 'nan')}" for name, value in fields.items()]
     text = "\n".join(lines)
     (tmp_path / "sensor.toml").write_text(text)
-    with pytest.raises(TactileError, match=told):
+    with pytest.raises(TactileError, match=said):
         electrode_gains.read(tmp_path / "sensor.toml")
 
 

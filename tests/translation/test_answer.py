@@ -64,20 +64,20 @@ def test_what_is_shifted_off_the_gel_is_flagged(touched):
 def test_the_mean_is_another_answer(touched):
     signals, _ = touched
     likely, mean = (load_translator(answer=Answer(kind)) for kind in ("likely", "mean"))
-    told = likely.posterior(signals)
-    assert np.array_equal(mean(signals).force, likely(signals, told.average).force)
+    said = likely.posterior(signals)
+    assert np.array_equal(mean(signals).force, likely(signals, said.average).force)
     assert not np.array_equal(mean(signals).force, likely(signals).force)
     assert not mean.answer.follows and likely.answer.follows
 
 
 def test_drawn_contacts_spread_as_the_posterior_says(touched):
     signals, frames = touched
-    told = load_translator().posterior(signals)
-    drawn = plausible.draw(told, frames, 40_000)
-    spread = np.sqrt((told.weight[..., None] * (told.spread**2 + (told.mean - told.average[:, None]) ** 2)).sum(1))
-    assert np.abs((drawn.mean(1) - told.average) / spread).max() < 5 / np.sqrt(40_000)  # 80 means, 5 standard errors
+    said = load_translator().posterior(signals)
+    drawn = plausible.draw(said, frames, 40_000)
+    spread = np.sqrt((said.weight[..., None] * (said.spread**2 + (said.mean - said.average[:, None]) ** 2)).sum(1))
+    assert np.abs((drawn.mean(1) - said.average) / spread).max() < 5 / np.sqrt(40_000)  # 80 means, 5 standard errors
     assert np.allclose(drawn.std(1) / spread, 1, atol=0.25)  # rare far components are drawn a few times
-    assert np.array_equal(plausible.draw(told, frames, 7), plausible.draw(told, frames, 7))
+    assert np.array_equal(plausible.draw(said, frames, 7), plausible.draw(said, frames, 7))
 
 
 def test_drawn_contacts_lie_round_the_answer(request, tmp_path):

@@ -150,10 +150,10 @@ def test_distance_grows_with_distance(nets):
 
 def test_rectified_signals_are_read_as_such(nets):
     change = np.abs(calls(nets, 8)["encode_signal"][1])
-    told = np.arange(8) % 2 == 1
-    mixed, signed, folded = (nets.encode_signal(change, each) for each in (told, False, True))
-    np.testing.assert_array_equal(mixed[told], folded[told])
-    np.testing.assert_array_equal(mixed[~told], signed[~told])
+    said = np.arange(8) % 2 == 1
+    mixed, signed, folded = (nets.encode_signal(change, each) for each in (said, False, True))
+    np.testing.assert_array_equal(mixed[said], folded[said])
+    np.testing.assert_array_equal(mixed[~said], signed[~said])
     assert np.abs(folded - signed).max() > 0.01
 
 

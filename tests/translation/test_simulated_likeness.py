@@ -50,7 +50,7 @@ def test_what_is_not_judged_is_not_marked():
 def test_far_contacts_are_found_and_single_ones_seldom_mistaken(pairs):
     found = two_contact_rows.rows(pairs)
     total, far = found[0], found[-1]
-    # The patterns are made anew with the weights: bounds, not the figures measured.
+    # The patterns are made again with the weights: bounds, not the metrics measured.
     assert total["baseline"] < 0.06 < 0.2 < total["value"] < far["value"]
 
 

@@ -113,14 +113,15 @@ def test_rectified_signals_are_read_as_such(translator, shipped, signals, transl
     """Without their sign the place is worse than with it, as expected, and better than taken for signed."""
     here = touched(shipped)
     folded = dataclasses.replace(signals, change=np.abs(signals.change))
-    told = translator(dataclasses.replace(folded, flags=signals.flags | np.uint16(Flag.RECTIFIED)))
+    unsigned = translator(dataclasses.replace(folded, flags=signals.flags | np.uint16(Flag.RECTIFIED)))
     fooled = translator(folded)
     true = shipped.truth.contact_center[here]
     signed, rectified, wrong = (
-        np.nanmedian(np.linalg.norm(each.contact_center[here] - true, axis=1)) for each in (translation, told, fooled)
+        np.nanmedian(np.linalg.norm(each.contact_center[here] - true, axis=1))
+        for each in (translation, unsigned, fooled)
     )
     assert signed < rectified < wrong
-    assert np.median(told.expected_error_biotac[here]) > np.median(translation.expected_error_biotac[here])
+    assert np.median(unsigned.expected_error_biotac[here]) > np.median(translation.expected_error_biotac[here])
 
 
 def test_errors_are_expected_where_they_are(shipped, translation):

@@ -59,8 +59,8 @@ def test_a_grip_without_rest_is_measured_from_the_unit_s_own():
     assert found.pdc.mean() == pytest.approx(120, abs=2)
     light = prepare_unit(held(0.01, 4), None, unit)  # calm and near the unit's rest: its own is better
     assert light.quiet.any() and np.abs(light.change).max() < 10
-    told = prepare_unit(grip, PrepareOptions(tare="0:50"), unit)
-    assert np.abs(told.change).max() < 10  # the user's own frames stand
+    said = prepare_unit(grip, PrepareOptions(tare="0:50"), unit)
+    assert np.abs(said.change).max() < 10  # the user's own frames stand
 
 
 def test_a_hand_s_file_is_read_by_finger(tmp_path):

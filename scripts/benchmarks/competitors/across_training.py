@@ -24,7 +24,7 @@ from benchmarks.translation.test_set import SEED
 from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.simulation.pairs_file import Pairs, read_pairs, split_presses
-from tactile_core.training.error_summary import figure_rows
+from tactile_core.training.error_summary import metric_rows
 from tactile_core.training.noise_model import measured
 from tactile_core.training.options import Options
 from tactile_core.training.step_errors import mesh_columns, true_displacement
@@ -53,9 +53,9 @@ def measure(pairs_file: Path, test_file: Path, seed: int = 0) -> list[Row]:
     train_signal(model.SVB, pairs, rows, seed)
     train_maps(model, pairs, rows, [scale for _, scale, _ in meshes], seed)
     seconds = time.process_time() - began + sum(took for _, _, took in meshes)
-    told = f"{len(rows)} contacts, mesh networks {MESH_EPOCHS} pass"
+    said = f"{len(rows)} contacts, mesh networks {MESH_EPOCHS} pass"
     found = error_rows(model, read_pairs(test_file), [scale for _, scale, _ in meshes])
-    return [*found, row("training_s", seconds, "s", of=f"{told}, CPU")]
+    return [*found, row("training_s", seconds, "s", of=f"{said}, CPU")]
 
 
 def trained_mesh(pairs_file: Path, sensor: str, seed: int) -> tuple[dict[str, np.ndarray], float, float]:
@@ -159,14 +159,14 @@ def error_rows(model: Across, pairs: Pairs, scales: list[float]) -> list[Row]:
         rows = np.arange(start, min(start + 64, len(pairs.press)))
         parts.append(error_columns(model, pairs, rows, change[rows], *scales))
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    found = figure_rows(columns, pairs, np.arange(len(pairs.press)), "seen indenters", {})
+    found = metric_rows(columns, pairs, np.arange(len(pairs.press)), "seen indenters", {})
     return [each for each in found if each["name"].endswith("_rms_um")]
 
 
 def error_columns(
     model: Across, pairs: Pairs, rows: np.ndarray, change: Tensor, skin_scale: float, gel_scale: float
 ) -> dict[str, np.ndarray]:
-    """Compute the columns of `step_errors.translation_figures` for these networks."""
+    """Compute the columns of `step_errors.translation_metrics` for these networks."""
     skin, gel = (true_displacement(pairs, sensor, rows) for sensor in SENSORS)
     with torch.no_grad():
         mesh = model.MVB.posterior(torch.from_numpy(skin / np.float32(skin_scale)))[0]

@@ -13,7 +13,7 @@ import numpy as np
 
 from tactile_core.pictures.calibrate.ball_pictures import BallPictures, FastPictures, working_factor
 from tactile_core.pictures.calibrate.ball_print import print_on
-from tactile_core.pictures.calibrate.photo_metrics import figures
+from tactile_core.pictures.calibrate.photo_metrics import metrics
 from tactile_core.pictures.calibrate.photographs import Photographs
 from tactile_core.pictures.calibrate.press_fit import Sight, fit_ball
 from tactile_core.pictures.perspective import slopes
@@ -65,14 +65,14 @@ def fit_table(calibration: Calibration, photographs: Photographs, radius: float)
 
 
 def try_table(table: Table, calibration: Calibration, photographs: Photographs, radius: float) -> list[dict]:
-    """The figures of ``tactile calibrate --test`` but for the radius, one a press."""
+    """The metrics of ``tactile calibrate --test`` but for the radius, one a press."""
     working = TableBench(_working(calibration), table)
     whole = TableBench(FastPictures(calibration), table)
     found = []
     for press in photographs.presses:
         ball, _ = fit_ball(working, Sight(press), radius)
         picture = np.rint(photographs.background + whole.change(ball.numbers)).clip(0, 255)
-        found.append(figures(picture, press.picture, photographs.background, press.region))
+        found.append(metrics(picture, press.picture, photographs.background, press.region))
     return found
 
 

@@ -28,8 +28,8 @@ from tactile_core.accuracy import HEADER, Row, line
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
-from tactile_core.training.error_summary import figure_row, figure_rows
-from tactile_core.training.step_errors import our_bodies, translation_figures
+from tactile_core.training.error_summary import metric_row, metric_rows
+from tactile_core.training.step_errors import our_bodies, translation_metrics
 from tactile_core.translation import translate
 
 TEST_SET = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_contacts.h5"
@@ -46,7 +46,7 @@ SETTINGS: dict[str, dict[str, float]] = {
     "beta 1e-5": {"beta": 1e-5},
     "published": {"latent_signal": 8, "latent_biotac": 128, "latent_digit": 128, "beta": 0.005},
 }
-FIGURES = ("MVB_rms_um", "MVD_rms_um", "M2MPN_rms_um", "S2MPN_rms_um", "chain_rms_um", "force_percent")
+METRICS = ("MVB_rms_um", "MVD_rms_um", "M2MPN_rms_um", "S2MPN_rms_um", "chain_rms_um", "force_percent")
 BASELINES = ("baseline_biotac_rms_um", "baseline_digit_rms_um")
 DIRECT_SEEDS = (0, 1, 2)
 NOT_COMPARED = ("back", "error")
@@ -82,20 +82,20 @@ def setting_rows(name: str, options: argparse.Namespace, test: Pairs) -> list[Ro
     """Errors of one setting's networks on the test contacts."""
     folder = trained(name, 0, SETTINGS[name], ("direct", *NOT_COMPARED), options)
     nets, rows = translate.load_translator(folder / "weights").nets, np.arange(len(test.press))
-    columns = translation_figures(nets, test, rows, as_read(test.signal, SEED), our_bodies())
-    return figure_rows({figure: columns[figure] for figure in (*FIGURES, *BASELINES)}, test, rows, name, {})
+    columns = translation_metrics(nets, test, rows, as_read(test.signal, SEED), our_bodies())
+    return metric_rows({metric: columns[metric] for metric in (*METRICS, *BASELINES)}, test, rows, name, {})
 
 
 def direct_rows(options: argparse.Namespace) -> list[Row]:
     """Errors of the direct network and of the chain on the trainings' own test presses, each seed and their mean."""
     folders = [trained(f"direct {seed}", seed, {}, NOT_COMPARED, options) for seed in DIRECT_SEEDS]
     found = []
-    for figure in ("direct_rms_um", "chain_rms_um"):
-        each = [own_error(folder, figure) for folder in folders]
+    for metric in ("direct_rms_um", "chain_rms_um"):
+        each = [own_error(folder, metric) for folder in folders]
         for seed, row in zip(DIRECT_SEEDS, each, strict=True):
-            found.append(figure_row(figure, row["value"], row["baseline"], None, f"seed {seed}"))
+            found.append(metric_row(metric, row["value"], row["baseline"], None, f"seed {seed}"))
         mean, baseline = (float(np.mean([row[key] for row in each])) for key in ("value", "baseline"))
-        found.append(figure_row(figure, mean, baseline, None, "mean of seeds"))
+        found.append(metric_row(metric, mean, baseline, None, "mean of seeds"))
     return found
 
 
@@ -105,14 +105,14 @@ def prototype_rows(options: argparse.Namespace) -> list[Row]:
         raise TactileError("--only prototype", "no pairs of scenes/prototype", "--prototype FILE", "`tactile pairs`")
     pairs = argparse.Namespace(**{**vars(options), "pairs": options.prototype})
     folder = trained("prototype", 0, {}, NOT_COMPARED, pairs)
-    rows = [own_error(folder, figure) for figure in (*FIGURES, "direct_rms_um")]
+    rows = [own_error(folder, metric) for metric in (*METRICS, "direct_rms_um")]
     return [{**row, "set": "the prototype's set"} for row in rows]
 
 
-def own_error(folder: Path, figure: str) -> Row:
+def own_error(folder: Path, metric: str) -> Row:
     """Metric of a training on its own test presses."""
     errors = translate.load_translator(folder / "weights").card["errors"]
-    return next(row for row in errors if row["name"] == figure)
+    return next(row for row in errors if row["name"] == metric)
 
 
 OWN_ROWS = {"direct": direct_rows, "prototype": prototype_rows}

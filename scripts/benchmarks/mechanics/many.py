@@ -43,10 +43,10 @@ def rows(quick: bool) -> Iterator[Row]:
         settle(sensor, contacts[0], "fast", 0.0)  # the matrices are read
         for friction in (0.0, FRICTION):
             for steps in (1, _STEPS):
-                yield from _figures(sensor, contacts[:: 1 if steps == 1 else 5], friction, steps)
+                yield from _metrics(sensor, contacts[:: 1 if steps == 1 else 5], friction, steps)
 
 
-def _figures(sensor: Sensor, contacts: list[RandomContact], friction: float, steps: int) -> Iterator[Row]:
+def _metrics(sensor: Sensor, contacts: list[RandomContact], friction: float, steps: int) -> Iterator[Row]:
     done = [settle(sensor, contact, "fast", friction, steps) for contact in contacts]
     found, took = [solution for solution, _ in done], 1e3 * np.array([seconds for _, seconds in done])
     name = f"{sensor}_fast_{'alone' if steps == 1 else 'on_a_path'}{f'_friction_{friction:g}' if friction else ''}"

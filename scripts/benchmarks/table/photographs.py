@@ -13,8 +13,8 @@ import numpy as np
 from tactile_core.accuracy import row
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.calibrate.ball_print import print_on
-from tactile_core.pictures.calibrate.evaluate import Evaluation, evaluate_unit, mean_figures
-from tactile_core.pictures.calibrate.photo_metrics import figures
+from tactile_core.pictures.calibrate.evaluate import Evaluation, evaluate_unit, mean_metrics
+from tactile_core.pictures.calibrate.photo_metrics import metrics
 from tactile_core.pictures.calibrate.photographs import chosen, read_photographs
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.renderer import Renderer
@@ -39,7 +39,7 @@ def measure(name: str, quick: bool, presses: str) -> Method:
     fitted = [press.name for press in photographs.presses if press.name in unit.fit.photographs]
     test = chosen(photographs, [press.name for press in photographs.presses if press.name not in fitted])
     tried = evaluate_unit(unit, test, BALL, search_radius=False)
-    baseline, of = mean_figures(tried)[1], f"{len(test.presses)} photographs kept apart"
+    baseline, of = mean_metrics(tried)[1], f"{len(test.presses)} photographs kept apart"
     label = name
     if name == TABLE:
         table = fit_table(unit, chosen(photographs, fitted), BALL)
@@ -52,7 +52,7 @@ def measure(name: str, quick: bool, presses: str) -> Method:
         heights = [_heights(unit, each) for each in tried]
         ms = best_ms(lambda: renderer(heights[0]))
         each = [
-            figures(renderer(height), one.press.picture, test.background, one.press.region)
+            metrics(renderer(height), one.press.picture, test.background, one.press.region)
             for height, one in zip(heights, tried, strict=True)
         ]
     values = _means(each)

@@ -15,8 +15,8 @@ from benchmarks.translation.test_set import SEED
 from tactile_core.accuracy import Row, row
 from tactile_core.files import atomic, provenance
 from tactile_core.simulation.pairs_file import read_pairs
-from tactile_core.training.error_summary import figure_rows
-from tactile_core.training.step_errors import our_bodies, translation_figures
+from tactile_core.training.error_summary import metric_rows
+from tactile_core.training.step_errors import our_bodies, translation_metrics
 from tactile_core.translation.networks import load
 
 from .method import TEST_SET
@@ -44,8 +44,8 @@ def our_rows(weights: Path) -> list[Row]:
     """Errors of a weights folder on the test contacts."""
     pairs = read_pairs(TEST_SET)
     rows, change = np.arange(len(pairs.press)), as_read(pairs.signal, SEED)
-    columns = translation_figures(load(weights), pairs, rows, change, our_bodies())
-    found = figure_rows(columns, pairs, rows, "seen indenters", {})
+    columns = translation_metrics(load(weights), pairs, rows, change, our_bodies())
+    found = metric_rows(columns, pairs, rows, "seen indenters", {})
     return [each for each in found if each["name"] in [f"{step}_rms_um" for step in STEPS]]
 
 

@@ -62,9 +62,9 @@ def named(method: Method, name: str) -> bool:
 
 
 def joined(methods: Sequence[Method], of: Callable[[Method], float | None]) -> str:
-    """The figures of all, once where they read alike."""
-    figures = [short(of(method)) for method in methods]
-    return figures[0] if len(set(figures)) == 1 else " / ".join(figures)
+    """Join the numbers of all methods, once where they read alike."""
+    texts = [short(of(method)) for method in methods]
+    return texts[0] if len(set(texts)) == 1 else " / ".join(texts)
 
 
 def short(value: float | None) -> str:

@@ -15,7 +15,7 @@ from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
-from tactile_core.training.error_summary import figure_rows
+from tactile_core.training.error_summary import metric_rows
 from tactile_core.training.step_errors import joined, mesh_columns, parts, true_displacement
 from tactile_core.translation.networks import COUNT_SCALE
 from tactile_core.translation.translate import load_translator
@@ -131,7 +131,7 @@ KINDS = {
 def _errors(work: Surfaces, pairs: Pairs, change: Change) -> list[Row]:
     rows = np.arange(len(pairs.press))
     columns = joined(map(partial(_columns, work, pairs, change), parts(len(rows))))
-    return figure_rows(columns, pairs, rows, "seen indenters", {})
+    return metric_rows(columns, pairs, rows, "seen indenters", {})
 
 
 def _columns(work: Surfaces, pairs: Pairs, change: Change, part: slice) -> dict[str, np.ndarray]:

@@ -43,21 +43,21 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
     """Medians over contacts that press without sliding, of three answers to signals read as ``change`` (C, 19)."""
     answers = joined(_answers(nets, pairs, part, change[part], bodies) for part in parts(len(change)))
     found, still = [], ~pairs.slide.any(-1)
-    answers |= _figures("nearest", *_nearest(pairs, change), pairs, slice(None), bodies)
+    answers |= _metrics("nearest", *_nearest(pairs, change), pairs, slice(None), bodies)
     for name, (least, most, targets) in SETS.items():
         inside = still & (pairs.depth_biotac >= least) & (pairs.depth_biotac < most)
-        for figure in ("place_mm", "force_size_percent", "peak_percent", "iou"):
+        for metric in ("place_mm", "force_size_percent", "peak_percent", "iou"):
             likely, mean, solved, baseline = (
-                _median(answers[f"{who}_{figure}"][inside]) for who in ("likely", "mean", "solved", "nearest")
+                _median(answers[f"{who}_{metric}"][inside]) for who in ("likely", "mean", "solved", "nearest")
             )
-            unit, at_least = figure.rsplit("_", 1)[-1].replace("percent", "%").replace("iou", "1"), figure == "iou"
+            unit, at_least = metric.rsplit("_", 1)[-1].replace("percent", "%").replace("iou", "1"), metric == "iou"
             of = f"{inside.sum()} contacts {name}; baseline: the nearest example"
             found.append(
-                row(f"likely_{figure}", likely, unit, targets.get(figure), baseline=baseline, of=of, at_least=at_least)
+                row(f"likely_{metric}", likely, unit, targets.get(metric), baseline=baseline, of=of, at_least=at_least)
             )
-            found.append(row(f"mean_{figure}", mean, unit, baseline=baseline, of=of))
-            if figure != "force_size_percent":  # which solving takes as it is
-                found.append(row(f"solved_{figure}", solved, unit, baseline=baseline, of=of))
+            found.append(row(f"mean_{metric}", mean, unit, baseline=baseline, of=of))
+            if metric != "force_size_percent":  # which solving takes as it is
+                found.append(row(f"solved_{metric}", solved, unit, baseline=baseline, of=of))
     return found
 
 
@@ -171,9 +171,9 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
     for name, state in (("likely", posterior.likely), ("mean", mean)):
         skin, latent = nets.latents(read, state)
         gel, force = nets.decode_digit(latent), FORCE_SCALE * np.sinh(state[:, PLACE])
-        found |= _figures(name, gel, force, pairs, part, bodies)
+        found |= _metrics(name, gel, force, pairs, part, bodies)
         if name == "likely":
-            found |= _figures("solved", solved_gels(gel, nets.force_in(state, skin)), force, pairs, part, bodies)
+            found |= _metrics("solved", solved_gels(gel, nets.force_in(state, skin)), force, pairs, part, bodies)
     return found
 
 
@@ -186,7 +186,7 @@ def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
     return solved_gel.solved(arrays)["displacement_digit"]
 
 
-def _figures(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
+def _metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
     true, size = true_displacement(pairs, "digit", part), accuracy.lengths(pairs.force[part])
     patches = digit_columns(name, gel, pairs.contact_patch_digit[part], bodies)
     return {

@@ -31,7 +31,7 @@ def rows(network: Translator, file: Path = SHIPPED) -> list[Row]:
     followed = _judged(recording, [network.followed(unit, recording.time) for unit in units])
     alone = _judged(recording, [network(unit) for unit in units])
     of = f"{len(followed['place'])} frames of {UNITS} units; baseline: each frame alone"
-    figures = [
+    metrics = [
         ("followed_place", "place", 50, "mm", PLACE), ("followed_place_90", "place", 90, "mm", None),
         ("followed_step", "step", 50, "mm", None), ("followed_force", "force", 50, "%", FORCE),
         ("followed_force_90", "force", 90, "%", None), ("followed_peak", "peak", 50, "%", PEAK),
@@ -39,7 +39,7 @@ def rows(network: Translator, file: Path = SHIPPED) -> list[Row]:
     ]  # fmt: skip
     return [
         row(name, _over(followed[kind], level), unit, target, baseline=_over(alone[kind], level), of=of)
-        for name, kind, level, unit, target in figures
+        for name, kind, level, unit, target in metrics
     ]
 
 

@@ -103,12 +103,12 @@ def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> li
             results.append(_judged(recordings.read(one), unit, network))
             baseline.append(_judged(recordings.read(one), unit, network, shuffle))
     of = f"{len(results)} grips of hard flat objects, trials 04 and 05; baseline: electrodes shuffled"
-    figures = [np.array([one[k] for one in results]) for k in range(3)]
+    metrics = [np.array([one[k] for one in results]) for k in range(3)]
     shuffled = [np.array([one[k] for one in baseline]) for k in range(3)]
     return [
-        row("grip_place_in_box", figures[0].mean(), "1", 0.95, baseline=shuffled[0].mean(), of=of, at_least=True),
-        row("grip_place_found", figures[1].mean(), "1", 0.9, baseline=shuffled[1].mean(), of=of, at_least=True),
-        row("grip_out_of_range", figures[2].mean(), "1", 0.2, baseline=shuffled[2].mean(), of=of),
+        row("grip_place_in_box", metrics[0].mean(), "1", 0.95, baseline=shuffled[0].mean(), of=of, at_least=True),
+        row("grip_place_found", metrics[1].mean(), "1", 0.9, baseline=shuffled[1].mean(), of=of, at_least=True),
+        row("grip_out_of_range", metrics[2].mean(), "1", 0.2, baseline=shuffled[2].mean(), of=of),
     ]
 
 

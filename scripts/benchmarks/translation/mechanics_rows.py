@@ -15,7 +15,7 @@ from tactile_core.errors import TactileError
 from tactile_core.mechanics.ball_contact import skin_contact
 from tactile_core.simulation.full_pairs import REGION_X
 from tactile_core.simulation.pairs_file import Pairs
-from tactile_core.training.error_summary import figure_rows, in_bins
+from tactile_core.training.error_summary import in_bins, metric_rows
 from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, mesh_columns, true_displacement
 
 SHARE = 2 / 3  # of the baseline, at most, in a part of the pad never trained on (docs/sources.md, Targets)
@@ -31,7 +31,7 @@ def mechanics_rows(pairs: Pairs, bodies: Bodies) -> list[Row]:
         columns = joined(_columns(pairs, rows[start : start + 1], bodies) for start in range(len(rows)))
         baseline = in_bins(columns["baseline_digit_rms_um"], pairs.depth_biotac[rows], pairs.indenter[rows])
         targets = {} if name == "seen indenters" or baseline is None else {"mechanics_rms_um": SHARE * baseline}
-        found += figure_rows(columns, pairs, rows, name, targets)
+        found += metric_rows(columns, pairs, rows, name, targets)
     return found
 
 

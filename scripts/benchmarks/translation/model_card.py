@@ -119,8 +119,8 @@ def _cases(translator: Translator, pairs: Pairs) -> bytes:
     change = as_read(pairs.signal, SEED)
     found = nets.decode_digit(nets.likely_latents(nets.encode_signal(change))[1])
     true = true_displacement(pairs, "digit", np.arange(len(change)))
-    figures = mesh_columns("chain", found, true) | mesh_columns("baseline", 0 * true, true)
-    share = np.where(true[..., 1].max(1) >= 1e-4, figures["chain_rms_um"] / figures["baseline_rms_um"], np.nan)
+    metrics = mesh_columns("chain", found, true) | mesh_columns("baseline", 0 * true, true)
+    share = np.where(true[..., 1].max(1) >= 1e-4, metrics["chain_rms_um"] / metrics["baseline_rms_um"], np.nan)
     order = np.argsort(share)[: np.isfinite(share).sum()]
     names = pairs.indenter_names
     figure = Figure(figsize=(9, 9), layout="constrained")

@@ -42,19 +42,19 @@ def rows(name: str, prepared: Iterable[Signals], network: Translator) -> list[Ro
 
     found = [row(f"{name}_contact_in_picture", _over(np.mean, seen[contact]), "1", of=f"{contact.sum()} frames")]
     if inside.any():
-        for figure, values, unit, over in (
+        for metric, values, unit, over in (
             ("visible", level > VISIBLE, "1", np.mean),
             ("level", level, "levels rms", np.median),
         ):
             nothing = _over(over, values[lost])
             found.append(
-                row(f"{name}_print_{figure}", _over(over, values[inside]), unit, baseline=nothing, of=of + baseline)
+                row(f"{name}_print_{metric}", _over(over, values[inside]), unit, baseline=nothing, of=of + baseline)
             )
     return found
 
 
-def _over(figure: Callable[[np.ndarray], float], values: np.ndarray) -> float | None:
-    return float(figure(values)) if len(values) else None
+def _over(metric: Callable[[np.ndarray], float], values: np.ndarray) -> float | None:
+    return float(metric(values)) if len(values) else None
 
 
 def _frames(signals: Signals, network: Translator) -> np.ndarray:

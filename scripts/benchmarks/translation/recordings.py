@@ -27,7 +27,7 @@ from tactile_core.translation.contact_track import track
 from tactile_core.translation.translate import Translation, Translator
 
 from . import slide_set
-from .slide_metrics import CONTACT, Figures, figures, largest_step
+from .slide_metrics import CONTACT, SlideMetrics, largest_step, metrics
 
 Translate = Callable[[Signals], Translation]
 CHUNK = 128  # frames in memory at a time: 10 MB of displacements
@@ -113,14 +113,14 @@ def write(folder: Path, name: str, translated: Translated) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Metrics of one recording. figures : None where wrench or pose are missing
+    """Metrics of one recording. metrics : None where wrench or pose are missing
 
     missed : share of the frames surely in contact for which no contact is found, NaN where there are none
     step, step_unrepaired : see `largest_step`; the second with the bad samples left in; NaN where there are none
     not_finite : how many numbers of the translation are none
     """
 
-    figures: Figures | None
+    metrics: SlideMetrics | None
     missed: float
     step: float
     step_unrepaired: float
@@ -144,7 +144,7 @@ def judge(path: Path, network: Translate, out: Path | None = None, sensor: Elect
     contact = recording.pressure > CONTACT
     missed = np.interp(recording.time, found.time, found.missed)[contact]
     return Judged(
-        figures(recording, found.time, strengths, found.centre),
+        metrics(recording, found.time, strengths, found.centre),
         float(missed.mean()) if len(missed) else np.nan, step, unrepaired, found.not_finite,
     )  # fmt: skip
 
@@ -171,11 +171,11 @@ def rows(
 
 
 def rows_of(judged: list[Judged]) -> list[Row]:
-    """The rows of a set of recordings: medians over recordings unless the name says otherwise; none without a figure.
+    """The rows of a set of recordings: medians over recordings unless the name says otherwise; none without a metric.
 
     Raises TactileError where no recording has its wrench and pose beside it.
     """
-    whole = [one.figures for one in judged if one.figures is not None]
+    whole = [one.metrics for one in judged if one.metrics is not None]
     if not whole:
         raise TactileError("recordings", "none with its _cw.csv and _cp.csv", "at least one", "Copy them beside it")
     of = f"{len(whole)} recordings"
@@ -194,9 +194,9 @@ def rows_of(judged: list[Judged]) -> list[Row]:
     return [row for rows in table for row in rows]
 
 
-def _strength_rows(whole: list[Figures], name: str, of: str, aimed: bool) -> list[list[Row]]:
-    def pick(figure: str) -> dict[str, list[float]]:
-        value, baseline = ([getattr(one, figure)[key] for one in whole] for key in (name, "electrode_sum"))
+def _strength_rows(whole: list[SlideMetrics], name: str, of: str, aimed: bool) -> list[list[Row]]:
+    def pick(metric: str) -> dict[str, list[float]]:
+        value, baseline = ([getattr(one, metric)[key] for one in whole] for key in (name, "electrode_sum"))
         return {"values": value, "baseline": baseline}
 
     ranks, still, rough = pick("ranks"), pick("silences"), pick("roughs")

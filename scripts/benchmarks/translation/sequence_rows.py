@@ -45,11 +45,11 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
     followed, alone = both = measured(network, truth)
     kind = np.repeat(truth["motion"], (truth["force"] > TOUCHED).sum(axis=1))
     found = []
-    for figure, unit in UNITS.items():
+    for metric, unit in UNITS.items():
         of = f"{len(kind)} frames of {number} sequences; baseline: each frame alone"
-        found.append(_row(f"sequence_{figure}", figure, both, slice(None), of, unit, TARGETS[figure]))
+        found.append(_row(f"sequence_{metric}", metric, both, slice(None), of, unit, TARGETS[metric]))
         for which, name in enumerate(MOTIONS):
-            found.append(_row(f"sequence_{figure}", figure, both, kind == which, name, unit))
+            found.append(_row(f"sequence_{metric}", metric, both, kind == which, name, unit))
     value, baseline = (_quantile(each["place"], 90) for each in (followed, alone))
     found.append(row("sequence_place_90", value, "mm", baseline=baseline, of=f"{len(kind)} frames"))
     of = f"{number} sequences, rest up to {REST_OFF:g} counts off; baseline: each frame alone"
@@ -112,20 +112,20 @@ def _joined(parts: list[Errors]) -> Errors:
 
 
 def _rows_of(name: str, both: tuple[Errors, Errors], of: str, targets: dict[str, float] | None = None) -> list[Row]:
-    """A row of each figure, over all judged frames."""
+    """A row of each metric, over all judged frames."""
     targets = targets or {}
     return [
-        _row(f"{name}_{figure}", figure, both, slice(None), of, unit, targets.get(figure))
-        for figure, unit in UNITS.items()
+        _row(f"{name}_{metric}", metric, both, slice(None), of, unit, targets.get(metric))
+        for metric, unit in UNITS.items()
     ]
 
 
 def _row(
-    name: str, figure: str, both: tuple[Errors, Errors], some: np.ndarray | slice, of: str, unit: str,
+    name: str, metric: str, both: tuple[Errors, Errors], some: np.ndarray | slice, of: str, unit: str,
     target: float | None = None,
 ) -> Row:  # fmt: skip
-    value, baseline = (_quantile(each[figure][some], 50) for each in both)
-    return row(name, value, unit, target, baseline=baseline, of=of, at_least=figure == "iou")
+    value, baseline = (_quantile(each[metric][some], 50) for each in both)
+    return row(name, value, unit, target, baseline=baseline, of=of, at_least=metric == "iou")
 
 
 def _quantile(values: np.ndarray, level: int) -> float | None:

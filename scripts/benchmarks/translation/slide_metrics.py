@@ -13,7 +13,7 @@ from . import slide_set
 from .slide_set import Slide
 
 CONTACT, SILENT = 15.0, 2.0  # PDC counts: surely in contact; contact lost (notes of the set)
-CENTRE_FRAMES, SILENT_FRAMES = 100, 30  # fewer frames of a recording give no figure (protocol)
+CENTRE_FRAMES, SILENT_FRAMES = 100, 30  # fewer frames of a recording give no metric (protocol)
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
@@ -59,7 +59,7 @@ def largest_step(strength: np.ndarray, repaired: np.ndarray) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Figures:
+class SlideMetrics:
     """Metrics of one recording. ranks, silences, roughs : by the strength's name; spreads : by the place's, mm."""
 
     ranks: dict[str, float]
@@ -68,8 +68,8 @@ class Figures:
     spreads: dict[str, np.ndarray]
 
 
-def figures(recording: Slide, time: np.ndarray, found: Mapping[str, np.ndarray], centre: np.ndarray) -> Figures:
-    """Figures of a translated recording and of what needs no translation: electrode 1, the sum and the rms of all.
+def metrics(recording: Slide, time: np.ndarray, found: Mapping[str, np.ndarray], centre: np.ndarray) -> SlideMetrics:
+    """Measure a translated recording, and what needs no translation: electrode 1, the sum and the rms of all.
 
     time : (T,) unix s of the translation's frames; found : strength by name, each (T,); centre : (T, 2) mm
     """
@@ -84,7 +84,7 @@ def figures(recording: Slide, time: np.ndarray, found: Mapping[str, np.ndarray],
     weights = np.square(smooth)
     weighed = weights @ (1e3 * sensors.electrodes()[:, [0, 2]]) / np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
     centre = np.column_stack([np.interp(recording.time, time, column) for column in centre.T])
-    return Figures(
+    return SlideMetrics(
         ranks={name: rank(values, recording) for name, values in strengths.items()},
         silences={name: silence(values, recording) for name, values in strengths.items()},
         roughs={name: roughness(values) for name, values in {"electrode_sum": raw.sum(axis=1), **found}.items()},

@@ -9,8 +9,8 @@ import numpy as np
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.simulation.pairs_file import Pairs
-from tactile_core.training.error_summary import figure_row, figure_rows, slices
-from tactile_core.training.step_errors import Bodies, error_columns, joined, parts, translation_figures
+from tactile_core.training.error_summary import metric_row, metric_rows, slices
+from tactile_core.training.step_errors import Bodies, error_columns, joined, parts, translation_metrics
 from tactile_core.translation.network_sizes import SURFACES
 from tactile_core.translation.translate import Translator
 
@@ -27,7 +27,7 @@ TARGETS = {
 }  # fmt: skip
 UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter that was kept from the training
 EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
-BASELINE_FIGURES = ("baseline_biotac_rms_um", "baseline_digit_rms_um", "baseline_digit_core_height_um")
+BASELINE_METRICS = ("baseline_biotac_rms_um", "baseline_digit_rms_um", "baseline_digit_core_height_um")
 FROM_SIGNALS = ("S2MPN_rms_um", "S2MPN_position_mm", "force_percent", "chain_rms_um")
 WINDOW, RATE = 3, 100.0  # frames; Hz, of the electrodes (docs/sources.md, BioTac read-out)
 BATCHES = {1: 0.8, 500: 0.25}  # frames a call -> target, ms a frame
@@ -39,23 +39,23 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
     """Measure all contacts: the metrics with their targets, the slices without, how good expected errors are."""
     rows = np.arange(len(pairs.press))
     change = as_read(pairs.signal, SEED)
-    columns = translation_figures(translator.nets, pairs, rows, change, bodies)
+    columns = translation_metrics(translator.nets, pairs, rows, change, bodies)
     found = answer_rows(translator.nets, pairs, change, bodies) + posterior_rows(translator.nets, pairs, change)
     found += gel_force_rows(translator.nets, pairs, change)
     found += rectified_rows(translator.nets, pairs, change, bodies)
-    found += figure_rows(columns, pairs, rows, "seen indenters", TARGETS)
+    found += metric_rows(columns, pairs, rows, "seen indenters", TARGETS)
     for name, mask in slices(pairs, rows):
         for step, body in (("S2MPN", "biotac"), ("M2MPN", "digit"), ("chain", "digit")):
             value, baseline = (accuracy.mean(columns[f"{each}_rms_um"][mask]) for each in (step, f"baseline_{body}"))
-            found.append(figure_row(f"{step}_rms_um", value, baseline, None, name))
-        for figure in ("S2MPN_position_mm", "force_percent"):
-            known = columns[figure][mask & np.isfinite(columns[figure])]
+            found.append(metric_row(f"{step}_rms_um", value, baseline, None, name))
+        for metric in ("S2MPN_position_mm", "force_percent"):
+            known = columns[metric][mask & np.isfinite(columns[metric])]
             if known.size:
-                found.append(figure_row(figure, float(np.median(known)), None, None, name))
+                found.append(metric_row(metric, float(np.median(known)), None, None, name))
     for number, name in enumerate(pairs.indenter_names):
         at = pairs.indenter == number
-        each = {figure: np.where(at, columns[figure], np.nan) for figure in (*EACH_INDENTER, *BASELINE_FIGURES)}
-        found += [one for one in figure_rows(each, pairs, rows, name, {}) if one["value"] is not None]
+        each = {metric: np.where(at, columns[metric], np.nan) for metric in (*EACH_INDENTER, *BASELINE_METRICS)}
+        found += [one for one in metric_rows(each, pairs, rows, name, {}) if one["value"] is not None]
     found += mechanics_rows(pairs, bodies)
     found += window_rows(translator, pairs, bodies)
     return [*found, *expected_error_rows(translator, pairs, rows, change, bodies, "seen indenters")]
@@ -64,9 +64,9 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
 def window_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
     """Measure what a short causal window gains over single frames, and how much later its result comes."""
     rows, name = np.arange(len(pairs.press)), f"causal mean over {WINDOW} frames"
-    columns = translation_figures(translator.nets, pairs, rows, as_read(pairs.signal, SEED, WINDOW), bodies)
-    found = figure_rows(
-        {figure: columns[figure] for figure in (*FROM_SIGNALS, *BASELINE_FIGURES)}, pairs, rows, name, {}
+    columns = translation_metrics(translator.nets, pairs, rows, as_read(pairs.signal, SEED, WINDOW), bodies)
+    found = metric_rows(
+        {metric: columns[metric] for metric in (*FROM_SIGNALS, *BASELINE_METRICS)}, pairs, rows, name, {}
     )
     return [*found, row("window_delay_ms", 1e3 * (WINDOW - 1) / 2 / RATE, "ms", of=name)]
 
@@ -83,10 +83,10 @@ def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Ro
         rows = np.flatnonzero(mask)
         if len(rows):
             change = as_read(pairs.signal[rows], SEED)
-            columns = translation_figures(translator.nets, pairs, rows, change, bodies)
+            columns = translation_metrics(translator.nets, pairs, rows, change, bodies)
             target = UNSEEN.get(name.removeprefix("unseen "))
             targets = {} if target is None else {"M2MPN_rms_um": target}
-            found += figure_rows(columns, pairs, rows, name, targets)
+            found += metric_rows(columns, pairs, rows, name, targets)
             found += expected_error_rows(translator, pairs, rows, change, bodies, name)
     return found
 
@@ -142,5 +142,5 @@ def speed_rows(translator: Translator, pairs: Pairs) -> list[Row]:
                 work(change)
                 took.append(time.perf_counter() - began)
             value = 1e3 * min(took) / frames
-            found.append(figure_row(name, value, None, aim, f"{frames} frames a call"))
+            found.append(metric_row(name, value, None, aim, f"{frames} frames a call"))
     return found

@@ -118,7 +118,7 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
         say(f"warning: {warning}")
     for each in done.tried:
         right, down, depth = (1e3 * value for value in each.ball.numbers[:3])
-        off = f"{each.figures['roi_l1']:.1f} levels off, the background {each.baseline['roi_l1']:.1f}"
+        off = f"{each.metrics['roi_l1']:.1f} levels off, the background {each.baseline['roi_l1']:.1f}"
         place = f"{depth:.2f} mm deep, {right:.1f} mm right and {down:.1f} down of the middle"
         say(f"{each.press.name}: used; {place}; {off}")
     check_worth(apart or done.tried)

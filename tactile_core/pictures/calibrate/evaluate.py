@@ -14,12 +14,12 @@ from ...errors import TactileError
 from ...sensors.calibration import LARGEST_LEVEL, Calibration
 from .ball_pictures import BallPictures, FastPictures, working_factor
 from .contact_light import contact_disc, contact_radius, fitted_light
-from .photo_metrics import figures
+from .photo_metrics import metrics
 from .photographs import Photographs, Press
 from .press_fit import MODEL_ERROR, Ball, Sight, fit_ball
 
 RADIUS_STARTS = (2e-3, 4.5e-3)  # m, from which the ball's radius is searched
-FIGURES = ("roi_l1", "roi_psnr", "through_l1", "through_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error")
+METRICS = ("roi_l1", "roi_psnr", "through_l1", "through_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error")
 BRIGHT = 15.0  # grey levels of light through the coating, in some channel, from which on a press is flagged
 # name -> (unit, target, which way is better); targets of presses that were not fitted
 TARGETS = {
@@ -34,8 +34,8 @@ class Evaluation:
     """Result of a calibration on one photograph.
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
-    picture : (H, W, 3) uint8, rendered; figures, baseline : by the names of FIGURES; flags : in words
-    through : (3,) levels of light that comes through the coating where the ball touches it. Figures of that name are of
+    picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of METRICS; flags : in words
+    through : (3,) levels of light that comes through the coating where the ball touches it. Metrics of that name are of
         another picture, in which it is fitted as well; all others know nothing of it.
     """
 
@@ -44,7 +44,7 @@ class Evaluation:
     free_radius: float
     picture: np.ndarray
     through: np.ndarray
-    figures: dict[str, float]
+    metrics: dict[str, float]
     baseline: dict[str, float]
     flags: tuple[str, ...]
 
@@ -92,7 +92,7 @@ def _try_press(
 
     def compared(change: np.ndarray | float) -> tuple[np.ndarray, dict[str, float]]:
         picture = np.rint(untouched + change).clip(0, LARGEST_LEVEL).astype(np.uint8)
-        return picture, figures(picture, press.picture, background, press.region)
+        return picture, metrics(picture, press.picture, background, press.region)
 
     ball, _ = fit_ball(working, sight, radius)
     picture, ours = compared(whole.change(ball.numbers))
@@ -130,12 +130,12 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
     return (*press.flags, "the print is cut by the picture's edge") if over_right or over_down else press.flags
 
 
-def mean_figures(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
+def mean_metrics(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
     """Return the means over presses of the metrics and of the baseline's; NaN ones left out, NaN where all are."""
     means = []
-    for which in ("figures", "baseline"):
+    for which in ("metrics", "baseline"):
         rows = [getattr(each, which) for each in tried]
-        values = {name: np.array([row[name] for row in rows if name in row]) for name in FIGURES}
+        values = {name: np.array([row[name] for row in rows if name in row]) for name in METRICS}
         means.append({name: _mean(value) for name, value in values.items()})
     return means[0], means[1]
 

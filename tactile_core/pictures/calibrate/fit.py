@@ -19,7 +19,7 @@ from ..mitsuba.variant import llvm_trouble
 from ..presets import QUALITY
 from ..shading import Shader
 from .ball_pictures import BallPictures, FastPictures, working_factor
-from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_figures
+from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_metrics
 from .levenberg_marquardt import minimise
 from .mitsuba_pictures import MitsubaPictures, working_preset
 from .parameters import FIRST_LED, NAMES, SPREAD, parameters_of
@@ -94,7 +94,7 @@ def calibrate(
     tried = evaluate_unit(fitted, used, ball_diameter / 2, search_radius=False)
     progress(total, total)
     errors, unknown = search.identified(factor)
-    figures = {name: value for name, value in mean_figures(tried)[0].items() if np.isfinite(value)}
+    metrics = {name: value for name, value in mean_metrics(tried)[0].items() if np.isfinite(value)}
     names = tuple(press.name for press in search.presses)
     light, rest = "Mitsuba" if finish else "fast picture", "estimated" if photographs.estimated else "photographed"
     note = f"{light}; {len(names)} presses; background {rest}"
@@ -104,7 +104,7 @@ def calibrate(
         ambient=fit_ambient(photographs.background, fitted, Shader(fitted).radiance(rest_height_map(fitted.camera))),
         photograph="",
         noise=photographs.noise,
-        fit=Fit(note, names, ball_diameter, figures, errors, (*unknown, *NEVER_IDENTIFIED)),
+        fit=Fit(note, names, ball_diameter, metrics, errors, (*unknown, *NEVER_IDENTIFIED)),
     )
     warnings = _warnings(photographs, tried, search.aside)
     if trouble:

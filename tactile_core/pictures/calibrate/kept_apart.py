@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import TactileError
 from ...sensors.calibration import Calibration
 from .ball_pictures import BallPictures, FastPictures, working_factor
-from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_figures
+from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_metrics
 from .fit import calibrate, unexplained_share
 from .photographs import Photographs, Press, chosen, turned
 from .press_fit import Sight, fit_ball
@@ -72,7 +72,7 @@ def tried_apart(
 
 def check_worth(tried: list[Evaluation]) -> None:
     """Raise TactileError for a calibration that explains its presses no better than the background."""
-    ours, baseline = mean_figures(tried)
+    ours, baseline = mean_metrics(tried)
     if not ours["roi_l1"] <= WORTH * baseline["roi_l1"]:
         found = (
             f"{ours['roi_l1']:.1f} levels off in the region of the press, the background alone {baseline['roi_l1']:.1f}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...accuracy import Row, row
 from ...files import atomic
-from .evaluate import TARGETS, Evaluation, mean_figures
+from .evaluate import TARGETS, Evaluation, mean_metrics
 
 LARGEST_SHEET = 20  # presses; more would make a picture that nobody opens
 GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round grey 128
@@ -18,13 +18,13 @@ GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round gr
 
 def rows_of(tried: list[Evaluation], name: str) -> list[Row]:
     """Make one row a metric, means over presses; name : of the set of photographs."""
-    ours, baseline = mean_figures(tried)
+    ours, baseline = mean_metrics(tried)
     rows = []
-    for figure, (unit, target, better) in TARGETS.items():
-        value, beside = (None if math.isnan(values[figure]) else values[figure] for values in (ours, baseline))
+    for metric, (unit, target, better) in TARGETS.items():
+        value, beside = (None if math.isnan(values[metric]) else values[metric] for values in (ours, baseline))
         if value is None:
             target = None
-        rows.append(row(figure, value, unit, target, baseline=beside, of=name, at_least=better > 0))
+        rows.append(row(metric, value, unit, target, baseline=beside, of=name, at_least=better > 0))
     return rows
 
 
@@ -35,10 +35,10 @@ def rows_by_press(tried: list[Evaluation]) -> list[Row]:
         name = each.press.name
         places = {"right": each.ball.right, "down": each.ball.down, "depth": each.ball.depth}
         rows += [row(f"press_{what}", 1e3 * value, "mm", of=name) for what, value in places.items()]
-        for figure, (unit, _, _) in TARGETS.items():
-            value, beside = each.figures.get(figure, math.nan), each.baseline.get(figure, math.nan)
+        for metric, (unit, _, _) in TARGETS.items():
+            value, beside = each.metrics.get(metric, math.nan), each.baseline.get(metric, math.nan)
             if math.isfinite(value):
-                rows.append(row(figure, value, unit, baseline=beside if math.isfinite(beside) else None, of=name))
+                rows.append(row(metric, value, unit, baseline=beside if math.isfinite(beside) else None, of=name))
     return rows
 
 
@@ -59,9 +59,9 @@ def write_sheet(path: str | os.PathLike, tried: list[Evaluation]) -> None:
         difference = 128 + MAGNIFIED * (each.picture.astype(float) - each.press.picture)
         for j, picture in enumerate((each.press.picture, each.picture, difference.clip(0, 255).astype(np.uint8))):
             sheet.paste(Image.fromarray(picture), (left + j * (width + GAP), top + 14))
-        figures, baseline = each.figures, each.baseline
-        text = f"{each.press.name}  {figures['roi_psnr']:.1f} dB (baseline {baseline['roi_psnr']:.1f})"
-        text += f"  {figures['roi_l1']:.1f} levels (baseline {baseline['roi_l1']:.1f})  {'; '.join(each.flags)}"
+        metrics, baseline = each.metrics, each.baseline
+        text = f"{each.press.name}  {metrics['roi_psnr']:.1f} dB (baseline {baseline['roi_psnr']:.1f})"
+        text += f"  {metrics['roi_l1']:.1f} levels (baseline {baseline['roi_l1']:.1f})  {'; '.join(each.flags)}"
         draw.text((left, top), text.encode("ascii", "replace").decode(), fill="black")
     content = io.BytesIO()
     sheet.save(content, "PNG")

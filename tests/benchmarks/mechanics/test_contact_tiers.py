@@ -16,10 +16,10 @@ def test_a_miss_is_told_in_metres_and_shares():
     true = np.zeros((4, 3))
     true[0, 1], true[1, 1] = 100e-6, 5e-6  # the second moves less than counts
     found = true + np.array([0.0, 3e-6, 4e-6])
-    told = miss(7, 0.2, found, 1.1, true, 1.0)
-    assert (told.press, told.share) == (7, 0.2)
-    assert told.shape == pytest.approx(5e-6) and told.baseline == pytest.approx(100e-6)
-    assert told.force == pytest.approx(0.1)
+    said = miss(7, 0.2, found, 1.1, true, 1.0)
+    assert (said.press, said.share) == (7, 0.2)
+    assert said.shape == pytest.approx(5e-6) and said.baseline == pytest.approx(100e-6)
+    assert said.force == pytest.approx(0.1)
 
 
 def test_bins_hold_what_lies_in_them():

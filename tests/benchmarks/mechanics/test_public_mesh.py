@@ -1,4 +1,4 @@
-"""What the comparison with the public meshes stands on; its figures are the report's."""
+"""What the comparison with the public meshes stands on; its metrics are the report's."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Rows of the answered contact and of the posterior: a posterior that is true is told so, one that boasts is not."""
+"""Rows of the answered contact and of the posterior: a posterior that is true is said so, one that boasts is not."""
 
 from __future__ import annotations
 

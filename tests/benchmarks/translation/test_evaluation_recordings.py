@@ -196,7 +196,7 @@ def test_what_may_be_chosen_by_is_not_reported(tmp_path):
 
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory, outside_data):
-    """Our figures of six real recordings, and what the tool beside them prints of the same files."""
+    """Our metrics of six real recordings, and what the tool beside them prints of the same files."""
     data = outside_data("biotac_recordings") / "slide"
     tool = data.parents[2] / "tools" / "judge_recordings.py"
     if not tool.exists():

@@ -1,4 +1,4 @@
-"""Figures of the translation on paired contacts: zero for the truth, the baseline answer for nothing, fair averages."""
+"""Metrics of the translation on paired contacts: zero for the truth, the baseline answer for nothing, fair averages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactile_core import sensors
 from tactile_core.accuracy import COSTS
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training import error_summary
-from tactile_core.training.step_errors import error_columns, translation_figures, true_displacement
+from tactile_core.training.step_errors import error_columns, translation_metrics, true_displacement
 from tactile_core.translation.contact_patch import contact_patch
 
 
@@ -68,16 +68,16 @@ class Answers:
         return np.full((len(change), 2), 1e-5)
 
 
-def figures(pairs, share):
+def metrics(pairs, share):
     rows = np.arange(len(pairs.press))
-    return translation_figures(Answers(pairs, share), pairs, rows, pairs.signal, bodies())
+    return translation_metrics(Answers(pairs, share), pairs, rows, pairs.signal, bodies())
 
 
 STEPS = ("MVB", "MVD", "S2MPN", "M2MPN", "chain", "D2B")
 
 
 def test_the_truth_has_no_error(pairs):
-    found = figures(pairs, 1.0)
+    found = metrics(pairs, 1.0)
     for step in STEPS:
         assert np.nanmax(found[f"{step}_rms_um"]) == 0 and found[f"{step}_max_um"].max() == 0
     assert np.nanmax(found["S2MPN_position_mm"]) == 0
@@ -86,7 +86,7 @@ def test_the_truth_has_no_error(pairs):
 
 
 def test_nothing_has_the_error_of_the_baseline(pairs):
-    found = figures(pairs, 0.0)
+    found = metrics(pairs, 0.0)
     for step in STEPS:
         baseline = error_summary.BASELINES.get(step, "baseline_digit")
         np.testing.assert_array_equal(found[f"{step}_rms_um"], found[f"{baseline}_rms_um"])
@@ -97,7 +97,7 @@ def test_nothing_has_the_error_of_the_baseline(pairs):
 
 
 def test_half_of_it_is_half_an_error(pairs):
-    found = figures(pairs, 0.5)
+    found = metrics(pairs, 0.5)
     np.testing.assert_allclose(found["M2MPN_rms_um"], 0.5 * found["baseline_digit_rms_um"], rtol=1e-5)
     peaks = found["M2MPN_peak_depth_percent"]
     np.testing.assert_allclose(peaks[np.isfinite(peaks)], 50, rtol=1e-5)
@@ -115,10 +115,10 @@ def test_bins_and_indenters_count_alike():
 
 
 def test_rows_say_what_they_met():
-    assert error_summary.figure_row("a_rms_um", 3.0, 9.0, 4.0, "s")["ok"] is True
-    patch = error_summary.figure_row("a_iou", 0.8, None, 0.85, "s")
+    assert error_summary.metric_row("a_rms_um", 3.0, 9.0, 4.0, "s")["ok"] is True
+    patch = error_summary.metric_row("a_iou", 0.8, None, 0.85, "s")
     assert (patch["unit"], patch["ok"], patch["baseline"], patch["set"]) == ("1", False, None, "s")
-    assert error_summary.figure_row("a_rms_um", 3.0, None, None, "s")["ok"] is None
+    assert error_summary.metric_row("a_rms_um", 3.0, None, None, "s")["ok"] is None
 
 
 def test_slices_cover_each_contact_once(pairs):

@@ -34,8 +34,8 @@ def test_the_truth_itself_has_no_error(truth):
     gel[:, 0, 1] = one["peak"]
     force = np.stack([0 * one["force"], one["force"], 0 * one["force"]], axis=1)
     found = load_translator()(sequence_rows.plain_signals(one["signal"].astype(np.float32)))
-    told = dataclasses.replace(found, displacement_digit=gel, force=force, contact_center=one["center"])
-    errors = sequence_rows.judged(told, one)
+    said = dataclasses.replace(found, displacement_digit=gel, force=force, contact_center=one["center"])
+    errors = sequence_rows.judged(said, one)
     assert len(errors["place"]) == (one["force"] > sequence_rows.TOUCHED).sum()
     for name in ("place", "force", "peak"):
         np.testing.assert_allclose(errors[name], 0, atol=1e-4)  # float32
@@ -50,7 +50,7 @@ def test_a_lost_contact_is_far(truth):
 def test_rows_are_of_some_sequences_or_all():
     found = sequence_rows.rows(load_translator(), every=10)
     whole = {row["name"]: row for row in found if "6 sequences" in row["set"]}
-    names = {f"sequence_{rest}{figure}" for figure in sequence_rows.UNITS for rest in ("", "rest_off_")}
+    names = {f"sequence_{rest}{metric}" for metric in sequence_rows.UNITS for rest in ("", "rest_off_")}
     assert set(whole) == names
     assert all(whole[name]["value"] > 0 for name in whole)
 

@@ -84,7 +84,7 @@ def test_a_folder_that_may_not_be_read_is_no_bag(recordings, tmp_path, monkeypat
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "said"),
     [
         (["--array", "3/3"], "--array: '3/3'"),
         (["--array", "0/2"], "no job yet"),
@@ -95,10 +95,10 @@ def test_a_folder_that_may_not_be_read_is_no_bag(recordings, tmp_path, monkeypat
         (["missing.csv"], "cannot be read"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_done_is_told_in_one_line(words, told, tmp_path, capsys):
+def test_what_cannot_be_done_is_told_in_one_line(words, said, tmp_path, capsys):
     assert main(["batch", *words, "--out", str(tmp_path / "job")]) == 2
     error = capsys.readouterr().err
-    assert told in error and error.count("\n") == 1
+    assert said in error and error.count("\n") == 1
 
 
 def test_the_calibration_belongs_to_the_job(command, recordings, tmp_path):

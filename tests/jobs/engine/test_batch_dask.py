@@ -122,8 +122,8 @@ def test_nobody_listening_is_told(new_job):
 
     folder, job = new_job()
     place = Cluster(folder, "tcp://127.0.0.1:9")
-    told = pytest.raises(TactileError, match="no scheduler answers")
-    with dask.config.set({CONFIGURED: "1s"}), told, runs.opened(folder, None):
+    reported = pytest.raises(TactileError, match="no scheduler answers")
+    with dask.config.set({CONFIGURED: "1s"}), reported, runs.opened(folder, None):
         runs.run(folder, job, place, None, lambda done, total: None)
 
 

@@ -45,9 +45,9 @@ def by_parts(tmp_path, *words):
 def test_a_grid_of_recordings(scene, tmp_path):
     words = ["simulate", scene, "--grid", "force_n=0.2,0.4", "--seed", "5"]
     run(*words, "--out", tmp_path / "one")
-    told = json.loads((tmp_path / "one" / "grid.json").read_text())["recordings"]
-    assert [one["values"] for one in told] == [{"force_n": 0.2}, {"force_n": 0.4}]
-    with h5py.File(tmp_path / "one" / told[1]["file"]) as file:
+    said = json.loads((tmp_path / "one" / "grid.json").read_text())["recordings"]
+    assert [one["values"] for one in said] == [{"force_n": 0.2}, {"force_n": 0.4}]
+    with h5py.File(tmp_path / "one" / said[1]["file"]) as file:
         assert np.linalg.norm(file["truth/force"][-1]) == pytest.approx(
             0.4, rel=0.05
         )  # of the axial force, tilted skin
@@ -56,14 +56,14 @@ def test_a_grid_of_recordings(scene, tmp_path):
 
 
 def test_a_grid_is_refused_before_any_work(scene, tmp_path, capsys):
-    for words, told in (
+    for words, said in (
         (["--grid", "recording.tilt=1"], "no such field"),
         (["--grid", "force_n=1", "--error", "5um"], "one of the two"),
         (["--plan"], "without --grid"),
         (["--workers", "2"], "without --grid"),
     ):
         assert main(["simulate", str(scene), "--out", str(tmp_path / "out"), *words]) == 2
-        assert told in capsys.readouterr().err
+        assert said in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [scene]
 
 

@@ -73,8 +73,8 @@ def test_verify_says_what_is_missing_and_what_is_not_complete(command, recording
     assert "not complete: 0 of 0 shards" in command("--out", out, "--verify").stderr
     command("--out", out)
     sorted((out / "shards").iterdir())[1].unlink()
-    told = command("--out", out, "--verify")
-    assert told.returncode == 2 and "00000_a-000001.h5: missing; the same command makes it again" in told.stderr
+    said = command("--out", out, "--verify")
+    assert said.returncode == 2 and "00000_a-000001.h5: missing; the same command makes it again" in said.stderr
 
 
 def test_a_damaged_prepared_recording_is_no_end_of_the_job(new_job, do, recordings):
@@ -119,9 +119,9 @@ def test_lists_name_what_is_there(recordings, tmp_path):
     (folder / "empty").mkdir()
     listed.write_bytes(b"\xef\xbb\xbfin/a.csv\r\n\r\nin/b.csv\r\n")  # as Windows' editor writes it
     assert inputs.find([f"@{listed}"], tmp_path / "out") == recordings
-    for line, told in (("in/empty", "names no recording"), ("in/none*", "names no recording"), ("@other", "no lists")):
+    for line, said in (("in/empty", "names no recording"), ("in/none*", "names no recording"), ("@other", "no lists")):
         listed.write_text(f"in/a.csv\n{line}\n")
-        with pytest.raises(TactileError, match=rf"list\.txt, line 2.*{told}"):
+        with pytest.raises(TactileError, match=rf"list\.txt, line 2.*{said}"):
             inputs.find([f"@{listed}"], tmp_path / "out")
 
 
@@ -151,8 +151,8 @@ def test_links_to_nothing_and_pipes_are_told(tmp_path):
     (tmp_path / "*.csv").symlink_to(tmp_path / "none")
     (tmp_path / "loop.csv").symlink_to(tmp_path / "loop.csv")
     os.mkfifo(tmp_path / "pipe.csv")
-    for name, told in (("*.csv", "cannot be read"), ("loop.csv", "cannot be read"), ("pipe.csv", "no regular file")):
-        with pytest.raises(TactileError, match=told):
+    for name, said in (("*.csv", "cannot be read"), ("loop.csv", "cannot be read"), ("pipe.csv", "no regular file")):
+        with pytest.raises(TactileError, match=said):
             inputs.hashed(inputs.find([str(tmp_path / name)], tmp_path / "out"), none)
     with pytest.raises(TactileError, match="no regular file"):
         inputs.find([f"@{tmp_path / 'pipe.csv'}"], tmp_path / "out")
@@ -162,24 +162,24 @@ def test_links_to_nothing_and_pipes_are_told(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "said"),
     [
         (["--counts-per-unit", "nan"], "counts_per_unit: nan"),
         (["--smooth", "2"], "smooth: 2 frames"),
         (["--shard-frames", "200000"], "--shard-frames: 200000"),
     ],
 )
-def test_options_that_no_recording_can_meet_make_no_job(words, told, command, recordings, tmp_path):
+def test_options_that_no_recording_can_meet_make_no_job(words, said, command, recordings, tmp_path):
     done = command(*recordings, "--out", tmp_path / "job", *words)
-    assert done.returncode == 2 and told in done.stderr
+    assert done.returncode == 2 and said in done.stderr
     assert not (tmp_path / "job" / jobs.FILE).exists()
 
 
 @pytest.mark.parametrize("path", ["/a\0b", "/a\ud800"])
 def test_a_job_file_with_impossible_paths_is_refused(path, new_job):
     folder, _ = new_job()
-    told = json.loads((folder / jobs.FILE).read_text())
-    told["inputs"][0]["path"] = path
-    (folder / jobs.FILE).write_text(json.dumps(told))
+    said = json.loads((folder / jobs.FILE).read_text())
+    said["inputs"][0]["path"] = path
+    (folder / jobs.FILE).write_text(json.dumps(said))
     with pytest.raises(TactileError, match="inputs"):
         jobs.read(folder)

@@ -46,9 +46,9 @@ def test_workers_and_restarts_change_no_byte(finished, new_job, do, content):
     other, same = new_job("three")
     do(other, same, workers=3, restart=1)
     assert content(folder) == content(other)
-    told = json.loads((folder / jobs.MANIFEST).read_text())
-    assert [one["frames"] for one in told["recordings"]] == [130, 70]
-    assert [len(one["shards"]) for one in told["recordings"]] == [3, 2] and told["aside"] == {}
+    said = json.loads((folder / jobs.MANIFEST).read_text())
+    assert [one["frames"] for one in said["recordings"]] == [130, 70]
+    assert [len(one["shards"]) for one in said["recordings"]] == [3, 2] and said["aside"] == {}
 
 
 def test_what_is_whole_is_kept_and_what_is_damaged_made_anew(finished, do, content):

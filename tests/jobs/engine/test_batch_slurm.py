@@ -94,8 +94,8 @@ def the_page_s(command, other):
 
 
 def queue_is_empty():
-    told = subprocess.run(["squeue", "-h"], capture_output=True, text=True, check=True, timeout=60)
-    return not told.stdout.strip()
+    said = subprocess.run(["squeue", "-h"], capture_output=True, text=True, check=True, timeout=60)
+    return not said.stdout.strip()
 
 
 def test_an_array_of_a_real_slurm(real_slurm, calm, tmp_path, content, monkeypatch):
@@ -111,8 +111,8 @@ def test_an_array_of_a_real_slurm(real_slurm, calm, tmp_path, content, monkeypat
         wait(queue_is_empty)
     with runs.opened(other, None):
         done = runs.run(other, job, local.Local(other, 1), None, lambda done, total: None)
-    told = [path.read_text() for path in real_slurm.glob("slurm-*.out")]
-    assert (done.kept, done.made) == (5, 0), told
+    said = [path.read_text() for path in real_slurm.glob("slurm-*.out")]
+    assert (done.kept, done.made) == (5, 0), said
     assert content(folder) == content(other)
 
 

@@ -188,7 +188,7 @@ def as_another_shard(file):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "said"),
     [
         (without_force, "arrays .*; expected .*force"),
         (with_another_array, "arrays .*odd"),
@@ -200,14 +200,14 @@ def as_another_shard(file):
         (as_another_shard, "another shard under this name"),
     ],
 )
-def test_shards_of_strangers_are_read_with_care(change, told, job, tmp_path):
+def test_shards_of_strangers_are_read_with_care(change, said, job, tmp_path):
     """A seal is a hash that anyone can make."""
     shutil.copytree(job, tmp_path / "job")
     path = jobs.shard_file(tmp_path / "job", "00001_b", 0)
     with h5py.File(path, "r+") as file:
         change(file)
     checksummed.write_checksum(path)
-    with pytest.raises(TactileError, match=told):
+    with pytest.raises(TactileError, match=said):
         export.export(tmp_path / "job", "npz", tmp_path / "out", silent)
     assert not (tmp_path / "out").exists()
 
@@ -224,8 +224,8 @@ def test_what_was_set_aside_is_told(job, tmp_path, capsys):
     assert "--overwrite" not in capsys.readouterr().err  # which this verb does not have
 
 
-@pytest.mark.parametrize(("stretch", "told"), [(3.0, "as the first"), (1e6, "1 or more")])
-def test_lerobot_takes_one_rate(stretch, told, job, tmp_path):
+@pytest.mark.parametrize(("stretch", "said"), [(3.0, "as the first"), (1e6, "1 or more")])
+def test_lerobot_takes_one_rate(stretch, said, job, tmp_path):
     reason = "pyarrow is absent, or newer than this numpy: pip install tactile-core[batch]"
     pytest.importorskip("pyarrow.parquet", reason=reason, exc_type=ImportError)
     shutil.copytree(job, tmp_path / "job")
@@ -234,5 +234,5 @@ def test_lerobot_takes_one_rate(stretch, told, job, tmp_path):
         with h5py.File(path, "r+") as file:
             file["time"][:] *= stretch
         checksummed.write_checksum(path)
-    with pytest.raises(TactileError, match=told):
+    with pytest.raises(TactileError, match=said):
         export.export(tmp_path / "job", "lerobot", tmp_path / "out", silent)

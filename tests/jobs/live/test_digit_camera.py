@@ -66,8 +66,8 @@ def test_watch_goes_on_when_the_camera_vanishes_and_says_so_once(video, slide_cs
     out = tmp_path / "now.png"
     command = ["watch", str(slide_csv(frames=90)), "--play", "--speed", "0", "--out", str(out), "--camera", path]
     assert main(command) == 0
-    told = capsys.readouterr()
-    assert told.out.startswith("90 frames: ") and told.err.count("watching goes on without it") == 1
+    said = capsys.readouterr()
+    assert said.out.startswith("90 frames: ") and said.err.count("watching goes on without it") == 1
     picture = np.asarray(Image.open(out))
     assert picture.shape == (320, 480, 3)
     assert 50 < picture[0, 239, 0] < 70 and not picture[:, 240:].any()  # the simulated one, and nothing beside it

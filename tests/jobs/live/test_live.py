@@ -99,8 +99,8 @@ def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
     np.savez(tmp_path / "gap.npz", electrodes=electrodes, time=np.r_[0.0, 1e6 + np.arange(39) / 100])
     monkeypatch.setattr(watch, "time", clock := Clock())
     assert main(["watch", str(tmp_path / "gap.npz"), "--play", "--out", str(tmp_path / "now.png")]) == 0
-    told = capsys.readouterr()
-    assert "before frame 1: skipped" in told.err and told.out.startswith("40 frames: ")
+    said = capsys.readouterr()
+    assert "before frame 1: skipped" in said.err and said.out.startswith("40 frames: ")
     assert clock.slept < 1.0  # s that were waited for, of a million
 
 
@@ -128,10 +128,10 @@ def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path,
         out = tmp_path / "now.png"
         path = str(slide_csv(frames=90))
         assert main(["watch", path, "--out", str(out), *more]) == 0
-        told = capsys.readouterr().out
-        assert told.startswith("90 frames: ") and "ms from frame to picture" in told
+        said = capsys.readouterr().out
+        assert said.startswith("90 frames: ") and "ms from frame to picture" in said
         if "0" in more:
-            assert ", 0 frames passed over" in told  # every frame has its picture
+            assert ", 0 frames passed over" in said  # every frame has its picture
         grey = np.asarray(Image.open(out))[0, -1, 0]
         assert 50 < grey < 70  # the last frame is pressed by 29 counts times 1 to 3, a grey level a count
         out.unlink()
@@ -173,8 +173,8 @@ def test_watch_takes_a_map_a_tare_and_a_sensor(slide_csv, tmp_path, monkeypatch,
     for more in (["--play"], ["--idle", "0.2"]):
         capsys.readouterr()
         assert main([*words, "--out", str(tmp_path / "now.png"), *more]) == 0
-        told = capsys.readouterr()
-        assert told.out.startswith("90 frames: ") and "frames 0:30, as given" in told.err
+        said = capsys.readouterr()
+        assert said.out.startswith("90 frames: ") and "frames 0:30, as given" in said.err
 
 
 def test_watch_without_a_display_says_what_to_do(slide_csv, monkeypatch, capsys):
@@ -229,7 +229,7 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "said"),
     [
         ([], "no recording, or two"),
         (["a.csv", "--rosbag-play", "b.bag"], "no recording, or two"),
@@ -241,9 +241,9 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
         (["--rosbag-play", __file__], "no bag"),
     ],
 )
-def test_words_that_do_not_go_together_are_told(words, told, capsys):
+def test_words_that_do_not_go_together_are_told(words, said, capsys):
     assert main(["watch", *words]) == 2
-    assert told in capsys.readouterr().err
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("sign", [1, -1])

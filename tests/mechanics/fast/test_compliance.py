@@ -1,4 +1,4 @@
-"""The cache of compliance matrices: damage is repaired, a folder that cannot be written is told before the work."""
+"""The cache of compliance matrices: damage is repaired, a folder that cannot be written is said before the work."""
 
 import pathlib
 import threading

@@ -1,4 +1,4 @@
-"""The compliance of the gaps: made anew where a few normals have turned, it is the one made from the start."""
+"""The compliance of the gaps: made again where a few normals have turned, it is the one made from the start."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Blocks on a fixed pattern say the same as a matrix that is assembled anew, and a factor of them solves it."""
+"""Blocks on a fixed pattern say the same as a matrix that is assembled again, and a factor of them solves it."""
 
 import numpy as np
 import pytest
@@ -78,7 +78,7 @@ def test_an_unstable_matrix_is_refused(solid, blocks, pattern_factor):
 
 
 def test_the_analysis_of_a_pattern_is_made_once(solid, blocks, monkeypatch):
-    """It costs about as much as a factor; SciPy wraps a pattern's arrays anew for every matrix."""
+    """It costs about as much as a factor; SciPy wraps a pattern's arrays again for every matrix."""
     if factors._pardiso() is None:
         pytest.skip("pypardiso is not installed")
     phases, run = [], PatternFactor._run

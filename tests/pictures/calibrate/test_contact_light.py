@@ -31,7 +31,7 @@ def test_light_through_the_coating_is_found_again(tmp_path: Path, through) -> No
     )
     (found,) = evaluate_unit(unit, dataclasses.replace(photographs, presses=(lit,)), BALL, search_radius=False)
     np.testing.assert_allclose(found.through, through, atol=3)  # levels; measured 1
-    assert found.figures["through_l1"] < 2.5
+    assert found.metrics["through_l1"] < 2.5
     bright = bool(max(through))
     assert any("through the coating" in flag for flag in found.flags) == bright
-    assert (found.figures["roi_l1"] > 2 * found.figures["through_l1"]) == bright
+    assert (found.metrics["roi_l1"] > 2 * found.metrics["through_l1"]) == bright

@@ -13,7 +13,7 @@ from pressed_unit import BALL, PLACES, write_photographs
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.pictures.calibrate.evaluate import FIGURES, evaluate_unit, mean_figures
+from tactile_core.pictures.calibrate.evaluate import METRICS, evaluate_unit, mean_metrics
 from tactile_core.pictures.calibrate.fit import Calibrated, calibrate
 from tactile_core.pictures.calibrate.parameters import NAMES
 from tactile_core.pictures.calibrate.photographs import chosen, read_photographs
@@ -64,7 +64,7 @@ def found(folder: Path) -> Calibrated:
 def test_known_numbers_are_found_again(found: Calibrated) -> None:
     unit, truth = found.calibration, other_unit()
     for led, true in zip(unit.leds, truth.leds, strict=True):
-        # Where the light comes from is told well; how far it stands looks almost like its gain, and what is assumed of
+        # Where the light comes from is said well; how far it stands looks almost like its gain, and what is assumed of
         # units pulls it to the start. Starts were 2 to 4 degrees and up to 1.2 mm away. Measured: 0.5 degrees, 0.5 mm.
         cosine = np.dot(led.position, true.position) / np.linalg.norm(led.position) / np.linalg.norm(true.position)
         assert np.degrees(np.arccos(cosine)) < 1
@@ -80,7 +80,7 @@ def test_places_and_depths_are_found_again(found: Calibrated) -> None:
         assert each.ball.right == pytest.approx(1e-3 * right, abs=0.08e-3)
         assert each.ball.down == pytest.approx(1e-3 * down, abs=0.08e-3)
         assert each.ball.depth == pytest.approx(1e-3 * depth, abs=0.05e-3)
-        assert each.figures["roi_l1"] < 2  # levels, of which the noise makes 0.9
+        assert each.metrics["roi_l1"] < 2  # levels, of which the noise makes 0.9
         assert each.baseline["roi_l1"] > 10
 
 
@@ -98,8 +98,8 @@ def test_one_press_tells_less_than_five(folder: Path, found: Calibrated) -> None
     one = calibrate(chosen(photographs, ["press_0.png"]), 2 * BALL, plain_unit(), unit="one", quick=True)
     assert set(found.calibration.fit.not_identified) < set(one.calibration.fit.not_identified)
     assert one.calibration.fit.standard_errors["red_right_mm"] > found.calibration.fit.standard_errors["red_right_mm"]
-    tried, _ = mean_figures(evaluate_unit(one.calibration, photographs, BALL, search_radius=False))
-    before, _ = mean_figures(evaluate_unit(plain_unit(), photographs, BALL, search_radius=False))
+    tried, _ = mean_metrics(evaluate_unit(one.calibration, photographs, BALL, search_radius=False))
+    before, _ = mean_metrics(evaluate_unit(plain_unit(), photographs, BALL, search_radius=False))
     assert tried["roi_l1"] < 0.7 * before["roi_l1"]
 
 
@@ -138,7 +138,7 @@ def test_larger_photographs_are_the_same_view(tmp_path: Path) -> None:
     assert tried.picture.shape == (640, 480, 3)
     assert tried.ball.right == pytest.approx(1.5e-3, abs=0.03e-3)
     assert tried.ball.depth == pytest.approx(0.9e-3, abs=0.03e-3)
-    assert tried.figures["roi_l1"] < 2 < tried.baseline["roi_l1"]  # levels, of which the noise makes 0.9
+    assert tried.metrics["roi_l1"] < 2 < tried.baseline["roi_l1"]  # levels, of which the noise makes 0.9
 
 
 def test_lying_photographs_are_refused(tmp_path: Path) -> None:
@@ -156,16 +156,16 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     common = [str(folder), "--background", untouched, "--only", "press_0.png,press_3.png"]
     words = ["calibrate", *common, "--quick", "--ball-diameter", "6", "--start", str(start), "--out", str(out)]
     assert main(words) == 0
-    told = capsys.readouterr()
-    assert "roi_psnr" in told.out and str(out) in told.out and "tell too little of" in told.err
-    assert all(f"press_{number}.png: used; " in told.err for number in (0, 3))
+    said = capsys.readouterr()
+    assert "roi_psnr" in said.out and str(out) in said.out and "tell too little of" in said.err
+    assert all(f"press_{number}.png: used; " in said.err for number in (0, 3))
     assert Image.open(tmp_path / "unit.png").size[0] > 3 * 240
     assert load_calibration(out).unit == "unit"
     rows, sheet = tmp_path / "rows.json", tmp_path / "trial.png"
     words = ["calibrate", "--test", str(out), *common, "--json", str(rows), "--sheet", str(sheet)]
     assert main(words) == 0
     written = {row["name"]: row for row in json.loads(rows.read_text()) if row["set"] == folder.name}
-    assert set(written) == set(FIGURES)
+    assert set(written) == set(METRICS)
     assert written["roi_l1"]["value"] < 2 < written["roi_l1"]["baseline"]
     assert written["ball_radius_error"]["value"] < 0.03
     assert sheet.exists()
@@ -193,7 +193,7 @@ def test_verb_refuses(words: list, where: str, folder: Path, capsys: pytest.Capt
 def test_shipped_calibration_meets_real_presses_that_it_has_not_seen(outside_data: Callable[[str], Path]) -> None:
     photographs = chosen(read_photographs(outside_data("digit_real") / "presses"), KEPT_APART)
     assert not set(KEPT_APART) & set(load_calibration().fit.photographs)
-    ours, baseline = mean_figures(evaluate_unit(load_calibration(), photographs, BALL))
+    ours, baseline = mean_metrics(evaluate_unit(load_calibration(), photographs, BALL))
     # Targets (docs/sources.md, Targets); measured: 30.6 dB, 5.7 levels, 0.80 and 3 %.
     assert ours["roi_psnr"] > 26 > baseline["roi_psnr"] + 5
     assert ours["roi_l1"] < 8 < baseline["roi_l1"]

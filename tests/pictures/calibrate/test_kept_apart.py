@@ -1,4 +1,4 @@
-"""No calibration is written that explains nothing, and the way photographs lie is told."""
+"""No calibration is written that explains nothing, and the way photographs lie is reported."""
 
 import numpy as np
 import pytest
@@ -21,15 +21,15 @@ def fit(folder, tmp_path, start):
     return main(["calibrate", str(folder), "--quick", *words, "--out", str(tmp_path / "unit.toml")])
 
 
-@pytest.mark.parametrize(("turn", "told"), [((True, True), "180 degrees"), ((False, True), "left to right")])
-def test_turned_photographs_are_told(turn, told, tmp_path, start, capsys):
+@pytest.mark.parametrize(("turn", "reported"), [((True, True), "180 degrees"), ((False, True), "left to right")])
+def test_turned_photographs_are_told(turn, reported, tmp_path, start, capsys):
     folder = write_photographs(tmp_path / "presses", plain_unit(), PLACES[:3])
     way = tuple(slice(None, None, -1 if reverse else 1) for reverse in turn)
     for file in [*folder.iterdir(), tmp_path / "untouched.png"]:
         Image.fromarray(np.asarray(Image.open(file))[way]).save(file)
     assert fit(folder, tmp_path, start) == 2
     said = capsys.readouterr().err
-    assert told in said and "fingertip up" in said
+    assert reported in said and "fingertip up" in said
     assert not (tmp_path / "unit.toml").exists()
 
 

@@ -1,4 +1,4 @@
-"""Light that drifts between photographs: told apart from presses, and no harm to where these are found."""
+"""Light that drifts between photographs: said apart from presses, and no harm to where these are found."""
 
 import numpy as np
 import pytest
@@ -32,4 +32,4 @@ def test_presses_are_found_under_a_drifted_light(tmp_path):
         assert each.ball.right == pytest.approx(1e-3 * right, abs=0.15e-3)
         assert each.ball.down == pytest.approx(1e-3 * down, abs=0.15e-3)
         assert each.ball.depth == pytest.approx(1e-3 * depth, abs=0.1e-3)
-        assert each.figures["frame_l1"] < 2.5
+        assert each.metrics["frame_l1"] < 2.5

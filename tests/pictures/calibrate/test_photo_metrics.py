@@ -1,9 +1,9 @@
-"""The figures of a trial against their definitions and against scikit-image, where that is installed."""
+"""The metrics of a trial against their definitions and against scikit-image, where that is installed."""
 
 import numpy as np
 import pytest
 
-from tactile_core.pictures.calibrate.photo_metrics import figures, lobe_overlap, psnr, similarity
+from tactile_core.pictures.calibrate.photo_metrics import lobe_overlap, metrics, psnr, similarity
 from tactile_core.pictures.calibrate.photographs import dilated, region_of_interest
 
 
@@ -18,7 +18,7 @@ def test_figures_by_their_words(pictures: tuple[np.ndarray, np.ndarray]) -> None
     one, other = pictures
     region = np.zeros(one.shape[:2], bool)
     region[10:30, 5:25] = True
-    found = figures(one, other, np.full_like(one, 120), region)
+    found = metrics(one, other, np.full_like(one, 120), region)
     inside = (one - other)[10:30, 5:25]
     assert found["roi_l1"] == pytest.approx(np.abs(inside).mean())
     assert found["roi_psnr"] == pytest.approx(10 * np.log10(255**2 / (inside**2).mean()))
@@ -37,8 +37,8 @@ def test_lobes_overlap_by_colour() -> None:
 
 
 def test_similarity_is_scikit_image_s(pictures: tuple[np.ndarray, np.ndarray]) -> None:
-    metrics = pytest.importorskip("skimage.metrics", reason="scikit-image is not installed")
-    _, expected = metrics.structural_similarity(*pictures, channel_axis=-1, data_range=255, full=True)
+    reference = pytest.importorskip("skimage.metrics", reason="scikit-image is not installed")
+    _, expected = reference.structural_similarity(*pictures, channel_axis=-1, data_range=255, full=True)
     np.testing.assert_allclose(similarity(*pictures)[3:-3, 3:-3], expected[3:-3, 3:-3], atol=1e-9)
 
 
