@@ -56,6 +56,14 @@ def write_slide() -> Callable[[str, int, Path], Path]:
 
 
 @pytest.fixture
+def no_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the contact sheet of a conversion empty: drawing it takes a second, and most tests look elsewhere."""
+    from tactile_core.jobs.frame_pass import FramePass
+
+    monkeypatch.setattr(FramePass, "draw_sheet", lambda made, path: path.write_bytes(b""))
+
+
+@pytest.fixture
 def slide_csv(tmp_path: Path, write_slide: Callable[[str, int, Path], Path]) -> Callable[..., Path]:
     """``slide_csv("touch", frames=150)`` writes such a recording into the test's own folder."""
 

@@ -19,10 +19,9 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
-def tactile(monkeypatch, capsys):
+def tactile(monkeypatch, capsys, no_sheet):
     """Run a command line in this process, without networks and contact sheets; returns (status, stdout, stderr)."""
     monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
-    monkeypatch.setattr(convert.FramePass, "draw_sheet", lambda made, path: path.write_bytes(b""))  # it takes a second
 
     def run(*arguments):
         status = main([str(argument) for argument in arguments])

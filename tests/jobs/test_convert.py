@@ -39,8 +39,8 @@ def tools():
 
 
 @pytest.fixture
-def run(tmp_path, tools):
-    """Convert one recording with options and return its result folder."""
+def run(tmp_path, tools, no_sheet):
+    """Convert one recording with options, without its contact sheet, and return its result folder."""
 
     def one(path, out="out", **options):
         return converted(path, tmp_path / out, tools, **options)
@@ -133,11 +133,11 @@ def test_marker_motion_needs_a_unit_with_dots_and_has_their_rest(slide_csv, tmp_
         assert np.abs(file["marker_motion"][:]).max() > 0.01  # a dent off the camera's axis: perspective alone
 
 
-def test_the_same_input_gives_the_same_bytes(run, slide_csv):
-    path = slide_csv(frames=80)
-    first, second = run(path, out="a"), run(path, out="b")
+def test_the_same_input_gives_the_same_bytes(whole, tools, tmp_path):
+    path, first = whole
+    second = converted(path, tmp_path / "again", tools)
     files = sorted(p.relative_to(first) for p in first.rglob("*") if p.is_file() and p.name != "timings.json")
-    assert len(files) == 80 + 3
+    assert len(files) == FRAMES + 3
     for file in files:
         assert (first / file).read_bytes() == (second / file).read_bytes(), file
 
@@ -325,7 +325,7 @@ def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
     assert convert.load_tools(preset=preset).preset == "quality" and drawn == ["quality"]
 
 
-def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys):
+def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys, no_sheet):
     monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     line = ["convert", str(slide_csv()), "--out", str(tmp_path / "out"), "--error"]
     assert main([*line, "5levels"]) == 0
