@@ -28,7 +28,7 @@ class NoLlvm(Exception):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Fetch, print the path; the exit status."""
+    """Fetch LLVM and print its path; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="DIR", type=Path, help="where to unpack it")
     try:

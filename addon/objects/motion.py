@@ -11,7 +11,7 @@ from . import axes, mesh_cache, shape_keys
 def animate(
     thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray, motion: str
 ) -> str:
-    """Let an object play displacements (T, n, 3) m of rest (n, 3) m at scene frames (T,); a sentence for the user.
+    """Let an object play displacements (T, n, 3) m of rest (n, 3) m at frames (T,); returns a sentence.
 
     motion : one of ``properties.MOTIONS``. Raises TactileError where a mesh cache cannot be written.
     """

@@ -118,7 +118,7 @@ def show(context: bpy.types.Context, things: list[bpy.types.Object], beside: Seq
 
 
 def _main_regions(context: bpy.types.Context, kind: str) -> list[tuple[bpy.types.Area, bpy.types.Region]]:
-    """Each of the window's areas of a kind, with the region that holds what it shows; none without a window."""
+    """List the window's areas of a kind, with the region that shows their content; none without a window."""
     areas = context.window.screen.areas if context.window else ()
     return [(a, region) for a in areas if a.type == kind for region in a.regions if region.type == "WINDOW"]
 

@@ -22,7 +22,7 @@ from tactile_core.files import atomic
 
 
 def main() -> int:
-    """Run, print, write; the exit status."""
+    """Run the checks, print and write their rows; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     parser.add_argument("--json", metavar="FILE", type=Path, help="write the rows here")

@@ -59,7 +59,7 @@ Change = Callable[[Ball], np.ndarray]  # (H, W, 3) grey levels, of a press
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure and print; the exit status."""
+    """Measure and print the rows; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("presses", metavar="PRESSES")
     parser.add_argument("--background", metavar="FILE", help="photograph of the untouched gel; estimated else")

@@ -33,7 +33,7 @@ from tactile_core.mechanics.solve import TIERS  # noqa: E402
 
 
 def main() -> int:
-    """Count, print, report."""
+    """Count, print and report."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sensor", choices=("biotac", "digit"))
     parser.add_argument("--count", type=int, default=1000, help="contacts (1000)")

@@ -83,7 +83,7 @@ def array_runners(bench: Bench) -> Lost:
 
 
 def in_child(folder: Path, cut: int | None) -> bool:
-    """Do the job in a child process that ends at its `cut`-th fsync or rename; whether it came to its end."""
+    """Do the job in a child process that ends at its `cut`-th fsync or rename; returns true if it came to its end."""
     child = os.fork()
     if child:
         return os.waitpid(child, 0)[1] == 0

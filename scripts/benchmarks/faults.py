@@ -26,7 +26,7 @@ QUICK_LIMIT, LIMIT = 300, 3600  # s for one fault; a quick one takes 10 s, and 5
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Try all faults; the exit status."""
+    """Try all faults; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two short recordings and few blows")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")

@@ -40,7 +40,7 @@ nodes for heights; Mitsuba's standard preset for the fast picture.
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run, print, write; the exit status."""
+    """Run the checks, print and write their rows; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="without the slow cases")
     parser.add_argument("--json", metavar="FILE", type=Path, help="write the rows here")

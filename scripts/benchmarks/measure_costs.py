@@ -51,7 +51,7 @@ class Part(NamedTuple):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, write."""
+    """Measure, print and write the results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="the DIGIT alone, and leave the table as it is")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")

@@ -53,7 +53,7 @@ Times = list[tuple[float, float]]  # CPU and wall, ms
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, write; the exit status."""
+    """Measure, print and write the results; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=500, help="contacts a sensor, alone and on paths (%(default)s)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
@@ -89,7 +89,7 @@ def quantiles(times: Times) -> list[float]:
 
 
 def as_rows(name: str, times: dict[str, Times], error: dict[str, str]) -> list[Row]:
-    """Six rows a way of computing."""
+    """Make six rows for each way of computing."""
     rows = []
     for how in HOW:
         key = f"loop_{name.replace(', ', '_').replace(' ', '_')}_{how}"

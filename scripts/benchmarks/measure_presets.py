@@ -63,7 +63,7 @@ REPEATS = 5  # of a frame whose time is taken
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, write; the exit status."""
+    """Measure, print and write the results; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two fields, the small size")
     parser.add_argument("--fields", type=int, default=FIELDS, metavar="N", help="contacts to draw")

@@ -54,7 +54,7 @@ SAYS = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Solve, compare, write."""
+    """Solve by each tier, compare and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=Path, metavar="DIR", help="where contacts that were solved are kept")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK} random contacts, few test contacts")

@@ -118,7 +118,7 @@ class Cost(NamedTuple):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, write."""
+    """Measure, print and write the results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help=f"without the {LONG} frames")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")

@@ -39,7 +39,7 @@ MANY = 64  # workers that `scaling` speaks of
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, write."""
+    """Measure, print and write the results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="small counts alone")
     parser.add_argument("--most", type=int, default=100_000, metavar="N", help="frames of the longest recording")
@@ -160,7 +160,7 @@ def memory(folder: Path, most: int) -> list[Row]:
 
 
 def resident(process: int) -> float:
-    """MB of memory that a process holds (Linux)."""
+    """Memory, MB, that a process holds (Linux)."""
     text = Path(f"/proc/{process}/status").read_text()
     return int(text.split("VmRSS:")[1].split()[0]) / 1024
 

@@ -66,7 +66,7 @@ def _about(scene: Path) -> str:
 
 
 def _installed_files() -> list[Path]:
-    """Where the installed package's files lie; [] where it has no metadata."""
+    """List the installed package's files; none where it has no metadata."""
     from importlib import metadata
 
     try:

@@ -34,7 +34,7 @@ class Lattice:
 
     @property
     def closed(self) -> bool:
-        """True where the last column joins the first: a surface with poles closes round its axis."""
+        """Return true if the last column joins the first: a surface with poles closes round its axis."""
         return len(self.rest) > self.shape[0] * self.shape[1]
 
     @property

@@ -68,13 +68,13 @@ class Plan:
 
     @property
     def memory(self) -> float:
-        """MB of the hungriest verb, as they run one after another; matrices are built one after another, too."""
+        """Memory, MB, of the hungriest verb: verbs run one after another, and matrices are built so, too."""
         verbs = {part.verb: [one for one in self.parts if one.verb == part.verb] for part in self.parts}
         return max(sum(p.memory for p in parts) + max(p.building for p in parts) for parts in verbs.values())
 
     @property
     def disk(self) -> float:
-        """MB in all."""
+        """Size on disk, MB, of all parts together."""
         return sum(part.disk for part in self.parts)
 
     def as_json(self) -> dict[str, Any]:

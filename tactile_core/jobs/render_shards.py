@@ -105,7 +105,7 @@ def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
 
 
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
-    """Render some frames."""
+    """Render the frames of a shard, unless they are there."""
     one, recipe = job.inputs[index], job.recipe
     file = jobs.shard_file(folder, one.name, number)
     if checksummed.verified_checksum(file) is not None:

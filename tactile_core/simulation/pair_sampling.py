@@ -56,7 +56,7 @@ def press_rows(
 def _on_both(
     indenter: Indenter, place: Placement, spec: PairSpec, steps: Iterator[Step], pair: tuple[str, str]
 ) -> Iterator[tuple[Step, Solution, Solution]]:
-    """Each step's contacts on both sensors, while both follow: to the greatest depth, or where an edge sinks in."""
+    """Yield each step's contacts on both sensors, to the greatest depth or until an edge sinks in."""
     steps, *for_each = itertools.tee(steps, 3)
     on_source, on_target = (
         _press(sensor, indenter, place, spec, own) for sensor, own in zip(pair, for_each, strict=True)

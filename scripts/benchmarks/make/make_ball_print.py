@@ -30,7 +30,7 @@ FADE = 0.8  # the table's last part goes to zero
 
 
 def main() -> int:
-    """Press, fit, write the table."""
+    """Press a ball, fit its prints and write the table."""
     mesh = disc_mesh(HALF_WIDTH, THICKNESS, TABLE_RADIUS, SPACING, FINE_DEPTH, GROWTH)
     contact = pressed(mesh, DIGIT_GEL, Sphere(TABLE_RADIUS), TABLE_RADIUS)
     place = STEP * np.arange(NODES)

@@ -22,7 +22,7 @@ HEADER = "x_mm,theta_deg,r_outer_mm,r_inner_mm,r_core_mm"
 
 
 def main() -> int:
-    """Compute and write."""
+    """Compute and write the profile."""
     skin = skin_of("biotac_sp").descriptor
     atomic.write_bytes(skin.folder / skin.skin.profile, table().encode())
     return 0

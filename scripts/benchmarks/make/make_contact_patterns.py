@@ -20,7 +20,7 @@ from tactile_core.translation import networks, reference_signals
 
 
 def main(arguments: list[str]) -> int:
-    """Write the table; the exit status."""
+    """Write the table; returns the exit status."""
     folder = arguments[0] if arguments else networks.WEIGHTS_FOLDER
     content = io.BytesIO()
     np.save(content, reference_signals.read(folder).typical.astype(np.float16))

@@ -80,7 +80,7 @@ def learn_all(arguments: argparse.Namespace) -> list[dict]:
 
 
 def main() -> int:
-    """Solve, learn, write, report."""
+    """Solve the presses, learn the correction, write and report it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
     parser.add_argument("--presses", type=int, default=155, help="presses a sensor, three contacts each (155)")

@@ -28,7 +28,7 @@ FLOOR = 0.2  # N
 
 
 def main(arguments: list[str]) -> int:
-    """Fit, choose, write; the exit status."""
+    """Fit, choose and write the matrix; returns the exit status."""
     pairs = read_pairs(arguments[0])
     with h5py.File(arguments[0]) as file:
         forces = file["force_digit"][()].astype(float)

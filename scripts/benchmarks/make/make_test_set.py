@@ -89,12 +89,12 @@ def _coarsen(fine: pathlib.Path, out: pathlib.Path) -> None:
 
 
 def _numbers(text: str) -> range:
-    """N or FROM:TO:STEP."""
+    """Parse N or FROM:TO:STEP."""
     return range(*map(int, text.split(":")))
 
 
 def main() -> int:
-    """Solve, merge, report."""
+    """Solve the presses, merge and report them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="the HDF5 file to write")

@@ -53,7 +53,7 @@ NOT_COMPARED = ("back", "error")
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Train, compare, print, write; the exit status."""
+    """Train, compare, print and write; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pairs", help="HDF5 file of `tactile pairs`")
     parser.add_argument("--out", type=Path, required=True, help="folder for the trainings, which are kept")

@@ -190,7 +190,7 @@ def volumes(press: Press, steps: list[Pressed]) -> tuple[np.ndarray, np.ndarray,
 
 
 def force_ratios(press: Press, steps: list[Pressed]) -> np.ndarray:
-    """Our force over COMSOL's at the steps deeper than ``DEEP``."""
+    """Ratios of our force to COMSOL's at the steps deeper than ``DEEP``."""
     deep = np.array([step.advance > DEEP for step in steps])
     return np.array([step.force for step in steps])[deep] / press.force[deep]
 

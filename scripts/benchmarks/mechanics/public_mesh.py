@@ -87,7 +87,7 @@ def _own(body: Body, pose: Pose, depth: float) -> Answer:
 
 
 def _dry(body: Body, pose: Pose, depth: float, material: Material) -> Answer:
-    """Our mesh of another material, without fluid and core."""
+    """Press our mesh of another material, without fluid and core."""
     mesh = body.solid.mesh
     near = mesh.surface[pose.moved(depth).distance(_BALL, mesh.nodes[mesh.surface])[0] < 1e-3]
     contact = FiniteStrainContact(FiniteStrainSolid(mesh, material, body.solid.pattern), near, _BALL, pose)
@@ -120,7 +120,7 @@ class Pairs:
         self.nodes, self.corners, self.weights = nodes[here], lattice.faces[faces[here]], weights[here]
 
     def expected(self, displacement: np.ndarray) -> np.ndarray:
-        """Our displacement (n, 3) m at those nodes."""
+        """Displacement (n, 3) m of our mesh at those nodes."""
         return np.einsum("nk,nkd->nd", self.weights, displacement[self.corners])
 
 

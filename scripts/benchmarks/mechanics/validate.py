@@ -86,7 +86,7 @@ CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run, print, write; the exit status."""
+    """Run the checks, print and write their rows; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer depths and meshes")
     parser.add_argument("--json", metavar="FILE", help="write the rows here")

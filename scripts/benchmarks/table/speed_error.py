@@ -34,7 +34,7 @@ from tactile_core.files import atomic  # noqa: E402
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, write; the exit status."""
+    """Measure, print and write the results; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("presses", nargs="?", metavar="PRESSES", help="folder of photographs")
     parser.add_argument("--quick", action="store_true", help="fewer contacts, coarser reference pictures")

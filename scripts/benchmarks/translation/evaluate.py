@@ -45,7 +45,7 @@ TEST_SET = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_c
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Translate, measure, print, write; the exit status."""
+    """Translate, measure, print and write the rows; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--test-set", default=TEST_SET, metavar="FILE", help="pairs of the full tier (%(default)s)")
     parser.add_argument(

@@ -9,7 +9,7 @@ GAIN = 0.1  # standard deviation a channel (assumed: docs/sources.md, BioTac rea
 
 
 def as_read(change: np.ndarray, seed: int, frames: int = 1) -> np.ndarray:
-    """True changes (C, 19) counts -> as read, the mean over ``frames`` of a contact at rest, float32; seeded."""
+    """Add seeded noise to true changes (C, 19) counts, as the mean over ``frames`` of a resting contact reads them."""
     random = np.random.default_rng(seed)
     gain = 1 + GAIN * random.standard_normal(change.shape)
     return (gain * change + NOISE / np.sqrt(frames) * random.standard_normal(change.shape)).astype(np.float32)

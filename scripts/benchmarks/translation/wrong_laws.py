@@ -37,7 +37,7 @@ Law = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, write; the exit status."""
+    """Measure, print and write the results; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fit", action="store_true", help="find the limit on the presses that are not reported")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
@@ -66,7 +66,7 @@ def doubled(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 
 def swapped(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Two channels in each other's place."""
+    """Swap two channels."""
     order = np.arange(change.shape[1])
     first, second = random.choice(len(order), 2, replace=False)
     order[[first, second]] = order[[second, first]]

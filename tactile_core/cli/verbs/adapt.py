@@ -37,7 +37,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit and write."""
+    """Fit and write the gains; returns the exit status."""
     from ...files import atomic
     from ...recordings import PrepareOptions, electrode_gains
     from ...translation import adapt, networks, reference_signals

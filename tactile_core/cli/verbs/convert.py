@@ -86,7 +86,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Convert; one bad recording does not stop the others."""
+    """Convert each recording, going on after a bad one; returns the exit status."""
     one_thread()  # before numpy is imported
     from ... import accuracy
     from ...jobs import convert, frame_range, results

@@ -31,7 +31,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write."""
+    """Write the job's results in the layout; returns the exit status."""
     from ...jobs import export
 
     with bar("export", "frame", options.progress) as shown:

@@ -45,7 +45,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Describe; one bad recording does not stop the others."""
+    """Describe each recording, going on after a bad one; returns the exit status."""
     from ...recordings import PrepareOptions, info
     from ...recordings.readers import each_finger
 

@@ -69,7 +69,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Render."""
+    """Render the pictures; returns the exit status."""
     engine.check_counts(options, "workers", "restart")
     size = _size(options.size)
     from ... import accuracy

@@ -27,7 +27,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """List or copy."""
+    """List the example scenes, or copy them; returns the exit status."""
     from ...files import example_scenes
 
     if options.action == "list":

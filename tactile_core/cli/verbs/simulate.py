@@ -60,7 +60,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate."""
+    """Simulate the scene; returns the exit status."""
     check_seed(options.seed)
     if options.grid:
         return _run_grid(options)

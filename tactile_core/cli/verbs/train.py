@@ -42,7 +42,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Train, or fine-tune."""
+    """Train or fine-tune networks; returns the exit status."""
     check_seed(options.seed)
     if options.pairs == "s2mpn":
         return _fine_tune(options)

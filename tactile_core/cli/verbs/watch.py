@@ -215,7 +215,7 @@ def _due(recording: Recording, passed: float) -> int:
 
 
 def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStack) -> list[Output]:
-    """Where frames go: the file, the port, or without either a window. ``opened`` closes the port."""
+    """List what shows frames: the file, the port, or without either a window. ``opened`` closes the port."""
     outputs: list[Output] = []
     if options.serve is not None:
         from ...jobs.live import FrameServer
@@ -234,7 +234,7 @@ def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStac
 
 
 def _drawn(draw: Callable[[np.ndarray], bool]) -> Output:
-    """Draws a frame's pictures, one beside the other."""
+    """Draw a frame's pictures, one beside the other."""
     import numpy as np
 
     return lambda shown, seen: draw(np.concatenate(list(seen.values()), axis=1))

@@ -140,7 +140,7 @@ class _Worker:
         return json.loads(line)
 
     def end(self) -> None:
-        """Let the process end."""
+        """End the process."""
         if self._process is not None:
             with suppress(OSError):
                 self._process.stdin.close()

@@ -69,7 +69,7 @@ class DigitCamera:
         return cv2.resize(colours, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
 
     def close(self) -> None:
-        """Let go of the camera."""
+        """Release the camera."""
         self._ended.set()
         self._thread.join(_LONGEST_READ)
         if not self._thread.is_alive():

@@ -23,7 +23,7 @@ _KEPT = 2  # messages for a reader that is slow; what comes meanwhile it does no
 
 
 class FrameServer:
-    """Publishes frames at a port of this machine; whether anybody reads them, and how fast, changes nothing here.
+    """Publishes frames at a port of this machine: whether anybody reads them, and how fast, changes nothing here.
 
     port : 0 for any free one. Every user of this machine can read them.
     Raises TactileError for a port that cannot be had, ModuleNotFoundError without the extra [live].

@@ -47,7 +47,7 @@ class LiveSignals:
         self.kind, self.found = "raw", ""
 
     def learn(self, electrodes: np.ndarray, pdc: np.ndarray | None = None, polarity: str = AUTO) -> bool:
-        """Look at frames (T, 19) counts for rest, and for their polarity; whether rest is known.
+        """Look at frames (T, 19) counts for rest, and for their polarity; returns true once rest is known.
 
         pdc : (T,) counts, where there are; polarity : what the file says of its counts, where it does
         """

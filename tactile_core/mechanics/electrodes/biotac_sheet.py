@@ -95,9 +95,9 @@ def biotac_sheet(sensor: str = "biotac", *, core_of_mesh: bool = False) -> Biota
     centers = np.einsum("ek,ekd->ed", weights, middle[corners])
     wet, faces = np.unique(_connected(faces[(film > thinnest)[faces].all(1)]), return_inverse=True)
     sheet = ThinSheet(middle[wet], faces.reshape(-1, 3), centers, skin.descriptor.electrodes.radius)
-    watched = sensing_nodes(sensor)
-    order = np.argsort(watched)
-    sensing = order[np.searchsorted(watched, wet, sorter=order)]
+    sensed = sensing_nodes(sensor)
+    order = np.argsort(sensed)
+    sensing = order[np.searchsorted(sensed, wet, sorter=order)]
     return BiotacSheet(skin.descriptor.fluid, sheet, wet, sensing, film[wet], outward[wet], sheet.unresolved(_FINE))
 
 

@@ -50,7 +50,7 @@ class Compliance:
         first the electrode feet, then the inner skin under the pad and beside it; toward the core is negative)
     watch_gap : (w,) float64, m, their distance to electrode or core at rest
     pressure : (3 m,) float64, Pa/N, fluid pressure under the same forces (zero for the gel)
-    inner_move : (w, 3 n) float32, m/N, surface displacement under 1 N at a watched point along its direction
+    inner_move : (w, 3 n) float32, m/N, surface displacement under 1 N at a sensing point along its direction
     inner_watch : (w, w) float32, m/N, motion of the sensing points under the same forces
     inner_pressure : (w,) float64, Pa/N, fluid pressure under them
     feet : how many of the sensing points, the first ones, are electrode feet
@@ -153,7 +153,7 @@ def _touchable_skin(sensor: str) -> np.ndarray:
 
 
 def _folder(solid: Solid) -> pathlib.Path:
-    """Named by all that decides the arrays."""
+    """Return the cache's folder, named by all that decides the arrays."""
     name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
     sensing = sensing_points_of(name, mesh)

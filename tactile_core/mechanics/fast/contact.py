@@ -228,7 +228,7 @@ class ContactProblem:
         return spots
 
     def _take_in(self, candidates: Candidates, around: _Around) -> bool:
-        """Let the nodes enter that the solved contact lets through the indenter or the core; whether there are any."""
+        """Add the nodes that the contact lets through the indenter or the core; returns true if there are any."""
         outside = np.ones(len(self.near), bool)
         outside[np.searchsorted(self.near, candidates.nodes)] = False
         found = bool(around.gap[outside].min(initial=0.0) < -_CLOSED)
@@ -290,7 +290,7 @@ def _single(nodes: np.ndarray, state: Try) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def _way_in(before: Contact, axial_force: float | None) -> float:
-    """About how much deeper, m, an indenter will stand when its force grows from that of ``before``: Hertz's law."""
+    """Estimate how much deeper, m, an indenter stands when its force grows from that of ``before`` (Hertz)."""
     if axial_force is None or before.axial_force <= 0 or before.depth <= 0:
         return 0.0
     return min(before.depth * max((axial_force / before.axial_force) ** (2 / 3) - 1, 0.0), _REACH / 2)

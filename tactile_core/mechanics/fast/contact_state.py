@@ -63,7 +63,7 @@ class Contact:
 
     @property
     def sensing_gaps(self) -> np.ndarray:
-        """Gaps (w,) m of the watched points: 19 electrodes, then inner skin over the core, then beside it."""
+        """Gaps (w,) m of the sensing points: 19 electrodes, then inner skin over the core, then beside it."""
         return self._gaps(len(self.compliance.watch_gap))
 
     @property

@@ -1,4 +1,4 @@
-"""Watched points inside a solid while its surface is pressed: electrodes' feet, nodes over the core and beside it."""
+"""Sensing points inside a solid whose surface is pressed: electrodes' feet, nodes over the core and beside it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 
 
 class SensingPoints(NamedTuple):
-    """Map from a displacement to the change of w watched gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
+    """Map from a displacement to the change of w gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
 
     rows, columns : (k,) int; weights : (k,); gap : (w,) m
     """
@@ -52,7 +52,7 @@ def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
 
 
 def sensing_nodes(sensor: str = "biotac") -> np.ndarray:
-    """Nodes (f,) of the inner skin that are watched after the electrodes' feet: all that can move, in their order."""
+    """Nodes (f,) of the inner skin that are sensing points after the electrodes' feet: all that can move."""
     mesh = skin_mesh(sensor)
     return np.r_[facing_nodes(sensor, mesh), _beside(sensor, mesh)]
 

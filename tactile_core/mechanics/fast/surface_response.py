@@ -1,4 +1,4 @@
-"""Response of the whole surface, the watched points and the fluid to the forces of a contact."""
+"""Response of the whole surface, the sensing points and the fluid to the forces of a contact."""
 
 from __future__ import annotations
 

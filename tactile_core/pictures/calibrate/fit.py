@@ -147,7 +147,7 @@ class _Search:
             self._minimise(self._x, PLACING_STEPS)
 
     def readmit(self) -> bool:
-        """Take photographs back that show the ball under this unit's own lights; whether there are any."""
+        """Take photographs back that show the ball under this unit's lights; returns true if there are any."""
         if not self.aside:
             return False
         bench, balls, taken = FastPictures(self.calibration()), self._problem.balls(self._x).tolist(), []
