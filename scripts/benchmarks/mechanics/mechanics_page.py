@@ -15,13 +15,16 @@ from .bonded_layer import GOLDEN_FORCE
 
 _INTRODUCTION = """# Contact mechanics against known answers
 
-Made by `python scripts/validate_mechanics.py`. *Baseline* is the error of doing nothing (`baseline` in
-the rows of `--json`); shape errors are vector rms over surface nodes that move more than 10 um, and the maximum. Times
-are from one shared 2-core machine.
+`tactile.solve` presses an indenter into a fingertip by one of three tiers: `fast` (milliseconds: linear, with friction
+and a learned correction), `full` (seconds: finite strain) and `reference` (a minute: the same on cells half as large).
+This page holds them against formulas, exact solutions, another solver and finer meshes; [accuracy](accuracy.md) has
+their errors in one table. Made by `python scripts/validate_mechanics.py`. *Baseline* is the error of doing nothing
+(`baseline` in the rows of `--json`); shape errors are vector rms over surface nodes that move more than 10 um, and the
+maximum. Times are from one shared 2-core machine.
 
 The golden forces, Hertz and the layers run the reference tier's material and contact (`newton.FiniteStrainContact`) on
-an axisymmetric mesh of the same element (`validation/axisymmetric.py`), so that nodes can lie 0.05 mm apart; the rows
-`golden_quarter` run the production cell itself on quarter discs.
+an axisymmetric mesh of the same element (`benchmarks/mechanics/axisymmetric.py`), so that nodes can lie 0.05 mm apart;
+the rows `golden_quarter` run the production cell itself on quarter discs.
 Dimitriadis's formula ends its series early: against the exact small-strain solution (`bonded_layer.exact_layer`, the
 dual integral equations of a bonded layer) it is 0.2 % low at sqrt(R d) / h = 0.1, 0.9 % at 0.19, 4 % at 0.35 and 12 %
 at 0.6 (nu = .5). The solver follows the exact solution, so the formula is asked for 1 % up to 0.15 only.

@@ -20,6 +20,11 @@ from .noise import as_read
 from .test_set import SEED
 
 PICTURE = "translation_cases.png"
+PURPOSE = """\
+The networks take changes of a BioTac's 19 electrodes to the contact that they most plausibly show, and to the
+deformation of the skin and of a DIGIT's gel; `tactile convert` and `tactile.translate` run them, [limits](#limits) end
+this page. Made by `scripts/evaluate_translation.py --card`; the numbers are of the weights that ship.
+"""
 SWEEP = """\
 ## Sweep
 
@@ -57,8 +62,7 @@ def write_model_card(
     text = [
         "# Model card: the networks that translate touch",
         "",
-        "Made by `scripts/evaluate_translation.py --card`; the numbers are of the weights that ship.",
-        "",
+        PURPOSE,
         _training(card),
         "## Errors",
         "",
