@@ -32,18 +32,22 @@ def draw(
     preset: str,
     size: tuple[int, int] | None = None,
     stopped: Callable[[], bool] = lambda: False,
+    better: Callable[[np.ndarray], None] = lambda picture: None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draw a gel's picture (H, W, 3) uint8 and heights (H, W) m, (width, height) pixels large, by a preset.
 
-    The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba. Raises TactileError, and
-    ``tracer_process.Stopped`` where stopped() is true.
+    The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba. Pictures that get better,
+    up to the one that is returned, are given to better(). Raises TactileError, and ``tracer_process.Stopped`` where
+    stopped() is true.
     """
     shown = digit_unit.shown_unit(gel, depsgraph, render_settings.calibration_of(depsgraph.scene, size))
     heights = height_map.height_map(digit_objects.displacement_of(gel, depsgraph), shown.unit.camera)
     if preset == FAST:
         return shader_of(shown.unit)(heights), heights
     reports.require("mitsuba")
-    return tracer_process.tracer_for(preset).draw(shown.unit, shown.around, heights, stopped), heights
+    if not bpy.app.background:
+        better(shader_of(shown.unit)(heights))
+    return tracer_process.draw(preset, shown.unit, shown.around, heights, stopped, better), heights
 
 
 def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Image:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
 from ..process import tracer_process
@@ -11,6 +12,7 @@ from ..ui import properties, render_settings, reports
 from . import pictures
 
 ID = "TACTILE_DIGIT"
+_LOOK = 10.0  # s between two looks for workers that do nothing
 # Panels of these kinds suit any engine; Blender shows them for engines that add themselves.
 _SHARED = {"properties_output", "properties_render", "properties_view_layer"}
 _OWN_KIND = ("eevee", "cycles", "freestyle", "hair", "grease", "motion_blur", "simplify", "curves_render")
@@ -27,19 +29,22 @@ class TactileRenderEngine(bpy.types.RenderEngine):
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Called by Blender for each frame."""
         try:
-            picture = self._picture(depsgraph)
+            self._show(self._picture(depsgraph))
         except (TactileError, OSError, ModuleNotFoundError) as error:
             self.report({"ERROR"}, _describe_error(error))
             return
         except tracer_process.Stopped:
             tracer_process.close_all()
             return
+        self.update_progress(1.0)
+
+    def _show(self, picture: np.ndarray) -> None:
+        """Put a picture (H, W, 3) uint8 into the result, in place of the one before."""
         height, width = picture.shape[:2]
         result = self.begin_result(0, 0, width, height)
         # Flat: a two-dimensional array takes fifty times as long (blender.md).
         result.layers[0].passes["Combined"].rect.foreach_set(to_linear(picture).ravel())
         self.end_result(result)
-        self.update_progress(1.0)
 
     def _picture(self, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
         scene = depsgraph.scene
@@ -50,7 +55,7 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         width, height = (int(size * share) for size in (scene.render.resolution_x, scene.render.resolution_y))
         preset = render_settings.preset_of(scene)
         self.update_stats("", f"Frame {scene.frame_current}: {preset}")
-        return pictures.draw(gel, depsgraph, preset, (width, height), self.test_break)[0]
+        return pictures.draw(gel, depsgraph, preset, (width, height), self.test_break, self._show)[0]
 
 
 def _describe_error(error: Exception) -> str:
@@ -82,9 +87,23 @@ def _panels() -> list[type]:
     return found
 
 
+@persistent
+def _end_workers(*_: object) -> None:
+    """Another file is opened: nothing draws for this one any more."""
+    tracer_process.close_all()
+
+
+def _end_idle_workers() -> float:
+    """Called by a timer; returns the seconds to the next call."""
+    tracer_process.close_idle()
+    return _LOOK
+
+
 def register() -> None:
     """Called by the package."""
     bpy.utils.register_class(TactileRenderEngine)
+    bpy.app.handlers.load_pre.append(_end_workers)
+    bpy.app.timers.register(_end_idle_workers, first_interval=_LOOK, persistent=True)
     for panel in _panels():
         panel.COMPAT_ENGINES.add(ID)
 
@@ -93,5 +112,7 @@ def unregister() -> None:
     """Called by the package."""
     for panel in _panels():
         panel.COMPAT_ENGINES.discard(ID)
+    bpy.app.timers.unregister(_end_idle_workers)
+    bpy.app.handlers.load_pre.remove(_end_workers)
     tracer_process.close_all()
     bpy.utils.unregister_class(TactileRenderEngine)

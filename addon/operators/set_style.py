@@ -1,5 +1,7 @@
 """Choose how the sensors' surfaces are coloured, and whether their force is shown as an arrow."""
 
+import math
+
 import bpy
 import numpy as np
 
@@ -54,7 +56,7 @@ class TACTILE_OT_set_style(TactileOperator):
             legend = ("change, counts", (f"-{largest:.0f}", f"+{largest:.0f}"))
         else:
             largest = (self.largest or 1e3 * thing.tactile.largest or 1.0) * unit
-            legend = ("displacement, mm", ("0", f"{largest / unit:.2g}"))
+            legend = ("displacement, mm", ("0", _two_digits(largest / unit)))
         styles.set_style(thing, style, largest, self.exaggeration)
         if style in ("DISPLACEMENT", "ELECTRODES"):
             style_legend.add_legend(thing, style, *legend)
@@ -62,6 +64,11 @@ class TACTILE_OT_set_style(TactileOperator):
             style_legend.add_legend(thing, style, "orange: in contact", None)
         else:
             style_legend.remove_legend(thing)
+
+
+def _two_digits(value: float) -> str:
+    """Write a positive number with two digits or more: "1.0", as a legend's 1 alone looks like an l."""
+    return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
 
 
 def _counts(thing: bpy.types.Object) -> float:

@@ -24,11 +24,13 @@ class Job:
     """Worker and its folder.
 
     ``done`` of ``total`` is its reported progress, in the ``stage`` of that name; ``finished`` : whether it ended well
+    ``drawn`` : pictures that could be shown so far
     """
 
     def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:
         """Start it. folder : where its input lies and its output goes; listening : whether it waits for ``tell``."""
         self.folder, self.done, self.total, self.finished, self.stage = folder, 0, 1, False, ""
+        self.drawn = 0
         (folder / "job.json").write_text(json.dumps({"kind": kind} | options), encoding="utf-8")
         self._lines: queue.Queue[str] = queue.Queue()
         with open(folder / "stderr.txt", "wb") as errors:
@@ -63,6 +65,7 @@ class Job:
             self.stage = message.get("stage", self.stage)
             if message.get("total"):
                 self.done, self.total = message["done"], message["total"]
+            self.drawn += "drawn" in message
             self.finished = self.finished or bool(message.get("finished"))
         if error is not None:
             self.cancel()

@@ -6,6 +6,8 @@ import dataclasses
 import hashlib
 import json
 import shutil
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from ...tactile_core.sensors.calibration import Calibration
 from .jobs import Job, JobFolder
 
 _LOOK = 0.05  # s between two looks at the worker and at Esc
+_IDLE = 60.0  # s
 
 
 class Stopped(Exception):
@@ -32,10 +35,19 @@ class Tracer:
         self._job = Job("render", self._folder.path, listening=True, preset=preset)
 
     def draw(
-        self, unit: Calibration, around: Surroundings, heights: np.ndarray, stopped: Callable[[], bool]
+        self,
+        unit: Calibration,
+        around: Surroundings,
+        heights: np.ndarray,
+        stopped: Callable[[], bool],
+        better: Callable[[np.ndarray], None],
     ) -> np.ndarray:
-        """Draw the picture (H, W, 3) uint8 of heights (H, W) m. Raises TactileError, or Stopped when asked to stop."""
+        """Draw the picture (H, W, 3) uint8 of heights (H, W) m; those before it, noisier, are given to ``better``.
+
+        Raises TactileError, or Stopped when asked to stop.
+        """
         self._count += 1
+        drawn = self._job.drawn
         self._tell_unit(unit, around)
         np.save(self._folder.path / "heights.npy", heights)
         self._job.tell({"picture": self._count, "unit": self._unit})
@@ -45,11 +57,17 @@ class Tracer:
                     raise TactileError("Tactile render", "the worker ended early", "a picture", "Render again")
                 if stopped():
                     raise Stopped
+                if self._job.drawn > drawn and self._job.done < self._count:
+                    drawn = self._job.drawn
+                    better(self._picture())
         except TactileError:
             for preset in [name for name, kept in _kept.items() if kept is self]:
                 del _kept[preset]  # it has ended: the next picture starts another
             self.close()
             raise
+        return self._picture()
+
+    def _picture(self) -> np.ndarray:
         return np.load(self._folder.path / "picture.npy", allow_pickle=False)
 
     def _tell_unit(self, unit: Calibration, around: Surroundings) -> None:
@@ -76,14 +94,37 @@ class Tracer:
 
 
 _kept: dict[str, Tracer] = {}  # one at most: starting Mitsuba takes seconds, the frames of an animation share it
+_in_use = threading.Lock()  # Blender renders in a thread of its own
+_last_used = 0.0  # s, of the clock that only grows
 
 
-def tracer_for(preset: str) -> Tracer:
-    """Return a running worker for this preset."""
-    if preset not in _kept:
-        close_all()
-        _kept[preset] = Tracer(preset)
-    return _kept[preset]
+def draw(
+    preset: str,
+    unit: Calibration,
+    around: Surroundings,
+    heights: np.ndarray,
+    stopped: Callable[[], bool],
+    better: Callable[[np.ndarray], None],
+) -> np.ndarray:
+    """Draw by a worker that lives on for the next picture of the preset; see ``Tracer.draw``."""
+    global _last_used
+    with _in_use:
+        if preset not in _kept:
+            close_all()
+            _kept[preset] = Tracer(preset)
+        try:
+            return _kept[preset].draw(unit, around, heights, stopped, better)
+        finally:
+            _last_used = time.monotonic()
+
+
+def close_idle() -> None:
+    """End a worker that has drawn nothing for a minute."""
+    if _kept and time.monotonic() - _last_used > _IDLE and _in_use.acquire(blocking=False):
+        try:
+            close_all()
+        finally:
+            _in_use.release()
 
 
 def close_all() -> None:

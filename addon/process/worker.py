@@ -1,8 +1,8 @@
 """The other process: long jobs run here, so that Blender lives on when they stall, are stopped or abort.
 
 Started by ``jobs.Job`` as `python worker.py FOLDER` with ``tactile_core`` on its path. FOLDER/job.json says what to do;
-each line on stdout is a JSON object: {"stage": "..."}, {"done": 3, "total": 10}, {"error": "..."} or
-{"finished": true}. No bpy here.
+each line on stdout is a JSON object: {"stage": "..."}, {"done": 3, "total": 10}, {"drawn": true} for a picture that
+can be shown, {"error": "..."} or {"finished": true}. No bpy here.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[fl
             try:
                 solution = solve("digit", indenter, place, depth=depth, friction=spec.friction)
             except TactileError as error:
-                raise _at_frame(spec.indenter, job, k, depth, error.found, error.expected) from error
+                raise _at_frame(spec.indenter, job, k, _too_deep(depth, error), error.expected, LIFT) from error
             force = max(solution.axial_force, 0.0)
         points.append(msgspec.structs.replace(point, force_n=force))
         depths.append(depth)
@@ -126,13 +126,19 @@ def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[fl
     return depths
 
 
-def _at_frame(indenter: str, job: dict, k: int, depth: float | None, found: str, expected: str) -> Exception:
-    """A TactileError in the words of the scene: object, frame and depth."""
+def _too_deep(depth: float, error: Any) -> str:
+    """Write how deep, m, an indenter stands, and why that is not solved where it is not the depth itself."""
+    from tactile_core.mechanics.force_search import UnreachableError
+
+    why = "" if isinstance(error, UnreachableError) else f" ({error.found})"
+    return f"{1e3 * depth:.2f} mm below the gel's surface{why}"
+
+
+def _at_frame(indenter: str, job: dict, k: int, found: str, expected: str, advice: str) -> Exception:
+    """A TactileError in the words of the scene: object and frame."""
     from tactile_core.errors import TactileError
 
-    deep = "" if depth is None else f", {1e3 * depth:.1f} mm below the gel's surface"
-    advice = "Lift it there, or let it press with less force"
-    return TactileError(f"{indenter}, frame {job['first_frame'] + k:g}{deep}", found, expected, advice)
+    return TactileError(f"{indenter}, frame {job['first_frame'] + k:g}", found, expected, advice)
 
 
 def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -> Exception:
@@ -145,8 +151,10 @@ def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -
         return error
     second = float(moment[1]) - spec.points[0].time_s if moment else spec.points[int(point[1]) - 1].time_s
     k = round(second * job["rate"])
-    depth = depths[k] if depths is not None and k < len(depths) else None
-    return _at_frame(spec.indenter, job, k, depth, error.found, error.expected)
+    if depths is None or k >= len(depths):
+        return _at_frame(spec.indenter, job, k, error.found, error.expected, "Let it press with less force there")
+    found = f"{error.found}, {1e3 * depths[k]:.2f} mm below the gel's surface"
+    return _at_frame(spec.indenter, job, k, found, error.expected, LIFT)
 
 
 def _result(folder: Path, picked: list[str]) -> None:
@@ -187,16 +195,18 @@ def _result(folder: Path, picked: list[str]) -> None:
 def render(folder: Path, job: dict, progress: Progress) -> None:
     """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8.
 
-    Unit and surroundings are those in the folder, read when the line names others than the one before.
+    Unit and surroundings are those in the folder, read when the line names others than the one before. Noisier pictures
+    come first, where the preset has some.
     """
     renderer, known = None, None
     for line in sys.stdin:
         asked = json.loads(line)
         if renderer is None or asked["unit"] != known:
             renderer, known = _renderer(folder, job["preset"]), asked["unit"]
-        picture = renderer(np.load(folder / "heights.npy", allow_pickle=False))
-        np.save(folder / "partial.npy", picture)
-        (folder / "partial.npy").replace(folder / "picture.npy")
+        for picture in renderer.refined(np.load(folder / "heights.npy", allow_pickle=False)):
+            np.save(folder / "partial.npy", picture)
+            (folder / "partial.npy").replace(folder / "picture.npy")
+            say(drawn=True)
         progress(asked["picture"], asked["picture"])
 
 
@@ -242,6 +252,7 @@ def read(folder: Path, job: dict, progress: Progress) -> None:
     (folder / "about.json").write_text(json.dumps(about), encoding="utf-8")
 
 
+LIFT = "Lift it there"
 STEPS = 8  # of sinking by the free distance; each leaves a small part of it, far below a pixel after eight
 JOBS = {"simulate": simulate, "render": render, "read": read, "variant": variant}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
@@ -106,6 +107,16 @@ class Renderer:
         """
         return self.picture(self.radiance(height_map), marks=marks)
 
+    def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield pictures (H, W, 3) uint8 of heights (H, W) m, ever less noisy; the last is that of a call.
+
+        The preset ``reference`` by LLVM has some, the others the last alone.
+        """
+        heights = self._heights(height_map, "height map")
+        light = self._light
+        for found in light.refined(heights) if isinstance(light, GelLight) else [light.radiance(heights)]:
+            yield self.picture(self._spread_levels(found))
+
     def render(self, displacement: np.ndarray) -> np.ndarray:
         """Render the pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
 
@@ -128,8 +139,10 @@ class Renderer:
         return self._spread_radiance(self._heights(height_map, "height map"))
 
     def _spread_radiance(self, heights: np.ndarray) -> np.ndarray:
-        found = self._light.radiance(heights)
-        return np.moveaxis(self._spread(np.moveaxis(found, -1, 0)), 0, -1)
+        return self._spread_levels(self._light.radiance(heights))
+
+    def _spread_levels(self, radiance: np.ndarray) -> np.ndarray:
+        return np.moveaxis(self._spread(np.moveaxis(radiance, -1, 0)), 0, -1)
 
     def picture(
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None

@@ -167,8 +167,8 @@ def traced(part):
     nothing = part("tactile_core.pictures.mitsuba.surroundings").NOTHING
     tracer = part("addon.process.tracer_process").Tracer("fast")
 
-    def draw(heights, stopped=lambda: False, unit=unit):
-        return tracer.draw(unit, nothing, heights, stopped)
+    def draw(heights, stopped=lambda: False, unit=unit, better=lambda picture: None):
+        return tracer.draw(unit, nothing, heights, stopped, better)
 
     yield tracer, draw, part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
     tracer.close()
@@ -192,6 +192,27 @@ def test_a_worker_takes_another_unit(traced, part):
     renderer = part("tactile_core.pictures.renderer").Renderer(off, "fast")
     draw(heights)
     np.testing.assert_array_equal(draw(heights, unit=off), renderer(heights))
+
+
+def test_an_idle_worker_ends_after_a_minute(part, monkeypatch):
+    process = part("addon.process.tracer_process")
+    unit = part("tactile_core.sensors.calibration_file").load_calibration()
+    heights = part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
+    nothing = part("tactile_core.pictures.mitsuba.surroundings").NOTHING
+    process.draw("fast", unit, nothing, heights, lambda: False, lambda picture: None)
+    worker = process._kept["fast"]._job._process
+    process.close_idle()
+    assert worker.poll() is None
+    monkeypatch.setattr(process, "_IDLE", -1.0)
+    process.close_idle()
+    assert worker.poll() is not None and not process._kept
+
+
+def test_another_file_ends_the_workers(part):
+    process = part("addon.process.tracer_process")
+    process._kept["fast"] = process.Tracer("fast")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    assert not process._kept
 
 
 def test_esc_stops_a_worker(traced, part):

@@ -90,6 +90,17 @@ def test_a_dent_that_moves_takes_its_picture_along(any_variant, small):
     assert np.sqrt(np.mean((moved - one)[inside] ** 2)) < 0.06 * np.sqrt(np.mean(one[inside] ** 2))
 
 
+@pytest.mark.parametrize(("preset", "count"), [("standard", 1), ("reference", REFERENCE.paths)])
+def test_pictures_get_better_up_to_the_one_of_a_call(preset, count, small, press):
+    unit = small.at_size(30, 40)
+    renderer, height = Renderer(unit, preset, works(LLVM)), press.on(unit.camera)
+    pictures = [picture.astype(float) for picture in renderer.refined(height)]
+    assert len(pictures) == count
+    np.testing.assert_array_equal(pictures[-1], renderer(height))
+    noise = [np.sqrt(np.mean((picture - pictures[-1]) ** 2)) for picture in pictures]
+    assert noise == sorted(noise, reverse=True)
+
+
 def test_repeats_are_bit_equal(variant, small, press, short):
     unit = small.at_size(30, 40)
     height = press.on(unit.camera)

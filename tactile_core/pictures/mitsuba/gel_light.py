@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,11 @@ class GelLight:
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
         """Radiance (H, W, 3) float32, levels, of heights (H, W) m."""
+        *_, found = self.refined(height_map)
+        return found
+
+    def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield the radiance of ``radiance``; of paths first the noisier means of each pass and those before."""
         height = np.asarray(height_map, np.float32)
         vertices = self._mesh.vertices(height)
         check_mesh(vertices, self._mesh.faces, self._mesh.count)
@@ -130,10 +136,11 @@ class GelLight:
             # Mitsuba's own normals are sums in an order that varies; a second update leaves ours.
             self._values["gel.vertex_normals"] = self._mesh.normals(height).ravel()
             self._values.update()
-            return self._by_paths(mi)
+            yield from self._by_paths(mi)
+            return
         self._slopes.set_tensor(mi.TensorXf(np.stack(slopes(height, self.unit.camera), -1)))
         found = self._direct(mi)
-        return found if self._coarse is None else found + self._bounced(mi)
+        yield found if self._coarse is None else found + self._bounced(mi)
 
     def _hit(self, ray: Any) -> Any:
         """Intersect rays with the scene; the gel's shading normals are of the map's own slopes."""
@@ -204,7 +211,8 @@ class GelLight:
         at = lookup(row.astype(np.float32), column.astype(np.float32), coarse.shape[:2])
         return np.stack([at(np.ascontiguousarray(coarse[..., k])) for k in range(3)], -1)
 
-    def _by_paths(self, mi: Any) -> np.ndarray:
+    def _by_paths(self, mi: Any) -> Iterator[np.ndarray]:
+        """Yield the mean radiance (H, W, 3) of all passes so far, after each."""
         import drjit as dr
 
         camera = self.unit.camera
@@ -220,5 +228,5 @@ class GelLight:
             ray = mi.RayDifferential3f(mi.Ray3f(mi.Point3f(start), mi.Vector3f(toward)))
             light, _, _ = self._paths.sample(self._scene, sampler, ray)
             total += np.stack([np.array(dr.block_sum(light[k], PATHS_A_PASS)) for k in range(3)])
-        total /= self.preset.paths * PATHS_A_PASS
-        return total.T.reshape(*camera.shape, 3).astype(np.float32)
+            mean = total / ((number + 1) * PATHS_A_PASS)
+            yield mean.T.reshape(*camera.shape, 3).astype(np.float32)
