@@ -10,6 +10,9 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from mathutils import Matrix
+
+from ...tactile_core.errors import TactileError
 
 _SIGNS = np.array([1.0, 1.0, -1.0], np.float32)
 
@@ -23,6 +26,15 @@ def to_sensor(points: np.ndarray, per_metre: float) -> np.ndarray:
     """Convert Blender units to float64 m, the inverse of ``to_blender``."""
     x, y, z = np.moveaxis(np.asarray(points, np.float64) / per_metre, -1, 0)
     return np.stack([x, -z, y], -1)
+
+
+def from_world(sensor: bpy.types.Object) -> Matrix:
+    """Return the matrix from the world to a sensor object's own axes; raises TactileError for one without volume."""
+    try:
+        return sensor.matrix_world.inverted()
+    except ValueError:
+        advice = "Clear its scale (Alt S)"
+        raise TactileError(sensor.name, "a scale of 0", "a scale other than 0", advice) from None
 
 
 def units_per_metre(scene: bpy.types.Scene) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ..ui import properties
-from . import axes, styles, surfaces
+from . import axes, mesh_cache, styles, surfaces
 from .style_nodes import DISPLACEMENT
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
@@ -32,8 +32,9 @@ def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Obj
 def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     """Return the displacement (n, 3) m of the gel's nodes as the scene has them now, all keys and modifiers applied.
 
-    Raises TactileError where modifiers have changed the number of vertices.
+    Raises TactileError where modifiers have changed the number of vertices, or lack the file that moves the gel.
     """
+    mesh_cache.check(gel)
     rest = sensors.digit_surface().rest
     mesh = gel.evaluated_get(depsgraph).data
     vertices = mesh.vertices

@@ -13,7 +13,7 @@ from ...tactile_core.pictures.mitsuba.surroundings import Lamp, Occluder, Surrou
 from ...tactile_core.sensors.calibration import Calibration
 from ...tactile_core.sensors.camera import Camera
 from ...tactile_core.sensors.coating import DIFFUSE, ROUGH_PLASTIC, Coating
-from . import digit_body, digit_materials, image_frame
+from . import axes, digit_body, digit_materials, image_frame
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
 _STEP = 1e-7  # m: no movement that anybody meant
@@ -47,7 +47,7 @@ def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Cali
 
 def _places(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: np.ndarray, camera: Camera) -> np.ndarray:
     """World points (n, 3) in the image frame, m."""
-    inverse = np.array(gel.evaluated_get(depsgraph).matrix_world.inverted())
+    inverse = np.array(axes.from_world(gel.evaluated_get(depsgraph)))
     own = np.asarray(points, float) @ inverse[:3, :3].T + inverse[:3, 3]
     return image_frame.from_gel(own, camera, gel.tactile.per_metre)
 
@@ -152,9 +152,9 @@ def _camera(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camer
     if thing is None:
         return camera
     now = thing.evaluated_get(depsgraph)
-    relative = gel.evaluated_get(depsgraph).matrix_world.inverted() @ now.matrix_world
-    axes = np.array(relative.to_3x3().normalized())
-    forward, right = -axes[:, 2], axes[:, 0]
+    relative = axes.from_world(gel.evaluated_get(depsgraph)) @ now.matrix_world
+    own = np.array(relative.to_3x3().normalized())
+    forward, right = -own[:, 2], own[:, 0]
     if forward[2] < 1 - _STRAIGHT or abs(abs(right[1]) - 1) > _STRAIGHT:
         found = f"{math.degrees(math.acos(max(-1.0, min(1.0, forward[2])))):.1f} degrees off the gel's normal"
         advice = "Clear its rotation, or Reset to Calibration"

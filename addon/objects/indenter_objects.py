@@ -53,10 +53,10 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
             thing.name, "its scale is negative or zero", "a scale above 0", "Apply the scale (Ctrl A) and flip normals"
         )
     if thing.tactile.spec and not np.allclose(relative, np.eye(3), atol=1e-4):
-        advice = "Clear its rotation and scale, or choose Press with Mesh in the sidebar"
+        advice = "Clear its rotation and scale, or choose Press with the Mesh as It Is in the sidebar"
         raise TactileError(thing.name, "turned or scaled", "an upright body of the sizes it was made with", advice)
     if thing.tactile.spec and (thing.modifiers or fingerprint(thing) != thing.get("tactile_shape")):
-        advice = "Undo that, or choose Press with Mesh in the sidebar"
+        advice = "Undo that, or choose Press with the Mesh as It Is in the sidebar"
         raise TactileError(thing.name, "its mesh was edited or has modifiers", "the body it was made as", advice)
 
 
@@ -115,10 +115,10 @@ def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
     """Return the axes (3, 3) of the object, scaled, in those of a sensor object."""
-    return np.array(sensor.matrix_world.inverted() @ thing.matrix_world)[:3, :3]
+    return np.array(axes.from_world(sensor) @ thing.matrix_world)[:3, :3]
 
 
 def place_of(thing: bpy.types.Object, sensor: bpy.types.Object, foot: np.ndarray) -> np.ndarray:
     """Return the point where the indenter touches, (3,) m in the sensor's frame."""
-    origin = np.array((sensor.matrix_world.inverted() @ thing.matrix_world).translation)
+    origin = np.array((axes.from_world(sensor) @ thing.matrix_world).translation)
     return axes.to_sensor(origin + foot, sensor.tactile.per_metre)

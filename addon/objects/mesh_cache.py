@@ -16,6 +16,15 @@ FOLDER = "tactile_cache"
 _BLOCK = 64  # frames at a time
 
 
+def check(thing: bpy.types.Object) -> None:
+    """Raise TactileError where the file that moves an object is not where the .blend looks for it."""
+    for modifier in thing.modifiers:
+        path = Path(bpy.path.abspath(modifier.filepath)) if modifier.type == "MESH_CACHE" else None
+        if path is not None and not path.is_file():
+            advice = f"Move the folder {FOLDER} with the .blend, or translate again"
+            raise TactileError(thing.name, f"its mesh cache {path} is gone", "the file that moves it", advice)
+
+
 def write_cache(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray) -> Path:
     """Write nodes = rest + displacement beside the .blend and let the object play them.
 

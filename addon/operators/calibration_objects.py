@@ -30,6 +30,7 @@ class TACTILE_OT_reset_to_calibration(_OnGel, TactileOperator):
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
         gel = properties.of_role(context.scene, "DIGIT", context.object)
+        properties.check_own(gel)
         digit_body.reset(gel, render_settings.calibration_of(context.scene))
 
 

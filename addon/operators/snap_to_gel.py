@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ...tactile_core.errors import TactileError
 from ...tactile_core.mechanics.placement import Placement, pose_at
 from ..objects import axes, indenter_objects
 from ..process.jobs import JobFolder
@@ -21,12 +22,15 @@ from .scene_bridge import indenter_of, sensor_of
 def depth_of(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float | None:
     """Compute how far an indenter stands below its point of first touch, m; negative above it.
 
-    None for a mesh of the user's, whose distances take too long for a panel.
+    None for a mesh of the user's, whose distances take too long for a panel, and where it meets no gel.
     """
     if not thing.tactile.spec:
         return None
-    place = _place(thing, sensor, depsgraph)
-    apex, direction = _touch(_name(sensor), thing.tactile.spec, *np.round(place[[0, 2]], 7), thing.tactile.tilt)
+    try:
+        place = _place(thing, sensor, depsgraph)
+        apex, direction = _touch(_name(sensor), thing.tactile.spec, *np.round(place[[0, 2]], 7), thing.tactile.tilt)
+    except TactileError:
+        return None
     return float((place - apex) @ direction)
 
 

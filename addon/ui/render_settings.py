@@ -61,7 +61,11 @@ def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) 
     Raises TactileError.
     """
     path = scene.tactile_render.calibration or preferences.addon_preferences(bpy.context).calibration
-    unit = calibration_file.load_calibration(bpy.path.abspath(path) if path else None)
+    try:
+        unit = calibration_file.load_calibration(bpy.path.abspath(path) if path else None)
+    except TactileError as error:
+        advice = "Choose another as Calibration in the tab Tactile, or leave it empty"
+        raise TactileError(error.where, error.found, "a calibration file", advice) from error
     return unit if size is None else unit.at_size(*size)
 
 
@@ -73,7 +77,7 @@ def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> N
     except TactileError:
         return
     for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
-        if digit_body.leds_of(gel):
+        if digit_body.leds_of(gel) and gel.library is None:
             digit_body.reset(gel, unit)
 
 

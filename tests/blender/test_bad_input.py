@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import bpy
 import pytest
 
@@ -85,6 +87,59 @@ def test_a_mirrored_indenter_is_refused_in_words(scene, scale):
         bpy.ops.tactile.snap_to_gel()
 
 
+@pytest.mark.parametrize("scale", [(1, 1, -1), (2, 2, 2), (3, 1, 1)])
+def test_a_scaled_or_mirrored_gel_draws_what_it_drew(translated, part, scale):
+    draw, frame = part("addon.operators.pictures").draw, bpy.context.scene.frame_current
+    before = draw(translated, bpy.context.evaluated_depsgraph_get(), "fast")[0]
+    translated.scale = scale
+    bpy.context.scene.frame_set(frame)
+    assert (draw(translated, bpy.context.evaluated_depsgraph_get(), "fast")[0] == before).all()
+
+
+def test_a_gel_scaled_to_nothing_is_named(translated, part):
+    pytest.importorskip("msgspec")
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    ball = bpy.context.object
+    translated.scale = (0, 1, 1)
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="DIGIT gel: a scale of 0"):
+        bpy.ops.tactile.snap_to_gel()
+    with pytest.raises(part("tactile_core.errors").TactileError, match="DIGIT gel: a scale of 0"):
+        part("addon.operators.pictures").draw(translated, bpy.context.evaluated_depsgraph_get(), "fast")
+    depth_of = part("addon.operators.snap_to_gel").depth_of
+    assert depth_of(ball, translated, bpy.context.evaluated_depsgraph_get()) is None  # the panel goes on
+
+
+def test_the_panel_goes_on_where_the_indenter_meets_no_gel(translated, part):
+    pytest.importorskip("msgspec")
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    ball = bpy.context.object
+    depth_of = part("addon.operators.snap_to_gel").depth_of
+    assert depth_of(ball, translated, bpy.context.evaluated_depsgraph_get()) is not None
+    ball.location.x += 200
+    bpy.context.view_layer.update()
+    assert depth_of(ball, translated, bpy.context.evaluated_depsgraph_get()) is None
+
+
+def test_what_lay_beside_a_moved_file_is_named(imported, tmp_path, part):
+    (tmp_path / "here").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "here" / "touch.blend"))
+    imported(frames="70:90", motion="MESH_CACHE")
+    bpy.ops.tactile.translate()
+    bpy.ops.tactile.save_as_calibration(filepath=str(tmp_path / "here" / "unit.toml"))
+    bpy.context.scene.tactile_render.calibration = "//unit.toml"
+    bpy.ops.wm.save_mainfile()
+    (tmp_path / "there").mkdir()
+    shutil.copy(tmp_path / "here" / "touch.blend", tmp_path / "there" / "touch.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "there" / "touch.blend"))
+    with pytest.raises(RuntimeError, match=r"unit\.toml.*Choose another as Calibration"):
+        bpy.ops.tactile.set_up_render()
+    bpy.context.scene.tactile_render.calibration = ""
+    bpy.ops.tactile.set_up_render()
+    with pytest.raises(RuntimeError, match=r"DIGIT gel: its mesh cache .*DIGIT_gel\.pc2 is gone.*with the \.blend"):
+        bpy.ops.render.render()
+
+
 def test_a_linked_sensor_is_left_alone_in_words(translated, tmp_path):
     """A library's objects are read-only."""
     path = tmp_path / "library.blend"
@@ -94,8 +149,12 @@ def test_a_linked_sensor_is_left_alone_in_words(translated, tmp_path):
         taken.objects = list(held.objects)
     for thing in taken.objects:
         bpy.context.scene.collection.objects.link(thing)
-    with pytest.raises(RuntimeError, match="library"):
-        bpy.ops.tactile.set_style(style="DISPLACEMENT")
+    for changes in ("set_style", "force_arrow", "set_up_render", "reset_to_calibration"):
+        with pytest.raises(RuntimeError, match="library"):
+            getattr(bpy.ops.tactile, changes)()
+    assert bpy.ops.tactile.save_as_calibration(filepath=str(tmp_path / "unit.toml")) == {
+        "FINISHED"
+    }  # which reads alone
 
 
 def test_a_file_of_the_former_version_gets_what_it_lacks(translated):
