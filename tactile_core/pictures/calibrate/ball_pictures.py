@@ -6,7 +6,7 @@ import abc
 
 import numpy as np
 
-from ...sensors import digit_surface
+from ...sensors import sensor_surface
 from ...sensors.calibration import Calibration
 from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of
@@ -14,7 +14,7 @@ from ..coating_spread import CoatingSpread
 from ..height_map import check_covered
 from ..perspective import Perspective
 from ..shading import Lamp, SeenSurface
-from .ball_print import print_on
+from .ball_print import deepest, print_on
 
 WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors down to this short side
 
@@ -26,11 +26,12 @@ class BallPictures(abc.ABC):
     """
 
     def __init__(self, calibration: Calibration) -> None:
-        check_covered(digit_surface(), calibration.camera)
+        check_covered(sensor_surface(calibration.camera.sensor), calibration.camera)
         self.calibration = calibration
         self.camera: Camera = calibration.camera
         x, z = np.meshgrid(self.camera.gel_x, self.camera.gel_z, indexing="ij")
         shape = shape_of(self.camera.sensor)
+        self.thickness = shape.thickness
         dome = shape.back_y - shape.dome_height(x, z) - self.camera.height_zero_y
         self.rest = (calibration.dome_scale * dome).astype(np.float32)
         self.right, self.down = np.meshgrid(self.camera.right, self.camera.down)
@@ -46,7 +47,11 @@ class BallPictures(abc.ABC):
 
     def heights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Return the heights (H, W) float32, m, of the gel under a ball (right, down, depth, radius), m."""
-        return print_on(self.rest, self.right, self.down, ball)
+        return print_on(self.rest, self.right, self.down, ball, self.thickness)
+
+    def deepest(self, radius: float) -> float:
+        """Return the depth, m, to which prints of a ball of a radius, m, are known on this gel."""
+        return deepest(radius, self.thickness)
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Return the change (H, W, 3) of the picture by a press, grey levels."""

@@ -1,12 +1,14 @@
 """The gel under a pressed ball: not a sphere cut out, but a print with the shoulder of a bonded layer around it.
 
-The rise of the gel comes from the project's own mechanics: the axisymmetric finite-strain solver, a 6 mm ball on a
-disc of the gel's thickness and half-width, frictionless, tabulated over depth (``make_ball_print.py``).
-Balls of other sizes scale all lengths, which leaves out that the layer is then relatively thinner or thicker.
+The rise of the gel comes from the project's own mechanics: the axisymmetric finite-strain solver, balls of a few sizes
+on a disc of the DIGIT's thickness and half-width, frictionless, tabulated over depth (``make_ball_print.py``). On
+another layer all lengths scale with its thickness; a ball between two of the table has a print between theirs. One that
+is larger than all scales the largest's lengths, which leaves out that the layer is then relatively thinner.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 import numpy as np
@@ -15,25 +17,70 @@ from ...files.shipped import shipped
 from ...geometry.cubic_spline import EvenSpline, bspline_weights
 
 TABLE = shipped("ball_print.npz")
-TABLE_RADIUS = 3e-3  # m, of the ball that was tabulated
+LAYER = 4.06e-3  # m, thickness of the layer that was pressed: the DIGIT's
 SPHERE_TO = 0.9  # of the radius: beyond, the ball's profile goes on as a cone, for the gap to it is no function there
 
 
+@dataclasses.dataclass(frozen=True)
+class _Table:
+    """Prints of one ball. radius : m; depths : (n,) m; coefficients : (n, k) of the spline of rise / depth over
+    distance / sqrt(2 radius depth)
+    """
+
+    radius: float
+    depths: np.ndarray
+    spline: EvenSpline
+    coefficients: np.ndarray
+
+    def rise(self, distance: np.ndarray, depth: float, radius: float) -> np.ndarray:
+        """Rise of the flat layer, m, at distances from the axis, m, under a ball of a radius, all lengths scaled."""
+        scale = radius / self.radius
+        distance, depth = distance / scale, depth / scale
+        k = int(np.clip(np.searchsorted(self.depths, depth) - 1, 0, len(self.depths) - 2))
+        part = np.clip((depth - self.depths[k]) / (self.depths[k + 1] - self.depths[k]), 0, 1)
+        mixed = ((1 - part) * self.coefficients[k] + part * self.coefficients[k + 1]).astype(np.float32)
+        cell, place = self.spline.cells(distance.ravel() / np.sqrt(2 * self.radius * depth))
+        weights = bspline_weights(place.astype(np.float32))
+        rise = sum(weight * mixed.take(cell + i) for i, weight in enumerate(weights))
+        return scale * (depth * rise.reshape(distance.shape))
+
+
 def print_on(
-    rest: np.ndarray, right: np.ndarray, down: np.ndarray, ball: tuple[float, float, float, float]
+    rest: np.ndarray,
+    right: np.ndarray,
+    down: np.ndarray,
+    ball: tuple[float, float, float, float],
+    thickness: float = LAYER,
 ) -> np.ndarray:
     """Return the heights (H, W) float32, m, of gel at rest (H, W) m under a ball; right, down : (H, W) m, image frame.
 
-    ball : right, down of its centre, depth from first touch, radius, m.
+    ball : right, down of its centre, depth from first touch, radius, m; thickness : m, of the gel
     The dome changes the gap g between ball and gel. The print is that of the flat layer at the radius where the flat
     gap is g: inside the contact the gel then lies on the sphere exactly.
     """
     at_right, at_down, depth, radius = ball
     gap = _profile(np.hypot(right - at_right, down - at_down), radius) + rest
     gap -= gap.min()
-    scale = radius / TABLE_RADIUS
-    rise = scale * _rise(_radius_of(gap, radius) / scale, depth / scale)
+    distance = _radius_of(gap, radius)
+    rise = sum(share * table.rise(distance, depth, radius) for table, share in _tables_near(radius, thickness))
     return (rest + rise).astype(np.float32)
+
+
+def deepest(radius: float, thickness: float = LAYER) -> float:
+    """Return the depth, m, to which the print of a ball of a radius, m, is known on a gel of a thickness, m."""
+    return sum(
+        share * radius / table.radius * float(table.depths[-1]) for table, share in _tables_near(radius, thickness)
+    )
+
+
+def _tables_near(radius: float, thickness: float) -> list[tuple[_Table, float]]:
+    """Tables of the balls next in size to one on a layer, and how much each counts: linear in the logarithm of size."""
+    tables = _tables()
+    sizes = np.log([table.radius for table in tables])
+    place = np.interp(np.log(radius * (LAYER / thickness)), sizes, np.arange(len(tables)))
+    below = int(place)
+    shares = [(below, 1 - (place - below)), (below + 1, place - below)]
+    return [(tables[k], share) for k, share in shares if share > 0]
 
 
 def _profile(distance: np.ndarray, radius: float) -> np.ndarray:
@@ -52,22 +99,14 @@ def _radius_of(gap: np.ndarray, radius: float) -> np.ndarray:
     return np.sqrt(inner * (2 * radius - inner)) + (gap - inner) * fall / edge
 
 
-def _rise(distance: np.ndarray, depth: float) -> np.ndarray:
-    """Rise of the flat layer at distances from the axis, by the table; linear between depths."""
-    depths, spline, coefficients = _table()
-    k = int(np.clip(np.searchsorted(depths, depth) - 1, 0, len(depths) - 2))
-    part = np.clip((depth - depths[k]) / (depths[k + 1] - depths[k]), 0, 1)
-    mixed = ((1 - part) * coefficients[k] + part * coefficients[k + 1]).astype(np.float32)
-    cell, place = spline.cells(distance.ravel() / np.sqrt(2 * TABLE_RADIUS * depth))
-    weights = bspline_weights(place.astype(np.float32))
-    rise = sum(weight * mixed.take(cell + i) for i, weight in enumerate(weights))
-    return depth * rise.reshape(distance.shape)
-
-
 @functools.cache
-def _table() -> tuple[np.ndarray, EvenSpline, np.ndarray]:
-    """Depths (n,) m, the spline over distance / sqrt(2 R depth), and coefficients (n, k) of rise / depth."""
+def _tables() -> tuple[_Table, ...]:
+    """Prints of all balls that were tabulated, the smallest first."""
     with np.load(TABLE, allow_pickle=False) as table:
-        depths, step, rise = table["depth"], float(table["step"]), table["rise"]
-    spline = EvenSpline(0.0, step, rise.shape[1])
-    return depths, spline, rise @ spline.to_coefficients.T
+        step = float(table["step"])
+        found = [(float(radius), table[f"depth_{k}"], table[f"rise_{k}"]) for k, radius in enumerate(table["radius"])]
+    splines = [EvenSpline(0.0, step, rise.shape[1]) for _, _, rise in found]
+    parts = zip(found, splines, strict=True)
+    return tuple(
+        _Table(radius, depth, spline, rise @ spline.to_coefficients.T) for (radius, depth, rise), spline in parts
+    )

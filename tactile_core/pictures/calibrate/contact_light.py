@@ -18,7 +18,7 @@ LIKELY = 20.0  # grey levels, how large it is (assumed): holds it near none wher
 
 def contact_radius(depth: float, radius: float) -> float:
     """Return the radius, m, of the contact of a ball of a radius pressed so deep, m."""
-    return float(CONTACT_SHARE * np.sqrt(2 * radius * depth))
+    return float(min(CONTACT_SHARE * np.sqrt(2 * radius * depth), radius))
 
 
 def contact_disc(bench: BallPictures, ball: tuple[float, float, float, float]) -> np.ndarray:

@@ -18,7 +18,7 @@ from .photo_metrics import metrics
 from .photographs import Photographs, Press
 from .press_fit import MODEL_ERROR, Ball, Sight, fit_ball
 
-RADIUS_STARTS = (2e-3, 4.5e-3)  # m, from which the ball's radius is searched
+RADIUS_STARTS = (2 / 3, 1.5)  # of the ball's radius, from which it is searched
 METRICS = ("roi_l1", "roi_psnr", "through_l1", "through_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error")
 BRIGHT = 15.0  # grey levels of light through the coating, in some channel, from which on a press is flagged
 # name -> (unit, target, which way is better); targets of presses that were not fitted
@@ -103,10 +103,10 @@ def _try_press(
     baseline |= {"through_l1": baseline["roi_l1"], "through_psnr": baseline["roi_psnr"]}
     free = float("nan")
     if search_radius:
-        ends = [fit_ball(working, sight, start, free_radius=True) for start in RADIUS_STARTS]
+        ends = [fit_ball(working, sight, start * radius, free_radius=True) for start in RADIUS_STARTS]
         free = min(ends, key=lambda end: end[1])[0].radius
         ours["ball_radius_error"] = abs(free - radius) / radius
-        baseline["ball_radius_error"] = float(np.mean([abs(start - radius) / radius for start in RADIUS_STARTS]))
+        baseline["ball_radius_error"] = float(np.mean([abs(start - 1) for start in RADIUS_STARTS]))
     flags = _flags(press, ball, whole)
     if through.max() > BRIGHT:
         flags += (f"{through.max():.0f} levels of light through the coating, where the ball touches it",)

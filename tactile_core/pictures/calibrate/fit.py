@@ -34,7 +34,7 @@ IDENTIFIED = 0.5  # of the assumed spread of units; a number whose standard erro
 NEVER_IDENTIFIED = ("centre_x_mm", "centre_z_mm")  # what a press does not move: kept from the start
 # mm, at which a fit begins: at none, a little more does not change the picture, and no step would be taken.
 LEAST_SPREAD = 0.1
-MM_LIMITS = (1.0, 16.0)  # mm, ball diameters that fit on the gel
+MM_LIMITS = (0.5, 16.0)  # mm, ball diameters that fit on the gel
 
 
 @dataclasses.dataclass(frozen=True)

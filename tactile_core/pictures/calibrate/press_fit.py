@@ -12,10 +12,10 @@ from .levenberg_marquardt import minimise
 from .photo_metrics import windowed
 from .photographs import Press, dilated
 
-DEPTHS = (0.5e-3, 1.2e-3)  # m, from which a fit starts; the best end is taken
-PRINT = 3e-3  # m, about the width of a print (assumed)
-SHALLOWEST, DEEPEST = 0.03e-3, 2.2e-3  # m, of the table of prints
-SMALLEST_BALL, LARGEST_BALL = 1e-3, 8e-3  # m, radius
+DEPTHS = (0.5 / 2.2, 1.2 / 2.2)  # of the deepest print, from which a fit starts; the best end is taken
+PRINT = 3e-3  # m, about the width of a print, of a small ball its diameter (assumed)
+SHALLOWEST = 0.03e-3  # m, of the table of prints
+SMALLEST_BALL, LARGEST_BALL = 0.25e-3, 8e-3  # m, radius
 MARGIN = 3  # working px round the region that count too: a print must not shade what the photograph shows untouched
 STEP = 10e-6  # m, of the differences that make the Jacobian
 STEPS, TOLERANCE = 25, 1e-5
@@ -49,10 +49,10 @@ class Sight:
         self.region = smaller(press.touched.astype(np.float32), factor) > 0.25
         self.counts = dilated(self.region, MARGIN) & ~spoilt
 
-    def guesses(self, bench: BallPictures) -> list[tuple[float, float]]:
+    def guesses(self, bench: BallPictures, radius: float) -> list[tuple[float, float]]:
         """Return right and down, m, of the change's middle, and of where it is largest over about a ball's print."""
         weight = np.abs(self.change).max(-1) * self.region
-        width = round(PRINT / bench.camera.pixel_size[0]) | 1
+        width = round(min(PRINT, 2 * radius) / bench.camera.pixel_size[0]) | 1
         largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)
         weight /= weight.sum()
         middle = float((weight * bench.right).sum()), float((weight * bench.down).sum())
@@ -69,9 +69,9 @@ def fit_ball(
     """
     problem = _PressProblem(bench, sight, radius, opaque)
     starts = [
-        np.array([*place, depth, radius][: 4 if free_radius else 3])
-        for place in sight.guesses(bench)
-        for depth in DEPTHS
+        np.array([*place, share * bench.deepest(radius), radius][: 4 if free_radius else 3])
+        for place in sight.guesses(bench, radius)
+        for share in DEPTHS
     ]
     x, cost = min(
         (minimise(problem, start, most=STEPS, tolerance=TOLERANCE) for start in starts), key=lambda end: end[1]
@@ -97,7 +97,9 @@ class _PressProblem:
         """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off picture and table."""
         radius = x[3] if len(x) > 3 else self._radius
         inside = np.abs(x[0]) < -2 * self._bench.right[0, 0] and np.abs(x[1]) < -2 * self._bench.down[0, 0]
-        if not (inside and SHALLOWEST <= x[2] <= DEEPEST * radius / 3e-3 and SMALLEST_BALL <= radius <= LARGEST_BALL):
+        if not (inside and x[2] >= SHALLOWEST and SMALLEST_BALL <= radius <= LARGEST_BALL):
+            return np.inf
+        if x[2] > self._bench.deepest(radius):
             return np.inf
         self._last = self._missed(x)
         return float(np.square(self._last).sum() / 2)

@@ -14,7 +14,9 @@ import numpy as np
 
 from ...errors import TactileError
 from ...sensors.calibration import Calibration, Response
+from ...sensors.gel_shape import shape_of
 from .ball_pictures import BallPictures, FastPictures
+from .ball_print import deepest
 from .parameters import (
     FIRST_LED,
     LARGEST_RADIUS,
@@ -25,7 +27,7 @@ from .parameters import (
     parameters_of,
     with_parameters,
 )  # fmt: skip
-from .press_fit import DEEPEST, MODEL_ERROR, SHALLOWEST, Sight
+from .press_fit import MODEL_ERROR, SHALLOWEST, Sight
 
 GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels a unit of radiance, of C; levels a mm, of its slopes; assumed
 PRESS_STEP = 10e-3  # mm
@@ -56,6 +58,7 @@ class UnitResiduals:
     ) -> None:
         self._start, self._sights, self._radius, self._free = start, sights, radius, free
         self._pictures = pictures
+        self._deepest = deepest(radius, shape_of(start.camera.sensor).thickness)
         self._numbers = parameters_of(start)
         self._seen = [sight.change[sight.counts].T.astype(float) for sight in sights]  # (3, p) each
         gain = start.gain
@@ -115,8 +118,7 @@ class UnitResiduals:
         balls, numbers = self.balls(x), self._numbers.copy()
         numbers[self._free] = x[: self._free.sum()]
         radii = numbers[FIRST_LED + 3 :: 4]
-        deepest = 1e3 * DEEPEST * self._radius / 3e-3
-        inside = (balls[:, 2] >= 1e3 * SHALLOWEST).all() and (balls[:, 2] <= deepest).all()
+        inside = (balls[:, 2] >= 1e3 * SHALLOWEST).all() and (balls[:, 2] <= 1e3 * self._deepest).all()
         return bool(inside and (radii >= SMALLEST_RADIUS).all() and (radii <= LARGEST_RADIUS).all())
 
     def _lights(self, bench: BallPictures, ball: np.ndarray, sight: Sight) -> _Lights:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactile_core.pictures.calibrate.ball_print import print_on
+from tactile_core.pictures.calibrate.ball_print import deepest, print_on
 
 RIGHT, DOWN = np.meshgrid(np.linspace(-6e-3, 6e-3, 241), np.linspace(-6e-3, 6e-3, 241))
 FLAT = np.zeros(RIGHT.shape)
@@ -53,3 +53,22 @@ def test_prints_change_smoothly_with_depth() -> None:
     heights = np.array([print_on(FLAT, RIGHT, DOWN, (0.0, 0.0, depth, 3e-3))[120, 160] for depth in depths])
     assert (np.diff(heights) > 0).all()  # 2 mm aside: deeper is higher
     assert np.abs(np.diff(heights, 2)).max() < 8e-6  # kinks of a table that is linear between depths
+
+
+@pytest.mark.parametrize("radius", [0.5e-3, 0.75e-3, 1.2e-3])
+@pytest.mark.parametrize("share", [0.3, 0.8])
+def test_small_balls_have_prints_of_their_own(radius: float, share: float) -> None:
+    depth = share * deepest(radius)
+    gel = print_on(FLAT, RIGHT, DOWN, (0.0, 0.0, depth, radius))
+    distance = np.hypot(RIGHT, DOWN)
+    inside = distance < 0.4 * np.sqrt(2 * radius * depth)
+    np.testing.assert_allclose(gel[inside], sphere(depth, radius)[inside], atol=5e-6)
+    scaled = print_on(FLAT, RIGHT, DOWN, (0.0, 0.0, depth, radius), thickness=1.35 * radius)  # as under a 6 mm ball
+    beside = np.abs(distance - 2.2 * np.sqrt(radius * depth)) < 0.1 * radius
+    assert (gel[beside] > scaled[beside]).all()  # in the thicker layer the shoulder reaches farther
+
+
+def test_a_print_changes_smoothly_with_the_ball_s_size() -> None:
+    radii = np.linspace(0.4e-3, 4e-3, 73)
+    heights = np.array([print_on(FLAT, RIGHT, DOWN, (0.0, 0.0, 0.25e-3, radius))[120, 160] for radius in radii])
+    assert np.abs(np.diff(heights)).max() < 4e-6  # 2 mm aside, at one depth
