@@ -55,7 +55,7 @@ def _read_elsewhere(path: str) -> Recording:
         about = json.loads((folder / "about.json").read_text(encoding="utf-8"))
         with np.load(folder / "arrays.npz", allow_pickle=False) as stored:
             arrays = dict(stored)
-    names = [field.name for field in dataclasses.fields(Truth)]
+    names = [field.name for field in dataclasses.fields(Truth) if field.name not in ("displacement", "traction")]
     truth = None
     if "truth.force" in arrays:
         truth = Truth(*(arrays.pop(f"truth.{name}", None) for name in names))

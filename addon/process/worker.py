@@ -245,7 +245,7 @@ def read(folder: Path, job: dict, progress: Progress) -> None:
     truth = whole.pop("truth")
     if truth is not None:
         held = {f"truth.{field.name}": getattr(truth, field.name) for field in dataclasses.fields(truth)}
-        whole |= {name: values for name, values in held.items() if values is not None}
+        whole |= {name: values for name, values in held.items() if isinstance(values, np.ndarray)}
     arrays = {name: value for name, value in whole.items() if isinstance(value, np.ndarray)}
     np.savez(folder / "arrays.npz", **arrays)
     about = {name: value for name, value in whole.items() if name not in arrays}

@@ -238,7 +238,7 @@ def write_long(path: Path) -> None:
     one = recordings.read(RECORDING)
     rows = np.arange(LONG) % len(one)
     held = {name: getattr(one.truth, name) for name in Truth.__dataclass_fields__}
-    truth = Truth(**{name: None if values is None else values[rows] for name, values in held.items()})
+    truth = Truth(**{name: values[rows] for name, values in held.items() if isinstance(values, np.ndarray)})
     counts = {name: getattr(one, name)[rows] for name in ("electrodes", "pdc", "tac", "tdc")}
     about = {"scene": "", "seed": 0, "made_by": "profile_verbs", "note": "the shipped recording, repeated"}
     write_simulated(path, time=np.arange(LONG) / 100, **counts, truth=truth, **about)

@@ -53,7 +53,6 @@ _LONGEST_STEP, _LARGEST_TURN = 3e-3, 0.13  # m, rad
 _LEAST_FORCE = 1e-5  # N, the weight of 1 mg: less is lost in rounding
 _LARGEST_DROP = 1e3  # of the force, in one search: larger ones go by way of a force between (assumed)
 _SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the greatest depth, at which to stand where a force is not reached
-PICTURED = "digit"  # of which pictures are drawn
 _ENDED: Any = object()  # stands for poses or forces that are used up
 _BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (assumed: 20 mm/s at 100 Hz)
 
@@ -118,6 +117,9 @@ class Gel:
         self.friction = _not_negative(friction, "Gel, friction", "a coefficient of zero or more")
         self.indenter: Indenter = indenter if _presses(indenter) else MeshIndenter.from_trimesh(indenter)
         self.surface = sensors.sensor_surface(sensor)
+        if calibration is not None and calibration.camera.sensor != sensor:
+            found = f"of a {sensors.title(calibration.camera.sensor)}"
+            raise TactileError("Gel, calibration", found, f"one of a {sensors.title(sensor)}")
         self._calibration = calibration
         self.reset()
 
@@ -192,22 +194,24 @@ class Gel:
         return node_areas(self.sensor)
 
     def height_map(self) -> np.ndarray:
-        """Return the heights (H, W) float32, m, of the DIGIT's gel under the camera's pixels in the last contact.
+        """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact.
 
-        Where a hard slide folds the gel over itself the height there is a guess. Raises TactileError for the BioTac.
+        Where a hard slide folds the gel over itself the height there is a guess. Raises TactileError for the BioTac,
+        and for a gel without a calibration.
         """
-        if self.sensor != PICTURED:
+        if not sensors.is_gel(self.sensor):
             found = f"the {sensors.title(self.sensor)}, of which no picture can be drawn"
-            raise TactileError("Gel, picture", found, f"a Gel of the {sensors.title(PICTURED)}")
+            raise TactileError("Gel, picture", found, "a Gel of a sensor with a camera, as the DIGIT")
         with folds_counted():
             return gel_mapper(self._renderer.camera)(self._contact.displacement)
 
     def picture(self) -> np.ndarray:
-        """Return the picture (H, W, 3) uint8 that the DIGIT's camera takes of the last contact.
+        """Return the picture (H, W, 3) uint8 that the sensor's camera takes of the last contact.
 
         Raises TactileError for the BioTac, which has no camera.
         """
-        return self._renderer(self.height_map(), self._renderer.marks(self._contact.displacement))
+        heights = self.height_map()
+        return self._renderer(heights, self._renderer.marks(self._contact.displacement))
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
         """Return the pose (4, 4) of the indenter, its own z out of the sensor, ``depth`` m past first touch.
@@ -229,7 +233,7 @@ class Gel:
 
     @functools.cached_property
     def _renderer(self) -> Renderer:
-        return Renderer(self._calibration or load_calibration(), self.preset)
+        return Renderer(self._calibration or load_calibration(None, self.sensor), self.preset)
 
     @functools.cached_property
     def _compliance(self) -> Compliance:

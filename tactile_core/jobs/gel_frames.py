@@ -18,9 +18,11 @@ from ..files import outside
 from ..files.hdf5_checked import SIGNATURE
 from ..recordings.array_store import open_hdf5, open_npz
 from ..recordings.simulated import FORMAT as SIMULATED
+from ..simulation.pairs_file import TARGET
 from .frames_file import FORMAT as CONVERTED
 
 if TYPE_CHECKING:
+    from ..mechanics.solve import Tier
     from ..recordings.array_store import Store
 
 CONVERT = "Of a recording: `tactile convert` it first, and render its frames.h5"
@@ -32,7 +34,7 @@ Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 
 @dataclasses.dataclass(frozen=True)
 class Frames:
-    """Frames of an input: displacements of the DIGIT's nodes or height maps, one of the two.
+    """Frames of an input: displacements of a gel's nodes or height maps, one of the two.
 
     kind : in words; numbers : (T,) by which frames are known
     displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m
@@ -58,16 +60,18 @@ def is_scene(path: Path) -> bool:
     return path.is_dir() or path.suffix == ".toml"
 
 
-def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier: str = "fast") -> Frames:
+def read_frames(
+    path: str | os.PathLike, progress: Progress = nullcontext, tier: Tier = "fast", gel: str = TARGET
+) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
 
-    tier : of a scene's contacts
+    tier : of a scene's contacts; gel : whose displacement is read, or solved
 
     Raises TactileError for anything else, or what cannot be read.
     """
     path = Path(path)
     if is_scene(path):
-        return _of_scene(path, progress, tier)
+        return _of_scene(path, progress, tier, gel)
     if not path.is_file():
         raise TactileError(path, "there is no such file", EXPECTED)
     if path.suffix == ".npz":
@@ -78,7 +82,7 @@ def read_frames(path: str | os.PathLike, progress: Progress = nullcontext, tier:
         return Frames("height map", np.zeros(1, int), heights=read_height(path)[None])
     if not _is_hdf5(path):
         raise TactileError(path, "no HDF5 file", EXPECTED, CONVERT)
-    return _of_hdf5(path)
+    return _of_hdf5(path, gel)
 
 
 def _is_hdf5(path: Path) -> bool:
@@ -87,34 +91,23 @@ def _is_hdf5(path: Path) -> bool:
         return file.read(len(SIGNATURE)) == SIGNATURE
 
 
-def _of_hdf5(path: Path) -> Frames:
+def _of_hdf5(path: Path, gel: str) -> Frames:
     with open_hdf5(os.fspath(path)) as store:
         kind = store.attributes.get("format")
         if kind == CONVERTED:
-            name, numbers = "displacement_digit", store.array("frame", (None,))
+            name, numbers = f"displacement_{gel}", store.array("frame", (None,))
             check_numbers(path, numbers)
             numbers = numbers.astype(int)
         elif kind == SIMULATED:
-            name, numbers = "truth/displacement_digit", None
+            name, numbers = f"truth/displacement_{gel}", None
         else:
             raise TactileError(path, f"format {kind!r}" if kind else "no frames of ours", EXPECTED, CONVERT)
-        _check_displacement(store, name)
         scale = float(store.attributes_of(name).get("scale", 1.0))
-        displacement = store.array(name, (None, len(sensors.digit_surface().rest), 3), np.float32)
+        displacement = _array(store, name, gel)
     numbers = np.arange(len(displacement)) if numbers is None else numbers
     if len(numbers) != len(displacement) or not len(numbers):
         raise TactileError(path, f"{len(displacement)} frames of {len(numbers)} numbers", "as many, one or more")
     return Frames("converted" if kind == CONVERTED else "simulated", numbers, displacement, scale)
-
-
-def _check_displacement(store: Store, name: str) -> None:
-    if name not in store.shapes:
-        raise TactileError(f"{store.path}, {name}", "missing", "the gel's deformation of each frame",
-                           "Convert with --keep displacement")  # fmt: skip
-    shape, count = store.shapes[name][0], len(sensors.digit_surface().rest)
-    if shape[1:] != (count, 3):
-        raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {count}, 3)",
-                           "It was made with another version of the surface: make it again")  # fmt: skip
 
 
 def _of_npz(path: Path) -> Frames:
@@ -133,14 +126,13 @@ def _of_npz(path: Path) -> Frames:
     return Frames("height map", np.arange(len(heights)), heights=heights)
 
 
-def _of_scene(path: Path, progress: Progress, tier: str) -> Frames:
+def _of_scene(path: Path, progress: Progress, tier: Tier, gel: str) -> Frames:
     from ..simulation.scene_recording import simulate_recording
 
     with tempfile.TemporaryDirectory() as folder, progress() as shown:
         simulated = Path(folder) / "scene.h5"
-        tiers = {"digit": tier}
-        simulate_recording(path, simulated, progress=shown, keep=("displacement_digit",), tiers=tiers)
-        return dataclasses.replace(_of_hdf5(simulated), kind="scene")
+        simulate_recording(path, simulated, progress=shown, keep=(f"displacement_{gel}",), tiers={gel: tier})
+        return dataclasses.replace(_of_hdf5(simulated, gel), kind="scene")
 
 
 def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.ndarray:
@@ -180,7 +172,8 @@ def check_numbers(path: str | os.PathLike, numbers: np.ndarray) -> None:
 
 def _array(store: Store, name: str, sensor: str) -> np.ndarray:
     if name not in store.shapes:
-        advice = "Convert with --keep displacement" if name.startswith("displacement") else ""
+        converted = name.startswith("displacement")
+        advice = "Convert with --keep displacement" if converted else f"Simulate with --keep displacement_{sensor}"
         raise TactileError(f"{store.path}, {name}", "missing", "the deformation of each frame", advice)
     shape, count = store.shapes[name][0], len(sensors.sensor_surface(sensor).rest)
     if shape[1:] != (count, 3):

@@ -123,7 +123,7 @@ def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | No
     time, place, force = scene_recording.motion(spec)
     frames, pressed = len(time), int((force > 0).sum())
     contacts = len({(*at, newtons) for at, newtons in zip(place.tolist(), force.tolist(), strict=True) if newtons > 0})
-    needed = set(keep) & set(scene_recording.OUTPUTS)
+    needed = set(keep) & set(scene_recording.outputs())
     needed |= {"electrodes"} if "translation" in keep else set()
     needed |= {"displacement_digit"} if "image" in keep else set()
     used = scene_recording.sensors_of(needed)

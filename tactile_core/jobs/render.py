@@ -86,17 +86,17 @@ def render(
     """
     clock = Stopwatch()
     out = Path(out)
-    load_calibration(options.calibration)
+    gel = load_calibration(options.calibration).camera.sensor
     preset = claimed(out, options)
     bound = options.error or Budget()
     if bound.levels is not None:
         say(describe_choice(preset, bound.levels))
     scene = is_scene(Path(path))
-    tier = _tier(Path(path), bound.um, say) if scene and bound.um is not None else "fast"
+    tier = _tier(Path(path), gel, bound.um, say) if scene and bound.um is not None else "fast"
     with clock.stage("read"):
-        frames = read_frames(path, lambda: progress("simulate"), tier)
+        frames = read_frames(path, lambda: progress("simulate"), tier, gel)
     if bound.um is not None and frames.displacement is not None and not scene:
-        share = sampling_error.depth_share(frames.displacement) * frames.scale
+        share = sampling_error.depth_share(frames.displacement, gel) * frames.scale
         say(sampling_error.check(bound.um, share))
     shape = None if frames.heights is None else frames.heights.shape[1:]
     rows = select(options.frames, len(frames.numbers))
@@ -148,20 +148,20 @@ def choose_preset(options: Options) -> str:
     return options.preset or DEFAULT if levels is None else fitting(levels, options.variant)
 
 
-def _tier(path: Path, um: float, say: Callable[[str], None]) -> str:
+def _tier(path: Path, gel: str, um: float, say: Callable[[str], None]) -> str:
     """Choose the tier of contact for a scene: within the bound less what its height map adds.
 
     Raises TactileError where none is.
     """
     from ..simulation import tier_choice
 
-    share = tier_choice.choose_for_scene(path, ("digit",), None)["digit"].share
+    share = tier_choice.choose_for_scene(path, (gel,), None)[gel].share
     sampled = sampling_error.height_error(share)
     if um <= sampled:
         expected = f"more than {sampled:.3g}, which heights between nodes add alone"
         raise TactileError("--error", f"{um:g} um", expected, "Allow more")
-    choice = tier_choice.choose("digit", share, um - sampled)
-    say(f"{choice.describe('digit')}; heights between nodes add {sampled:.2g} um")
+    choice = tier_choice.choose(gel, share, um - sampled)
+    say(f"{choice.describe(gel)}; heights between nodes add {sampled:.2g} um")
     return choice.tier
 
 

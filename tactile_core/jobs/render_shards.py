@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
 from ..pictures.mitsuba.variant import variant_for
+from ..sensors.calibration_file import load_calibration
 from . import results
 from .engine import inputs, result_parts
 from .engine import job as jobs
@@ -96,7 +97,7 @@ def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
         if content_hash(Path(one.path))[0] != one.sha256:
             found = "another content than when the job was made"
             raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
-        frames = read_frames(one.path)
+        frames = read_frames(one.path, gel=load_calibration(job.calibration).camera.sensor)
         rows = select(parse_frames(job.recipe.frames), len(frames.numbers))
         arrays = {NUMBERS: frames.numbers[rows], VALUES: np.stack(list(frames.iterate_rows(rows)))}
         kind = np.frombuffer(frames.kind.encode(), np.uint8)

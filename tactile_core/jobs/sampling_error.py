@@ -10,7 +10,8 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.shipped import shipped
-from ..sensors.digit import THICKNESS
+from ..sensors import shape_of
+from ..simulation.pairs_file import TARGET
 
 TABLE = shipped("sampling.json")
 
@@ -51,6 +52,7 @@ def check(bound: float, share: float | None) -> str:
     return f"{what}: {added:.2g} um, at most {bound:g}; there is nothing to choose"
 
 
-def depth_share(displacement: np.ndarray) -> float:
+def depth_share(displacement: np.ndarray, gel: str = TARGET) -> float:
     """Return the largest move of a gel's node in displacements (..., M, 3) m, over the gel's thickness."""
-    return float(np.sqrt(np.square(displacement, dtype=np.float32).sum(-1).max(initial=0))) / THICKNESS
+    largest = float(np.sqrt(np.square(displacement, dtype=np.float32).sum(-1).max(initial=0)))
+    return largest / shape_of(gel).thickness

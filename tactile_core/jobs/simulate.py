@@ -64,7 +64,7 @@ def plan(
 ) -> Job:
     """Return the job: the [recording] of a scene for each combination of the values in ``grid`` (``scene_grid``).
 
-    seed : of the first recording, each has one more than that before it; keep : words of ``recording.OUTPUTS``
+    seed : of the first recording, each has one more than that before it; keep : words of ``scene_recording.outputs``
     electrodes : the law of their counts, of ``law.LAWS``
     Raises TactileError for a bad scene, grid or place, before any work.
     """

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..sensors import ELECTRODES
+from ..sensors import ELECTRODES, title
 from .biotac_sp import describe_sp
 from .fingers import split
 from .flags import Flag, names
@@ -78,8 +78,7 @@ def _channels(recording: Recording) -> str:
     if recording.pac is not None:
         held.insert(0, f"pac ({recording.pac.shape[1]} a frame)")
     if recording.truth is not None:
-        moved = ("BioTac", recording.truth.displacement_biotac), ("DIGIT", recording.truth.displacement_digit)
-        nodes = [f"{values.shape[1]} {sensor}" for sensor, values in moved if values is not None]
+        nodes = [f"{moved.shape[1]} {title(sensor)}" for sensor, moved in recording.truth.displacements.items()]
         pressed = " and traction" if recording.truth.tractions else ""
         held.append(f"truth ({' and '.join(nodes)} nodes{pressed})" if nodes else f"truth (force{pressed})")
     return ", ".join(["electrodes", *held])

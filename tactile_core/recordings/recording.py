@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,6 +24,7 @@ class Truth:
     contact_center : (T, 2) float, m, (x, z) on the DIGIT after unrolling; NaN without contact
     traction_biotac : (T, N, 3) float32, Pa, of the object on the resting skin's nodes
     traction_digit : (T, M, 3) float32, Pa, of the object on the resting gel's nodes
+    displacement, traction : the same of further sensors, by their names
     """
 
     displacement_biotac: np.ndarray | None
@@ -31,11 +33,19 @@ class Truth:
     contact_center: np.ndarray | None
     traction_biotac: np.ndarray | None = None
     traction_digit: np.ndarray | None = None
+    displacement: Mapping[str, np.ndarray] = field(default_factory=dict)
+    traction: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def displacements(self) -> dict[str, np.ndarray]:
+        """Displacements that the file was made with, by sensor."""
+        held = {"biotac": self.displacement_biotac, "digit": self.displacement_digit, **self.displacement}
+        return {sensor: values for sensor, values in held.items() if values is not None}
 
     @property
     def tractions(self) -> dict[str, np.ndarray]:
-        """Tractions that the file was made with, by ``"biotac"`` and ``"digit"``."""
-        held = {"biotac": self.traction_biotac, "digit": self.traction_digit}
+        """Tractions that the file was made with, by sensor."""
+        held = {"biotac": self.traction_biotac, "digit": self.traction_digit, **self.traction}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
 

@@ -6,7 +6,8 @@ Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sen
 (T, 19), ``pdc``, ``tac``, ``tdc`` (T,) int16 raw 12-bit counts; ``truth/displacement_biotac`` (T, N, 3) and
 ``truth/displacement_digit`` (T, M, 3) int16 with attribute ``scale`` (m a unit); ``truth/force`` (T, 3) float32 N;
 ``truth/contact_center`` (T, 2) float32 m; where asked for ``truth/traction_biotac`` (T, N, 3) and
-``truth/traction_digit`` (T, M, 3) float32 Pa. The same arrays give the same bytes. `tactile simulate --keep` leaves out
+``truth/traction_digit`` (T, M, 3) float32 Pa; so of further sensors,
+by their names. The same arrays give the same bytes. `tactile simulate --keep` leaves out
 the rest but ``time`` and ``truth/force``; without ``electrodes`` (and the counts) the file is no recording to
 translate.
 """
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 FORMAT = "tactile-recording-1"
 SCALE = 5e-7  # m a unit of the truth's int16: steps of 0.5 um (0.14 um rms, below any error measured), reach +-16 mm
+_MOVED, _PRESSED = "displacement_", "traction_"  # before a sensor's name
 BLOCK = 16  # frames a chunk of the truth: a chunk stays below 300 kB at 2,700 nodes
 
 
@@ -69,8 +71,8 @@ def write_simulated(
     forces = {f"truth/{name}": np.asarray(value, np.float32) for name, value in known.items() if value is not None}
     for name, value in forces.items():
         _check_shape(path, name, value, (frames, 3 if name == "truth/force" else 2))
-    moved = {name: getattr(truth, name) for name in ("displacement_biotac", "displacement_digit")}
-    steps = {name: _steps(path, name, value, frames) for name, value in moved.items() if value is not None}
+    moved = {f"{_MOVED}{sensor}": values for sensor, values in truth.displacements.items()}
+    steps = {name: _steps(path, name, value, frames) for name, value in moved.items()}
     attributes = {
         "format": FORMAT,
         "simulated": True,
@@ -83,8 +85,8 @@ def write_simulated(
         "start_time": float(start_time),
     }
     plain = {"time": np.asarray(time, np.float64)} | counts
-    pressed = {f"truth/{name}": getattr(truth, name) for name in ("traction_biotac", "traction_digit")}
-    tractions = {name: _tractions(path, name, value, frames) for name, value in pressed.items() if value is not None}
+    pressed = {f"truth/{_PRESSED}{sensor}": values for sensor, values in truth.tractions.items()}
+    tractions = {name: _tractions(path, name, value, frames) for name, value in pressed.items()}
     _write_whole(path, lambda file: _fill(file, attributes, plain, steps, forces, tractions))
     return path
 
@@ -156,25 +158,28 @@ def _times(store: Store, frames: int) -> np.ndarray:
 
 
 def _truth(store: Store, frames: int) -> Truth:
+    moved, pressed = (
+        {name.removeprefix(f"truth/{kind}"): read(store, name, frames)
+         for name in sorted(store.shapes) if name.startswith(f"truth/{kind}")}
+        for kind, read in ((_MOVED, _displacement), (_PRESSED, _traction))
+    )  # fmt: skip
     return Truth(
-        _displacement(store, "truth/displacement_biotac", frames),
-        _displacement(store, "truth/displacement_digit", frames),
+        moved.pop("biotac", None),
+        moved.pop("digit", None),
         store.array("truth/force", (frames, 3)),
         store.optional("truth/contact_center", (frames, 2)),
-        _traction(store, "truth/traction_biotac", frames),
-        _traction(store, "truth/traction_digit", frames),
+        pressed.pop("biotac", None),
+        pressed.pop("digit", None),
+        moved,
+        pressed,
     )
 
 
-def _traction(store: Store, name: str, frames: int) -> np.ndarray | None:
-    if name not in store.shapes:
-        return None
+def _traction(store: Store, name: str, frames: int) -> np.ndarray:
     return store.array(name, (frames, *store.shapes[name][0][1:2], 3), np.float32)
 
 
-def _displacement(store: Store, name: str, frames: int) -> np.ndarray | None:
-    if name not in store.shapes:
-        return None
+def _displacement(store: Store, name: str, frames: int) -> np.ndarray:
     steps = store.array(name, (frames, *store.shapes[name][0][1:2], 3), np.float32)
     scale = store.attributes_of(name).get("scale")
     if not isinstance(scale, float) or not 0 < scale < 1:

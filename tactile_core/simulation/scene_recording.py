@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
@@ -18,21 +19,22 @@ from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement, on_gel
 from ..mechanics.solve import Sensor, Solution, Tier, solve
 from ..recordings import Truth, write_simulated
+from ..sensors import descriptor
 from ..sensors.readout import Wiring, readings
+from .pairs_file import TARGET
 from .scene import RecordingSpec, Scene, load_scene
 
 PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (docs/sources.md, BioTac fluid)
 _STILL_COUNT = 2000  # TDC and TAC, not simulated: a constant reading
 
-# What a file may hold beside time, force and, where there is a DIGIT, the contact's centre; and the sensor it needs.
-OUTPUTS: dict[str, Sensor] = {
-    "electrodes": "biotac",
-    "displacement_biotac": "biotac",
-    "traction_biotac": "biotac",
-    "displacement_digit": "digit",
-    "traction_digit": "digit",
-}
 DEFAULT = ("electrodes", "displacement_biotac", "displacement_digit")
+_FIELDS = ("displacement", "traction")  # of a sensor
+
+
+def outputs() -> dict[str, Sensor]:
+    """Return what a file may hold beside time, force and, with a gel, the contact's centre; and whose each is."""
+    fields = {f"{field}_{sensor}": sensor for sensor in descriptor.names() for field in _FIELDS}
+    return {"electrodes": "biotac", **fields}
 
 
 class _Frame(NamedTuple):
@@ -40,7 +42,7 @@ class _Frame(NamedTuple):
 
     moved, pressed : by sensor, displacement (n, 3) float32 m and traction (n, 3) float32 Pa
     force : (3,) N; pressure : Pa, rise of the fluid's
-    change : (19,) counts of the electrodes; centre : (2,) m, of pressure on the DIGIT
+    change : (19,) counts of the electrodes; centre : (2,) m, of pressure on the first gel
     """
 
     moved: dict[Sensor, np.ndarray]
@@ -68,7 +70,7 @@ def simulate_recording(
     The motion is linear between the scene's points. Each frame is a press of its own, straight to its force with the
     scene's friction, so rolling and sliding differ in nothing: no frame drags what the one before has moved.
     progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
-    keep : words of OUTPUTS; a sensor that none of them needs is not solved. tiers : of each sensor, fast by default.
+    keep : words of ``outputs()``; a sensor that none of them needs is not solved. tiers : of each, fast by default.
     loaded : a scene and its text in place of the file's, which is then named in messages alone.
     electrodes : the law of their counts, of ``law.LAWS``.
     Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked,
@@ -82,7 +84,7 @@ def simulate_recording(
     if wiring.tared:
         raise TactileError("wiring, tared", "True", "raw counts in a simulated recording", "Tare it when it is read")
     atomic.claim(out)
-    check_places(scene_path, spec)
+    check_places(scene_path, spec, [sensor for sensor in used if sensors.is_gel(sensor)])
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     time, place, force = motion(spec)
     frames: list[_Frame] = []
@@ -111,8 +113,8 @@ def simulate_recording(
 
 
 def sensors_of(keep: Collection[str]) -> tuple[Sensor, ...]:
-    """Return the sensors that outputs need, of ``"biotac"`` and ``"digit"``."""
-    return tuple(dict.fromkeys(sensor for word, sensor in OUTPUTS.items() if word in keep))
+    """Return the sensors that outputs need."""
+    return tuple(dict.fromkeys(sensor for word, sensor in outputs().items() if word in keep))
 
 
 def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
@@ -135,13 +137,16 @@ def _check_tiers(keep: Collection[str], tiers: Mapping[Sensor, Tier]) -> None:
             raise TactileError(f"--keep traction_{sensor}", found, "the fast tier", "Give a larger --error, or none")
 
 
-def check_places(scene_path: str | os.PathLike, spec: RecordingSpec) -> None:
-    """Raise TactileError for a point that presses beside the DIGIT's gel."""
-    for number, point in enumerate(spec.points, 1):
-        if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3):
+def check_places(scene_path: str | os.PathLike, spec: RecordingSpec, gels: Sequence[Sensor] = ()) -> None:
+    """Raise TactileError for a point that presses beside one of the gels; without any, beside what the DIGIT covers."""
+    for (number, point), gel in itertools.product(enumerate(spec.points, 1), gels or (TARGET,)):
+        if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3, sensor=gel):
+            shape = sensors.shape_of(gel)
+            along, across = f"{1e3 * shape.tip_x:g} to {1e3 * shape.base_x:g} mm", f"{1e3 * shape.half_width:g} mm"
             raise TactileError(
                 f"{scene_path}, recording.points, point {number}", f"({point.x_mm:g}, {point.z_mm:g}) mm",
-                "a place on the DIGIT's gel, x -20.06 to 4.94 mm, z within 9.17 mm", "Move it or set its force_n to 0",
+                f"a place on the {sensors.title(gel)}'s gel, x {along}, z within {across}",
+                "Move it or set its force_n to 0",
             )  # fmt: skip
 
 
@@ -173,13 +178,13 @@ def _solve(
 
 
 def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str], law: str) -> _Frame:
-    """Extract what is kept of a frame's contacts. The force is the BioTac's, or the DIGIT's where that is alone."""
+    """Extract what is kept of a frame's contacts. The force is the first sensor's, of the BioTac where it is solved."""
     moved, pressed = _field(solved, keep, "displacement"), _field(solved, keep, "traction")
     if not solved:
         return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(19), np.full(2, np.nan))
-    biotac, digit, first = solved.get("biotac"), solved.get("digit"), next(iter(solved.values()))
-    change = signal_of(biotac, law) if "electrodes" in keep else np.zeros(19)
-    centre = digit.centre if digit else np.full(2, np.nan)
+    first = next(iter(solved.values()))
+    change = signal_of(solved["biotac"], law) if "electrodes" in keep else np.zeros(19)
+    centre = next((each.centre for sensor, each in solved.items() if sensors.is_gel(sensor)), np.full(2, np.nan))
     return _Frame(moved, pressed, first.force, first.pressure, change, centre)
 
 
@@ -215,14 +220,14 @@ def _wiring(spec: RecordingSpec) -> Wiring:
 
 
 def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
-    """Fields as far as they are kept, force, and the centre of pressure where the DIGIT is solved."""
+    """Fields as far as they are kept, force, and the centre of pressure where a gel is solved."""
 
-    def stacked(fields: Sequence[dict[Sensor, np.ndarray]], sensor: Sensor) -> np.ndarray | None:
-        return np.stack([field[sensor] for field in fields]) if sensor in fields[0] else None
+    def stacked(fields: Sequence[dict[Sensor, np.ndarray]]) -> dict[Sensor, np.ndarray]:
+        return {sensor: np.stack([field[sensor] for field in fields]) for sensor in fields[0]}
 
-    moved, pressed = [frame.moved for frame in frames], [frame.pressed for frame in frames]
+    moved, pressed = (stacked([getattr(frame, name) for frame in frames]) for name in ("moved", "pressed"))
     centre = np.stack([frame.centre for frame in frames]) if any(map(sensors.is_gel, sensors_of(keep))) else None
     return Truth(
-        stacked(moved, "biotac"), stacked(moved, "digit"), np.stack([frame.force for frame in frames]), centre,
-        stacked(pressed, "biotac"), stacked(pressed, "digit"),
+        moved.pop("biotac", None), moved.pop("digit", None), np.stack([frame.force for frame in frames]), centre,
+        pressed.pop("biotac", None), pressed.pop("digit", None), moved, pressed,
     )  # fmt: skip

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..accuracy import Candidate, cheapest
+from ..errors import TactileError
 from ..mechanics.error_estimate import expected_error, measured
 from ..mechanics.fast.compliance import stored
 from ..mechanics.force_search import UnreachableError
@@ -43,6 +44,10 @@ def tier_errors(sensor: str, share: float) -> list[Candidate]:
 
     The fast tier was measured against the full one, whose own error is added to it.
     """
+    if sensor not in measured()["tiers"]["fast"]:
+        expected = f"one of {', '.join(sorted(measured()['tiers']['fast']))}"
+        advice = "Leave --error out: the fast tier is taken"
+        raise TactileError("--error", f"no errors are measured on the {title(sensor)}", expected, advice)
     own = {tier: _up_to(tier, sensor, share) for tier in TIERS}
     own["fast"] += own["full"]
     return [Candidate(f"the {tier} tier", own[tier], measured()["tiers"][tier][sensor]["ms"]) for tier in TIERS]

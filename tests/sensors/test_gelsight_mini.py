@@ -1,12 +1,18 @@
 """The GelSight Mini by its descriptor: the public mesh's nodes, and its picture inside the even window."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
+from tactile_core.geometry.indenters import Sphere
+from tactile_core.jobs.gel import Gel
+from tactile_core.jobs.render import Options, render
 from tactile_core.sensors.about import about
-from tactile_core.sensors.calibration_file import load_calibration
+from tactile_core.sensors.calibration_file import calibration_path, load_calibration
 
 NAME = "gelsight_mini"
 # Nodes of the public mesh (docs/sources.md, GelSight Mini gel): mm from its middle, along the short and the long side,
@@ -44,3 +50,30 @@ def test_a_sensor_is_told_in_words():
     assert "kind: fluid, a skin 1.58 mm thick" in about("biotac")
     with pytest.raises(TactileError, match="expected biotac, biotac_sp, digit, gelsight_mini"):
         about("gelsight")
+
+
+def test_a_scene_is_simulated_and_drawn_on_it(request, tmp_path):
+    """`tactile render SCENE --gel gelsight_mini`: the scene's presses of its gel, seen by its camera."""
+    scene = request.config.rootpath / "scenes/press"
+    text = (scene / "scene.toml").read_text(encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    options = Options(preset="fast", calibration=calibration_path(NAME), size=(80, 60), frames=slice(0, 101, 100))
+    folder = render(
+        tmp_path / "scene.toml", tmp_path / "out", options, lambda word: nullcontext(lambda done, total: None)
+    )
+    rest, pressed = (np.asarray(Image.open(folder / "images" / f"{k:05d}.png")).astype(int) for k in (0, 100))
+    assert rest.shape == (60, 80, 3)
+    assert np.abs(pressed - rest).max() > 30
+
+
+def test_a_gel_is_drawn_by_its_own_camera_alone():
+    gel = Gel(NAME, Sphere(3e-3))
+    gel.press(gel.touching(-8e-3, 0.0, 0.3e-3))
+    assert gel.picture().shape == (*load_calibration(None, NAME).camera.shape, 3)
+    with pytest.raises(TactileError, match="calibration: of a DIGIT; expected one of a GelSight Mini"):
+        Gel(NAME, Sphere(3e-3), calibration=load_calibration())
+
+
+def test_a_calibration_of_another_gel_is_refused(tmp_path):
+    with pytest.raises(TactileError, match="'digit'; expected 'gelsight_mini'"):
+        load_calibration(calibration_path("digit"), NAME)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 BRIEF = "pictures of deformed gels, physically based"
 TEXT = """\
-Draw what the DIGIT's camera sees of a deformed gel. INPUT is one of
+Draw what the camera of a DIGIT, or of another --gel, sees of its deformed gel. INPUT is one of
   frames.h5          of `tactile convert`, with displacement kept
   recording.h5       simulated, with its true gel
   heights.npz, .exr  heights in metres under the camera's pixels: array height_map, (H, W) or (T, H, W); channel height
@@ -46,7 +46,8 @@ examples:
   tactile render results/touch/frames.h5 --out pictures --frames 100:200
   tactile render scenes/press_roll_slide --out pictures --preset quality --exr
   tactile render heights.npz --out pictures --error 0.5levels --calibration unit.toml
-  tactile render scenes/press --out pictures --error 50um,0.6levels"""
+  tactile render scenes/press --out pictures --error 50um,0.6levels
+  tactile render scenes/press --out pictures --gel gelsight_mini"""
 LEAVES = NOTHING
 
 
@@ -57,6 +58,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--preset", choices=PRESETS, help="how exactly (default: standard)")
     error_argument(verb, "levels of the picture (picks the preset), um of the gel (picks a scene's tier), or both")
     verb.add_argument("--calibration", metavar="UNIT.toml", help="of your sensor (default: the one that ships)")
+    verb.add_argument("--gel", metavar="SENSOR", help="whose gel it is (default: the calibration's, else digit)")
     verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="only these, counted from 0 as in Python")
     verb.add_argument("--size", metavar="WxH", help="pixels, such as 480x640 (default: the calibration's)")
     verb.add_argument("--exr", action="store_true", help="write OpenEXR beside PNG")
@@ -80,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     asked = render.Options(
         preset=options.preset,
         error=None if options.error is None else accuracy.parse_budget(options.error),
-        calibration=options.calibration,
+        calibration=_calibration(options.calibration, options.gel),
         size=size,
         frames=frame_range.parse_frames(options.frames),
         exr=options.exr,
@@ -112,6 +114,16 @@ def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
         done = render_in_parts(options.input, options.out, asked, lambda folder: engine.place(folder, options), shown)
     tell(str(done))
     return 0
+
+
+def _calibration(file: str | None, gel: str | None) -> str | None:
+    """Return the calibration's file; of a gel that is named, the one that ships with it, or a file that is checked."""
+    if gel is None:
+        return file
+    from ...sensors.calibration_file import calibration_path, load_calibration
+
+    load_calibration(file, gel)
+    return file or str(calibration_path(gel))
 
 
 def _size(text: str | None) -> tuple[int, int] | None:

@@ -39,7 +39,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         "--keep",
         metavar="WORDS",
         help="what the file holds, out of electrodes,displacement_biotac,displacement_digit (default: these three) and"
-        " traction_biotac,traction_digit, or traction for both: Pa on each surface node, by the fast tier alone",
+        " traction_biotac,traction_digit, or traction for both: Pa on each surface node, by the fast tier alone;"
+        " displacement_NAME and traction_NAME of any other sensor, too",
     )
     electrodes_argument(verb)
     error_argument(verb, "um of the surface, such as 50um")
@@ -81,14 +82,21 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _keep(text: str | None) -> tuple[str, ...]:
-    """Return the words of ``recording.OUTPUTS``; ``traction`` is both sensors'. Raises TactileError for other words."""
+    """Return words of ``scene_recording.outputs``; ``traction`` is that of BioTac and DIGIT.
+
+    Raises TactileError for other words.
+    """
     from ...jobs import results
-    from ...simulation.scene_recording import DEFAULT, OUTPUTS
+    from ...simulation.pairs_file import SENSORS
+    from ...simulation.scene_recording import DEFAULT, outputs
 
     if text is None:
         return DEFAULT
-    words = results.parse_words(text, (*OUTPUTS, "traction"))
-    return tuple(word for word in OUTPUTS if word in words or ("traction" in words and word.startswith("traction")))
+    known = outputs()
+    words = set(results.parse_words(text, (*known, "traction")))
+    if "traction" in words:
+        words |= {f"traction_{sensor}" for sensor in SENSORS}
+    return tuple(word for word in known if word in words)
 
 
 def _bound(text: str) -> float:

@@ -77,7 +77,7 @@ class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_
     """A scene to one recording for each input, which has its own values; see ``scene_grid``.
 
     seed : of the first; each has one more than that before it; values : name -> value, an input each
-    keep : words of ``mechanics.recording.OUTPUTS``
+    keep : words of ``scene_recording.outputs``
     """
 
     seed: int
