@@ -130,8 +130,9 @@ def _drawn(shown: Contents, camera: Camera) -> SheetFigure:
     figure.skin_row(label, displacement, largest, center, shown.source)
     if truth is not None:
         figure.skin_row(f"{name}, unrolled\ntrue (simulated)", truth, largest, None, shown.source)
-    figure.digit_row("DIGIT gel\ndisplacement", shown.displacement_digit, shown.contact_center)
-    figure.picture_row("DIGIT picture", shown.pictures)
+    gel = title(camera.sensor)
+    figure.gel_row(f"{gel} gel\ndisplacement", shown.displacement_digit, shown.contact_center)
+    figure.picture_row(f"{gel} picture", shown.pictures)
     figure.captions(shown.force, shown.confidence, shown.expected_error_digit)
     return figure
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.stopwatch import Stopwatch
-from ..translation.card_sensors import SOURCE
+from ..translation.card_sensors import SOURCE, TARGET
 from . import results
 from .frame_pass import FramePass, Solver, Tools
 from .frame_range import frames_text, select
@@ -70,7 +70,8 @@ def load_tools(
     from ..sensors.calibration_file import load_calibration
     from ..translation import translate
 
-    translator, unit = translate.load_translator(weights, answer, target, source), load_calibration(calibration)
+    translator = translate.load_translator(weights, answer, target, source)
+    unit = load_calibration(calibration, translator.target)
     mapper = height_map.gel_mapper(unit.camera)
     dots = None
     if preset == "fast" and unit.markers is None:
@@ -82,6 +83,8 @@ def load_tools(
         dots = shade.dots
     solve: Solver | None = None
     if gel == SOLVED:
+        if translator.target != TARGET:
+            raise TactileError("--gel solved", f"asked of {translator.target}", f"{TARGET}, which alone is solved")
         from . import solved_gel
 
         solved_gel.prepare()
@@ -89,9 +92,9 @@ def load_tools(
     asked = translator.answer
     posterior = translator.posterior if asked.follows else None
     drawn = translator.plausible if asked.samples else None
-    named = translator.card, translator.sha256
+    named, pair = (translator.card, translator.sha256), (translator.source, translator.target)
     drawing = mapper, shade, preset, unit.camera
-    return Tools(translator, *named, *drawing, posterior, drawn, asked, solve, dots, translator.source)
+    return Tools(translator, *named, *drawing, posterior, drawn, asked, solve, dots, *pair)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ..sensors import PRESSURE_PER_COUNT
 from ..sensors.camera import Camera
 from ..translation.answer import Answer
 from ..translation.card_errors import doubt
-from ..translation.card_sensors import SOURCE
+from ..translation.card_sensors import SOURCE, TARGET
 from ..translation.contact_track import Evidence, Tracked
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet
@@ -62,7 +62,7 @@ class Tools:
     answer : what the translator was asked for
     solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
     dots : on the gel that is drawn; None: it has none
-    source : the sensor whose recordings are translated
+    source, target : the sensor whose recordings are translated, and the gel
     """
 
     translate: Callable[..., Translation]
@@ -78,6 +78,7 @@ class Tools:
     solve: Solver | None = None
     dots: MarkerField | None = None
     source: str = SOURCE
+    target: str = TARGET
 
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """Draw the picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
@@ -160,8 +161,8 @@ class FramePass:
             (folder / results.IMAGES).mkdir()
         name = self.recording.name.encode(errors="replace").decode()  # HDF5 text is UTF-8, file names need not be
         about = {"recording": name, "simulated": self.recording.simulated}
-        keep, source = kept(self.keep, self.tools.answer), self.tools.source
-        with FramesFile(folder / results.FRAMES, len(self.frames), keep, about, source=source) as file:
+        keep, pair = kept(self.keep, self.tools.answer), (self.tools.source, self.tools.target)
+        with FramesFile(folder / results.FRAMES, len(self.frames), keep, about, pair=pair) as file:
             for start in range(0, len(self.frames), CHUNK):
                 frames = self.frames[start : start + CHUNK]
                 arrays = self._translate(frames)
@@ -216,7 +217,9 @@ class FramePass:
         from .gel_traction import gel_traction  # with all of contact mechanics
 
         with self.clock.stage("traction"):
-            found = gel_traction(arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]))
+            found = gel_traction(
+                arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]), self.tools.target
+            )
         self._forces.append(np.stack([found["traction_force"], arrays["force"]]))
         return found
 
@@ -224,7 +227,7 @@ class FramePass:
         touching = np.isfinite(arrays["contact_center"][:, 0])
         self._errors.append(np.stack([arrays[name][touching] for name in LEFT]))
         self._pressure.append(arrays["pressure"])
-        self.share = max(self.share, depth_share(arrays["displacement_digit"]))
+        self.share = max(self.share, depth_share(arrays["displacement_digit"], self.tools.target))
 
     def _translate(self, frames: np.ndarray) -> dict[str, np.ndarray]:
         """Translate some frames to all arrays, T first, by the names of frames.h5."""
@@ -291,4 +294,4 @@ class FramePass:
             source=self.tools.source,
             **columns,
         )
-        contact_sheet(path, contents)
+        contact_sheet(path, contents, self.tools.camera)

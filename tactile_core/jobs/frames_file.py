@@ -12,7 +12,7 @@ from .. import sensors
 from ..files.hdf5_writer import Disk
 from ..files.version import __version__
 from ..recordings import flags
-from ..translation.card_sensors import SOURCE
+from ..translation.card_sensors import SHIPPED
 
 if TYPE_CHECKING:
     import h5py
@@ -85,22 +85,20 @@ def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]
     return {name: meaning for about in (ALWAYS, *kept) for name, meaning in about.items()}
 
 
-def named(name: str, source: str) -> str:
-    """Return the name of a dataset of frames of another source than a BioTac."""
-    return f"{name.removesuffix(SOURCE)}{source}" if name.endswith(f"_{SOURCE}") else name
+def named(name: str, pair: tuple[str, str]) -> str:
+    """Return the name of a dataset of frames of another source than a BioTac, or another gel than a DIGIT's."""
+    stem, _, role = name.rpartition("_")
+    return f"{stem}_{pair[SHIPPED.index(role)]}" if role in SHIPPED else name
 
 
-def described(meaning: str, source: str) -> str:
-    """Return a dataset's meaning in frames of another source than a BioTac."""
-    if source == SOURCE:
-        return meaning
-    count = sensors.electrode_count(source)
-    for word, other in (
-        ("biotac_surface()", f"sensor_surface({source!r})"), ("BioTac", sensors.title(source)),
-        ("(T, 19) E1..E19", f"(T, {count}) E1..E{count}"),
-    ):  # fmt: skip
-        meaning = meaning.replace(word, other)
-    return meaning
+def described(meaning: str, pair: tuple[str, str]) -> str:
+    """Return a dataset's meaning in frames of another source than a BioTac, or another gel than a DIGIT's."""
+    for role, sensor in zip(SHIPPED, pair, strict=True):
+        if role != sensor:
+            meaning = meaning.replace(f"{role}_surface()", f"sensor_surface({sensor!r})")
+            meaning = meaning.replace(sensors.title(role), sensors.title(sensor))
+    count = sensors.electrode_count(pair[0])
+    return meaning.replace("(T, 19) E1..E19", f"(T, {count}) E1..E{count}")
 
 
 class FramesFile:
@@ -111,11 +109,11 @@ class FramesFile:
 
     def __init__(
         self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0,
-        source: str = SOURCE,
+        pair: tuple[str, str] = SHIPPED,
     ) -> None:  # fmt: skip
         """Create the file.
 
-        source : the sensor that was read, after which its datasets are named
+        pair : the sensor that was read and the gel, after which datasets are named
 
         path : new file; count : T; attributes : of the file itself, beside format and version.
 
@@ -125,7 +123,7 @@ class FramesFile:
         import h5py
 
         self._about = arrays_of(keep, shard=bool(room))
-        self._count, self._framed, self._source = count, bool(room), source
+        self._count, self._framed, self._pair = count, bool(room), pair
         self._disk = Disk(path)
         self._file = h5py.File(self._disk, "w", userblock_size=room)
         self._file.attrs.update({"format": FORMAT, "tactile_core": __version__, **attributes})
@@ -155,7 +153,7 @@ class FramesFile:
         with self._checked():
             for name, array in arrays.items():
                 if name in self._about:
-                    own = named(name, self._source)
+                    own = named(name, self._pair)
                     data = self._file[own] if own in self._file else self._create(name, array)
                     data[start : start + len(array)] = array
 
@@ -170,10 +168,10 @@ class FramesFile:
         large = self._framed and array[0].size >= LARGE
         chunks = (1, *array.shape[1:]) if packing or large else None
         shape = (self._count, *array.shape[1:])
-        own = named(name, self._source)
+        own = named(name, self._pair)
         data = self._file.create_dataset(own, shape, kind, chunks=chunks, track_times=False, **packing)
         unit, meaning = self._about[name]
-        data.attrs.update({"unit": unit, "description": described(meaning, self._source)})
+        data.attrs.update({"unit": unit, "description": described(meaning, self._pair)})
         if name == "flags":
             data.attrs["names"] = json.dumps(flags.names())
         return data

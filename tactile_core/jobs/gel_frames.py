@@ -22,7 +22,7 @@ from ..simulation.pairs_file import TARGET
 from .frames_file import FORMAT as CONVERTED
 
 if TYPE_CHECKING:
-    from ..mechanics.solve import Tier
+    from ..mechanics.solution import Tier
     from ..recordings.array_store import Store
 
 CONVERT = "Of a recording: `tactile convert` it first, and render its frames.h5"

@@ -7,20 +7,21 @@ import numpy as np
 from .. import accuracy, sensors
 from ..mechanics.inverse_contact import pressing_traction
 from ..mechanics.node_areas import node_areas
+from ..translation.card_sensors import TARGET
 from ..translation.contact_patch import contact_patch
 
 
-def gel_traction(displacement: np.ndarray, touched: np.ndarray) -> dict[str, np.ndarray]:
+def gel_traction(displacement: np.ndarray, touched: np.ndarray, gel: str = TARGET) -> dict[str, np.ndarray]:
     """Return arrays ``traction_digit`` (T, M, 3) Pa, ``traction_force`` (T, 3) N of gels displaced by (T, M, 3) m.
 
-    touched : (T,) bool, frames in contact; the others are zero
+    touched : (T,) bool, frames in contact; the others are zero; gel : the sensor
     """
     traction = np.zeros(displacement.shape, np.float32)
     frames = np.flatnonzero(touched)
-    patches = contact_patch(displacement[frames], sensors.digit_surface()) if len(frames) else ()
+    patches = contact_patch(displacement[frames], sensors.sensor_surface(gel)) if len(frames) else ()
     for frame, patch in zip(frames, patches, strict=True):
-        traction[frame] = pressing_traction("digit", displacement[frame].astype(float), patch)
-    total = np.einsum("tnk,n->tk", traction, node_areas("digit"))
+        traction[frame] = pressing_traction(gel, displacement[frame].astype(float), patch)
+    total = np.einsum("tnk,n->tk", traction, node_areas(gel))
     return {"traction_digit": traction, "traction_force": total.astype(np.float32)}
 
 

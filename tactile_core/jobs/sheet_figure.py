@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import sensors
+from ..geometry.lattice import Lattice
 from ..sensors import unrolling
 from ..sensors.camera import Camera
 
@@ -26,7 +27,7 @@ PRESSURE = 0.75
 CAPTION, FOOT = 0.75, 0.25
 
 UNROLLED_X, UNROLLED_Z = (-24e-3, 8e-3), (-11.2e-3, 11.2e-3)  # m, what the unrolled rows show
-GEL_X, GEL_Z = (-20.6e-3, 5.4e-3), (-9.6e-3, 9.6e-3)  # m, what the DIGIT's row shows
+BESIDE_GEL = 0.5e-3, 0.4e-3  # m along and across the finger, of what the gel's row shows beside it
 COLORMAP = "viridis"
 SMALLEST_SCALE = 1e-6  # m, so that frames without contact do not show rounding as colour
 MARK = "#c03028"
@@ -39,8 +40,14 @@ class SheetFigure:
         from matplotlib.figure import Figure
 
         self.columns, self.camera, self.warnings = columns, camera, warnings
+        self._gel = sensors.sensor_surface(camera.sensor)
+        self._gel_x, self._gel_z = (
+            _shown(self._gel.rest[:, axis], beside) for axis, beside in zip((0, 2), BESIDE_GEL, strict=True)
+        )
         self.column_width = (WIDTH - LEFT - RIGHT - (FRAMES - 1) * GAP) / FRAMES
-        rows = (2 if truth else 1) * self._row_height(UNROLLED_X, UNROLLED_Z) + self._row_height(GEL_X, GEL_Z)
+        rows = (2 if truth else 1) * self._row_height(UNROLLED_X, UNROLLED_Z) + self._row_height(
+            self._gel_x, self._gel_z
+        )
         rows += self.column_width * camera.height / camera.width + (2 if truth else 1) * GAP + Z_AXIS
         head = TITLE + WARNING_LINE * len(warnings) + NUMBERS + ELECTRODES + TIME_AXIS + HEADING
         head += (PRESSURE + TIME_AXIS) * pressure
@@ -120,12 +127,12 @@ class SheetFigure:
         faces = faces[np.isfinite(plan[faces]).all((1, 2))]
         self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, contact_center)
 
-    def digit_row(self, label: str, displacement: np.ndarray, contact_center: np.ndarray | None) -> None:
+    def gel_row(self, label: str, displacement: np.ndarray, contact_center: np.ndarray | None) -> None:
         """Draw maps of (k, M, 3) m on the gel, with the border of its picture; contact_center : (k, 2) m."""
-        gel = sensors.digit_surface()
+        gel = self._gel
         largest = scale(displacement)
         axes = self._surface_row(
-            label, gel.rest[:, [0, 2]], gel.faces, displacement, largest, GEL_X, GEL_Z, contact_center
+            label, gel.rest[:, [0, 2]], gel.faces, displacement, largest, self._gel_x, self._gel_z, contact_center
         )
         x, z = self.camera.gel_x[[0, -1]], self.camera.gel_z[[0, -1]]
         for each in axes:
@@ -146,14 +153,14 @@ class SheetFigure:
         z: tuple[float, float],
         contact_center: np.ndarray | None,
     ) -> list[Axes]:
-        """Draw one row of maps of |displacement| over the plan (n, 2) = (x, z) m, with the DIGIT's outline."""
+        """Draw one row of maps of |displacement| over the plan (n, 2) = (x, z) m, with the gel's outline."""
         from matplotlib.tri import Triangulation
 
         height = self._row_height(x, z)
         place = np.nan_to_num(plan) * 1e3
         triangles = Triangulation(place[:, 1], place[:, 0], faces)
         length = np.linalg.norm(displacement, axis=-1) * 1e3
-        outline = _gel_outline() * 1e3
+        outline = _outline(self._gel) * 1e3
         row = []
         for k in range(self.columns):
             axes = self._axes(LEFT + k * (self.column_width + GAP), self.column_width, height)
@@ -202,9 +209,10 @@ class SheetFigure:
             self._text(self._middle(k), 0.08, text, size=10, ha="center", va="top", color=color)
         self.top += CAPTION
         along = "left" if self.camera.right_z < 0 else "right"
+        gel = sensors.title(self.camera.sensor)
         foot = (
             f"Maps lie as the camera sees the gel: fingertip (-x) {'up' if self.camera.down_x > 0 else 'down'}, "
-            f"z to the {along}. Black: outline of the DIGIT's gel. Dashed: its picture. Cross: contact centre."
+            f"z to the {along}. Black: outline of the {gel}'s gel. Dashed: its picture. Cross: contact centre."
         )
         self._text(LEFT, 0.05, foot, size=7.5, color="0.35", va="center")
 
@@ -225,8 +233,13 @@ def scale(*displacements: np.ndarray | None) -> float:
     return max(SMALLEST_SCALE, *lengths)
 
 
-def _gel_outline() -> np.ndarray:
-    """Closed outline (n, 2) = (x, z) m of the DIGIT's gel surface: the border of its lattice."""
-    gel = sensors.digit_surface()
+def _shown(place: np.ndarray, beside: float) -> tuple[float, float]:
+    """Return what a row shows along one axis, m: all nodes' places (n,) m and a little beside, in tenths of a mm."""
+    low, high = np.round(1e4 * np.array([place.min() - beside, place.max() + beside])) / 1e4
+    return float(low), float(high)
+
+
+def _outline(gel: Lattice) -> np.ndarray:
+    """Closed outline (n, 2) = (x, z) m of a gel's surface: the border of its lattice."""
     grid = gel.grid(gel.rest)[..., [0, 2]]
     return np.concatenate([grid[0], grid[1:, -1], grid[-1, -2::-1], grid[-2::-1, 0]])

@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import sensors
 from ..accuracy import CORE
+from .card_sensors import TARGET
 
 STILL = 1e-9  # m: below, there is no dent to follow and the frame stays in the middle
 FADE = 5  # cells (assumed)
@@ -27,12 +28,14 @@ class ContactFrame:
     rows, columns : of the lattice; nodes behind them (poles) lie in no window
     half : cells from the window's middle to its edge
     turn : (n,) rad, rotation of each node's frame about x against the shared one
+    sensor : whose surface it is
     """
 
     rows: int
     columns: int
     half: int
     turn: np.ndarray
+    sensor: str = TARGET
 
     @property
     def width(self) -> int:
@@ -127,7 +130,7 @@ def frame_of(sensor: str, half: int) -> ContactFrame:
     if not sensors.is_gel(sensor):
         rows, columns = lattice.shape
         turn[: rows * columns] = np.tile(sensors.skin_of(sensor).angles(), rows)
-    return ContactFrame(*lattice.shape, half, turn)
+    return ContactFrame(*lattice.shape, half, turn, sensor)
 
 
 def between_nodes(grid: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Convert between places of the DIGIT's latent and positions on its gel, so that contacts can be shifted."""
+"""Convert between places of a gel's latent and positions on it, so that contacts can be shifted."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ SMALL = 1e-3  # cells, over which a slope is taken
 
 def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
     """Return positions (T, 2) = (x, z) m on the resting gel of places (T, 2) of a latent, bilinearly."""
-    return between_nodes(_grid(frame.rows, frame.columns), place)
+    return between_nodes(_grid(frame.sensor, frame.rows, frame.columns), place)
 
 
 def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
     """Return the places (T, 2) of points (T, 2) m, inverse of `on_gel`; points beside the gel have rim places."""
-    grid = _grid(frame.rows, frame.columns)
+    grid = _grid(frame.sensor, frame.rows, frame.columns)
     size = np.array(grid.shape[:2])
     apart = np.square(grid.reshape(-1, 2)[None] - point[:, None]).sum(axis=-1).argmin(axis=1)
     nearest = np.stack(np.unravel_index(apart, grid.shape[:2]), axis=-1)
@@ -43,7 +43,7 @@ class Shift:
 
     def __init__(self, frame: ContactFrame, shift: np.ndarray) -> None:
         """Take the shift (2,) = (x, z) m of contacts."""
-        came = _grid(frame.rows, frame.columns).reshape(-1, 2) - shift
+        came = _grid(frame.sensor, frame.rows, frame.columns).reshape(-1, 2) - shift
         place = place_on(frame, came)
         self._frame, self._place = frame, place
         # Beside the gel there is nothing to move here: what moved at its rim fades out.
@@ -59,6 +59,6 @@ class Shift:
 
 
 @functools.cache
-def _grid(rows: int, columns: int) -> np.ndarray:
+def _grid(sensor: str, rows: int, columns: int) -> np.ndarray:
     """Coordinates (x, z), (rows, columns, 2) m, of the gel's nodes at rest."""
-    return sensors.digit_surface().rest[: rows * columns, [0, 2]].reshape(rows, columns, 2)
+    return sensors.sensor_surface(sensor).rest[: rows * columns, [0, 2]].reshape(rows, columns, 2)

@@ -96,11 +96,11 @@ class Networks:
         self.tensors = {
             net: {name: np.ascontiguousarray(array, np.float32) for name, array in tensors[net].items()} for net in NETS
         }
-        self.frames = {net: self._frame(net) for net in ("MVB", "MVD")}
+        self.frames = {"MVB": self._frame("MVB", self.source), "MVD": self._frame("MVD", self.target)}
 
-    def _frame(self, net: str) -> ContactFrame:
+    def _frame(self, net: str, sensor: str) -> ContactFrame:
         sizes = self.sizes[net]
-        return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"])
+        return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"], sensor)
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Encode change (T, 19) counts from rest, as `sensors.COUNT_SIGN`, rectified or not, to SVB's mean (T, K)."""

@@ -13,7 +13,6 @@ from .. import accuracy, sensors
 from ..errors import TactileError
 from ..recordings import Signals
 from ..recordings.flags import Flag
-from ..sensors import digit as digit_shape
 from ..sensors import unrolling as surface
 from . import error_bounds, gel_place, networks, plausible, reference_signals
 from .answer import MEAN, Answer
@@ -102,7 +101,7 @@ class Translator:
     def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
         """Take patterns : simulated contacts of the source; None for a BioTac's, which ship."""
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
-        self.source, self._patterns = nets.source, patterns
+        self.source, self.target, self._patterns = nets.source, nets.target, patterns
         self.answer = answer or Answer()
         moved = self.answer.mount_shift
         self._shift = gel_place.Shift(nets.frames["MVD"], moved) if moved.any() else None
@@ -159,7 +158,9 @@ class Translator:
         if self._shift is not None:
             digit = self._shift(digit)
         # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
-        center = contact_center(digit, sensors.digit_surface().rest, self.silent("digit_m") if alone else STILL)
+        center = contact_center(
+            digit, sensors.sensor_surface(self.target).rest, self.silent("digit_m") if alone else STILL
+        )
         silent = np.isnan(center[:, 0])
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
@@ -246,7 +247,7 @@ class Translator:
         total = weight.sum(axis=1)
         center = weight @ np.nan_to_num(self._unrolled) / np.where(total > 0, total, 1)[:, None]
         center += self.answer.mount_shift
-        outside = digit_shape.outline_distance(center[:, 0], center[:, 1]) <= 0
+        outside = sensors.shape_of(self.target).outline_distance(center[:, 0], center[:, 1]) <= 0
         return core.any(axis=1) & (outside | (total == 0))
 
 
@@ -274,10 +275,7 @@ def _grows(values: Any) -> bool:
 
 
 def _check_pair(card: dict[str, Any], source: str | None, target: str | None, where: str) -> None:
-    """Check that a card's networks, which its hashes of surfaces name, lead from a sensor to the gel of another.
-
-    Pictures and places know the DIGIT's lattice alone, so that networks to another gel are refused.
-    """
+    """Check that a card's networks, which its hashes of surfaces name, lead from a sensor to the gel of another."""
     if target is not None:
         sensors.shape_of(target)  # raises for a name that is none, and for a sensor without a gel
     known = pair_of(card, where)
