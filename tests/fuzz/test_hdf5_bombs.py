@@ -170,7 +170,8 @@ def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
     said = report_of(prepare, tmp_path / "a.h5")
     assert said.startswith("refused: "), said
     with h5py.File(tmp_path / "b.h5", "w") as file:
-        words = dict.fromkeys(pairs_file.ATTRIBUTES, "x") | {"polarity": "falls", "electrodes": "sheet"}
+        nodes = ("biotac_nodes_sha256", "digit_nodes_sha256")
+        words = dict.fromkeys((*pairs_file.ATTRIBUTES, *nodes), "x") | {"polarity": "falls", "electrodes": "sheet"}
         file.attrs.update(words, format=pairs_file.FORMAT)
         file.create_dataset("displacement_biotac", (10**6, 5000, 3), "i2", chunks=(1, 5000, 3))
         for name in set(pairs_file.DATASETS) - {"displacement_biotac"}:
