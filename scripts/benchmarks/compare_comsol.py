@@ -9,38 +9,29 @@ target, 2 when a file cannot be read. Under a minute a press. Needs the extra [f
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
+from benchmarks.measured_rows import finished, parser_of, printed
 from benchmarks.mechanics.comsol import comsol, fast_rows, presses
-from tactile_core.accuracy import failed
 from tactile_core.errors import TactileError
-from tactile_core.files import atomic
 
 
 def main() -> int:
     """Run the checks, print and write their rows; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("folder", metavar="FOLDER", type=Path)
-    parser.add_argument("--json", metavar="FILE", type=Path, help="write the rows here")
     parser.add_argument("--fast", action="store_true", help="the fast tier of the sensor biotac_sp")
     options = parser.parse_args()
-    rows = []
     try:
         fast = (row for press in presses(options.folder) for row in fast_rows(press))
-        for found in fast if options.fast else comsol(options.folder):
-            rows.append(found)
-            cells = [found[key] for key in ("name", "value", "unit", "target", "baseline", "set", "ok")]
-            print("| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |", flush=True)
+        rows = printed(fast if options.fast else comsol(options.folder))
     except TactileError as error:
         print(error, file=sys.stderr)
         return 2
-    if options.json:
-        atomic.write_json(options.json, rows)
-    return int(bool(failed(rows)))
+    return finished(rows, options.json)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,6 @@ where LLVM works.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -31,8 +30,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is 
 
 from benchmarks.competitors.taxim_like import TableBench, fit_table
 from benchmarks.measure_presets import best_ms, one_thread, working_variants
-from tactile_core.accuracy import HEADER, Row, line, row
-from tactile_core.files import atomic
+from benchmarks.measured_rows import finished, parser_of, printed
+from tactile_core.accuracy import Row, row
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures, working_factor
 from tactile_core.pictures.calibrate.contact_light import contact_disc, contact_radius, fitted_light
 from tactile_core.pictures.calibrate.fit import calibrate
@@ -60,25 +59,18 @@ Change = Callable[[Ball], np.ndarray]  # (H, W, 3) grey levels, of a press
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure and print the rows; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("presses", metavar="PRESSES")
     parser.add_argument("--background", metavar="FILE", help="photograph of the untouched gel; estimated else")
     parser.add_argument("--deeper", metavar="DIR", help="further photographs, of another day")
     parser.add_argument("--finish", action="store_true", help="finish each fit on Mitsuba's pictures")
     parser.add_argument("--every", action="store_true", help="by reference and without LLVM as well")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     parser.add_argument("--quick", action="store_true", help="one third of the photographs, 240 x 320 at 32 samples")
     options = parser.parse_args(arguments)
-    rows = []
-    print(HEADER)
     photographs = read_photographs(options.presses, options.background)
-    for found in measure(photographs, options.deeper, options.finish, options.every, options.quick):
-        rows.append(found)
-        print(line(found), flush=True)
-    if options.json:
-        atomic.write_json(Path(options.json), rows)
+    rows = printed(measure(photographs, options.deeper, options.finish, options.every, options.quick))
     print(table(rows))
-    return 0
+    return finished(rows, options.json)
 
 
 def measure(photographs: Photographs, deeper: str | None, finish: bool, every: bool, quick: bool) -> Iterator[Row]:

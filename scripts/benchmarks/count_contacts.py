@@ -11,7 +11,6 @@ is silently wrong, or when fewer than 99 % converge.
 
 from __future__ import annotations
 
-import argparse
 import collections
 import pathlib
 import sys
@@ -19,6 +18,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 
+from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
 from tactile_core.files.threads import one_thread  # noqa: E402
 
 one_thread()  # before numpy is imported: the times are those of one core
@@ -27,21 +27,19 @@ import numpy as np  # noqa: E402
 
 from benchmarks.mechanics.many import PENETRATION, SETTLED_TARGET, settle  # noqa: E402
 from benchmarks.mechanics.random_contacts import random_contacts  # noqa: E402
-from tactile_core.accuracy import failed, row  # noqa: E402
-from tactile_core.files import atomic  # noqa: E402
+from tactile_core.accuracy import row  # noqa: E402
 from tactile_core.mechanics.solve import TIERS  # noqa: E402
 
 
 def main() -> int:
     """Count, print and report."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("sensor", choices=("biotac", "digit"))
     parser.add_argument("--count", type=int, default=1000, help="contacts (1000)")
     parser.add_argument("--tier", choices=TIERS, default="fast", help="(fast)")
     parser.add_argument("--friction", type=float, default=0.0, help="Coulomb's coefficient (0)")
     parser.add_argument("--steps", type=int, default=1, help="of the path to each contact (1)")
     parser.add_argument("--seed", type=int, default=0, help="(0)")
-    parser.add_argument("--json", type=pathlib.Path, help="write the rows here")
     options = parser.parse_args()
     if options.steps < 1:
         parser.error(f"--steps {options.steps}: expected at least 1")
@@ -65,11 +63,8 @@ def main() -> int:
     rows.append(row(f"{options.sensor}_settled", share, "percent", SETTLED_TARGET, of=of, at_least=True))
     rows.append(row(f"{options.sensor}_silently_wrong", wrong, "1", 0.0, of=of))
     rows.append(row(f"{options.sensor}_mean_time", float(every.mean()), "ms", of=of + ", with its set-up"))
-    for found in rows[-3:]:
-        print(f"{found['name']}: {found['value']} {found['unit']}, {of}")
-    if options.json:
-        atomic.write_json(options.json, rows)
-    return int(bool(failed(rows)))
+    printed(rows[-3:])
+    return finished(rows, options.json)
 
 
 if __name__ == "__main__":

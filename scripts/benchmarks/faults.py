@@ -10,7 +10,6 @@ small disk the right to mount one (root), and says so without it. Linux alone.
 
 from __future__ import annotations
 
-import argparse
 import signal
 import tempfile
 import time
@@ -19,34 +18,27 @@ from pathlib import Path
 
 from benchmarks.fault_bench import Bench, Lost, end_all
 from benchmarks.fault_kinds import ABSENT, FAULTS
-from tactile_core.accuracy import HEADER, Row, failed, line, row
-from tactile_core.files import atomic
+from benchmarks.measured_rows import finished, parser_of, printed
+from tactile_core.accuracy import Row, row
 
 QUICK_LIMIT, LIMIT = 300, 3600  # s for one fault; a quick one takes 10 s, and 50 s where ten programs share two cores
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Try all faults; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="two short recordings and few blows")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     parser.add_argument("--seed", type=int, default=0, help="of the recordings and of the moments (default: 0)")
     parser.add_argument("--only", choices=FAULTS, help="this fault alone")
     options = parser.parse_args(arguments)
-    print(HEADER)
-    found = []
     signal.signal(signal.SIGALRM, late)
     limit = QUICK_LIMIT if options.quick else LIMIT
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(Path(folder), options.quick, options.seed)
         count = len(bench.known)
-        for name, fault in FAULTS.items():
-            if options.only in (None, name):
-                found.append(tried(name, fault, bench, count, limit))
-                print(line(found[-1]), flush=True)
-    if options.json:
-        atomic.write_json(Path(options.json), found)
-    return int(bool(failed(found)))
+        chosen = {name: fault for name, fault in FAULTS.items() if options.only in (None, name)}
+        rows = (tried(name, fault, bench, count, limit) for name, fault in chosen.items())
+        return finished(printed(rows), options.json)
 
 
 def tried(name: str, fault: Callable[[Bench], Lost | None], bench: Bench, count: int, limit: int) -> Row:

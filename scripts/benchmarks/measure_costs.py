@@ -9,7 +9,6 @@ each frame's. Times are CPU time of one thread; memory is the peak resident size
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import sys
 import tempfile
@@ -17,13 +16,13 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-from tactile_core.files.shipped import shipped
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
+from benchmarks.measured_rows import finished, parser_of, printed
 from benchmarks.profile_verbs import RECORDING, Case, run, write_scene
-from tactile_core.accuracy import HEADER, Row, line, row
+from tactile_core.accuracy import Row, row
 from tactile_core.files import atomic, provenance
+from tactile_core.files.shipped import shipped
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.placement import FRICTION, Placement
 from tactile_core.mechanics.solve import Sensor, solve
@@ -52,9 +51,8 @@ class Part(NamedTuple):
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="the DIGIT alone, and leave the table as it is")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -64,15 +62,13 @@ def main(arguments: list[str] | None = None) -> int:
             parts |= conversions(folder)
         full = {} if options.quick else full_tier()
     rows = as_rows(parts, full)
-    print("\n".join([HEADER, *map(line, rows)]))
-    if options.json:
-        atomic.write_json(Path(options.json), rows)
+    printed(rows)
     if not options.quick:
         how = "scripts/benchmarks/measure_costs.py: CPU s of one thread, MB resident, kB a frame on disk"
         named = {name: part._asdict() for name, part in parts.items()}
         about = {"how": how, "machine": provenance.machine(), "versions": provenance.versions()}
         atomic.write_json(TABLE, about | {"parts": named, "full_ms": full})
-    return 0
+    return finished(rows, options.json)
 
 
 def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:

@@ -13,7 +13,6 @@ fast tier against the full one (`mechanics_tiers.json`), and how far what is com
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -24,6 +23,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 
+from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
 from tactile_core.files.threads import one_thread  # noqa: E402
 
 one_thread()  # before numpy is imported: the times are those of one core
@@ -31,7 +31,7 @@ one_thread()  # before numpy is imported: the times are those of one core
 import numpy as np  # noqa: E402
 
 from benchmarks.mechanics.random_contacts import RandomContact, random_contacts  # noqa: E402
-from tactile_core.accuracy import HEADER, Row, line, row  # noqa: E402
+from tactile_core.accuracy import Row, row  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.files import atomic, compiled  # noqa: E402
 from tactile_core.jobs.gel import Gel  # noqa: E402
@@ -54,9 +54,8 @@ Times = list[tuple[float, float]]  # CPU and wall, ms
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--count", type=int, default=500, help="contacts a sensor, alone and on paths (%(default)s)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table here")
     options = parser.parse_args(arguments)
     if not compiled.available():
@@ -74,13 +73,11 @@ def main(arguments: list[str] | None = None) -> int:
             middle = quantiles(times[how])
             table.append(f"| {name} | {how} | {' | '.join(f'{each:.3g}' for each in middle)} | {error[how]} |")
         rows += as_rows(name, times, error)
-    print("\n".join([HEADER, *map(line, rows)]))
+    printed(rows)
     print("\n".join(table))
-    if options.json:
-        atomic.write_json(options.json, rows)
     if options.markdown:
         atomic.write_bytes(options.markdown, ("\n".join(table) + "\n").encode())
-    return 0
+    return finished(rows, options.json)
 
 
 def quantiles(times: Times) -> list[float]:

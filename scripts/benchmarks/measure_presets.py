@@ -15,7 +15,6 @@ its target. Needs the extras [render] and [fem]; rows of llvm_ad_rgb only where 
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import sys
 import time
@@ -26,9 +25,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
+from benchmarks.measured_rows import finished, parser_of, printed
 from benchmarks.mechanics.random_contacts import DEEPEST as DRAWN_TO
 from benchmarks.mechanics.random_contacts import random_contacts
-from tactile_core.accuracy import HEADER, Row, failed, line, row
+from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic, provenance
 from tactile_core.mechanics.placement import pose_at
@@ -64,27 +64,18 @@ REPEATS = 5  # of a frame whose time is taken
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="two fields, the small size")
     parser.add_argument("--fields", type=int, default=FIELDS, metavar="N", help="contacts to draw")
     parser.add_argument("--coatings", action="store_true", help="only standard and quality against paths, by coating")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     parser.add_argument("--calibration", metavar="FILE", help="another than the shipped one")
     options = parser.parse_args(arguments)
     unit = load_calibration(options.calibration)
-    rows = []
-    print(HEADER)
     count = 2 if options.quick else options.fields
-    for found in against_paths(unit) if options.coatings else measure(unit, count, options.quick):
-        rows.append(found)
-        print(line(found), flush=True)
-    if options.json:
-        atomic.write_json(Path(options.json), rows)
+    rows = printed(against_paths(unit) if options.coatings else measure(unit, count, options.quick))
     if not (options.quick or options.calibration or options.coatings):
         atomic.write_json(TABLE, table(rows, count))
-    for missed in failed(rows):
-        print(f"MISSED: {missed['name']} = {missed['value']}, target {missed['target']}", file=sys.stderr)
-    return int(bool(failed(rows)))
+    return finished(rows, options.json)
 
 
 def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:

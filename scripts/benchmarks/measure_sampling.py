@@ -10,14 +10,16 @@ gel stands upright), over those in the picture that have moved by more than 10 u
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
+
+from benchmarks.measured_rows import finished, parser_of, printed
 from tactile_core import sensors
-from tactile_core.accuracy import HEADER, Row, line, row
+from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic, provenance
 from tactile_core.files.shipped import shipped
@@ -42,19 +44,15 @@ MOVED = 10e-6  # m
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="two presses, and leave the table as it is")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
     found = measured(options.quick)
-    rows = as_rows(found)
-    print("\n".join([HEADER, *map(line, rows)]))
-    if options.json:
-        atomic.write_json(Path(options.json), rows)
+    rows = printed(as_rows(found))
     if not options.quick:
         how = "scripts/benchmarks/measure_sampling.py: heights between nodes, full-tier presses of five indenters"
         atomic.write_json(TABLE, {"how": how, "versions": provenance.versions(), **found})
-    return 0
+    return finished(rows, options.json)
 
 
 def measured(quick: bool) -> dict:

@@ -9,7 +9,6 @@ what each may load are in ``CASES``; tests/scripts/test_profile_verbs.py runs th
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import io
 import json
@@ -24,9 +23,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
+
+from benchmarks.measured_rows import finished, parser_of, printed
 from tactile_core import recordings
-from tactile_core.accuracy import HEADER, Row, line, row
-from tactile_core.files import atomic, png_writer
+from tactile_core.accuracy import Row, row
+from tactile_core.files import png_writer
 from tactile_core.jobs import live
 from tactile_core.jobs.convert import load_tools
 from tactile_core.recordings import Truth, write_simulated
@@ -119,22 +121,14 @@ class Cost(NamedTuple):
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help=f"without the {LONG} frames")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
-    print(HEADER)
-    found: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_inputs(folder)
-        for part in (verbs(folder), packings(), live_picture(), [] if options.quick else long_conversion(folder)):
-            for one in part:
-                found.append(one)
-                print(line(one), flush=True)
-    if options.json:
-        atomic.write_json(Path(options.json), found)
-    return 0
+        parts = verbs(folder), packings(), live_picture(), [] if options.quick else long_conversion(folder)
+        return finished(printed(one for part in parts for one in part), options.json)
 
 
 def write_inputs(folder: Path) -> None:

@@ -10,7 +10,6 @@ it was. Frames a second of more workers than there are cores are not measured: `
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import shutil
@@ -25,8 +24,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
 from benchmarks.fault_bench import write_hdf5
-from tactile_core.accuracy import HEADER, Row, line, row
-from tactile_core.files import atomic
+from benchmarks.measured_rows import finished, parser_of, printed
+from tactile_core.accuracy import Row, row
 from tactile_core.files.threads import ONE
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import local
@@ -40,27 +39,19 @@ MANY = 64  # workers that `scaling` speaks of
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="small counts alone")
     parser.add_argument("--most", type=int, default=100_000, metavar="N", help="frames of the longest recording")
     parser.add_argument("--pictures", type=int, default=3000, metavar="N", help="frames of the most fast pictures")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
     most, seen = (10_000, 300) if options.quick else (options.most, options.pictures)
-    print(HEADER)
-    found: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for part in (  # one after another, so that what was measured stands there whatever comes next
+        parts = (  # one after another, so that what was measured stands there whatever comes next
             lambda: growth(folder, most), lambda: workers(folder), lambda: memory(folder, most),
             lambda: pictures(folder, seen),
-        ):  # fmt: skip
-            for one in part():
-                found.append(one)
-                print(line(one), flush=True)
-    if options.json:
-        atomic.write_json(Path(options.json), found)
-    return 0
+        )  # fmt: skip
+        return finished(printed(one for part in parts for one in part()), options.json)
 
 
 def cost(*words: object) -> tuple[float, float, float]:

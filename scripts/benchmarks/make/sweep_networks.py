@@ -22,11 +22,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # `benchmarks` is no package that is installed
 
+from benchmarks.measured_rows import finished, parser_of
 from benchmarks.translation.noise import as_read
 from benchmarks.translation.test_set import SEED
 from tactile_core.accuracy import HEADER, Row, line
 from tactile_core.errors import TactileError
-from tactile_core.files import atomic
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.error_summary import metric_row, metric_rows
 from tactile_core.training.step_errors import our_bodies, translation_metrics
@@ -54,14 +54,13 @@ NOT_COMPARED = ("back", "error")
 
 def main(arguments: list[str] | None = None) -> int:
     """Train, compare, print and write; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("pairs", help="HDF5 file of `tactile pairs`")
     parser.add_argument("--out", type=Path, required=True, help="folder for the trainings, which are kept")
     parser.add_argument("--effort", type=float, default=1.0, help="times the usual epochs (default: 1)")
     names = [*SETTINGS, *OWN_ROWS]
     parser.add_argument("--only", action="append", choices=names, help="a setting (default: all there are pairs for)")
     parser.add_argument("--prototype", metavar="FILE", help="pairs of scenes/prototype, to train on as well")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
     test, rows = read_pairs(TEST_SET), []
     print(HEADER, flush=True)
@@ -73,9 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
     except TactileError as error:
         print(error, file=sys.stderr)
         return 2
-    if options.json:
-        atomic.write_json(Path(options.json), rows)
-    return 0
+    return finished(rows, options.json)
 
 
 def setting_rows(name: str, options: argparse.Namespace, test: Pairs) -> list[Row]:

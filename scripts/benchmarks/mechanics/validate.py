@@ -9,7 +9,6 @@ Prints a table as it goes; exits 1 when an error row misses its target. Needs th
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -17,6 +16,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from benchmarks.measured_rows import finished, parser_of
 from benchmarks.mechanics import (
     comsol,
     electrode_law,
@@ -36,9 +36,8 @@ from benchmarks.mechanics import (
 )
 from benchmarks.mechanics.mechanics_page import write
 from benchmarks.translation import rest_impedance, simulated_patterns, skin_stiffness
-from tactile_core.accuracy import HEADER, Row, failed, line
+from tactile_core.accuracy import HEADER, Row, line
 from tactile_core.accuracy import row as make_row
-from tactile_core.files import atomic
 
 ROOT = Path(__file__).resolve().parents[3]
 REPORT = ROOT / "docs" / "mechanics.md"
@@ -87,9 +86,8 @@ CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the checks, print and write their rows; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer depths and meshes")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     parser.add_argument("--only", nargs="+", choices=CHECKS, metavar="CHECK", help=f"of {', '.join(CHECKS)}")
     options = parser.parse_args(arguments)
     found: dict[str, list[Row]] = {}
@@ -103,13 +101,9 @@ def main(arguments: list[str] | None = None) -> int:
             print(line(row), flush=True)
         print(f"{name}: {time.perf_counter() - started:.0f} s", file=sys.stderr, flush=True)
     rows = [row for part in found.values() for row in part]
-    if options.json:
-        atomic.write_json(Path(options.json), rows)
     if not options.quick and not options.only:
         write(REPORT, {CHECKS[name][1]: part for name, part in found.items()})
-    for row in failed(rows):
-        print(f"MISSED: {row['name']} = {row['value']} {row['unit']}, target {row['target']}", file=sys.stderr)
-    return int(bool(failed(rows)))
+    return finished(rows, options.json)
 
 
 def measured(name: str, quick: bool) -> Iterator[Row]:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.measured_rows import finished, parser_of, printed
 from benchmarks.translation import (
     fluid_pressure,
     followed_rows,
@@ -30,9 +31,8 @@ from benchmarks.translation import (
     two_contact_rows,
 )
 from benchmarks.translation.model_card import write_model_card
-from tactile_core.accuracy import HEADER, Row, failed, line
+from tactile_core.accuracy import Row
 from tactile_core.errors import TactileError
-from tactile_core.files import atomic
 from tactile_core.recordings import electrode_gains, read
 from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
 from tactile_core.simulation.pairs_file import read_pairs
@@ -46,7 +46,7 @@ TEST_SET = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_c
 
 def main(arguments: list[str] | None = None) -> int:
     """Translate, measure, print and write the rows; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--test-set", default=TEST_SET, metavar="FILE", help="pairs of the full tier (%(default)s)")
     parser.add_argument(
         "--kept-apart",
@@ -60,7 +60,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--weights", metavar="FOLDER", help="networks of your own training instead of the shipped ones")
     parser.add_argument("--sensor", metavar="FILE", help="gains and offsets of their sensor, from `tactile adapt`")
     parser.add_argument("--out", default="out/translated", metavar="FOLDER", help="translations (default: %(default)s)")
-    parser.add_argument("--json", metavar="FILE", help="write the rows here")
     parser.add_argument("--card", metavar="FILE", help="write the model card (Markdown, and a picture beside it) here")
     parser.add_argument("--sweep", metavar="FILE", help="rows of sweep_networks.py, for the card")
     parser.add_argument("--quick", action="store_true", help="a few recordings, or a few test presses")
@@ -71,14 +70,7 @@ def main(arguments: list[str] | None = None) -> int:
     except TactileError as error:
         print(error, file=sys.stderr)
         return 2
-    print(HEADER)
-    for row in found:
-        print(line(row))
-    if options.json:
-        atomic.write_json(Path(options.json), found)
-    for row in failed(found):
-        print(f"MISSED: {row['name']} = {row['value']} {row['unit']}, target {row['target']}", file=sys.stderr)
-    return int(bool(failed(found)))
+    return finished(printed(found), options.json)
 
 
 def on_recordings(network: translate.Translator, options: argparse.Namespace) -> list[Row]:
