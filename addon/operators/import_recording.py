@@ -91,7 +91,10 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Open a small popup for a file that was dropped; the menu opens the file browser."""
-        return self.invoke_popup(context) if self.filepath else super().invoke(context, event)
+        if not self.filepath:
+            return super().invoke(context, event)
+        asked = {"title": os.path.basename(self.filepath), "confirm_text": "Import", "translate": False}
+        return context.window_manager.invoke_props_dialog(self, **asked)
 
     def _objects(
         self, scene: bpy.types.Scene, path: str, found: recording_data.Translated, frames: np.ndarray

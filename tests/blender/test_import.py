@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -160,3 +161,10 @@ def test_what_another_process_cannot_read_is_told_as_here(part, tmp_path):
     bad.write_bytes(b"\x89HDF\r\n\x1a\nrubbish")
     with pytest.raises(part("tactile_core.errors").TactileError, match="damaged"):
         part("addon.process.recording_reader")._read_elsewhere(str(bad))
+
+
+def test_a_dropped_file_opens_a_popup(extension, part):
+    """Blender has no windows here: the operator's own function is called."""
+    operator = part("addon.operators.import_recording").TACTILE_OT_import_recording
+    context = SimpleNamespace(window_manager=SimpleNamespace(invoke_props_dialog=lambda _, **words: words["title"]))
+    assert operator.invoke(SimpleNamespace(filepath="/day/touch.h5"), context, None) == "touch.h5"
