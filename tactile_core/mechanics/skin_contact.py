@@ -36,9 +36,7 @@ MOVES = 2  # of each body toward the load's centre; then it lies within .07 mm i
 
 @dataclass(frozen=True)
 class _Dent:
-    """A dented skin: displacement (n, 3) m, its inward part (n,) m, pressure (n,) Pa, and the centre (2,) m of its
-    load on the unrolled pad.
-    """
+    """Dented skin: displacement (n, 3) m, its inward part (n,) m, pressure (n,) Pa, centre (2,) m of its load."""
 
     displacement: np.ndarray
     inward: np.ndarray

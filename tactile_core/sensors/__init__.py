@@ -41,7 +41,7 @@ PRESSURE_PER_COUNT = _READOUT.pressure  # Pa a count of PDC
 
 
 def electrode_count(sensor: str) -> int:
-    """How many electrodes of a fluid sensor are read. Raises TactileError for another kind of sensor."""
+    """Return how many electrodes of a fluid sensor are read. Raises TactileError for another kind of sensor."""
     return of_kind(sensor, Fluid).electrodes.count
 
 

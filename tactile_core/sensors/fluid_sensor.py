@@ -98,7 +98,7 @@ class Electrodes:
 
 @dataclasses.dataclass(frozen=True)
 class Readout:
-    """How counts come about: each electrode in a voltage divider with a load, read by a converter.
+    """Origin of the counts: each electrode in a voltage divider with a load, read by a converter.
 
     polarity : what counts do where a film thins; pressure : Pa a count of the fluid's pressure
     """
@@ -112,7 +112,7 @@ class Readout:
 
 @dataclasses.dataclass(frozen=True)
 class Unrolling:
-    """How the pad rolls onto the common plane. radius : m, of its cross-section; origin_x : m, where both share x"""
+    """Rolling of the pad onto the common plane. radius : m, of its cross-section; origin_x : m, where both share x"""
 
     radius: float = number("mm", above=0)
     origin_x: float = number("mm")

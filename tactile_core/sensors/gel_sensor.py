@@ -75,7 +75,7 @@ class GelLattice:
 
 @dataclasses.dataclass(frozen=True)
 class Camera:
-    """What the camera looks at. height_zero_y : m, of the plane whose height is zero in pictures
+    """View of the camera. height_zero_y : m, of the plane whose height is zero in pictures
 
     calibration : of a unit's camera and lights, see ``calibration_file``; empty where there is none
     """
