@@ -31,6 +31,7 @@ PYTHONS = ("3.11", "3.13", "3.14")
 WHEELS = ("h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "mitsuba", "drjit")
 PACKED = ("__init__.py", "blender_manifest.toml", "LICENSE", "addon/", "tactile_core/", "scenes/")
 LEFT_OUT = ("scenes/training/", "tactile_core/training/")  # 1.8 MB for tests; torch
+KEPT = ("tactile_core/training/__init__.py", "tactile_core/training/options.py")  # the verb `train` names its choices
 EPOCH = (1980, 1, 1, 0, 0, 0)  # zip's own zero, so that the time of building changes no byte
 
 
@@ -56,7 +57,8 @@ def main(arguments: list[str] | None = None) -> int:
 def tracked() -> list[str]:
     """Files of the checkout that belong in the zip, sorted."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True).stdout.decode()
-    return sorted(n for n in listed.split("\0") if n.startswith(PACKED) and not n.startswith(LEFT_OUT))
+    packed = (name for name in listed.split("\0") if name.startswith(PACKED))
+    return sorted(name for name in packed if name in KEPT or not name.startswith(LEFT_OUT))
 
 
 def fetch(platform: str, python: str, folder: Path) -> list[Path]:

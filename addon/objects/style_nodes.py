@@ -61,6 +61,13 @@ def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> No
         modifier[input_of(modifier.node_group, name)] = value
 
 
+def get_input(modifier: bpy.types.NodesModifier, name: str) -> object:
+    """Return the value of a group's input in a modifier."""
+    if hasattr(modifier, "properties"):
+        return getattr(*input_property(modifier, name))
+    return modifier[input_of(modifier.node_group, name)]
+
+
 def input_path(modifier: bpy.types.NodesModifier, name: str) -> str:
     """Return the data path of a group's input, from its modifier on."""
     key = input_of(modifier.node_group, name)

@@ -43,6 +43,14 @@ def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration:
     _add_nodes(thing, style, {style_nodes.LARGEST: largest, style_nodes.EXAGGERATION: exaggeration})
 
 
+def style_of(thing: bpy.types.Object) -> str:
+    """Name a sensor's style; "NONE" for one of the user's own, too."""
+    modifier = thing.modifiers.get(MODIFIER)
+    names = [name for name, _, _ in STYLES if name != "NONE"]
+    shown = None if modifier is None else modifier.node_group
+    return next((name for name in names if shown is not None and shown == style_nodes.group(name)), "NONE")
+
+
 def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
     """Add an arrow, child of a sensor, that follows its custom property ``force``; works without the add-on.
 

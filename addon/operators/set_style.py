@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ..objects import curves, frame_attribute, style_legend, styles
+from ..objects import curves, frame_attribute, style_legend, style_nodes, styles
 from ..ui import properties, view
 from ..ui.reports import TactileOperator
 
@@ -43,27 +43,48 @@ class TACTILE_OT_set_style(TactileOperator):
             raise TactileError("Tactile", "no electrodes' readings", "an imported recording", "Import it (again)")
         before = len(context.scene.objects)
         for thing in sensors:
-            self._give(thing)
+            _give(thing, self.style, self.largest, self.exaggeration)
         if len(context.scene.objects) > before:  # a first legend
             view.look_at(context, sensors)
         view.colour_by(context, "OBJECT" if self.style == "NONE" else "VERTEX")
 
-    def _give(self, thing: bpy.types.Object) -> None:
-        style = self.style if styles.can_show(thing, self.style) else "NONE"
-        unit = thing.tactile.per_metre * 1e-3
-        if style == "ELECTRODES":
-            largest = self.largest or _counts(thing) or 1.0
-            legend = ("change, counts", (f"-{largest:.0f}", f"+{largest:.0f}"))
-        else:
-            largest = (self.largest or 1e3 * thing.tactile.largest or 1.0) * unit
-            legend = ("displacement, mm", ("0", _two_digits(largest / unit)))
-        styles.set_style(thing, style, largest, self.exaggeration)
-        if style in ("DISPLACEMENT", "ELECTRODES"):
-            style_legend.add_legend(thing, style, *legend)
-        elif style == "CONTACT_PATCH":
-            style_legend.add_legend(thing, style, "orange: in contact", None)
-        else:
-            style_legend.remove_legend(thing)
+
+def _give(thing: bpy.types.Object, style: str, largest: float, exaggeration: float) -> None:
+    """Give a sensor a style that it can show; largest : mm, or counts; 0 for the animation's."""
+    style = style if styles.can_show(thing, style) else "NONE"
+    unit = thing.tactile.per_metre * 1e-3
+    if style == "ELECTRODES":
+        largest = largest or _counts(thing) or 1.0
+        legend = ("change, counts", (f"-{largest:.0f}", f"+{largest:.0f}"))
+    else:
+        largest = (largest or _largest_mm(thing.tactile.largest)) * unit
+        legend = ("displacement, mm", ("0", _two_digits(largest / unit)))
+    styles.set_style(thing, style, largest, exaggeration)
+    if style in ("DISPLACEMENT", "ELECTRODES"):
+        style_legend.add_legend(thing, style, *legend)
+    elif style == "CONTACT_PATCH":
+        style_legend.add_legend(thing, style, "orange: in contact", None)
+    else:
+        style_legend.remove_legend(thing)
+
+
+def follow(thing: bpy.types.Object, before: float) -> None:
+    """Fit a sensor's style to a new animation: its range, unless it was set by hand, and what it colours by.
+
+    before : m, largest displacement of the animation that it replaces
+    """
+    style = styles.style_of(thing)
+    if style not in ("DISPLACEMENT", "CONTACT_PATCH"):
+        return
+    modifier, unit = thing.modifiers[styles.MODIFIER], thing.tactile.per_metre * 1e-3
+    shown = style_nodes.get_input(modifier, style_nodes.LARGEST) / unit
+    by_hand = not math.isclose(shown, _largest_mm(before), rel_tol=1e-4)
+    _give(thing, style, shown if by_hand else 0.0, style_nodes.get_input(modifier, style_nodes.EXAGGERATION))
+
+
+def _largest_mm(largest: float) -> float:
+    """Return the colours' upper end for a largest displacement, m; 1 mm where nothing has moved yet."""
+    return 1e3 * largest or 1.0
 
 
 def _two_digits(value: float) -> str:

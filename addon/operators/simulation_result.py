@@ -13,7 +13,7 @@ from ...tactile_core import sensors
 from ...tactile_core.translation import contact_patch
 from ..objects import axes, curves, custom_properties, frame_attribute, motion
 from ..ui import properties, view
-from . import pictures
+from . import pictures, set_style
 
 STANDING = "{} simulated"
 _BOUNDS = {"sphere": "SPHERE", "cylinder": "CYLINDER"}  # Blender's outlines; the others are boxes
@@ -62,11 +62,14 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
         sensor = properties.of_role(scene, role)
         if sensor is None or moved is None:  # it was added, or removed, while the other process worked
             continue
+        before = sensor.tactile.largest
         sentences.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
         custom_properties.write(sensor, {"force": force}, frames)
         if role == "DIGIT":
             patch = contact_patch.contact_patch(moved[sample], surface)
             frame_attribute.add(sensor, frame_attribute.PATCH, patch, frames[0], 1.0)
+        set_style.follow(sensor, before)
+        if role == "DIGIT":
             view.show_picture(context, pictures.update(sensor, context.evaluated_depsgraph_get()))
     if thing.tactile.press_by == "HEIGHT":
         curves.write_curve(thing, "tactile.force", frames, np.linalg.norm(force, axis=1))

@@ -8,7 +8,7 @@ from ..objects import custom_properties, digit_body, digit_objects, frame_attrib
 from ..ui import properties, render_settings, timeline, view
 from ..ui.progress import shown
 from ..ui.reports import TactileOperator
-from . import pictures, recording_data
+from . import pictures, recording_data, set_style
 
 
 class TACTILE_OT_translate(TactileOperator):
@@ -42,10 +42,12 @@ class TACTILE_OT_translate(TactileOperator):
         gel = next(there, None) or digit_objects.add_gel(group, about.per_metre, skin)
         digit_body.add_body(gel, render_settings.calibration_of(context.scene))
         surface, moved = sensors.digit_surface(), found.translation.displacement_digit
+        before = gel.tactile.largest
         summary = motion.animate(gel, surface.rest, moved, frames, about.motion)
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0
         patch = contact_patch.contact_patch(moved, surface)
         frame_attribute.add(gel, frame_attribute.PATCH, patch, frames[0], step)
+        set_style.follow(gel, before)
         values = custom_properties.columns(found)
         told_of_gel = {"expected_error_um": 1e6 * found.translation.expected_error_digit}
         told_of_gel |= {name: values[name] for name in ("force", "confidence")}

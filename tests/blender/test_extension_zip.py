@@ -43,9 +43,17 @@ def test_the_listing_is_what_git_tracks(builder, packed):
         "tactile_core/data/weights/MVB.safetensors",
     ):
         assert needed in names
-    assert not [
-        name for name in names if "torch" in name or name.startswith(("tests/", "scripts/", "tactile_core/training/"))
-    ]
+    assert not [name for name in names if "torch" in name or name.startswith(("tests/", "scripts/"))]
+    assert [name for name in names if name.startswith("tactile_core/training/")] == list(builder.KEPT)
+
+
+def test_the_command_line_starts_from_what_was_packed(packed, tmp_path):
+    with zipfile.ZipFile(packed) as file:
+        file.extractall(tmp_path)
+    command = [sys.executable, "-P", "-m", "tactile_core", "train", "--help"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_the_same_checkout_gives_the_same_bytes(builder, packed, tmp_path):

@@ -51,6 +51,33 @@ def test_styles_take_each_other_s_place(gel):
     assert not [thing for thing in gel.children if thing.tactile.role == "LEGEND"]
 
 
+@pytest.mark.parametrize(("largest", "ends"), [(0.0, None), (2.0, "2.0")])
+def test_a_style_fits_what_is_translated_after_it_unless_set_by_hand(imported, part, largest, ends):
+    skin = imported(frames="60:70")
+    bpy.ops.tactile.translate()
+    gel = bpy.context.scene.objects["DIGIT gel"]
+    bpy.ops.tactile.set_style(style="DISPLACEMENT", largest=largest, exaggeration=2.0)
+    light = gel.tactile.largest
+    skin.tactile.frames = "70:90"
+    bpy.ops.tactile.translate()
+    assert gel.tactile.largest > 1.2 * light
+    assert legend_of(gel)[-1] == (ends or f"{1e3 * gel.tactile.largest:.2f}")
+    nodes = part("addon.objects.style_nodes")
+    assert nodes.get_input(gel.modifiers["Tactile style"], nodes.EXAGGERATION) == pytest.approx(2.0)
+
+
+def test_a_contact_patch_is_coloured_though_the_style_came_first(imported, part):
+    imported(frames="70:90")
+    bpy.ops.tactile.translate()
+    gel = bpy.context.scene.objects["DIGIT gel"]
+    gel.modifiers.remove(part("addon.objects.frame_attribute").modifier_of(gel, "contact_patch"))
+    bpy.ops.tactile.set_style(style="CONTACT_PATCH")
+    bpy.ops.tactile.translate()
+    bpy.context.scene.frame_set(80)
+    patch = shown(gel, "contact_patch", 1, "value")[:, 0] > 0.5
+    assert patch.any() and (shown(gel, "Tactile colour", 4, "color")[patch, 0] > 0.9).all()
+
+
 def test_electrodes_are_coloured_with_their_range(gel):
     skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
     assert bpy.ops.tactile.set_style(style="ELECTRODES") == {"FINISHED"}
