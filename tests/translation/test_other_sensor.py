@@ -77,7 +77,9 @@ def test_a_card_names_a_sensor_of_each_kind(weights):
     assert pair_of({}, "card.json") == ("biotac", "digit")
 
 
-def test_what_is_written_is_named_after_the_sensor(weights):
-    assert named("displacement_biotac", NAME) == "displacement_finger" and named("latent_digit", NAME) == "latent_digit"
-    assert described("(T, 19) E1..E19 as read", "biotac_sp") == "(T, 24) E1..E24 as read"
-    assert described("code of the BioTac's", "biotac") == "code of the BioTac's"
+def test_what_is_written_is_named_after_the_sensors(weights):
+    pair = NAME, "digit"
+    assert named("displacement_biotac", pair) == "displacement_finger" and named("latent_digit", pair) == "latent_digit"
+    assert named("latent_digit", ("biotac", "gelsight_mini")) == "latent_gelsight_mini"
+    assert described("(T, 19) E1..E19 as read", ("biotac_sp", "digit")) == "(T, 24) E1..E24 as read"
+    assert described("code of the BioTac's", ("biotac", "digit")) == "code of the BioTac's"
