@@ -36,7 +36,7 @@ class TableBench:
     """Stands in for ``BallPictures`` where balls are fitted: the same geometry, the table's picture."""
 
     def __init__(self, bench: BallPictures, table: Table) -> None:
-        self.right, self.down, self.camera = bench.right, bench.down, bench.camera
+        self.right, self.down, self.camera, self.deepest = bench.right, bench.down, bench.camera, bench.deepest
         self._bench, self._table = bench, table
         self._terms = _terms(bench)
 
