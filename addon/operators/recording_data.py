@@ -13,7 +13,6 @@ from ...tactile_core import recordings
 from ...tactile_core.jobs import frame_range
 from ...tactile_core.recordings import PrepareOptions, Recording, Signals
 from ...tactile_core.recordings.polarity import AUTO
-from ...tactile_core.recordings.signals import FRAMEWISE
 from ...tactile_core.translation import translate
 from ...tactile_core.translation.contact_track import Evidence, Tracked
 from ...tactile_core.translation.translate import Translation
@@ -62,17 +61,11 @@ def _translated(path: str, tare: str, frames: str, progress: Callable[[float], N
     signals = recordings.prepare(recording, options)
 
     def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Evidence]:
-        return recording.time[start:stop], translator().posterior(_part(signals, np.arange(start, stop)))
+        return recording.time[start:stop], translator().posterior(signals.at(slice(start, stop)))
 
     tracked, parts = Tracked(read_posteriors, len(recording)), []
     for start in range(0, len(chosen), CHUNK):
         frames = chosen[start : start + CHUNK]
-        parts.append(translator()(_part(signals, frames), tracked(frames)))
+        parts.append(translator()(signals.at(frames), tracked(frames)))
         progress(min(1.0, (start + CHUNK) / len(chosen)))
-    names = [field.name for field in dataclasses.fields(Translation)]
-    whole = Translation(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
-    return Translated(recording, chosen, _part(signals, chosen), whole)
-
-
-def _part(signals: Signals, frames: np.ndarray) -> Signals:
-    return dataclasses.replace(signals, **{name: getattr(signals, name)[frames] for name in FRAMEWISE})
+    return Translated(recording, chosen, signals.at(chosen), Translation.joined(parts))

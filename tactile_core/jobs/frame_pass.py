@@ -14,7 +14,6 @@ from ..files.png_writer import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import folds_counted
 from ..recordings import flags
-from ..recordings.signals import FRAMEWISE
 from ..sensors import PRESSURE_PER_COUNT
 from ..sensors.camera import Camera
 from ..translation.answer import Answer
@@ -232,15 +231,11 @@ class FramePass:
     def _translate(self, frames: np.ndarray) -> dict[str, np.ndarray]:
         """Translate some frames to all arrays, T first, by the names of frames.h5."""
         with self.clock.stage("translate"):
-            arrays = translated(self._signals(frames), self.tools, self._tracked, frames)
+            arrays = translated(self.signals.at(frames), self.tools, self._tracked, frames)
         return arrays | {"frame": frames.astype(np.int32), "time": self.recording.time[frames]}
 
     def _read(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
-        return self.recording.time[start:stop], self._signals(np.arange(start, stop))
-
-    def _signals(self, frames: np.ndarray) -> Signals:
-        part = {name: getattr(self.signals, name)[frames] for name in FRAMEWISE}
-        return dataclasses.replace(self.signals, **part)
+        return self.recording.time[start:stop], self.signals.at(slice(start, stop))
 
     def _draw(self, folder: Path, frames: np.ndarray, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Heights, as far as they are kept; pictures go to their files. Frames neither kept nor shown are skipped."""

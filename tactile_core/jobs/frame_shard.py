@@ -6,7 +6,6 @@ frames `number * shard_frames` to that of the next. Pictures are the dataset ``i
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ import numpy as np
 
 from ..files import atomic, checksummed
 from ..files.hdf5_checked import check_before_opening
-from ..recordings.signals import FRAMEWISE
 from .engine import job as jobs
 from .frame_pass import CHUNK, Tools, translated
 from .frames_file import FramesFile, kept
@@ -93,9 +91,8 @@ def _arrays(
     tracked: Tracked | None,
 ) -> dict[str, np.ndarray]:
     """Compute all arrays of some rows of a shard that begins at frame `start`."""
-    part = {name: getattr(signals, name)[rows] for name in FRAMEWISE}
     frames = np.arange(len(time), dtype=np.int32)[rows] + np.int32(start)
-    arrays = translated(dataclasses.replace(signals, **part), tools, tracked, frames)
+    arrays = translated(signals.at(rows), tools, tracked, frames)
     arrays |= {"frame": frames, "time": time[rows]}
     if "traction" in keep:
         from .gel_traction import gel_traction  # with all of contact mechanics

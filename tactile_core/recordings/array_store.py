@@ -15,9 +15,8 @@ from ..errors import TactileError
 from ..files.hdf5_checked import declared, open_checked
 from .assemble import MAX_FRAMES
 
-MAX_BYTES = (
-    2 * 2**30
-)  # of one array in memory; a truth of 700 frames and 6,000 nodes takes 50 MB as float32 (assumed enough)
+# Bytes of one array in memory; a truth of 700 frames and 6,000 nodes takes 50 MB as float32 (assumed enough).
+MAX_BYTES = 2 * 2**30
 MAX_HEADER = 10_000  # bytes of an array's header in NPZ, numpy's own limit
 _NPY_START = 12  # bytes: magic, version, length
 

@@ -26,7 +26,7 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
     frames = np.flatnonzero(ends.any(axis=1))
     if len(frames):
         warnings.append(
-            f"{_electrodes(ends.any(axis=0))} at an end of the 12-bit range in {len(frames)} frames, first in "
+            f"{named_electrodes(ends.any(axis=0))} at an end of the 12-bit range in {len(frames)} frames, first in "
             f"{recording.row_word} {recording.rows[frames[0]]}"
         )
     return np.where(ends.any(axis=1), Flag.SATURATED, 0).astype(np.uint16)
@@ -40,7 +40,7 @@ def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.
     still = _still(readings)
     whole = still.all(axis=0)
     if whole.any():
-        warnings.append(f"{_electrodes(whole)} never changes: dead channel")
+        warnings.append(f"{named_electrodes(whole)} never changes: dead channel")
     for j in np.flatnonzero(still.any(axis=0) & ~whole):
         frames = np.flatnonzero(still[:, j])
         warnings.append(
@@ -74,5 +74,6 @@ def _moves(readings: np.ndarray) -> bool:
     return bool(np.median(np.ptp(readings, axis=0)) > STEADY)
 
 
-def _electrodes(mask: np.ndarray | np.bool) -> str:
+def named_electrodes(mask: np.ndarray | np.bool) -> str:
+    """Name the electrodes of a mask (19,) bool: ``"E3, E7"``."""
     return ", ".join(f"E{j + 1}" for j in np.flatnonzero(mask))

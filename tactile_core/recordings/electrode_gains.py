@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +13,7 @@ from msgspec import Meta
 
 from ..errors import TactileError
 from ..files import atomic
-from ..files.text_file import read_toml_text
+from ..files.text_file import read_toml_text, toml_quoted
 from ..sensors import COUNT_MAX, divider
 from .assemble import COUNTS
 from .fingers import FINGERS
@@ -161,13 +160,13 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
     lines = [
         "# A BioTac against the simulated one: reading - rest = gain * simulated change + offset, E1 to E19.",
         "# Used by: tactile convert RECORDING --sensor THIS_FILE",
-        f"format = {_quoted(sensor.format)}",
+        f"format = {toml_quoted(sensor.format)}",
     ]
     if sensor.sensor != TRANSLATED:
         lines[:2] = ["# Rest of a BioTac SP, E1 to E24. Used by: tactile info RECORDING --sensor THIS_FILE"]
-        lines.append(f"sensor = {_quoted(sensor.sensor)}")
+        lines.append(f"sensor = {toml_quoted(sensor.sensor)}")
     for name, section in sensor.sections().items():
-        lines += ["", f"[{name}]", f"note = {_quoted(section.note)}"]
+        lines += ["", f"[{name}]", f"note = {toml_quoted(section.note)}"]
         lines += [f"gain = {_numbers(section.gain)}  # counts a count"]
         lines += [f"offset_counts = {_numbers(section.offset_counts)}"]
         for field in ("rest_counts", "rest_spread_counts"):
@@ -176,11 +175,6 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
         if section.rest_pdc is not None:
             lines.append(f"rest_pdc = {section.rest_pdc:.4f}  # counts")
     atomic.write_bytes(path, "\n".join([*lines, ""]).encode())
-
-
-def _quoted(text: str) -> str:
-    """Quote text as a TOML basic string: JSON's escapes are valid there, its ASCII keeps names that are no UTF-8."""
-    return json.dumps(text.encode(errors="replace").decode())
 
 
 def _numbers(values: list[float]) -> str:

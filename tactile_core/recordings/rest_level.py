@@ -6,19 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import TactileError
+
 WINDOW = 0.3  # s, the shortest part that is called quiet; 30 frames bring 1.5 counts of noise down to 0.3
 FEWEST = 8  # frames of a window, at slow rates
-CALM_STD = (
-    2.4  # counts within a window: noise is 0.7-1.5 (docs/sources.md), plus 4 deviations of its estimate from 30 samples
-)
+# Counts within a window: noise is 0.7-1.5 (docs/sources.md), plus 4 deviations of its estimate from 30 samples.
+CALM_STD = 2.4
 CALM_TREND = 2.5  # counts from the first to the second half of a window: 4 deviations of that difference at 1.5 counts
 QUIET_PDC = 2.0  # counts over rest (a tare is right below 2: docs/sources.md, BioTac read-out)
 RECTIFIED_LEVEL = 4.0  # counts; without PDC a quiet electrode of a rectified recording stays below (noise folds to 1.2)
 RECTIFIED_LEVEL_PDC = 15.0  # counts; where PDC says that nothing touches, the rest is drift since the tare (assumed)
-LEVEL, LEVEL_RATE = (
-    3.0,
-    0.1,
-)  # counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts an hour = 0.024/s)
+# Counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts an hour = 0.024/s).
+LEVEL, LEVEL_RATE = 3.0, 0.1
 LEVEL_PDC, LEVEL_PDC_RATE = 15.0, 0.2  # the same where PDC confirms both (assumed: skin creep after a contact)
 PDC_RATE = 0.1  # counts/s of drift allowed to PDC itself (assumed as for electrodes)
 TRACKED = 60.0  # s; over longer times drift is followed, or it would come to be as large as a press (assumed)
@@ -213,3 +212,27 @@ def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> 
 def _runs(mask: np.ndarray) -> tuple[tuple[int, int], ...]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
+
+
+def tare_frames(asked: slice | str, count: int) -> slice:
+    """Convert the tare frames to a plain slice. Raises TactileError where they are not inside these `count` frames."""
+    if isinstance(asked, slice):
+        tare = asked
+    else:
+        ends = asked.split(":")
+        try:
+            tare = slice(*(int(end) if end.strip() else None for end in ends))
+        except (ValueError, TypeError):
+            ends = []
+        if len(ends) != 2:
+            raise TactileError("option tare", repr(asked), "frames A:B, such as 0:50, or 'none'")
+    first = 0 if tare.start is None else tare.start + (count if tare.start < 0 else 0)
+    last = count if tare.stop is None else tare.stop + (count if tare.stop < 0 else 0)
+    if tare.step not in (None, 1) or not 0 <= first < last <= count:
+        raise TactileError(
+            "option tare",
+            f"frames {asked if isinstance(asked, str) else f'{tare.start}:{tare.stop}'}",
+            f"A:B inside {count} frames, without a step",
+            "Name frames without contact",
+        )
+    return slice(first, last)

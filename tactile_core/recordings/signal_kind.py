@@ -6,9 +6,8 @@ import numpy as np
 
 KINDS = ("raw", "tared", "scaled", "rectified")
 RAW_LEVEL = 500.0  # counts; rest is near 3,300 (slide set) or 2,600-2,700 (Ruppel), changes stay below (assumed)
-SCALED_LIMIT = (
-    20.0  # larger values than this are counts; scaled ones are volts, shares or standard deviations (assumed)
-)
+# Larger values than this are counts; scaled ones are volts, shares or standard deviations (assumed).
+SCALED_LIMIT = 20.0
 NEGATIVE_SHARE = 0.005  # of all samples: more than the odd glitch
 WHOLE_SHARE = 0.99  # of all samples: a file with more whole numbers holds counts (assumed)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +19,17 @@ from .flags import Flag
 from .polarity import AUTO, BLOCK, Polarity, choose, polarity_of, spread_out, touching
 from .recording import TRANSLATED, Recording
 from .repair import fill, find_glitches, is_time_series
-from .rest_level import TARED_PDC, Quiet, baseline, calmest, find_quiet, level, pressure_rest, window_frames
+from .rest_level import (
+    TARED_PDC,
+    Quiet,
+    baseline,
+    calmest,
+    find_quiet,
+    level,
+    pressure_rest,
+    tare_frames,
+    window_frames,
+)
 from .signal_kind import KINDS, detect
 from .smoothing import LONGEST, RECTIFIED, SIGNED, smooth
 
@@ -117,6 +126,10 @@ class Signals:
     warnings: tuple[str, ...]
     report: dict[str, Any]
     sensor: str = TRANSLATED
+
+    def at(self, frames: np.ndarray | slice) -> Signals:
+        """Return the signals of some frames alone; rest and drift stay those of the recording."""
+        return replace(self, **{name: getattr(self, name)[frames] for name in FRAMEWISE})
 
     @property
     def typical(self) -> np.ndarray:
@@ -331,30 +344,6 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
     return Quiet(mask, ((frames.start, frames.stop),), "given by the user")
 
 
-def tare_frames(asked: slice | str, count: int) -> slice:
-    """Convert the tare frames to a plain slice. Raises TactileError where they are not inside these `count` frames."""
-    if isinstance(asked, slice):
-        tare = asked
-    else:
-        ends = asked.split(":")
-        try:
-            tare = slice(*(int(end) if end.strip() else None for end in ends))
-        except (ValueError, TypeError):
-            ends = []
-        if len(ends) != 2:
-            raise TactileError("option tare", repr(asked), "frames A:B, such as 0:50, or 'none'")
-    first = 0 if tare.start is None else tare.start + (count if tare.start < 0 else 0)
-    last = count if tare.stop is None else tare.stop + (count if tare.stop < 0 else 0)
-    if tare.step not in (None, 1) or not 0 <= first < last <= count:
-        raise TactileError(
-            "option tare",
-            f"frames {asked if isinstance(asked, str) else f'{tare.start}:{tare.stop}'}",
-            f"A:B inside {count} frames, without a step",
-            "Name frames without contact",
-        )
-    return slice(first, last)
-
-
 def _rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> np.ndarray:
@@ -404,9 +393,5 @@ def _report(
         "drift_counts_per_s": [round(float(value), 4) for value in slope],
         "samples_interpolated": int(unreadable.sum()),
         "samples_glitch": int(glitches.sum()),
-        "rows_repaired": _rows(recording.rows[(glitches | unreadable).any(axis=1)]),
+        "rows_repaired": recording.rows[(glitches | unreadable).any(axis=1)].tolist(),
     }
-
-
-def _rows(rows: np.ndarray) -> Sequence[int]:
-    return [int(row) for row in rows]

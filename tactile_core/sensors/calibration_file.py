@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 import math
 import os
 import sys
@@ -14,7 +13,7 @@ from typing import Any
 
 from ..errors import TactileError
 from ..files import atomic, outside
-from ..files.text_file import read_toml_text
+from ..files.text_file import read_toml_text, toml_quoted
 from . import digit
 from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
 from .camera import COLOURS, Camera, Led
@@ -284,9 +283,9 @@ def _as_text(calibration: Calibration) -> str:
     lines = [
         f"# A {title} unit: picture = response(right, down) x radiance of the coating + ambient light, 8-bit values.",
         "# Image frame: right, down, toward the camera; origin in the picture's middle on the plane of height zero.",
-        f"format = {_quoted(FORMAT)}",
-        f"unit = {_quoted(calibration.unit)}",
-        *[f"sensor = {_quoted(camera.sensor)}"] * (camera.sensor != Camera.sensor),
+        f"format = {toml_quoted(FORMAT)}",
+        f"unit = {toml_quoted(calibration.unit)}",
+        *[f"sensor = {toml_quoted(camera.sensor)}"] * (camera.sensor != Camera.sensor),
         "",
         "[camera]",
         f"width_px = {camera.width}",
@@ -316,7 +315,7 @@ def _as_text(calibration: Calibration) -> str:
         *[f"{led} = {_list(row)}" for led, row in zip(COLOURS, calibration.ambient, strict=True)],
         "",
         "[coating]  # diffuse, roughplastic or principled; albedo of each LED's light",
-        f"bsdf = {_quoted(coating.bsdf)}",
+        f"bsdf = {toml_quoted(coating.bsdf)}",
         f"albedo = {_list(coating.albedo)}",
         *[f"{name} = {_digits(getattr(coating, name))}" for name in ("roughness", "gloss", "metallic")],
         f"spread_mm = {_digits(1e3 * coating.spread)}  # of light, sideways in it: standard deviation",
@@ -326,7 +325,7 @@ def _as_text(calibration: Calibration) -> str:
         f"index = {_digits(calibration.gel_index)}  # of gel and acrylic",
         "",
         "[background]  # a photograph of the untouched gel, beside this file, is then the picture at rest",
-        f"photograph = {_quoted(Path(calibration.photograph).name)}",
+        f"photograph = {toml_quoted(Path(calibration.photograph).name)}",
     ]
     if calibration.markers is not None:
         markers = calibration.markers
@@ -345,10 +344,10 @@ def _as_text(calibration: Calibration) -> str:
         f"levels = {_list(calibration.noise)}",
         "",
         "[fit]",
-        f"note = {_quoted(fit.note)}",
+        f"note = {toml_quoted(fit.note)}",
         f"ball_diameter_mm = {_digits(1e3 * fit.ball_diameter)}",
-        f"photographs = [{', '.join(map(_quoted, fit.photographs))}]",
-        f"not_identified = [{', '.join(map(_quoted, fit.not_identified))}]",
+        f"photographs = [{', '.join(map(toml_quoted, fit.photographs))}]",
+        f"not_identified = [{', '.join(map(toml_quoted, fit.not_identified))}]",
         "",
         "[fit.errors]  # on those photographs",
         *_named(fit.errors),
@@ -361,12 +360,7 @@ def _as_text(calibration: Calibration) -> str:
 
 
 def _named(values: Mapping[str, float]) -> list[str]:
-    return [f"{_quoted(name)} = {_digits(value)}" for name, value in values.items()]
-
-
-def _quoted(text: str) -> str:
-    """Quote text as a TOML basic string: JSON's escapes are valid there, its ASCII keeps names that are no UTF-8."""
-    return json.dumps(text.encode(errors="replace").decode())
+    return [f"{toml_quoted(name)} = {_digits(value)}" for name, value in values.items()]
 
 
 def _digits(value: float) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, read
+from ..recordings.electrode_faults import named_electrodes
 from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit
 from ..recordings.fingers import split
 from ..recordings.readers import each_finger, sensor_of
@@ -193,7 +194,7 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
     gain, fitted, warnings = _believable(np.exp(log_gain), touched, found)
     offset = np.where(np.abs(found.offset) <= LARGEST_OFFSET, found.offset, 0.0)
     if (np.abs(found.offset) > LARGEST_OFFSET).any():
-        warnings.append(f"{_names(np.abs(found.offset) > LARGEST_OFFSET)}: no believable offset; taken as 0")
+        warnings.append(f"{named_electrodes(np.abs(found.offset) > LARGEST_OFFSET)}: no believable offset; taken as 0")
     signs = "rectified, so no offsets" if rectified else "signed"
     note = f"{note}; {frames} frames in contact ({signs}), {found.alike} different contacts"
     uncertainty = _uncertainty(gain[fitted], found.alike)
@@ -208,7 +209,7 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
     wild = touched & ~((gain >= LEAST) & (gain <= MOST))
     warnings = []
     if not touched.all():
-        warnings.append(f"{_names(~touched)}: hardly touched in these recordings; gain kept at 1")
+        warnings.append(f"{named_electrodes(~touched)}: hardly touched in these recordings; gain kept at 1")
     for electrode in np.flatnonzero(wild):
         outcome = f"outside {LEAST:g} to {MOST:g}; kept at 1 (a dead channel?)"
         warnings.append(f"E{electrode + 1}: gain {gain[electrode]:.2f} is {outcome}")
@@ -227,7 +228,3 @@ def _uncertainty(gain: np.ndarray, contacts: int) -> float:
     if not len(gain):
         return np.nan
     return float(np.log(gain).std()) * (LEAST_LEFT + LEFT / np.sqrt(contacts))
-
-
-def _names(which: np.ndarray) -> str:
-    return ", ".join(f"E{electrode + 1}" for electrode in np.flatnonzero(which))

@@ -18,9 +18,8 @@ ROUNDS = 30  # most turns; 10 to 20 are usual
 SETTLED = 0.01  # largest change of a log gain in a turn that counts as none
 FLOOR = 2.0  # counts added before a ratio is taken: noise of 0.7 to 1.5 (docs/sources.md, BioTac read-out) says no more
 SURE = 10.0  # counts: from there on a reading says more of the gain than of noise and of the match (measured)
-PRIOR = (
-    5.0  # contacts' worth of belief in gain 1 and offset 0 (measured: helps from 10 % scatter on, costs little at 50)
-)
+# Contacts' worth of belief in gain 1 and offset 0 (measured: helps from 10 % scatter on, costs little at 50).
+PRIOR = 5.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,12 @@ class Translation:
     error_bound_biotac: np.ndarray
     error_bound_digit: np.ndarray
     flags: np.ndarray
+
+    @classmethod
+    def joined(cls, parts: Sequence[Translation]) -> Translation:
+        """Join translations of frames that follow each other."""
+        names = [field.name for field in dataclasses.fields(cls)]
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
 def _rectified(signals: Signals) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from functools import lru_cache
 
@@ -11,7 +10,7 @@ import numpy as np
 from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, electrode_gains
 from ..recordings.fingers import split
-from ..recordings.signals import FRAMEWISE, Signals
+from ..recordings.signals import Signals
 from .answer import Answer
 from .contact_track import Evidence, Tracked
 from .translate import Translation, Translator, load_translator
@@ -57,12 +56,10 @@ def translate(
     signals = _prepared(recording, prepare, sensor)
     tracked = _tracked(translator, recording, signals)
     parts = [
-        translator(_part(signals, some), None if tracked is None else tracked(some))
+        translator(signals.at(some), None if tracked is None else tracked(some))
         for some in (chosen[start : start + CHUNK] for start in range(0, len(chosen), CHUNK))
     ]
-    names = [field.name for field in dataclasses.fields(Translation)]
-    whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return Translation(**whole)
+    return Translation.joined(parts)
 
 
 @lru_cache(maxsize=2)
@@ -85,11 +82,6 @@ def _tracked(translator: Translator, recording: Recording, signals: Signals) -> 
         return None
 
     def read(start: int, stop: int) -> tuple[np.ndarray, Evidence]:
-        return recording.time[start:stop], translator.posterior(_part(signals, np.arange(start, stop)))
+        return recording.time[start:stop], translator.posterior(signals.at(slice(start, stop)))
 
     return Tracked(read, len(recording))
-
-
-def _part(signals: Signals, frames: np.ndarray) -> Signals:
-    """Return the signals of some frames (n,)."""
-    return dataclasses.replace(signals, **{name: getattr(signals, name)[frames] for name in FRAMEWISE})

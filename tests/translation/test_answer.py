@@ -1,7 +1,5 @@
 """Which contact answers a frame, where it lies on the gel, and which others it may be."""
 
-import dataclasses
-
 import h5py
 import numpy as np
 import pytest
@@ -9,7 +7,6 @@ import pytest
 from tactile_core import accuracy, recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.recordings.signals import FRAMEWISE
 from tactile_core.translation import gel_place, plausible
 from tactile_core.translation.answer import Answer, parse_shift
 from tactile_core.translation.contact_frame import PLACE_UNIT
@@ -25,7 +22,7 @@ def touched(request):
     recording = recordings.read(request.config.rootpath / RECORDING)
     frames = np.flatnonzero(np.linalg.norm(recording.truth.force, axis=1) > 0.4)[::9][:20]
     signals = recordings.prepare(recording)
-    return dataclasses.replace(signals, **{name: getattr(signals, name)[frames] for name in FRAMEWISE}), frames
+    return signals.at(frames), frames
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +93,7 @@ def test_drawn_contacts_lie_round_the_answer(request, tmp_path):
 def test_a_frame_s_draws_do_not_depend_on_the_other_frames(touched):
     signals, frames = touched
     translator = load_translator(answer=Answer(samples=5))
-    some = dataclasses.replace(signals, **{name: getattr(signals, name)[3:7] for name in FRAMEWISE})
+    some = signals.at(slice(3, 7))
     whole, part = translator.plausible(signals, frames), translator.plausible(some, frames[3:7])
     for name in plausible.NAMES:
         assert np.allclose(part[name], whole[name][3:7], rtol=1e-5, atol=1e-8, equal_nan=True)

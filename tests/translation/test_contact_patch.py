@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tactile_core import recordings, sensors
-from tactile_core.recordings.signals import FRAMEWISE
 from tactile_core.translation import contact_patch, translate
 from tactile_core.translation.contact_track import Tracked
 
@@ -37,11 +36,8 @@ def test_what_the_networks_make_of_noise_alone_shows_no_contact(request, gel):
     silent = dataclasses.replace(signals, change=noise.astype(signals.change.dtype))
     translator = translate.load_translator()
 
-    def part(frames):
-        return dataclasses.replace(silent, **{name: getattr(silent, name)[frames] for name in FRAMEWISE})
-
     def posteriors(start, stop):
-        return recording.time[start:stop], translator.posterior(part(np.arange(start, stop)))
+        return recording.time[start:stop], translator.posterior(silent.at(np.arange(start, stop)))
 
     every = np.arange(len(recording))
     moved = translator(silent, Tracked(posteriors, len(recording))(every)).displacement_digit

@@ -37,9 +37,7 @@ def weights(tmp_path, monkeypatch):
 def signals(request):
     path = request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5"
     found = recordings.prepare(recordings.read(path))
-    rows = slice(100, 300, 20)
-    part = {name: getattr(found, name)[rows] for name in recordings.signals.FRAMEWISE}
-    return dataclasses.replace(found, **part)
+    return found.at(slice(100, 300, 20))
 
 
 def test_the_same_shape_and_signals_give_the_same_by_another_name(weights, signals):

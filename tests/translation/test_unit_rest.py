@@ -76,7 +76,6 @@ def test_a_hand_s_file_is_read_by_finger(tmp_path):
 def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
     """The place of a flat object held by two real fingers, against the electrodes it squeezes (docs/sources.md)."""
     pytest.importorskip("scipy", reason="scipy is absent: pip install tactile-core[matlab]")
-    from tactile_core.recordings.signals import FRAMEWISE
     from tactile_core.translation import adapt, networks, reference_signals, translate
 
     files = [path for path in sorted(outside_data("biotac_phac").glob("*.mat")) if path.stem.split("_")[-2] < "04"]
@@ -89,10 +88,10 @@ def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
         for finger in (0, 1):
             recording = recordings.read(f"{path}#{finger}")
             signals = prepare_unit(recording, None, sensor.gains_for(path, finger, "made"))
-            some = {name: getattr(signals, name)[::100] for name in FRAMEWISE}
+            some = signals.at(slice(None, None, 100))
             for name, order in (("as read", slice(None)), ("shuffled", shuffled)):
-                turned = {"change": some["change"][:, order], "rest": signals.rest[order]}
-                part = dataclasses.replace(signals, **(some | turned))
+                turned = {"change": some.change[:, order], "rest": signals.rest[order]}
+                part = dataclasses.replace(some, **turned)
                 centres[name].append(np.nanmedian(1e3 * translator(part).contact_center, axis=0))
     within = {name: in_box(np.array(places)).mean() for name, places in centres.items()}
     # Measured: 11 of 12; the one beside lies at z 3.5 mm.

@@ -14,10 +14,7 @@ from tactile_core.files import outside
 
 MAX_CELLS = 100_000  # the public BioTac mesh holds 15,410; a solve of 100,000 takes minutes and gigabytes
 MAX_BYTES = 16 * 2**20  # assumed: three times what MAX_CELLS cells take; its lines take 200 MB at most
-SIZES = (
-    1e-3,
-    0.2,
-)  # m, smallest and largest extent of a fingertip's mesh (assumed): one in millimetres is larger
+SIZES = 1e-3, 0.2  # m, least and largest extent of a fingertip's mesh (assumed): one in millimetres is larger
 THINNEST = 1e-6  # volume of a cell over its longest edge's cube; below that it is flat (a regular one: 0.118)
 # What exporters write before the lists (Isaac Gym's own does); a file that was cut short holds less.
 _PROMISE = re.compile(r"#\s*(\d+)\s+(vertices|tetrahedra)\s*$")

@@ -18,7 +18,7 @@ from tactile_core.recordings import Recording
 from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile, prepare_unit
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.readers import each_finger
-from tactile_core.recordings.signals import FRAMEWISE, Signals
+from tactile_core.recordings.signals import Signals
 from tactile_core.sensors import digit, digit_surface, electrodes
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation import adapt, networks, reference_signals
@@ -134,8 +134,7 @@ def _judged(
     signals = prepare_unit(recording, None, unit)
     signals = dataclasses.replace(signals, change=signals.change[:, order], rest=signals.rest[order])
     state = track(network.posterior(signals), recording.time)[::EVERY]
-    some = {name: getattr(signals, name)[::EVERY] for name in FRAMEWISE}
-    found = network(dataclasses.replace(signals, **some), state)
+    found = network(signals.at(slice(None, None, EVERY)), state)
     known = np.isfinite(found.contact_center[:, 0])
     within = known.any() and in_box(np.median(found.contact_center[known], axis=0))
     return float(within), float(known.mean()), float((found.flags & Flag.OUT_OF_RANGE > 0).mean())

@@ -7,7 +7,6 @@ pictures stay empty.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable
 
 import numpy as np
@@ -16,7 +15,6 @@ from tactile_core.accuracy import Row, row
 from tactile_core.pictures.height_map import folds_counted, height_map
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.recordings import Signals
-from tactile_core.recordings.signals import FRAMEWISE
 from tactile_core.sensors import PRESSURE_PER_COUNT
 from tactile_core.translation.contact_track import FRAME, track
 from tactile_core.translation.translate import Translator
@@ -68,7 +66,7 @@ def _chunks(count: int) -> list[slice]:
 
 
 def _drawn(signals: Signals, network: Translator, state: np.ndarray, render: Renderer, rows: slice) -> np.ndarray:
-    signals = dataclasses.replace(signals, **{name: getattr(signals, name)[rows] for name in FRAMEWISE})
+    signals = signals.at(rows)
     found = network(signals, state[rows])
     place = found.contact_center
     seen = np.isfinite(place[:, 0]) & render.camera.sees(*place.T)

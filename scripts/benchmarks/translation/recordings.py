@@ -5,7 +5,6 @@ The label for strength is PDC, the fluid's pressure: a transducer of its own tha
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,7 +20,6 @@ from tactile_core.recordings import PrepareOptions, Signals, read
 from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.repair import fill
-from tactile_core.recordings.signals import FRAMEWISE
 from tactile_core.sensors import unrolling
 from tactile_core.translation.contact_track import track
 from tactile_core.translation.translate import Translation, Translator
@@ -66,7 +64,7 @@ def translate(
     signals = prepare_unit(recording, options, sensor)
     tracked = isinstance(network, Translator)  # a baseline answers by itself
     state = track(network.posterior(signals), recording.time) if tracked else [None] * len(recording)
-    parts = [_translate(_part(signals, rows), network, state[rows]) for rows in _chunks(len(recording))]
+    parts = [_translate(signals.at(rows), network, state[rows]) for rows in _chunks(len(recording))]
     force, volume, centre, latent = (np.concatenate([part[k] for part in parts]) for k in range(4))
     missed = ~np.isfinite(centre).all(axis=1)
     return Translated(
@@ -80,10 +78,6 @@ def translate(
 
 def _chunks(count: int) -> list[slice]:
     return [slice(start, start + CHUNK) for start in range(0, count, CHUNK)]
-
-
-def _part(signals: Signals, rows: slice) -> Signals:
-    return dataclasses.replace(signals, **{name: getattr(signals, name)[rows] for name in FRAMEWISE})
 
 
 def _translate(

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...recordings.flags import Flag
 from ...recordings.polarity import AUTO, TOUCHING, Polarity, polarity_of
-from ...recordings.rest_level import find_quiet, level, window_frames
+from ...recordings.rest_level import find_quiet, level, tare_frames, window_frames
 from ...recordings.signal_kind import detect
-from ...recordings.signals import Rest, Signals, tare_frames
+from ...recordings.signals import Rest, Signals
 from ...sensors import ELECTRODES, SAMPLE_RATE
 from ...sensors.fluid_sensor import FALLS, POLARITIES
 
