@@ -58,7 +58,16 @@ def open_radiance(unit: Calibration) -> np.ndarray:
     height = of_unit(rest_height_map(unit.camera), unit).astype(np.float32)
     right, down = np.meshgrid(unit.camera.right, unit.camera.down)
     hits = Hits.from_slopes(np.stack([right, down, height], -1).astype(np.float32), *slopes(height, unit.camera))
-    return direct_light(hits, None, [np.array([led.position]) for led in unit.leds], unit)
+    direct = direct_light(hits, None, [np.array([led.position]) for led in unit.leds], unit)
+    return direct + np.moveaxis(raised_light(unit, height), 0, -1)
+
+
+def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:
+    """Ambient light (3, H, W) float32, levels of each LED's band, that gel which is seen at heights (H, W) m has more
+    of than gel at height zero.
+    """
+    share = unit.ambient_unit * unit.ambient_rise
+    return share.astype(np.float32)[:, None, None] * seen
 
 
 def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:

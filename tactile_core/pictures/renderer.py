@@ -13,7 +13,7 @@ from ..files.compiled import available
 from ..files.installed import needing
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
-from .background import correction, resting_picture
+from .background import correction, raised_light, resting_picture
 from .camera_noise import camera_noise
 from .coating_spread import CoatingSpread
 from .height_map import gel_mapper, of_unit, rest_height_map
@@ -28,7 +28,7 @@ from .mitsuba.surroundings import NOTHING, Surroundings
 from .mitsuba.tracer import make_tracer
 from .mitsuba.variant import LLVM, choose_variant
 from .mitsuba.window import through_window
-from .perspective import slopes
+from .perspective import Perspective, slopes
 from .presets import DEFAULT, FAST, Preset, preset_named
 from .shading import Shader, camera_array, check_reach
 
@@ -80,8 +80,10 @@ class Renderer:
         self._spread = CoatingSpread(self.camera, 0.0 if preset == FAST else calibration.coating.spread)
         if preset == FAST:
             self.variant = None
-            self._light: Light = Shader(calibration, rest=resting)
+            self._light: Light = Shader(calibration, rest=resting)  # has the light that grows with height itself
+            self._view = None
         else:
+            self._view = Perspective(self.camera, resting) if any(calibration.ambient_rise) else None
             chosen = preset_named(preset)
             with needing("render"):
                 self.variant = choose_variant(variant).name
@@ -115,7 +117,7 @@ class Renderer:
         heights = self._heights(height_map, "height map")
         light = self._light
         for found in light.refined(heights) if isinstance(light, GelLight) else [light.radiance(heights)]:
-            yield self.picture(self._spread_levels(found))
+            yield self.picture(self._completed(found, heights))
 
     def render(self, displacement: np.ndarray) -> np.ndarray:
         """Render the pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
@@ -139,10 +141,14 @@ class Renderer:
         return self._spread_radiance(self._heights(height_map, "height map"))
 
     def _spread_radiance(self, heights: np.ndarray) -> np.ndarray:
-        return self._spread_levels(self._light.radiance(heights))
+        return self._completed(self._light.radiance(heights), heights)
 
-    def _spread_levels(self, radiance: np.ndarray) -> np.ndarray:
-        return np.moveaxis(self._spread(np.moveaxis(radiance, -1, 0)), 0, -1)
+    def _completed(self, radiance: np.ndarray, heights: np.ndarray) -> np.ndarray:
+        """The lights' radiance (H, W, 3) with the ambient light of raised gel, spread by the coating."""
+        found = np.moveaxis(radiance, -1, 0)
+        if self._view is not None:
+            found = found + raised_light(self.calibration, self._view(heights))
+        return np.moveaxis(self._spread(found), 0, -1)
 
     def picture(
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None

@@ -13,7 +13,7 @@ from ..files.compiled import available
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import COLOURS, Camera, Led
-from .background import resting_picture
+from .background import raised_light, resting_picture
 from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .coating_spread import CoatingSpread
 from .height_map import of_unit, rest_height_map
@@ -86,9 +86,8 @@ class Shader:
         """Radiance (3, H, W) of heights (H, W) that the pixels see."""
         surface = SeenSurface(self._view, seen)
         scale = self.calibration.facing.astype(np.float32)
-        return self._spread(
-            np.stack([lamp.radiance(surface) * level for lamp, level in zip(self._lamps, scale, strict=True)])
-        )
+        direct = np.stack([lamp.radiance(surface) * level for lamp, level in zip(self._lamps, scale, strict=True)])
+        return self._spread(direct + raised_light(self.calibration, seen))
 
 
 class SeenSurface:

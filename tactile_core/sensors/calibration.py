@@ -25,6 +25,7 @@ AMBIENT_UNIT = 10e-3  # m; image coordinates are divided by it in the ambient li
 # m: ambient light is counted in what a LED gives on a coating that faces it from there, so that it goes with the LED's
 # power alone, not with its place.
 AMBIENT_DISTANCE = 20e-3
+MOST_RISE = 2.0  # a mm, of the ambient light's unit
 MOST_INDEX = 4.0  # germanium's: no clear solid has more
 LARGEST_LEVEL = 255.0  # of 8 bits
 
@@ -91,6 +92,7 @@ class Calibration:
     response : the camera's response to each LED's light
     ambient : (3, 21), a row a LED: its light scattered in gel and acrylic, in units of its radiance on a coating that
         faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i + j, then by j
+    ambient_rise : of each LED, share by which the ambient light's unit grows for each metre that gel stands higher
     coating : the paint on the gel
     gel_index : refractive index of gel and acrylic, taken as equal
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
@@ -113,6 +115,7 @@ class Calibration:
     fit: Fit
     photographed: tuple[tuple[Led, Led, Led], tuple[float, float, float]] | None = None
     markers: Markers | None = None
+    ambient_rise: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         if tuple(led.colour for led in self.leds) != COLOURS:
@@ -126,6 +129,8 @@ class Calibration:
         table = np.asarray(self.ambient, float)
         if table.shape != (3, AMBIENT_TERMS) or not np.isfinite(table).all():
             raise TactileError("ambient", f"shape {table.shape}", f"3 rows of {AMBIENT_TERMS} finite numbers")
+        for share in self.ambient_rise:
+            _check_range("ambient, rise_per_mm", 1e-3 * share, -MOST_RISE, MOST_RISE)
         if self.markers is not None and self.photograph:
             found = f"beside the photograph {self.photograph}, whose own dots would stay"
             raise TactileError("markers", found, "a picture at rest that the lights make", "Leave the photograph out")

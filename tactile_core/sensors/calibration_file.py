@@ -35,7 +35,7 @@ _TABLES = {
                "apparent_height_mm", "right_z", "down_x"),
     "leds": COLOURS,
     "response": ("centre", "along_right_per_mm", "along_down_per_mm"),
-    "ambient": COLOURS,
+    "ambient": (*COLOURS, "rise_per_mm"),
     "coating": ("bsdf", "albedo", "roughness", "gloss", "metallic", "spread_mm"),
     "gel": ("dome_scale", "index"),
     "background": ("photograph",),
@@ -110,6 +110,8 @@ class _Reader:
             raise TactileError("format", f"{FORMER!r}, of an older version", expected)
         if content.get("format") == WITHOUT_SPREAD and isinstance(content.get("coating"), dict):
             self._content = content | {"format": FORMAT, "coating": {"spread_mm": 0.0} | content["coating"]}
+        if isinstance(content.get("ambient"), dict):  # files of earlier versions have none
+            self._content = self._content | {"ambient": {"rise_per_mm": [0.0, 0.0, 0.0]} | content["ambient"]}
         for table, names in _TABLES.items():
             if not table:
                 optional = (name for name in OPTIONAL if name in self._content)
@@ -149,7 +151,12 @@ class _Reader:
             fit=self._fit(),
             photographed=(leds, coating.albedo) if photograph else None,
             markers=self._markers() if "markers" in self._content else None,
+            ambient_rise=self._ambient_rise(),
         )
+
+    def _ambient_rise(self) -> tuple[float, float, float]:
+        red, green, blue = _three("ambient, rise_per_mm", self._content["ambient"]["rise_per_mm"])
+        return 1e3 * red, 1e3 * green, 1e3 * blue
 
     def _markers(self) -> Markers:
         table = self._content["markers"]
@@ -313,6 +320,7 @@ def _as_text(calibration: Calibration) -> str:
         "",
         "[ambient]  # of each LED, held in gel and acrylic, of right^i down^j / (10 mm)^(i + j), by i + j, then j",
         *[f"{led} = {_list(row)}" for led, row in zip(COLOURS, calibration.ambient, strict=True)],
+        f"rise_per_mm = {_list([1e-3 * share for share in calibration.ambient_rise])}  # more of it on higher gel",
         "",
         "[coating]  # diffuse, roughplastic or principled; albedo of each LED's light",
         f"bsdf = {toml_quoted(coating.bsdf)}",

@@ -11,6 +11,7 @@ from gel_pictures import Press, levels, with_leds, works
 from tactile_core.errors import TactileError
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR
+from tactile_core.pictures.perspective import Perspective
 from tactile_core.pictures.presets import NAMES, PRESETS, REFERENCE
 from tactile_core.pictures.renderer import MitsubaLight, Renderer
 from tactile_core.sensors.coating import Coating
@@ -55,6 +56,23 @@ def test_each_led_dims_in_its_own_shadow_alone(any_variant, small, press):
         at = np.hypot(right - behind[0], down - behind[1]) < 0.3e-3
         assert change[at][:, led.channel].mean() < -0.15  # of about 0.4 that a level gel has
         assert np.abs(np.delete(change[at].mean(0), led.channel)).max() < 0.1
+
+
+@pytest.mark.parametrize("preset", ["fast", "standard"])
+def test_ambient_light_grows_with_the_gel_s_height(preset, any_variant, small, press):
+    """By what a pixel sees of the gel, in each LED's band; an LED that is off has none."""
+    red, *others = small.leds
+    off = dataclasses.replace(small, leds=(dataclasses.replace(red, radiance=0.0), *others))
+    raised = dataclasses.replace(off, ambient_rise=(50.0, 50.0, -100.0))  # a metre
+    height, rest = press.on(small.camera), rest_height_map(small.camera)
+    changes = []
+    for unit in (off, raised):
+        renderer = Renderer(unit, preset, any_variant)
+        changes.append(renderer.radiance(height) - renderer.rest_radiance)
+    view = Perspective(small.camera, rest)
+    more = (view(height) - view(rest))[..., None] * raised.ambient_rise * off.ambient_unit
+    np.testing.assert_allclose(changes[1] - changes[0], more, atol=0.01)
+    assert not changes[1][..., 0].any() and more[..., 1].max() > 4 and more[..., 2].min() < -7
 
 
 def test_a_mirrored_scene_makes_the_mirrored_picture(any_variant, small):

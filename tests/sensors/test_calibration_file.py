@@ -45,9 +45,18 @@ def test_a_file_of_before_coatings_spread_light_is_read_as_one_that_does_not(tmp
     assert found == dataclasses.replace(shipped, coating=dataclasses.replace(shipped.coating, spread=0.0))
 
 
+def test_ambient_light_of_higher_gel_is_kept_and_may_be_left_out(tmp_path: Path) -> None:
+    unit = dataclasses.replace(load_calibration(), ambient_rise=(40.0, -20.0, 0.0))
+    write_calibration(tmp_path / "unit.toml", unit)
+    assert load_calibration(tmp_path / "unit.toml").ambient_rise == pytest.approx(unit.ambient_rise)
+    (tmp_path / "older.toml").write_text(re.sub(r"rise_per_mm = .*\n", "", SHIPPED_TEXT))
+    assert load_calibration(tmp_path / "older.toml").ambient_rise == (0, 0, 0)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "where"),
     [
+        ("rise_per_mm = [", "rise_per_mm = [5", "ambient, rise_per_mm"),
         ("px_per_mm_x =", "px_per_cm_x =", "unknown px_per_cm_x"),
         ("albedo =", "# albedo =", "coating: albedo missing"),
         ("radius_mm =", "radius =", "leds, .*unknown radius"),

@@ -10,6 +10,7 @@ from ...sensors import sensor_surface
 from ...sensors.calibration import Calibration
 from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of
+from ..background import raised_light
 from ..coating_spread import CoatingSpread
 from ..height_map import check_covered
 from ..perspective import Perspective
@@ -37,6 +38,7 @@ class BallPictures(abc.ABC):
         self.right, self.down = np.meshgrid(self.camera.right, self.camera.down)
         self.spread = CoatingSpread(self.camera, calibration.coating.spread)
         self.gain = np.moveaxis(calibration.gain.matrices(self.camera), (2, 3), (0, 1))
+        self._view = Perspective(self.camera, self.rest)
 
     @abc.abstractmethod
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
@@ -53,6 +55,10 @@ class BallPictures(abc.ABC):
         """Return the depth, m, to which prints of a ball of a radius, m, are known on this gel."""
         return deepest(radius, self.thickness)
 
+    def raised(self, seen: np.ndarray) -> np.ndarray:
+        """Return the ambient light (3, H, W) that grows with height, seen (H, W) m, in the same unit."""
+        return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
+
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Return the change (H, W, 3) of the picture by a press, grey levels."""
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
@@ -63,7 +69,6 @@ class FastPictures(BallPictures):
 
     def __init__(self, calibration: Calibration) -> None:
         super().__init__(calibration)
-        self._view = Perspective(self.camera, self.rest)
         self._lamps = [Lamp(self.camera, led) for led in calibration.leds]
         self._resting = self._radiance(self.rest)
 
@@ -73,7 +78,7 @@ class FastPictures(BallPictures):
 
     def _radiance(self, heights: np.ndarray) -> np.ndarray:
         surface = SeenSurface(self._view, self._view(heights))
-        return np.stack([lamp.radiance(surface) for lamp in self._lamps])
+        return np.stack([lamp.radiance(surface) for lamp in self._lamps]) + self.raised(surface.height)
 
 
 def working_factor(width: int, height: int) -> int:

@@ -39,13 +39,14 @@ class MitsubaPictures:
 class _OfUnit(BallPictures):
     def __init__(self, calibration: Calibration, maker: MitsubaPictures) -> None:
         super().__init__(calibration)
-        self._maker = maker
+        self._maker, self._facing = maker, calibration.facing.astype(np.float32)
         self._resting = self._maker.radiance(calibration, self.rest)
 
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Change (3, H, W) by a press of each LED's light."""
-        change = self._maker.radiance(self.calibration, self.heights(ball)) - self._resting
-        return self.spread(np.moveaxis(change / self.calibration.facing.astype(np.float32), -1, 0))
+        heights = self.heights(ball)
+        change = (self._maker.radiance(self.calibration, heights) - self._resting) / self._facing
+        return self.spread(np.moveaxis(change, -1, 0) + self.raised(self._view(heights) - self._view(self.rest)))
 
 
 def working_preset(preset: Preset, factor: int) -> Preset:

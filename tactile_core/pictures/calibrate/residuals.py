@@ -20,6 +20,7 @@ from .ball_print import deepest
 from .parameters import (
     FIRST_LED,
     LARGEST_RADIUS,
+    PER_LED,
     SMALLEST_RADIUS,
     SPREAD,
     STEP,
@@ -45,7 +46,7 @@ class UnitResiduals:
     """Cost and normal equations of x = the unit's free numbers, then right, down, depth of each press in mm.
 
     start : the calibration that the spread of units is centred on, in working pixels; radius : m, the ball's
-    free : (18,) bool, which of the unit's numbers may change; pictures : what makes a unit's
+    free : (21,) bool, which of the unit's numbers may change; pictures : what makes a unit's
     """
 
     def __init__(
@@ -117,7 +118,7 @@ class UnitResiduals:
     def _sensible(self, x: np.ndarray) -> bool:
         balls, numbers = self.balls(x), self._numbers.copy()
         numbers[self._free] = x[: self._free.sum()]
-        radii = numbers[FIRST_LED + 3 :: 4]
+        radii = numbers[FIRST_LED + 3 :: PER_LED]
         inside = (balls[:, 2] >= 1e3 * SHALLOWEST).all() and (balls[:, 2] <= 1e3 * self._deepest).all()
         return bool(inside and (radii >= SMALLEST_RADIUS).all() and (radii <= LARGEST_RADIUS).all())
 
@@ -175,7 +176,7 @@ class UnitResiduals:
                 for number in wanted:
                     terms = after.terms
                     if number >= FIRST_LED:  # of this LED alone
-                        changes, led = lights.changes.copy(), (number - FIRST_LED) // 4
+                        changes, led = lights.changes.copy(), (number - FIRST_LED) // PER_LED
                         changes[led] = after.changes[led]
                         terms = self._terms(bench, changes, sight)
                     slopes[k][:, column[number]] = self.gain @ (terms - lights.terms) / (way * STEP[number])

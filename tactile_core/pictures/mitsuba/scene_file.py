@@ -27,7 +27,8 @@ from ...files import atomic
 from ...files.exr_file import write_exr
 from ...sensors.calibration import Calibration
 from ...sensors.camera import COLOURS, Camera
-from ..background import by_led
+from ..background import by_led, raised_light
+from ..perspective import Perspective
 from .gel_mesh import MM, SPACING, GelMesh, check_mesh
 from .gel_scene import lamps, material, walls
 
@@ -49,12 +50,14 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
     path = Path(path)
     if path.suffix != ".xml":
         raise TactileError(path, f"the ending {path.suffix!r}", "a name that ends in .xml")
-    mesh = GelMesh(unit.camera, SPACING / 2)
+    mesh, height_map = GelMesh(unit.camera, SPACING / 2), np.asarray(height_map, np.float32)
     check_mesh(mesh.vertices(height_map), mesh.faces, mesh.count)
     square = square_pixels(unit.camera)
-    atomic.write_bytes(path.with_suffix(".ply"), _ply(mesh, np.asarray(height_map, np.float32)))
+    atomic.write_bytes(path.with_suffix(".ply"), _ply(mesh, height_map))
     view = dataclasses.replace(unit, camera=square)
-    ambient = by_led(view, np.zeros((*square.shape, 3))).sum(-1)
+    rows = np.rint((np.arange(square.height) + 0.5) * unit.camera.height / square.height - 0.5).astype(int)
+    seen = Perspective(unit.camera, height_map)(height_map)[rows]
+    ambient = by_led(view, np.moveaxis(raised_light(view, seen), 0, -1)).sum(-1)
     spread = f"{unit.coating.spread / square.pixel_size[0]:.6g}"
     about = {"calibration": unit.unit, "coating_spread_px": spread}
     write_exr(path.with_suffix(".camera.exr"), camera_planes(view, ambient), about)
