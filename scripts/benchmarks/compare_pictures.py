@@ -7,8 +7,9 @@ On photographs: three fits without a third of PRESSES each, tried on that third;
 (right, down, depth), by the fast picture; with --deeper, on further photographs of the same unit and ball, too, whose
 drift of the light is taken off. Fits end on the fast picture, with --finish on Mitsuba's; they start from round
 numbers that know nothing of the unit. Nulls: the background alone, and the nearest fitted photograph shifted to the
-place. `through` allows light through the coating where the ball touches it, three more numbers a photograph. With
---every, by `reference`, too (20 s of CPU a photograph), and by the presets without LLVM.
+place. `through` allows light through the coating where the ball touches it, three more numbers a photograph; `known`
+takes the mean of what the other photographs of the same day show. With --every, by `reference`, too (20 s of CPU a
+photograph), and by the presets without LLVM.
 Times are CPU ms a picture on one core, the least of a few. The presets' own, and their levels from the full model, are
 those of data/optics_presets.json (measure_presets.py). Stock Mitsuba draws the file of `render --scene-out`; its error
 is its noise, of the difference of two renders. Prints rows, then one table. Needs the extra [render]; LLVM's rows only
@@ -126,14 +127,21 @@ def one_fit(
     ways = methods(unit, fitted, fast, variants, every) | {
         "baseline_shifted": lambda ball: shifted(ball, fitted, balls, fast)
     }
-    for press in presses:
-        ball, _ = fit_ball(working, Sight(press), BALL)
-        seen, _ = fit_ball(working, Sight(press), BALL, opaque=False)
-        for name, change in ways.items():
+    placed = [fit_ball(working, Sight(press), BALL)[0] for press in presses]
+    through = [fit_ball(working, Sight(press), BALL, opaque=False)[0] for press in presses]
+    discs = [contact_disc(fast, seen.numbers) for seen in through]
+    for name, change in ways.items():
+        for press, ball in zip(presses, placed, strict=True):
             yield name, compared(change(ball), press, fitted.background, fast, ball)
-            if not name.startswith("baseline") and name != REFERENCE.name:  # whose one picture takes long enough
-                lit = with_light(change(seen), press, fast, seen)
-                yield f"{name}_through", compared(lit, press, fitted.background, fast, seen)
+        if name.startswith("baseline") or name == REFERENCE.name:  # whose one picture takes long enough
+            continue
+        changes = [change(seen) for seen in through]
+        lights = np.stack([light_of(*each) for each in zip(changes, presses, discs, strict=True)])
+        others = (lights.sum(0) - lights) / max(len(lights) - 1, 1)
+        for kind, known in (("through", lights), ("known", others)):
+            for press, seen, dark, disc, light in zip(presses, through, changes, discs, known, strict=True):
+                lit = dark + disc[..., None] * light
+                yield f"{name}_{kind}", compared(lit, press, fitted.background, fast, seen)
 
 
 def methods(
@@ -176,11 +184,10 @@ def shifted(ball: Ball, fitted: Photographs, balls: dict[str, Ball], fast: FastP
     return moved
 
 
-def with_light(change: np.ndarray, press: Press, fast: FastPictures, ball: Ball) -> np.ndarray:
-    """The change with as much light through the coating as the photograph shows."""
-    disc = contact_disc(fast, ball.numbers)
+def light_of(change: np.ndarray, press: Press, disc: np.ndarray) -> np.ndarray:
+    """Light (3,) through the coating, levels, that a photograph shows under a disc (H, W) beside a change."""
     counts = press.touched & (press.picture.max(-1) < 255)
-    return change + disc[..., None] * fitted_light((press.change - change)[counts], disc[counts], MODEL_ERROR)
+    return fitted_light((press.change - change)[counts], disc[counts], MODEL_ERROR)
 
 
 def compared(
