@@ -27,7 +27,7 @@ STYLE = {"font.size": 9, "axes.linewidth": 0.6, "agg.path.chunksize": 10_000}
 class Contents:
     """Contents of a sheet of a recording of T frames, in k columns. Raises ValueError where their counts differ.
 
-    name : of the recording; time : (T,) s; electrodes : (T, 19) counts, change from rest
+    name : of the recording; time : (T,) s, of snapshots their numbers; electrodes : (T, 19) counts, change from rest
     pressure, pressure_measured : (T,) Pa, rise of the fluid's as translated and by PDC; NaN where it was not measured
     frames : (k,) which of the T frames are the columns
     displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
@@ -55,6 +55,7 @@ class Contents:
     mount_shift: np.ndarray | float = 0.0
     warnings: Sequence[str] = ()
     source: str = SOURCE
+    snapshots: bool = False
 
     def __post_init__(self) -> None:
         for what in COLUMNS:
@@ -116,6 +117,7 @@ def _drawn(shown: Contents, camera: Camera) -> SheetFigure:
         _sentences(shown.warnings, shown.confidence),
         truth is not None,
         pressure=shown.pressure is not None,
+        snapshots=shown.snapshots,
     )
     # File names may hold what is no text at all.
     figure.title("".join(letter if letter.isprintable() else "?" for letter in shown.name), shown.simulated)

@@ -273,11 +273,12 @@ class FramePass:
         """Draw the contact sheet of the frames kept for it; call after `write`."""
         shown = np.array(list(self.shown))
         columns = {name: np.stack([at[name] for at in self.shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
-        truth = self.recording.truth
+        truth, timeless = self.recording.truth, bool(np.isnan(self.recording.time).all())
         skin = None if truth is None else truth.displacement_biotac
         contents = Contents(
             name=self.recording.name,
-            time=self.recording.time[self.frames],
+            time=self.frames if timeless else self.recording.time[self.frames],
+            snapshots=timeless,
             electrodes=self.signals.change[self.frames],
             frames=np.searchsorted(self.frames, shown),
             true_displacement_biotac=None if skin is None else skin[shown],

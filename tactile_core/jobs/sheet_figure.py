@@ -36,9 +36,13 @@ MARK = "#c03028"
 class SheetFigure:
     """A figure that is filled from the top; rows and columns lie as the camera sees the gel, fingertip up."""
 
-    def __init__(self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, pressure: bool) -> None:
+    def __init__(
+        self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, pressure: bool, snapshots: bool = False
+    ) -> None:
+        """Make an empty figure. snapshots : whether frames are shown over their numbers, having no time"""
         from matplotlib.figure import Figure
 
+        self._over, self._heading = ("snapshot", "snapshot {:.0f}") if snapshots else ("time, s", "{:.2f} s")
         self.columns, self.camera, self.warnings = columns, camera, warnings
         self._gel = sensors.sensor_surface(camera.sensor)
         self._gel_x, self._gel_z = (
@@ -94,7 +98,7 @@ class SheetFigure:
             axes.annotate(str(k + 1), (at, 1), xycoords=("data", "axes fraction"), xytext=(0, 3),
                           textcoords="offset points", ha="center", size=10, weight="bold")  # fmt: skip
         axes.margins(x=0.005)
-        axes.set_xlabel("time, s", labelpad=1)
+        axes.set_xlabel(self._over, labelpad=1)
         axes.set_ylabel("electrodes, counts\nfrom rest")
         axes.legend(loc="center left", bbox_to_anchor=(1.003, 0.5), ncols=2, fontsize=6.5, frameon=False,
                     handlelength=0.9, columnspacing=0.7, handletextpad=0.4, labelspacing=0.25,
@@ -108,15 +112,16 @@ class SheetFigure:
             axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")
         axes.plot(time, 1e-3 * pressure, color=MARK, linewidth=0.9, label="translated")
         axes.margins(x=0.005)
-        axes.set_xlabel("time, s", labelpad=1)
+        axes.set_xlabel(self._over, labelpad=1)
         axes.set_ylabel("fluid, kPa")
         axes.legend(loc="center left", bbox_to_anchor=(1.003, 0.5), fontsize=6.5, frameon=False, borderaxespad=0)
         self.top += PRESSURE + TIME_AXIS
 
     def headings(self, seconds: np.ndarray) -> None:
-        """Write number and time (k,) s above each column."""
+        """Write number and time (k,) s, or a snapshot's own number, above each column."""
         for k, at in enumerate(seconds):
-            self._text(self._middle(k), 0.17, f"{k + 1}:  {at:.2f} s", size=10, weight="bold", ha="center", va="center")
+            text = f"{k + 1}:  {self._heading.format(at)}"
+            self._text(self._middle(k), 0.17, text, size=10, weight="bold", ha="center", va="center")
         self.top += HEADING
 
     def skin_row(

@@ -102,8 +102,8 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Time from the first frame to the last, s."""
-        return float(self.time[-1] - self.time[0])
+        """Time from the first frame to the last, s; 0 of snapshots, which have none."""
+        return float(np.nan_to_num(self.time[-1] - self.time[0]))
 
     @property
     def row_word(self) -> str:

@@ -1,14 +1,20 @@
 """Recordings of a BioTac SP: read and described, never taken for those of a BioTac, nor the reverse."""
 
+import dataclasses
+
+import fake_tools
+import h5py
 import numpy as np
 import pytest
 
 from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
+from tactile_core.jobs import convert
 from tactile_core.recordings import PrepareOptions, electrode_gains, info
 from tactile_core.recordings.column_map import ColumnMap
 from tactile_core.recordings.readers import each_finger, sensor_of
+from tactile_core.translation.answer import Answer
 from tactile_core.translation.unit_rest import find_rest_sp
 
 SLIP = [f"ff_e{number}" for number in range(1, 25)]
@@ -148,3 +154,23 @@ def test_public_recordings_are_described(outside_data):
         for finger in each_finger(path):
             text = info.describe(finger)
             assert "raw: whole numbers" in text and "weights of a BioTac SP" in text
+
+
+def test_tools_of_it_convert_its_recordings_alone(counts, write, press, in_layout, tmp_path):
+    tools = dataclasses.replace(fake_tools.tools(), source="biotac_sp")
+    slip = written(write, SLIP, counts)
+    rows = [["ball", 1, *row, *row, *row] for row in counts]
+    grasp = written(lambda lines: write(lines, "grasp.csv"), GRASP, rows)
+    done = convert.convert(slip, tmp_path / "slip", convert.Options(keep=("displacement",)), tools)
+    with h5py.File(done.folder / "frames.h5") as file:
+        assert file["electrodes"].shape == (30, 24) and "E1..E24" in file["electrodes"].attrs["description"]
+        assert "displacement_biotac_sp" in file and "displacement_biotac" not in file
+        assert "sensor_surface('biotac_sp')" in file["displacement_biotac_sp"].attrs["description"]
+    with pytest.raises(TactileError, match=r"snapshots, which do not follow each other.*--frames-apart"):
+        convert.convert(f"{grasp}#0", tmp_path / "grasp", convert.Options(), tools)
+    alone = dataclasses.replace(tools, answer=Answer(frames_apart=True))
+    convert.convert(f"{grasp}#0", tmp_path / "grasp", convert.Options(keep=()), alone)
+    with pytest.raises(TactileError, match="19 electrodes; expected the 24 electrodes of a BioTac SP"):
+        convert.convert(in_layout("csv_slide", press), tmp_path / "biotac", convert.Options(), tools)
+    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19 electrodes of a BioTac"):
+        convert.convert(slip, tmp_path / "other", convert.Options(), fake_tools.tools())
