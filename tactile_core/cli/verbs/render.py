@@ -31,10 +31,10 @@ DIR is a new folder, which appears whole or not at all:
   note.json        input, calibration, preset, versions;  timings.json  ms a frame
 
 Presets, from fast to exact: fast needs numpy alone; the others need Mitsuba (`tactile doctor` says how).
-  fast       direct light, soft shadows            standard   direct light, traced
-  quality    standard, and one bounce of light     reference  Mitsuba's path integrator, half a minute a frame
+  fast       direct light, soft shadows            standard   direct light, traced, and a coarse bounce
+  quality    more points of light, a finer bounce  reference  Mitsuba's path integrator, half a minute a frame
 With LLVM, Mitsuba renders a scene: LEDs as lamps, the coating as a material, the window. Without it the coating is
-matte, and standard and quality have no window; pictures differ by half a level. `tactile doctor` says which runs.
+matte, and standard and quality have no window; pictures differ by a tenth of a level. `tactile doctor` says which runs.
 
 --error 0.6levels picks the cheapest preset whose measured error, rms from the full model of the same gel, is at most
 that; --error 50um, for a scene, the tier of contact as `tactile simulate` does. It says what it picked, and why.
