@@ -9,10 +9,15 @@ from PIL import Image
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere
+from tactile_core.jobs import frames_file
 from tactile_core.jobs.gel import Gel
 from tactile_core.jobs.render import Options, render
+from tactile_core.pictures.calibrate.ball_pictures import FastPictures
+from tactile_core.pictures.height_map import of_unit, rest_height_map
 from tactile_core.sensors.about import about
 from tactile_core.sensors.calibration_file import calibration_path, load_calibration
+from tactile_core.translation import gel_place
+from tactile_core.translation.contact_frame import frame_of
 
 NAME = "gelsight_mini"
 # Nodes of the public mesh (docs/sources.md, GelSight Mini gel): mm from its middle, along the short and the long side,
@@ -77,3 +82,24 @@ def test_a_gel_is_drawn_by_its_own_camera_alone():
 def test_a_calibration_of_another_gel_is_refused(tmp_path):
     with pytest.raises(TactileError, match="'digit'; expected 'gelsight_mini'"):
         load_calibration(calibration_path("digit"), NAME)
+
+
+def test_a_ball_presses_the_dome_of_its_descriptor():
+    unit = load_calibration(None, NAME).at_size(80, 60)
+    bench = FastPictures(unit)
+    np.testing.assert_allclose(bench.rest, of_unit(rest_height_map(unit.camera), unit), atol=3e-6)
+    assert bench.deepest(0.75e-3) / 0.75e-3 > bench.deepest(3e-3) / 3e-3  # small balls are pressed deeper
+
+
+def test_places_of_a_latent_lie_on_its_own_gel():
+    frame = frame_of(NAME, 4)
+    point = np.array([[-8e-3, 0.0], [-4e-3, 8e-3]])
+    np.testing.assert_allclose(gel_place.on_gel(frame, gel_place.place_on(frame, point)), point, atol=1e-6)
+
+
+def test_frames_are_named_after_the_gel():
+    pair = "biotac", NAME
+    assert frames_file.named("displacement_digit", pair) == "displacement_gelsight_mini"
+    assert frames_file.named("displacement_biotac", pair) == "displacement_biotac"
+    meaning = frames_file.described(frames_file.KEPT["displacement"]["displacement_digit"][1], pair)
+    assert meaning == "(T, M, 3) of the nodes of sensors.sensor_surface('gelsight_mini')"
