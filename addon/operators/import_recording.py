@@ -72,7 +72,8 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
             scene.frame_set(int(frames[firmest]))
             view.fit_timeline(context)
         view.open_tab(context)
-        view.show(context, [skin])
+        there = [thing for thing in scene.objects if thing.tactile.role in ("BIOTAC", "DIGIT") and thing != skin]
+        view.show(context, [skin], there)
         for warning in found.signals.warnings:
             self.report({"WARNING"}, warning)
         if len(frames) > LONG and self.motion != "MESH_CACHE":

@@ -7,6 +7,7 @@ import json
 import os
 import queue
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -53,7 +54,7 @@ class Job:
 
     def tell(self, message: dict) -> None:
         """Send a line to a worker that listens; one that has died says why in the next ``poll``."""
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError), _alive_on_broken_pipe():
             self._process.stdin.write(json.dumps(message) + "\n")
             self._process.stdin.flush()
 
@@ -88,7 +89,7 @@ class Job:
         self._reader.join(_PATIENCE)
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
-                with contextlib.suppress(OSError):  # what was not read by a dead worker
+                with contextlib.suppress(OSError), _alive_on_broken_pipe():  # what was not read by a dead worker
                     pipe.close()
 
     def _messages(self, wait: float) -> Iterator[dict]:
@@ -124,6 +125,21 @@ class JobFolder:
     def close(self) -> None:
         """Remove it."""
         shutil.rmtree(self.path, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _alive_on_broken_pipe() -> Iterator[None]:
+    """Hold SIGPIPE back: Python ignores it, but not inside a Blender, which it would end."""
+    if not hasattr(signal, "SIGPIPE"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
+    try:
+        yield
+    finally:
+        if signal.SIGPIPE in signal.sigpending():
+            signal.sigwait({signal.SIGPIPE})
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _message(line: str) -> dict:
