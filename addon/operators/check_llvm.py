@@ -29,7 +29,9 @@ class TACTILE_OT_check_llvm(TactileOperator):
             finally:
                 job.cancel()
             verdict = (folder / "variant.txt").read_text(encoding="utf-8")
-        preferences.addon_preferences(context).verdict = verdict
+        chosen = preferences.addon_preferences(context)
+        if chosen is not None:
+            chosen.verdict = verdict
         self.report({"INFO"}, verdict)
 
 

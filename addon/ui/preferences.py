@@ -13,9 +13,16 @@ ID = __package__.rsplit(".", 2)[0]  # the extension, not this package in it
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"  # by which Mitsuba finds the library
 
 
-def addon_preferences(context: bpy.types.Context) -> bpy.types.AddonPreferences:
-    """Return the extension's preferences."""
-    return context.preferences.addons[ID].preferences
+def addon_preferences(context: bpy.types.Context) -> bpy.types.AddonPreferences | None:
+    """Return the extension's preferences; None where ``--addons`` has switched it on for one run alone."""
+    known = context.preferences.addons.get(ID)
+    return None if known is None else known.preferences
+
+
+def default_calibration(context: bpy.types.Context) -> str:
+    """Return the file of scenes that name none; empty for the calibration that ships."""
+    chosen = addon_preferences(context)
+    return "" if chosen is None else chosen.calibration
 
 
 class TACTILE_OT_clear_cache(TactileOperator):

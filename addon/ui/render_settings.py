@@ -60,7 +60,7 @@ def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) 
 
     Raises TactileError.
     """
-    path = scene.tactile_render.calibration or preferences.addon_preferences(bpy.context).calibration
+    path = scene.tactile_render.calibration or preferences.default_calibration(bpy.context)
     try:
         unit = calibration_file.load_calibration(bpy.path.abspath(path) if path else None)
     except TactileError as error:

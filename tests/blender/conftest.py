@@ -67,6 +67,18 @@ def part(extension: ModuleType):
 
 
 @pytest.fixture
+def needs(extension: ModuleType):
+    """``needs("h5py")``: skips a test where a package is missing; imports none, as h5py's own does not work in each."""
+
+    def check(*names):
+        for name in names:
+            if importlib.util.find_spec(name) is None:
+                pytest.skip(f"{name} is missing")
+
+    return check
+
+
+@pytest.fixture
 def imported(scene):
     """``imported(motion="COMPACT")``: the shipped recording's frames 40 to 140, as the skin object."""
     import bpy

@@ -351,8 +351,8 @@ def test_friction_and_tilt_reach_the_scene_file(sensors, part, tmp_path):
     assert (spec.friction, spec.tilt_deg) == (0.35, 12.0)
 
 
-def test_a_simulation_names_its_stages(sensors, part, monkeypatch):
-    pytest.importorskip("h5py")
+def test_a_simulation_names_its_stages(sensors, part, needs, monkeypatch):
+    needs("h5py")
     bpy.ops.tactile.add_indenter(shape="sphere")
     bpy.ops.tactile.snap_to_gel(depth=0.1)
     sensors.frame_end = 2

@@ -7,14 +7,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-import pytest
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "blender.md"
 
 
-def test_the_example_goes_from_an_empty_file_to_a_picture(scene, part, monkeypatch, tmp_path):
-    for name in ("h5py", "msgspec", "scipy"):
-        pytest.importorskip(name)
+def test_the_example_goes_from_an_empty_file_to_a_picture(scene, part, needs, monkeypatch, tmp_path):
+    needs("h5py", "msgspec", "scipy")
     monkeypatch.chdir(tmp_path)
     code = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL).group(1)
     bpy.context.scene.frame_set(1)

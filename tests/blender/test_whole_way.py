@@ -17,22 +17,23 @@ CONTACTS, EFFORT = 200, 0.01  # enough for each stage to run, not for a translat
 
 @pytest.fixture
 def tactile(part):
-    """``tactile("pairs", ...)``: a verb of the command line on this Python."""
+    """``tactile("pairs", ...)``: a verb of the command line on this Python, or with ``-c`` a program; its output."""
 
     def run(*arguments):
-        command = [sys.executable, "-P", "-m", "tactile_core", *map(str, arguments)]
+        start = [] if arguments[0] == "-c" else ["-m", "tactile_core"]
+        command = [sys.executable, "-P", *start, *map(str, arguments)]
         environment = part("addon.process.jobs")._environment()
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
         assert done.returncode == 0, done.stderr
+        return done.stdout
 
     return run
 
 
 @pytest.fixture
-def authored(scene, tmp_path):
+def authored(scene, needs, tmp_path):
     """The folder of press.blend, its exported scene and its simulated recording."""
-    for name in ("h5py", "msgspec", "scipy"):
-        pytest.importorskip(name)
+    needs("h5py", "msgspec", "scipy")
     for sensor in ("BIOTAC", "DIGIT"):
         bpy.ops.tactile.add_sensor(sensor=sensor)
     bpy.ops.tactile.add_indenter(shape="sphere", radius=4.0)
@@ -46,10 +47,12 @@ def authored(scene, tmp_path):
     return tmp_path
 
 
-def test_an_exported_scene_is_paired(authored, tactile, part):
+def test_an_exported_scene_is_paired(authored, tactile):
     tactile("pairs", authored / "press" / "scene.toml", "--count", 2, "--out", authored / "pairs.h5")
-    pairs = part("tactile_core.simulation.pairs_file").read_pairs(authored / "pairs.h5")
-    assert len(pairs.force) == 2 and (pairs.depth_digit > 0).all()
+    # In a process of its own: some Blenders hold an HDF5 that h5py does not work with.
+    read = "import sys; from tactile_core.simulation.pairs_file import read_pairs; pairs = read_pairs(sys.argv[1])"
+    told = tactile("-c", f"{read}; print(len(pairs.force), (pairs.depth_digit > 0).all())", authored / "pairs.h5")
+    assert told.split() == ["2", "True"]
 
 
 @pytest.mark.skipif(importlib.util.find_spec("torch") is None, reason="torch is missing")
@@ -63,8 +66,8 @@ def test_what_was_paired_is_trained_translated_and_drawn(authored, tactile):
     assert len(list((authored / "out" / "sphere" / "images").glob("*.png"))) > 0
 
 
-def test_the_example_is_written(extension, tmp_path):
-    pytest.importorskip("h5py")
+def test_the_example_is_written(needs, tmp_path):
+    needs("h5py")
     path = tmp_path / "example.blend"
     runpy.run_path(str(ROOT / "scenes" / "press_roll_slide" / "make_blend.py"))["write"](path)
     bpy.ops.wm.open_mainfile(filepath=str(path))
