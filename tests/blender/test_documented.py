@@ -22,6 +22,11 @@ def test_the_example_goes_from_an_empty_file_to_a_picture(scene, part, needs, mo
     assert forces[0] == 0 and max(forces) > 0.5
     picture = bpy.data.images.load(str(tmp_path / "author" / "press.png"))
     assert tuple(picture.size) == (240, 320) and np.ptp(np.array(picture.pixels)) > 0.3
+    shown = np.array(picture.pixels)
+    bpy.context.scene.frame_set(1)
+    bpy.ops.render.render(write_still=True)
+    picture.reload()
+    assert np.abs(np.array(picture.pixels) - shown).max() > 0.1  # the page's picture shows the dent
     gel = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "DIGIT")
     assert gel["expected_error_um"] > 0  # translated, no longer the simulated one
 
