@@ -102,8 +102,8 @@ def _of_hdf5(path: Path, gel: str) -> Frames:
             name, numbers = f"truth/displacement_{gel}", None
         else:
             raise TactileError(path, f"format {kind!r}" if kind else "no frames of ours", EXPECTED, CONVERT)
-        scale = float(store.attributes_of(name).get("scale", 1.0))
         displacement = _array(store, name, gel)
+        scale = float(store.attributes_of(name).get("scale", 1.0))
     numbers = np.arange(len(displacement)) if numbers is None else numbers
     if len(numbers) != len(displacement) or not len(numbers):
         raise TactileError(path, f"{len(displacement)} frames of {len(numbers)} numbers", "as many, one or more")

@@ -45,8 +45,7 @@ def tier_errors(sensor: str, share: float) -> list[Candidate]:
     The fast tier was measured against the full one, whose own error is added to it.
     """
     if sensor not in measured()["tiers"]["fast"]:
-        expected = f"one of {', '.join(sorted(measured()['tiers']['fast']))}"
-        advice = "Leave --error out: the fast tier is taken"
+        advice, expected = "Leave --error out: the fast tier is taken", "a sensor whose tiers were measured"
         raise TactileError("--error", f"no errors are measured on the {title(sensor)}", expected, advice)
     own = {tier: _up_to(tier, sensor, share) for tier in TIERS}
     own["fast"] += own["full"]

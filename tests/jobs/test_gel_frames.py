@@ -79,3 +79,8 @@ def test_odd_frame_numbers_are_refused(numbers, converted):
     for read in (lambda: frame_displacement(converted, "digit", 4), lambda: read_frames(converted)):
         with pytest.raises(TactileError, match="frame: frame numbers"):
             read()
+
+
+def test_a_gel_that_was_not_kept_is_asked_for(simulated):
+    with pytest.raises(TactileError, match=r"displacement_gelsight_mini: missing.*--keep displacement_gelsight_mini"):
+        read_frames(simulated, gel="gelsight_mini")

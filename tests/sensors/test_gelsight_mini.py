@@ -16,6 +16,7 @@ from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.height_map import of_unit, rest_height_map
 from tactile_core.sensors.about import about
 from tactile_core.sensors.calibration_file import calibration_path, load_calibration
+from tactile_core.simulation import tier_choice
 from tactile_core.translation import gel_place
 from tactile_core.translation.contact_frame import frame_of
 
@@ -103,3 +104,8 @@ def test_frames_are_named_after_the_gel():
     assert frames_file.named("displacement_biotac", pair) == "displacement_biotac"
     meaning = frames_file.described(frames_file.KEPT["displacement"]["displacement_digit"][1], pair)
     assert meaning == "(T, M, 3) of the nodes of sensors.sensor_surface('gelsight_mini')"
+
+
+def test_tiers_of_a_gel_that_were_not_measured_are_not_chosen():
+    with pytest.raises(TactileError, match="no errors are measured on the GelSight Mini"):
+        tier_choice.choose(NAME, 0.2, 50.0)
