@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.sensors import SAMPLE_RATE
 from ..process.jobs import Job, JobFolder
 from ..ui import properties, render_settings
 from ..ui.reports import Refused, TactileOperator, reported, require
@@ -72,6 +73,7 @@ class TACTILE_OT_simulate(TactileOperator):
         shutil.copyfile(self._folder.path / "recording.h5", path)
         skin.tactile.recording, skin.tactile.tare = f"//tactile_simulations/{name}", "auto"
         skin.tactile.frames, skin.tactile.first_frame = ":", context.scene.frame_start
+        skin.tactile.samples = SAMPLE_RATE / _rate(context.scene)
 
     def work(self, context: bpy.types.Context) -> None:
         """Simulate without a window, or from a script: waits for the end."""

@@ -35,7 +35,7 @@ class TACTILE_OT_translate(TactileOperator):
         with shown(context) as progress:
             path = bpy.path.abspath(about.recording)
             found = recording_data.load(path, about.tare, about.frames, progress, about.polarity)
-        frames = about.first_frame + found.chosen.astype(float)
+        frames = about.first_frame + found.chosen / about.samples
         group = properties.home_of(skin)
         # A gel that is there keeps its LEDs, coating and camera as the user has set them.
         there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")

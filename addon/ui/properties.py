@@ -82,6 +82,10 @@ class TactileObject(bpy.types.PropertyGroup):
         name="Largest", description="Largest displacement of the animation, metres", default=0.0, min=0.0
     )
     first_frame: bpy.props.IntProperty(name="First Frame", description="Scene frame of the recording's first frame")
+    samples: bpy.props.FloatProperty(
+        name="Samples a Frame", description="Frames of a recording simulated here that one of the scene takes",
+        default=1.0, min=1e-3,
+    )  # fmt: skip
 
 
 def set_up(thing: bpy.types.Object, role: str, per_metre: float) -> TactileObject:
