@@ -51,20 +51,14 @@ class Tracer:
         self._tell_unit(unit, around)
         np.save(self._folder.path / "heights.npy", heights)
         self._job.tell({"picture": self._count, "unit": self._unit})
-        try:
-            while self._job.done < self._count:
-                if self._job.poll(_LOOK):
-                    raise TactileError("Tactile render", "the worker ended early", "a picture", "Render again")
-                if stopped():
-                    raise Stopped
-                if self._job.drawn > drawn and self._job.done < self._count:
-                    drawn = self._job.drawn
-                    better(self._picture())
-        except TactileError:
-            for preset in [name for name, kept in _kept.items() if kept is self]:
-                del _kept[preset]  # it has ended: the next picture starts another
-            self.close()
-            raise
+        while self._job.done < self._count:
+            if self._job.poll(_LOOK):
+                raise TactileError("Tactile render", "the worker ended early", "a picture", "Render again")
+            if stopped():
+                raise Stopped
+            if self._job.drawn > drawn and self._job.done < self._count:
+                drawn = self._job.drawn
+                better(self._picture())
         return self._picture()
 
     def _picture(self) -> np.ndarray:
@@ -114,6 +108,9 @@ def draw(
             _kept[preset] = Tracer(preset)
         try:
             return _kept[preset].draw(unit, around, heights, stopped, better)
+        except TactileError:
+            close_all()  # the worker has ended: the next picture starts another
+            raise
         finally:
             _last_used = time.monotonic()
 

@@ -2,10 +2,10 @@
 
     python scripts/benchmarks/place_bound.py [--every N]
 
-Known are the law of the electrodes, the body pressed and how much readings scatter; sought are place, lean and depth.
-No estimate without bias errs less on average, whether a network makes it or a fit: what the networks leave beside
-these numbers is the most that they could gain, and where the body is not known they can gain less. Needs scipy, of the
-extra [fem].
+The law of the electrodes, the body pressed and the scatter of readings are known; place, lean and depth are sought, of
+which only their spread over training contacts is known before. Where signals change evenly with the contact, no
+estimate errs less on average, whether a network makes it or a fit; where the body is not known, all err more. Needs
+scipy, of the extra [fem].
 """
 
 from __future__ import annotations

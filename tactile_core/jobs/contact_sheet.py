@@ -12,10 +12,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..files import atomic
-from ..sensors import title
+from ..sensors import SOURCE, title
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import Camera
-from ..translation.card_sensors import SOURCE
 from .sheet_figure import FRAMES, LOW_CONFIDENCE, SheetFigure, scale
 
 WARNING_LINES, WARNING_WIDTH = 5, 200

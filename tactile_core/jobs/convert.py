@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.stopwatch import Stopwatch
-from ..translation.card_sensors import SOURCE, TARGET
+from ..sensors import SOURCE, TARGET
 from . import results
 from .frame_pass import FramePass, Solver, Tools
 from .frame_range import frames_text, select

@@ -14,11 +14,10 @@ from ..files.png_writer import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import folds_counted
 from ..recordings import flags
-from ..sensors import PRESSURE_PER_COUNT
+from ..sensors import PRESSURE_PER_COUNT, SOURCE, TARGET
 from ..sensors.camera import Camera
 from ..translation.answer import Answer
 from ..translation.card_errors import doubt
-from ..translation.card_sensors import SOURCE, TARGET
 from ..translation.contact_track import Evidence, Tracked
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet

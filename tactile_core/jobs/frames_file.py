@@ -12,7 +12,7 @@ from .. import sensors
 from ..files.hdf5_writer import Disk
 from ..files.version import __version__
 from ..recordings import flags
-from ..translation.card_sensors import SHIPPED
+from ..sensors import PAIR
 
 if TYPE_CHECKING:
     import h5py
@@ -88,12 +88,12 @@ def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]
 def named(name: str, pair: tuple[str, str]) -> str:
     """Return the name of a dataset of frames of another source than a BioTac, or another gel than a DIGIT's."""
     stem, _, role = name.rpartition("_")
-    return f"{stem}_{pair[SHIPPED.index(role)]}" if role in SHIPPED else name
+    return f"{stem}_{pair[PAIR.index(role)]}" if role in PAIR else name
 
 
 def described(meaning: str, pair: tuple[str, str]) -> str:
     """Return a dataset's meaning in frames of another source than a BioTac, or another gel than a DIGIT's."""
-    for role, sensor in zip(SHIPPED, pair, strict=True):
+    for role, sensor in zip(PAIR, pair, strict=True):
         if role != sensor:
             meaning = meaning.replace(f"{role}_surface()", f"sensor_surface({sensor!r})")
             meaning = meaning.replace(sensors.title(role), sensors.title(sensor))
@@ -109,7 +109,7 @@ class FramesFile:
 
     def __init__(
         self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0,
-        pair: tuple[str, str] = SHIPPED,
+        pair: tuple[str, str] = PAIR,
     ) -> None:  # fmt: skip
         """Create the file.
 

@@ -18,7 +18,7 @@ from ..files import outside
 from ..files.hdf5_checked import SIGNATURE
 from ..recordings.array_store import open_hdf5, open_npz
 from ..recordings.simulated import FORMAT as SIMULATED
-from ..simulation.pairs_file import TARGET
+from ..sensors import TARGET
 from .frames_file import FORMAT as CONVERTED
 
 if TYPE_CHECKING:

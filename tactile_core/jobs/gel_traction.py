@@ -7,7 +7,7 @@ import numpy as np
 from .. import accuracy, sensors
 from ..mechanics.inverse_contact import pressing_traction
 from ..mechanics.node_areas import node_areas
-from ..translation.card_sensors import TARGET
+from ..sensors import TARGET
 from ..translation.contact_patch import contact_patch
 
 

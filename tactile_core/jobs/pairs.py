@@ -20,11 +20,12 @@ from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
 from ..mechanics.electrodes.law import SHEET
 from ..mechanics.fast.compliance import compliance_of
+from ..sensors import PAIR
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import Fluid
 from ..sensors.gel_sensor import Gel
 from ..simulation.pairs_card import card, card_path
-from ..simulation.pairs_file import SENSORS, merge
+from ..simulation.pairs_file import merge
 from ..simulation.scene import Scene
 from .engine import job as jobs
 from .engine import result_parts, scene_input
@@ -52,7 +53,7 @@ def make_pairs(
     progress: Callable[[int, int], None] | None = None,
     place: Callable[[pathlib.Path], Place] | None = None,
     electrodes: str = SHEET,
-    pair: tuple[str, str] = SENSORS,
+    pair: tuple[str, str] = PAIR,
 ) -> None:
     """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
 
@@ -80,9 +81,9 @@ def plan(
     seed: int,
     out: pathlib.Path,
     electrodes: str = SHEET,
-    pair: tuple[str, str] = SENSORS,
+    pair: tuple[str, str] = PAIR,
 ) -> tuple[jobs.Job, list[str], str]:
-    """Return the job, the names of the indenters and the scene's text; raises what ``make_pairs`` raises at first."""
+    """Return the job, the names of the indenters and the scene's text; raises as ``make_pairs``."""
     source, target = pair
     of_kind(source, Fluid), of_kind(target, Gel)
     scene, text, inputs, files = scene_input.read_inputs(scene_path, ["presses"])

@@ -18,7 +18,7 @@ from typing import Any
 from ..accuracy import Budget
 from ..errors import TactileError
 from ..files.shipped import shipped
-from ..sensors import title
+from ..sensors import PAIR, title
 from ..translation import network_sizes
 from . import results
 
@@ -26,7 +26,6 @@ COSTS = shipped("costs.json")
 TIERS = shipped("mechanics_tiers.json")
 OF_SCENE = ("electrodes", "displacement_biotac", "displacement_digit", "translation", "image")
 OF_RECORDING = results.KEEPABLE
-SENSORS = "biotac", "digit"
 # Once, where matrices are not cached: CPU time measured on one core (AMD EPYC with AVX-512), memory as
 # ``compliance.build`` asks for, and the size of the files.
 BUILD_S, BUILD_MB, MATRICES_MB = {"biotac": 42.0, "digit": 18.0}, 2200.0, {"biotac": 342.0, "digit": 151.0}
@@ -138,7 +137,7 @@ def of_scene(path: Path, keep: Collection[str], budget: Budget, preset: str | No
         parts.append(Part("electrodes", "simulate", "19, from the film over each; noise and drift", disk=disk))
     parts += _translation(frames, "latent", "convert") if "translation" in keep else []
     parts += _rendered(frames, budget, preset) if "image" in keep else []
-    left = [f"{title(sensor)} and its matrices" for sensor in SENSORS if sensor not in used]
+    left = [f"{title(sensor)} and its matrices" for sensor in PAIR if sensor not in used]
     left += [] if "translation" in keep else ["networks"]
     left += [] if "image" in keep else ["height maps, LEDs and pictures"]
     return Plan(f"scene {scene.name}: {', '.join(keep)}", tuple(parts), tuple(left))

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.shipped import shipped
-from ..sensors import shape_of
-from ..simulation.pairs_file import TARGET
+from ..sensors import TARGET, shape_of
 
 TABLE = shipped("sampling.json")
 

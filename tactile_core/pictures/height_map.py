@@ -199,7 +199,7 @@ def _say_folded(count: int, places: int) -> None:
 def check_covered(surface: Lattice, camera: Camera) -> None:
     """Raise TactileError for a surface without an evenly spaced window, and for a picture that reaches past it."""
     if surface.window is None:
-        raise TactileError("surface", "no evenly spaced window", "one", "Use sensors.digit_surface()")
+        raise TactileError("surface", "no evenly spaced window", "one", "Use a gel's: sensors.sensor_surface(name)")
     rest = surface.grid(surface.rest)[surface.window]
     across, down = camera.pixel_size
     for name, nodes, seen, pixel in (

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import ELECTRODES, SAMPLE_RATE, title
+from ..sensors import ELECTRODES, SAMPLE_RATE, SOURCE, title
 from ..sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
 from .flags import Flag
-from .recording import TRANSLATED, Recording, Truth
+from .recording import Recording, Truth
 
 MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
@@ -24,7 +24,7 @@ OTHER_RATE = 1.6  # times the usual rate, or a share of it, from which on it is 
 MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 STAMP_UNITS = ((1e17, 1e-9, "nanoseconds"), (1e14, 1e-6, "microseconds"), (1e11, 1e-3, "milliseconds"))  # of unix time
 MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory
-COUNTS = {TRANSLATED: ELECTRODES, "biotac_sp": SP_ELECTRODES}  # of electrodes
+COUNTS = {SOURCE: ELECTRODES, "biotac_sp": SP_ELECTRODES}  # of electrodes
 SHOWN = 8  # problems spelled out one by one; more are counted
 
 
@@ -43,12 +43,12 @@ class BadRows(TactileError):
     """Error for more bad rows than a recording may have."""
 
 
-def check_electrodes(path: str, count: int, source: str, sensor: str = TRANSLATED) -> None:
+def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -> None:
     """Raise for another number of electrodes than a sensor has. source says where the count was seen."""
     wanted = COUNTS[sensor]
     if count == wanted:
         return
-    if sensor != TRANSLATED:
+    if sensor != SOURCE:
         raise TactileError(f"{path}, {source}", f"{count} electrodes", f"the {wanted} electrodes of a {title(sensor)}")
     if count == SP_ELECTRODES:
         raise TactileError(
@@ -79,7 +79,7 @@ def assemble(
     about: dict[str, Any] | None = None,
     names: Sequence[str] = (),
     warnings: Sequence[str] = (),
-    sensor: str = TRANSLATED,
+    sensor: str = SOURCE,
     snapshots: bool = False,
     **channels: np.ndarray | None,
 ) -> Recording:

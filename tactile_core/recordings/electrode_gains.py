@@ -14,10 +14,10 @@ from msgspec import Meta
 from ..errors import TactileError
 from ..files import atomic
 from ..files.text_file import read_toml_text, toml_quoted
-from ..sensors import COUNT_MAX, divider
+from ..sensors import COUNT_MAX, SOURCE, divider
 from .assemble import COUNTS
 from .fingers import FINGERS
-from .recording import TRANSLATED, Recording
+from .recording import Recording
 from .signals import PrepareOptions, Rest, Signals, doubt_law, prepare
 
 FORMAT = "tactile-sensor-2"
@@ -63,7 +63,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     finger2: ElectrodeGains | None = None
     finger3: ElectrodeGains | None = None
     finger4: ElectrodeGains | None = None
-    sensor: str = TRANSLATED
+    sensor: str = SOURCE
 
     def sections(self) -> dict[str, ElectrodeGains]:
         """Return the sections present, by name."""
@@ -71,7 +71,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
         return {name: found for name in names if (found := getattr(self, name)) is not None}
 
     def gains_for(
-        self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike, sensor: str = TRANSLATED
+        self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike, sensor: str = SOURCE
     ) -> ElectrodeGains:
         """Return the unit that made a sensor's recording. Raises TactileError where the file has no section for it."""
         if self.sensor != sensor:
@@ -107,7 +107,7 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
     offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
     change = (signals.typical - offset) / np.array(sensor.gain)
-    if signals.kind == "raw" and signals.sensor == TRANSLATED:  # another's changes are its own, see `Signals.typical`
+    if signals.kind == "raw" and signals.sensor == SOURCE:  # another's changes are its own, see `Signals.typical`
         change = divider.of_unit(change, signals.rest)
     return doubt_law(dataclasses.replace(signals, change=change, report={**signals.report, "sensor": applied}))
 
@@ -162,7 +162,7 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
         "# Used by: tactile convert RECORDING --sensor THIS_FILE",
         f"format = {toml_quoted(sensor.format)}",
     ]
-    if sensor.sensor != TRANSLATED:
+    if sensor.sensor != SOURCE:
         lines[:2] = ["# Rest of a BioTac SP, E1 to E24. Used by: tactile info RECORDING --sensor THIS_FILE"]
         lines.append(f"sensor = {toml_quoted(sensor.sensor)}")
     for name, section in sensor.sections().items():

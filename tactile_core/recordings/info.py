@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..sensors import ELECTRODES, title
+from ..sensors import ELECTRODES, SOURCE, title
 from .biotac_sp import describe_sp
 from .fingers import split
 from .flags import Flag, names
 from .readers import read, sensor_of
-from .recording import TRANSLATED, Recording
+from .recording import Recording
 from .signals import PrepareOptions, Signals, prepare
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def describe(
     recording = read(path, columns, sensor)
     finger = split(os.fspath(path))[1]
     gains = None if unit is None else unit.gains_for(path, finger, "--sensor", sensor)
-    if sensor != TRANSLATED:
+    if sensor != SOURCE:
         return describe_sp(recording, gains)
     signals = prepare(recording, options)
     if gains is not None:

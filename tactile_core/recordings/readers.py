@@ -15,6 +15,7 @@ from ..errors import TactileError
 from ..files import outside
 from ..files.hdf5_checked import SIGNATURE
 from ..files.registry import modules_of
+from ..sensors import SOURCE
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
 from .assemble import COUNTS, check_electrodes
@@ -22,7 +23,7 @@ from .bag import START_BYTES, fingers_of, is_bag_folder, kind_of, open_bag, read
 from .column_map import ColumnMap, read_mapped, refuse_other
 from .fingers import named, split
 from .matlab import START, START_OF_HDF5, open_matlab
-from .recording import TRANSLATED, Recording
+from .recording import Recording
 from .table import Table, read_header, read_table
 from .truncated_cell import shown
 
@@ -49,7 +50,7 @@ def layouts() -> tuple[ModuleType, ...]:
     return tuple(modules_of(formats.__name__).values())
 
 
-def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = TRANSLATED) -> Recording:
+def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = SOURCE) -> Recording:
     """Read a recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
@@ -64,7 +65,7 @@ def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor:
     >>> len(recording), recording.rate, recording.electrodes.shape
     """
     path = os.fspath(path)
-    if sensor != TRANSLATED:
+    if sensor != SOURCE:
         return _read_sp(path, columns, sensor)
     with opened(path) as (container, where, finger, file):
         refuse_other(path, container, columns)
@@ -95,12 +96,12 @@ def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) ->
     path = os.fspath(path)
     with opened(path) as (container, where, _, file):
         if columns is not None or container != "csv":
-            return TRANSLATED
+            return SOURCE
         return _sensor(layout_of(where, "csv", read_header(where, file)))
 
 
 def _sensor(layout: ModuleType) -> str:
-    return getattr(layout, "SENSOR", TRANSLATED)
+    return getattr(layout, "SENSOR", SOURCE)
 
 
 def _read_sp(path: str, columns: ColumnMap | None, sensor: str) -> Recording:
@@ -165,7 +166,7 @@ def list_fingers(paths: Iterable[str | os.PathLike[str]]) -> list[str]:
 
 def _fingers_of_table(header: tuple[str, ...]) -> tuple[int, ...]:
     """Fingers of a BioTac SP's file; none of others, also of those whose columns a map names."""
-    known = [layout for layout in layouts() if _sensor(layout) != TRANSLATED and layout.score(header) >= RECOGNISED]
+    known = [layout for layout in layouts() if _sensor(layout) != SOURCE and layout.score(header) >= RECOGNISED]
     return known[0].fingers(header) if known else ()
 
 

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..sensors import SAMPLE_RATE
+from ..sensors import SAMPLE_RATE, SOURCE
 
-TRANSLATED = "biotac"  # the sensor whose recordings weights translate, and that a file is of where nothing else is said
 LEAST_STEP = 1e-6  # s between stamps; less is no time (assumed), and its inverse no number
 
 
@@ -88,7 +87,7 @@ class Recording:
     simulated: bool = False
     truth: Truth | None = None
     about: dict[str, Any] = field(default_factory=dict)
-    sensor: str = TRANSLATED
+    sensor: str = SOURCE
 
     def __len__(self) -> int:
         return len(self.electrodes)

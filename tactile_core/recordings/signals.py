@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import divider, title
+from ..sensors import SOURCE, divider, title
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, POLARITIES, Fluid
 from . import contact_law
@@ -17,7 +17,7 @@ from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
 from .polarity import AUTO, BLOCK, Polarity, choose, polarity_of, spread_out, touching
-from .recording import TRANSLATED, Recording
+from .recording import Recording
 from .repair import fill, find_glitches, is_time_series
 from .rest_level import (
     TARED_PDC,
@@ -125,7 +125,7 @@ class Signals:
     pdc: np.ndarray
     warnings: tuple[str, ...]
     report: dict[str, Any]
-    sensor: str = TRANSLATED
+    sensor: str = SOURCE
 
     def at(self, frames: np.ndarray | slice) -> Signals:
         """Return the signals of some frames alone; rest and drift stay those of the recording."""
@@ -138,7 +138,7 @@ class Signals:
         Only raw readings show their unit's rest counts; other changes are not converted, nor are those of a sensor of
         which no unit has been seen at rest: see `relative_to`.
         """
-        if self.kind != "raw" or self.sensor != TRANSLATED:
+        if self.kind != "raw" or self.sensor != SOURCE:
             return self.change
         found = np.empty(self.change.shape)
         for start in range(0, len(found), BLOCK):
@@ -151,7 +151,7 @@ class Signals:
 
     def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
         """Change (n, 19) counts of some frames alone, as ``typical`` has them."""
-        own = self.kind != "raw" or self.sensor != TRANSLATED
+        own = self.kind != "raw" or self.sensor != SOURCE
         return self.change[rows] if own else divider.typical(self.change[rows], self.rest)
 
 
@@ -203,7 +203,7 @@ def doubt_law(signals: Signals) -> Signals:
 
     Simulated ones of other sensors than a BioTac come with their weights: their law is not judged.
     """
-    if signals.kind not in ("raw", "tared") or signals.sensor != TRANSLATED:
+    if signals.kind not in ("raw", "tared") or signals.sensor != SOURCE:
         return signals
     contact = ~signals.quiet
     for start in range(0, len(contact), BLOCK):
@@ -263,7 +263,7 @@ def _polarity(
 ) -> Polarity:  # fmt: skip
     if kind == "rectified":
         return Polarity(FALLS, "the sign is lost", True)
-    if recording.sensor != TRANSLATED:
+    if recording.sensor != SOURCE:
         return choose(
             _polarity_of_sensor(recording.sensor, kind), options.polarity, recording.about.get("polarity", "")
         )

@@ -20,12 +20,13 @@ from .gel_shape import shape_of
 from .skin_shape import skin_of
 
 __all__ = [
-    "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PRESSURE_PER_COUNT", "REST_COUNTS",
-    "SAMPLE_RATE", "Lattice", "Material", "biotac_surface", "describe", "digit_surface", "electrode_count",
-    "electrodes", "excitation_electrodes", "from_maker", "from_syntouch", "is_gel", "places_of", "sensor_surface",
-    "shape_of", "skin_of", "thickness", "title",
+    "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PAIR", "PRESSURE_PER_COUNT", "REST_COUNTS",
+    "SAMPLE_RATE", "SOURCE", "TARGET", "Lattice", "Material", "biotac_surface", "describe", "digit_surface",
+    "electrode_count", "electrodes", "excitation_electrodes", "from_maker", "from_syntouch", "is_gel", "places_of",
+    "sensor_surface", "shape_of", "skin_of", "thickness", "title",
 ]  # fmt: skip
 
+PAIR = SOURCE, TARGET = "biotac", "digit"  # of the weights that ship, and where no other sensors are named
 BIOTAC_SKIN, DIGIT_GEL = biotac.DESCRIPTOR.material, digit.DESCRIPTOR.material
 
 _PLACES: Places = places_of("biotac")

@@ -16,8 +16,8 @@ from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, on_gel, pose_at
 from ..mechanics.solve import Sensor, Solution, Step, solve_path
 from ..mechanics.thickness import depth_at
-from ..sensors import unrolling
-from .pairs_file import SENSORS, SOURCE, TARGET, quantise
+from ..sensors import PAIR, SOURCE, TARGET, unrolling
+from .pairs_file import quantise
 from .scene import PairSpec, Scene
 
 _SLIDE_FROM, _SLIDE_TO = 2, 10  # steps of a path's force at which a slide may begin (assumed)
@@ -25,7 +25,7 @@ _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping on
 
 
 def press_rows(
-    scene: Scene, seed: int, press: int, electrodes: str = SHEET, pair: tuple[str, str] = SENSORS
+    scene: Scene, seed: int, press: int, electrodes: str = SHEET, pair: tuple[str, str] = PAIR
 ) -> list[dict[str, np.ndarray]]:
     """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
 
@@ -113,7 +113,7 @@ def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET
 
 
 def pair_row(
-    biotac: Solution, digit: Solution, electrodes: str = SHEET, pair: tuple[str, str] = SENSORS
+    biotac: Solution, digit: Solution, electrodes: str = SHEET, pair: tuple[str, str] = PAIR
 ) -> dict[str, np.ndarray]:
     """Arrays stored of one paired contact, as in the file, see ``units``. Electrodes' films are not corrected."""
     source, target = pair

@@ -9,7 +9,7 @@ import pathlib
 import numpy as np
 
 from ..files.provenance import sha256
-from .pairs_file import SOURCE, TARGET
+from ..sensors import SOURCE, TARGET
 
 _DEPTHS_MM = (0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2, 1.6, 2.0, 2.4)
 _FORCES_N = (0, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)

@@ -18,6 +18,7 @@ from ..files.hdf5_checked import declared, open_checked
 from ..files.hdf5_writer import Disk
 from ..files.version import __version__
 from ..mechanics.electrodes.law import LAWS, SHEET
+from ..sensors import PAIR, SOURCE, TARGET
 from ..sensors.descriptor import OWN
 from ..sensors.descriptor import names as known_sensors
 from ..sensors.fluid_sensor import FALLS
@@ -46,7 +47,6 @@ DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
 SCALED = ("displacement_biotac", "displacement_digit")
 SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 
-SENSORS = SOURCE, TARGET = "biotac", "digit"  # that pairs are made of where nothing else is asked for
 _NODES = "_nodes_sha256"  # after a sensor's name, the attribute that says which nodes its surface has
 
 
@@ -98,7 +98,7 @@ class Pairs:
     indenter: np.ndarray
     attributes: dict[str, str]
     sha256: str
-    pair: tuple[str, str] = SENSORS
+    pair: tuple[str, str] = PAIR
 
     def select_rows(self, rows: np.ndarray) -> Pairs:
         """Select the contacts of these rows alone."""
@@ -174,7 +174,7 @@ def _pair(file: object, path: str | os.PathLike) -> tuple[str, str]:
     """
     of = sorted(name.removesuffix(_NODES) for name in file.attrs if name.endswith(_NODES))
     if len(of) != 2:
-        return SENSORS
+        return PAIR
     unknown = [name for name in of if name not in known_sensors()]
     if unknown:
         expected = f"known ones: {', '.join(known_sensors())}"
@@ -187,7 +187,7 @@ def _pair(file: object, path: str | os.PathLike) -> tuple[str, str]:
 
 def _named(pair: tuple[str, str]) -> dict[str, str]:
     """Names in the file of ``DATASETS``, which are named after both sensors."""
-    of = dict(zip(SENSORS, pair, strict=True))
+    of = dict(zip(PAIR, pair, strict=True))
     parts = {name: name.rpartition("_") for name in DATASETS}
     return {name: f"{stem}_{of[role]}" if role in of else name for name, (stem, _, role) in parts.items()}
 
@@ -274,7 +274,7 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
 
 def merge(
     files: list[pathlib.Path], count: int, out: pathlib.Path, text: str, seed: int, names: list[str],
-    electrodes: str = SHEET, pair: tuple[str, str] = SENSORS,
+    electrodes: str = SHEET, pair: tuple[str, str] = PAIR,
 ) -> None:  # fmt: skip
     """Join the blocks in order into one HDF5 file, cut to ``count`` contacts; written beside and renamed.
 

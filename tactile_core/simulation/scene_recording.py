@@ -19,9 +19,8 @@ from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement, on_gel
 from ..mechanics.solve import Sensor, Solution, Tier, solve
 from ..recordings import Truth, write_simulated
-from ..sensors import descriptor
+from ..sensors import TARGET, descriptor
 from ..sensors.readout import Wiring, readings
-from .pairs_file import TARGET
 from .scene import RecordingSpec, Scene, load_scene
 
 PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (docs/sources.md, BioTac fluid)

@@ -9,8 +9,8 @@ import numpy as np
 
 from .. import accuracy, sensors
 from ..geometry.lattice import Lattice
-from ..sensors import unrolling
-from ..simulation.pairs_file import SOURCE, TARGET, Pairs
+from ..sensors import SOURCE, TARGET, unrolling
+from ..simulation.pairs_file import Pairs
 from ..translation.contact_patch import contact_patch
 from ..translation.network_sizes import SURFACES
 from ..translation.networks import Networks

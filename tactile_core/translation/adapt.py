@@ -17,7 +17,7 @@ from ..recordings.electrode_faults import named_electrodes
 from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit
 from ..recordings.fingers import split
 from ..recordings.readers import each_finger, sensor_of
-from ..recordings.recording import TRANSLATED
+from ..sensors import SOURCE
 from . import reference_signals
 from .gain_matching import PRIOR, Match, match
 from .reference_signals import ReferenceSignals
@@ -94,7 +94,7 @@ def adapt_hand(
     if len(found) > 1:
         raise TactileError(paths[0], f"recordings of {' and '.join(sorted(found))} together", "one sensor")
     units = _units(paths)
-    if found != {TRANSLATED}:
+    if found != {SOURCE}:
         return _rests_sp(units), ("no gains: networks of this sensor, which they need, do not ship",)
     sections: dict[str, Any] = {}
     warnings: list[str] = []

@@ -7,12 +7,12 @@ from typing import Any
 
 from .. import sensors
 from ..errors import TactileError
+from ..sensors import PAIR
 from ..sensors.descriptor import OWN
 from ..sensors.descriptor import names as known_sensors
 
 NODES = "_nodes_sha256"  # after a sensor's name in a card, the hash of its surface
 REST = "rest_counts"  # in a card: counts at rest that changes are those of, where the sensor's table holds none
-SHIPPED = SOURCE, TARGET = "biotac", "digit"  # of the weights that ship, and of a card that names no two sensors
 
 
 def pair_of(card: dict[str, Any], where: str | os.PathLike) -> tuple[str, str]:
@@ -22,7 +22,7 @@ def pair_of(card: dict[str, Any], where: str | os.PathLike) -> tuple[str, str]:
     """
     of = sorted(key.removesuffix(NODES) for key in card if key.endswith(NODES))
     if len(of) != 2:
-        return SHIPPED
+        return PAIR
     missing = [name for name in of if name not in known_sensors()]
     if missing:
         advice = f"Put the folder of {missing[0]} into the one that ${OWN} names"

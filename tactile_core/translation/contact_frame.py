@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import sensors
 from ..accuracy import CORE
-from .card_sensors import TARGET
+from ..sensors import TARGET
 
 STILL = 1e-9  # m: below, there is no dent to follow and the frame stays in the middle
 FADE = 5  # cells (assumed)

@@ -14,11 +14,12 @@ from .. import accuracy, sensors
 from ..errors import TactileError
 from ..recordings import Signals
 from ..recordings.flags import Flag
+from ..sensors import SOURCE, TARGET
 from ..sensors import unrolling as surface
 from . import error_bounds, gel_place, networks, plausible, reference_signals
 from .answer import MEAN, Answer
 from .card_errors import doubt
-from .card_sensors import NODES, REST, SOURCE, TARGET, pair_of
+from .card_sensors import NODES, REST, pair_of
 from .contact_frame import STILL, ContactFrame
 from .contact_track import Evidence, track
 from .error_bounds import KINDS

@@ -87,7 +87,7 @@ def _keep(text: str | None) -> tuple[str, ...]:
     Raises TactileError for other words.
     """
     from ...jobs import results
-    from ...simulation.pairs_file import SENSORS
+    from ...sensors import PAIR
     from ...simulation.scene_recording import DEFAULT, outputs
 
     if text is None:
@@ -95,7 +95,7 @@ def _keep(text: str | None) -> tuple[str, ...]:
     known = outputs()
     words = set(results.parse_words(text, (*known, "traction")))
     if "traction" in words:
-        words |= {f"traction_{sensor}" for sensor in SENSORS}
+        words |= {f"traction_{sensor}" for sensor in PAIR}
     return tuple(word for word in known if word in words)
 
 
