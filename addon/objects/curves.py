@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-_LINEAR = 1  # bpy.types.Keyframe.interpolation as a number: CONSTANT 0, LINEAR 1, BEZIER 2
+CONSTANT, LINEAR = 0, 1  # bpy.types.Keyframe.interpolation as numbers; BEZIER is 2
 
 
 def fcurves_of(owner: bpy.types.ID) -> Any:
@@ -27,8 +27,10 @@ def fcurves_of(owner: bpy.types.ID) -> Any:
     return strip.channelbag(animation.action_slot, ensure=True).fcurves
 
 
-def write_curve(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, index: int = 0) -> None:
-    """Replace one F-curve by straight lines through ``values`` (T,) at ``frames`` (T,)."""
+def write_curve(
+    owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, index: int = 0, lines: int = LINEAR
+) -> None:
+    """Replace one F-curve by straight lines, or by steps, through ``values`` (T,) at ``frames`` (T,)."""
     curves = fcurves_of(owner)
     old = curves.find(path, index=index)
     if old is not None:
@@ -37,14 +39,14 @@ def write_curve(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.n
     curve.keyframe_points.add(len(frames))
     points = np.column_stack([frames, values]).astype(np.float32)
     curve.keyframe_points.foreach_set("co", points.ravel())
-    curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), _LINEAR, np.int32))
+    curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), lines, np.int32))
     curve.update()
 
 
-def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray) -> None:
+def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, lines: int = LINEAR) -> None:
     """Write one F-curve a column of ``values`` (T, k)."""
     for index in range(values.shape[1]):
-        write_curve(owner, path, frames, values[:, index], index)
+        write_curve(owner, path, frames, values[:, index], index, lines)
 
 
 def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:

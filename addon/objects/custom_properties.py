@@ -14,6 +14,7 @@ ABOUT = {
     "force": "Force of the object on the BioTac, N, along the finger, across it, and into the pad (negative Z)",
     "confidence": "1: signals like those of the training, 0: far from them",
     "expected_error_um": "Largest node error of this surface that half of such frames stay below, micrometres",
+    "flags": "What is remarkable about the frame, as bits; the tab Tactile says it in words",
 }
 
 
@@ -25,6 +26,7 @@ def columns(found: Translated) -> dict[str, np.ndarray]:
         "force": translation.force[:, [0, 2, 1]] * np.array([1, 1, -1]),
         "confidence": translation.confidence,
         "expected_error_um": 1e6 * translation.expected_error_biotac,
+        "flags": translation.flags,
     }
     if found.recording.pdc is not None:
         values["pdc"] = found.recording.pdc[found.chosen]
@@ -34,7 +36,9 @@ def columns(found: Translated) -> dict[str, np.ndarray]:
 def write(thing: bpy.types.Object, values: dict[str, np.ndarray], frames: np.ndarray) -> None:
     """Set and keyframe custom properties."""
     for name, numbers in values.items():
-        numbers = np.nan_to_num(np.asarray(numbers, np.float64))
+        bits = name == "flags"  # which mean nothing between two frames
+        numbers = np.nan_to_num(np.asarray(numbers, int if bits else np.float64))
         thing[name] = numbers[0].tolist()
         thing.id_properties_ui(name).update(description=ABOUT[name])
-        curves.write_curves(thing, f'["{name}"]', frames, numbers.reshape(len(frames), -1))
+        lines = curves.CONSTANT if bits else curves.LINEAR
+        curves.write_curves(thing, f'["{name}"]', frames, numbers.reshape(len(frames), -1), lines)

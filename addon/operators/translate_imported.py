@@ -3,7 +3,7 @@
 import bpy
 
 from ...tactile_core import sensors
-from ...tactile_core.translation import contact_patch
+from ...tactile_core.translation import contact_patch, gel_place
 from ..objects import custom_properties, digit_body, digit_objects, frame_attribute, motion
 from ..ui import properties, render_settings, timeline, view
 from ..ui.progress import shown
@@ -51,6 +51,8 @@ class TACTILE_OT_translate(TactileOperator):
         values = custom_properties.columns(found)
         told_of_gel = {"expected_error_um": 1e6 * found.translation.expected_error_digit}
         told_of_gel |= {name: values[name] for name in ("force", "confidence")}
+        seen_by = render_settings.calibration_of(context.scene).camera
+        told_of_gel["flags"] = values["flags"] | gel_place.beyond_picture(found.translation.contact_center, seen_by)
         custom_properties.write(gel, told_of_gel, frames)
         low = timeline.mark_low_confidence(context.scene, found.translation.confidence, frames)
         view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))

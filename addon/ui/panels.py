@@ -1,9 +1,11 @@
 """The tab "Tactile" in the 3D view's sidebar."""
 
 import json
+import textwrap
 
 import bpy
 
+from ...tactile_core.translation import trust_words
 from ..objects import style_nodes, styles
 from ..operators import preview, render_setup, snap_to_gel
 from ..operators.import_recording import TACTILE_OT_import_recording
@@ -12,7 +14,7 @@ from ..operators.render_setup import draw_parts, draw_settings
 from ..operators.scene_files import TACTILE_OT_export_scene, TACTILE_OT_import_scene
 from ..operators.simulate import TACTILE_OT_simulate
 from ..operators.translate_imported import TACTILE_OT_translate
-from . import properties, timeline
+from . import properties
 from .add_menu import TACTILE_MT_add
 from .reports import missing
 from .workspace import TACTILE_OT_open_workspace
@@ -48,7 +50,7 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
         row.operator("tactile.force_arrow", text="", icon="EMPTY_SINGLE_ARROW")
         for role in ("BIOTAC", "DIGIT"):
             _exaggeration(layout, properties.of_role(context.scene, role, context.object))
-        _numbers(layout, skin)
+        _numbers(layout, context, skin)
 
 
 def _exaggeration(layout: bpy.types.UILayout, sensor: bpy.types.Object | None) -> None:
@@ -61,20 +63,36 @@ def _exaggeration(layout: bpy.types.UILayout, sensor: bpy.types.Object | None) -
         layout.prop(holder, name, text=f"{sensor.name}: Exaggeration")
 
 
-def _numbers(layout: bpy.types.UILayout, skin: bpy.types.Object | None) -> None:
-    """The current frame's force, confidence, and how far a node may be off."""
+def _numbers(layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.types.Object | None) -> None:
+    """Draw the current frame's force, and how far it is to be trusted: the gel's translation, else the skin."""
     if skin is None or "force" not in skin:
         return
-    force = skin["force"]
-    size = sum(part * part for part in force) ** 0.5
+    size = sum(part * part for part in skin["force"]) ** 0.5
     column = layout.column(align=True)
     column.label(text=f"Force {size:.3f} N", icon="FORCE_FORCE")
-    if "confidence" in skin:
-        trusted = skin["confidence"] >= timeline.LOW
-        words = "Signals as in training" if trusted else "Unlike training: a guess"
-        column.label(text=words, icon="CHECKMARK" if trusted else "ERROR")
-    if "expected_error_um" in skin:
-        column.label(text=f"Expected error {1e-3 * skin['expected_error_um']:.2f} mm", icon="BLANK1")
+    words, guess = trust_of(skin, properties.of_role(context.scene, "DIGIT", skin))
+    icon = "ERROR" if guess else "CHECKMARK"
+    for line in _wrapped(words, context.region.width):
+        column.label(text=line, icon=icon)
+        icon = "BLANK1"
+
+
+def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str, bool]:
+    """Return the contact sheet's words on the current frame, of the gel once there is one, and whether it is a guess.
+
+    No words for sensors that were simulated.
+    """
+    told = gel if gel is not None and "expected_error_um" in gel else skin
+    if "expected_error_um" not in told:
+        return "", False
+    trust = told["confidence"], int(told.get("flags", 0))
+    return trust_words.in_words(*trust, 1e-6 * told["expected_error_um"]), trust_words.is_guess(*trust)
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    """Break a text into lines that fit a panel of so many pixels beside an icon."""
+    scale = bpy.context.preferences.system.ui_scale
+    return textwrap.wrap(text, max(16, int((width / scale - 60) / 6.2)))
 
 
 class TACTILE_PT_picture(_Panel, bpy.types.Panel):

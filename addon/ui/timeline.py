@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-LOW = 0.5  # confidence below which frames are marked (assumed)
+from ...tactile_core.translation.trust_words import LOW_CONFIDENCE
+
 MARKER = "low confidence"
 MOST_MARKERS = 100  # more would hide the timeline
 
@@ -22,7 +23,7 @@ def mark_low_confidence(scene: bpy.types.Scene, confidence: np.ndarray, frames: 
     """Replace the markers, one where a doubtful part begins, its last frame in the name; returns how many parts."""
     for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARKER)]:
         scene.timeline_markers.remove(marker)
-    edges = np.diff(np.concatenate([[0], confidence < LOW, [0]]).astype(int))
+    edges = np.diff(np.concatenate([[0], confidence < LOW_CONFIDENCE, [0]]).astype(int))
     parts = list(zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1, strict=True))
     for start, end in parts[:MOST_MARKERS]:
         scene.timeline_markers.new(f"{MARKER} to {frames[end]:g}", frame=int(frames[start]))

@@ -15,7 +15,8 @@ from ..files import atomic
 from ..sensors import SOURCE, title
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import Camera
-from .sheet_figure import FRAMES, LOW_CONFIDENCE, SheetFigure, scale
+from ..translation.trust_words import LOW_CONFIDENCE
+from .sheet_figure import FRAMES, SheetFigure, scale
 
 WARNING_LINES, WARNING_WIDTH = 5, 200
 # Lines in pieces: Agg refuses a noisy line of a hundred thousand points as a whole.
@@ -30,7 +31,7 @@ class Contents:
     pressure, pressure_measured : (T,) Pa, rise of the fluid's as translated and by PDC; NaN where it was not measured
     frames : (k,) which of the T frames are the columns
     displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
-    force : (k, 3) N; confidence : (k,) 0..1; expected_error_digit : (k,) m, of the largest node
+    force : (k, 3) N; confidence : (k,) 0..1; flags : (k,) uint16; expected_error_digit : (k,) m, of the largest node
     contact_center : (k, 2) m = (x, z) on the DIGIT, NaN without contact; mount_shift : (2,) m, of a mount in it
     true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
     source : the sensor that was read, whose skin is drawn
@@ -45,6 +46,7 @@ class Contents:
     pictures: np.ndarray
     force: np.ndarray
     confidence: np.ndarray
+    flags: np.ndarray
     expected_error_digit: np.ndarray
     contact_center: np.ndarray | None = None
     pressure: np.ndarray | None = None
@@ -64,7 +66,8 @@ class Contents:
 
 
 COLUMNS = (
-    "displacement_biotac", "displacement_digit", "pictures", "force", "confidence", "expected_error_digit",
+    "displacement_biotac", "displacement_digit", "pictures", "force", "confidence", "flags",
+    "expected_error_digit",
     "contact_center", "true_displacement_biotac",
 )  # fmt: skip
 
@@ -134,7 +137,7 @@ def _drawn(shown: Contents, camera: Camera) -> SheetFigure:
     gel = title(camera.sensor)
     figure.gel_row(f"{gel} gel\ndisplacement", shown.displacement_digit, shown.contact_center)
     figure.picture_row(f"{gel} picture", shown.pictures)
-    figure.captions(shown.force, shown.confidence, shown.expected_error_digit)
+    figure.captions(shown.force, shown.confidence, shown.flags, shown.expected_error_digit)
     return figure
 
 

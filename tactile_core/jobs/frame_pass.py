@@ -19,6 +19,7 @@ from ..sensors.camera import Camera
 from ..translation.answer import Answer
 from ..translation.card_errors import doubt
 from ..translation.contact_track import Evidence, Tracked
+from ..translation.gel_place import beyond_picture
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet
 from .frames_file import FramesFile, kept
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
 Solver = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
 CHUNK = 64  # frames in memory at a time: about 5 MB of displacements and 20 MB of heights
 SHEET_ARRAYS = (
-    "displacement_biotac", "displacement_digit", "force", "confidence", "expected_error_digit", "contact_center"
+    "displacement_biotac", "displacement_digit", "force", "confidence", "flags", "expected_error_digit",
+    "contact_center",
 )  # fmt: skip
 LEFT = ("expected_error_digit", "error_bound_digit")
 # Flags that the translation sets, which no warning of the recording mentions.
@@ -114,16 +116,8 @@ def translated(signals: Signals, tools: Tools, tracked: Tracked | None, frames: 
     if tools.plausible is not None:
         arrays |= tools.plausible(signals, frames)
     arrays |= {"electrodes": signals.electrodes, "pressure_measured": PRESSURE_PER_COUNT * signals.pdc}
-    arrays["flags"] = arrays["flags"] | signals.flags | _beyond_picture(arrays["contact_center"], tools.camera)
+    arrays["flags"] = arrays["flags"] | signals.flags | beyond_picture(arrays["contact_center"], tools.camera)
     return arrays if tools.solve is None else tools.solve(arrays)
-
-
-def _beyond_picture(center: np.ndarray, camera: Camera | None) -> np.ndarray:
-    """Flags (T,) of contacts (T, 2) m on the gel that the camera does not see."""
-    if camera is None:
-        return np.zeros(len(center), np.uint16)
-    beside = np.isfinite(center[:, 0]) & ~camera.sees(*center.T)
-    return np.where(beside, flags.Flag.BEYOND_PICTURE, 0).astype(np.uint16)
 
 
 class FramePass:

@@ -11,13 +11,13 @@ from .. import sensors
 from ..geometry.lattice import Lattice
 from ..sensors import unrolling
 from ..sensors.camera import Camera
+from ..translation.trust_words import in_words, is_guess
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FRAMES = 6  # columns of a sheet
-LOW_CONFIDENCE = 0.5  # assumed: numbers of less are marked, and a sheet that has no others warns
 
 # Layout, inches at DPI: 1,600 px wide.
 DPI = 100
@@ -205,12 +205,17 @@ class SheetFigure:
                 axes.set_ylabel(label)
         self.top += height
 
-    def captions(self, force: np.ndarray, confidence: np.ndarray, expected_error: np.ndarray) -> None:
-        """Write numbers below each column: (k, 3) N, (k,) 0..1 and (k,) m; and how to read the maps."""
+    def captions(
+        self, force: np.ndarray, confidence: np.ndarray, flags: np.ndarray, expected_error: np.ndarray
+    ) -> None:
+        """Write below each column its force (k, 3) N and how far it is to be trusted, and how to read the maps.
+
+        confidence (k,) 0..1, flags (k,), expected_error (k,) m : for `trust_words.in_words`
+        """
         for k in range(self.columns):
-            text = f"force {np.linalg.norm(force[k]):.2f} N\nconfidence {confidence[k]:.2f}"
-            text += f"\nexpected error {1e3 * expected_error[k]:.2f} mm"
-            color = MARK if confidence[k] < LOW_CONFIDENCE else "black"
+            trust = in_words(confidence[k], flags[k], expected_error[k])
+            text = f"force {np.linalg.norm(force[k]):.2f} N\n" + trust.replace(", ", ",\n")
+            color = MARK if is_guess(confidence[k], flags[k]) else "black"
             self._text(self._middle(k), 0.08, text, size=10, ha="center", va="top", color=color)
         self.top += CAPTION
         along = "left" if self.camera.right_z < 0 else "right"

@@ -7,6 +7,8 @@ import functools
 import numpy as np
 
 from .. import sensors
+from ..recordings.flags import Flag
+from ..sensors.camera import Camera
 from .contact_frame import PLACE_UNIT, ContactFrame, between_nodes
 from .network_sizes import PLACE
 
@@ -36,6 +38,14 @@ def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
         step = np.linalg.pinv(slope) @ missing * (2 * SMALL / PLACE_UNIT)  # at a corner one slope may be none
         place = np.clip(place + step[..., 0], -limit, limit)
     return place
+
+
+def beyond_picture(center: np.ndarray, camera: Camera | None) -> np.ndarray:
+    """Return the flags (T,) uint16 of contacts (T, 2) = (x, z) m on the gel that a camera does not see."""
+    if camera is None:
+        return np.zeros(len(center), np.uint16)
+    beside = np.isfinite(center[:, 0]) & ~camera.sees(*center.T)
+    return np.where(beside, Flag.BEYOND_PICTURE, 0).astype(np.uint16)
 
 
 class Shift:

@@ -47,6 +47,27 @@ def test_the_gel_says_how_far_it_may_be_off(gel, part):
     assert shown["expected_error_um"] == pytest.approx(expected, rel=1e-5)
 
 
+def test_the_panel_s_words_on_trust_are_the_contact_sheet_s(gel, part):
+    bpy.context.scene.frame_set(80)
+    skin, found = bpy.context.scene.objects["BioTac skin"], _translation(part)
+    in_words = part("tactile_core.translation.trust_words").in_words
+    words = in_words(found.confidence[40], found.flags[40], found.expected_error_digit[40])
+    assert part("addon.ui.panels").trust_of(skin, gel) == (words, False)
+
+
+def test_flags_are_kept_frame_by_frame(scene, part):
+    thing = bpy.data.objects.new("gel", None)
+    scene.collection.objects.link(thing)
+    values = {"confidence": np.ones(2), "expected_error_um": np.full(2, 370.0), "flags": np.array([0, 4], np.uint16)}
+    part("addon.objects.custom_properties").write(thing, values, np.array([10.0, 20.0]))
+    said = {}
+    for frame in (10, 19, 20):
+        scene.frame_set(frame)
+        said[frame] = part("addon.ui.panels").trust_of(thing, None)
+    assert said[19] == said[10] == ("as in training, expected error 0.37 mm", False)
+    assert said[20] == ("guess: rectified recording, expected error 0.37 mm", True)
+
+
 def test_the_contact_patch_is_an_attribute_of_every_frame(gel, part):
     surface = part("tactile_core.sensors").digit_surface()
     patch = part("tactile_core.translation.contact_patch").contact_patch(_translation(part).displacement_digit, surface)

@@ -23,6 +23,7 @@ def columns() -> dict:
         "pictures": rng.integers(0, 256, (2, 320, 240, 3), dtype=np.uint8),
         "force": np.array([[0, 1.0, 0], [0, 0, 0]]),
         "confidence": np.array([0.9, 0.1]),
+        "flags": np.array([0, 4], np.uint16),
         "expected_error_digit": np.array([30e-6, 90e-6]),
         "contact_center": np.array([[-7e-3, 1e-3], [np.nan, np.nan]]),
     }
@@ -76,8 +77,8 @@ def test_any_name_can_be_drawn(tmp_path: Path, columns: dict, name: str, recwarn
 
 
 def test_one_frame_without_contact(tmp_path: Path, columns: dict) -> None:
-    given = ("displacement_biotac", "displacement_digit", "pictures", "force", "confidence", "expected_error_digit")
-    for what in (*given, "contact_center"):
+    given = ("displacement_biotac", "displacement_digit", "pictures", "force", "confidence", "flags")
+    for what in (*given, "expected_error_digit", "contact_center"):
         columns[what] = 0 * columns[what][:1]
     columns |= {"frames": np.array([0]), "time": np.zeros(1), "electrodes": np.full((1, 19), np.nan)}
     contact_sheet(tmp_path / "a.png", Contents(**columns))

@@ -1,0 +1,48 @@
+"""How far a frame's translation is to be trusted, in one line of plain words, for contact sheets and panels alike."""
+
+from __future__ import annotations
+
+from ..recordings.flags import Flag
+
+LOW_CONFIDENCE = 0.5  # assumed: frames of less are guesses
+_REASONS = 2  # at most in a line, the gravest first
+_UNLIKE = "signals unlike training"
+# What makes a frame a guess, the gravest first; then what is only worth saying.
+_DOUBTS = {
+    Flag.UNEXPLAINED: "rest perhaps under load",
+    Flag.LAW_DOUBTED: "gains or order doubted",
+    Flag.POLARITY_DOUBTED: "polarity doubted",
+    Flag.OUT_OF_RANGE: _UNLIKE,
+    Flag.NO_QUIET_PART: "rest not found",
+    Flag.RECTIFIED: "rectified recording",
+    Flag.DEAD_CHANNEL: "dead electrode",
+    Flag.SATURATED: "saturated electrode",
+    Flag.TWO_CONTACTS: "perhaps two contacts",
+    Flag.UNDECIDED_PLACE: "place undecided",
+}
+_REMARKS = {
+    Flag.BEYOND_DIGIT: "beside the gel",
+    Flag.BEYOND_PICTURE: "beside the picture",
+    Flag.GEL_NOT_SOLVED: "gel not solved",
+    Flag.POLARITY_ASSUMED: "polarity assumed",
+    Flag.REPAIRED: "repaired sample",
+    Flag.TIME_JUMP: "jump in time",
+}
+
+
+def is_guess(confidence: float, flags: int) -> bool:
+    """Return whether a frame is a guess, by its confidence 0..1 and the bits of its flags."""
+    return bool(confidence < LOW_CONFIDENCE or any(flags & bit for bit in _DOUBTS))
+
+
+def in_words(confidence: float, flags: int, expected_error: float) -> str:
+    """Return a frame's line: "guess: rectified recording, expected error 0.40 mm".
+
+    confidence : 0..1; flags : bits of ``Flag``; expected_error : m, of the largest node
+    """
+    reasons = [words for bit, words in (_DOUBTS | _REMARKS).items() if flags & bit]
+    guess = is_guess(confidence, flags)
+    if guess and not any(flags & bit for bit in _DOUBTS):
+        reasons.insert(0, _UNLIKE)
+    head = ": ".join(["guess" if guess else "as in training", *filter(None, [", ".join(reasons[:_REASONS])])])
+    return f"{head}, expected error {1e3 * expected_error:.2f} mm"

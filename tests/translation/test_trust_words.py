@@ -1,0 +1,29 @@
+import pytest
+
+from tactile_core.recordings.flags import Flag
+from tactile_core.translation.trust_words import in_words, is_guess
+
+
+@pytest.mark.parametrize(
+    ("confidence", "flags", "words"),
+    [
+        (1.0, 0, "as in training, expected error 0.37 mm"),
+        (1.0, Flag.RECTIFIED, "guess: rectified recording, expected error 0.37 mm"),
+        (0.2, 0, "guess: signals unlike training, expected error 0.37 mm"),
+        (0.2, Flag.REPAIRED, "guess: signals unlike training, repaired sample, expected error 0.37 mm"),
+        (1.0, Flag.REPAIRED, "as in training: repaired sample, expected error 0.37 mm"),
+        (
+            0.2,
+            Flag.REPAIRED | Flag.RECTIFIED | Flag.UNEXPLAINED | Flag.OUT_OF_RANGE,
+            "guess: rest perhaps under load, signals unlike training, expected error 0.37 mm",
+        ),
+    ],
+)
+def test_trust_is_one_line_of_plain_words(confidence: float, flags: int, words: str) -> None:
+    assert in_words(confidence, flags, 370e-6) == words
+
+
+@pytest.mark.parametrize("flag", Flag)
+def test_every_flag_is_said(flag: Flag) -> None:
+    assert in_words(1.0, flag, 0.0) != in_words(1.0, 0, 0.0)
+    assert is_guess(1.0, flag) == in_words(1.0, flag, 0.0).startswith("guess: ")
