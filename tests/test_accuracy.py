@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_core import accuracy
-from tactile_core.accuracy import Budget, Candidate, cheapest, parse_budget
+from tactile_core.accuracy import Candidate, cheapest
 from tactile_core.errors import TactileError
 
 REST = np.array([[x * 1e-3, -8e-3, z * 1e-3] for x in range(5) for z in range(4)])
@@ -62,32 +62,6 @@ def test_depth_on_a_curved_pad_is_the_length():
 def test_center_of_a_dent():
     displacement = dent(1e-3, 0) + dent(1e-3, 1) + dent(0.2e-3, 19)  # the last is below 30 % of the peak
     assert accuracy.dent_center(displacement, REST)[0] == pytest.approx([0.0, 0.5e-3])
-
-
-@pytest.mark.parametrize(
-    ("text", "budget"),
-    [
-        ("5um", Budget(um=5)), ("0.6levels", Budget(levels=0.6)), ("1level", Budget(levels=1)),
-        (" 5 µm ", Budget(um=5)), (".5UM,2levels", Budget(0.5, 2)), ("2levels, 1e-1um", Budget(0.1, 2)),
-    ],
-)  # fmt: skip
-def test_a_bound_is_a_number_and_its_unit(text, budget):
-    assert parse_budget(text) == budget
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", "5", "um", "5mm", "-5um", "0um", "0levels", "nanum", "infum", "1e999um", "5um,6um", "5um,", "5 6um"],
-)
-def test_anything_else_is_refused(text):
-    with pytest.raises(TactileError, match=r"such as 5um or 0\.6levels"):
-        parse_budget(text)
-
-
-def test_a_unit_that_means_nothing_here_is_refused():
-    assert parse_budget("5um").only("um", "why") == 5
-    with pytest.raises(TactileError, match=r"2levels.*um.*Drawn elsewhere"):
-        parse_budget("5um,2levels").only("um", "Drawn elsewhere")
 
 
 @pytest.mark.parametrize(("bound", "name"), [(30, "rough"), (20, "rough"), (19.9, "odd"), (4, "odd")])

@@ -4,8 +4,8 @@ import importlib.util
 
 import bpy
 
-from ...tactile_core import accuracy
 from ...tactile_core.errors import TactileError
+from ...tactile_core.jobs.error_budget import Budget, parse_budget
 from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.calibration import Calibration
 from ..objects import digit_body
@@ -37,10 +37,10 @@ class TactileRender(bpy.types.PropertyGroup):
     )  # fmt: skip
 
 
-def budget_of(scene: bpy.types.Scene) -> accuracy.Budget:
+def budget_of(scene: bpy.types.Scene) -> Budget:
     """Return the bound that a scene's panel holds. Raises TactileError for anything else than bounds."""
     text = scene.tactile_render.error.strip()
-    return accuracy.parse_budget(text) if text else accuracy.Budget()
+    return parse_budget(text) if text else Budget()
 
 
 def preset_of(scene: bpy.types.Scene) -> str:

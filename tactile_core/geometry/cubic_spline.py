@@ -19,6 +19,11 @@ class EvenSpline:
         self.start, self.step, self.count = start, step, count
         self.to_coefficients = _interpolation_matrix(count)
 
+    @classmethod
+    def through(cls, nodes: np.ndarray) -> EvenSpline:
+        """Make the spline of evenly spaced positions (count,)."""
+        return cls(nodes[0], (nodes[-1] - nodes[0]) / (len(nodes) - 1), len(nodes))
+
     @property
     def nodes(self) -> np.ndarray:
         """Positions (count,) of the nodes."""

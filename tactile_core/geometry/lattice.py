@@ -8,6 +8,7 @@ import hashlib
 
 import numpy as np
 
+from .cubic_spline import EvenSpline
 from .lattice_blocks import LatticeBlocks
 
 
@@ -52,6 +53,16 @@ class Lattice:
     def axes(self) -> np.ndarray:
         """The resting nodes of the grid axis by axis, (3, rows, columns) m."""
         return np.ascontiguousarray(np.moveaxis(self.grid(self.rest), 2, 0))
+
+    @functools.cached_property
+    def window_rest(self) -> np.ndarray:
+        """The resting nodes (rows, columns, 3) m of the window."""
+        return self.grid(self.rest)[self.window]
+
+    @functools.cached_property
+    def window_axes(self) -> tuple[EvenSpline, EvenSpline]:
+        """Splines through the window's nodes along x and across z."""
+        return EvenSpline.through(self.window_rest[:, 0, 0]), EvenSpline.through(self.window_rest[0, :, 2])
 
     def grid(self, values: np.ndarray) -> np.ndarray:
         """Return the values at nodes (..., n_nodes, k) as a grid (..., rows, columns, k); poles left out."""

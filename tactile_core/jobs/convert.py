@@ -20,10 +20,10 @@ from .frame_range import frames_text, select
 from .results import SOLVED, TRANSLATED, Gel
 
 if TYPE_CHECKING:
-    from ..accuracy import Budget
     from ..recordings import PrepareOptions, Recording
     from ..recordings.electrode_gains import SensorFile
     from ..translation.answer import Answer
+    from .error_budget import Budget
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,12 +15,12 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from ..accuracy import Budget
 from ..errors import TactileError
 from ..files.shipped import shipped
 from ..sensors import PAIR, title
 from ..translation import network_sizes
 from . import results
+from .error_budget import Budget
 
 COSTS = shipped("costs.json")
 TIERS = shipped("mechanics_tiers.json")

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from ..accuracy import Budget
 from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.png_writer import write_png
@@ -30,6 +29,7 @@ from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import SHIPPED, load_calibration
 from . import results, sampling_error
+from .error_budget import Budget
 from .frame_range import frames_text, select
 from .gel_frames import is_scene, read_frames
 

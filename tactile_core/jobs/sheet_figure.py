@@ -44,7 +44,7 @@ class SheetFigure:
 
         self._over, self._heading = ("snapshot", "snapshot {:.0f}") if snapshots else ("time, s", "{:.2f} s")
         self.columns, self.camera, self.warnings = columns, camera, warnings
-        self._gel = sensors.sensor_surface(camera.sensor)
+        self._gel = camera.surface
         self._gel_x, self._gel_z = (
             _shown(self._gel.rest[:, axis], beside) for axis, beside in zip((0, 2), BESIDE_GEL, strict=True)
         )

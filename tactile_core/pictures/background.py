@@ -76,7 +76,7 @@ def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
     ambient = np.zeros((*unit.camera.shape, 3))
     for (i, j), share in zip(terms(), np.asarray(unit.ambient).T, strict=True):
         ambient += (down[:, None] ** j * right**i)[..., None] * share
-    levels = unit.response.matrices(unit.camera) * radiance[..., None, :]
+    levels = unit.pixel_response * radiance[..., None, :]
     levels += np.asarray(unit.response.centre) * (ambient * unit.ambient_unit)[..., None, :]
     return levels.astype(np.float32)
 
@@ -88,7 +88,7 @@ def fit_ambient(picture: np.ndarray, unit: Calibration, radiance: np.ndarray) ->
     """
     right, down = np.meshgrid(unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT)
     basis = np.stack([(right**i * down**j).ravel() for i, j in terms()], -1)
-    left = picture - np.einsum("hwcl,hwl->hwc", unit.response.matrices(unit.camera), radiance)
+    left = picture - np.einsum("hwcl,hwl->hwc", unit.pixel_response, radiance)
     found = np.linalg.lstsq(basis, left.reshape(-1, 3), rcond=None)[0]
     bands = np.linalg.solve(np.asarray(unit.response.centre), found.T) / unit.ambient_unit[:, None]
     return tuple(tuple(row) for row in bands.tolist())

@@ -17,10 +17,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .. import sensors
 from ..errors import TactileError
 from ..files.compiled import available
-from ..geometry.cubic_spline import EvenSpline, bspline_weights
+from ..geometry.cubic_spline import bspline_weights
 from ..geometry.lattice import Lattice
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import load_calibration
@@ -61,8 +60,7 @@ class HeightMapper:
         camera = camera or load_calibration().camera
         self.surface, self.camera = surface, camera
         check_covered(surface, camera)
-        rest = surface.grid(surface.rest)[surface.window]
-        self._along, self._across = _axis(rest[:, 0, 0]), _axis(rest[0, :, 2])
+        self._along, self._across = surface.window_axes
         self._fine_along, self._fine_across = self._along.refined(REFINEMENT), self._across.refined(REFINEMENT)
         fine = self._fine_along.nodes, self._fine_across.nodes
         # [order of the derivative][along x, across z]
@@ -71,7 +69,7 @@ class HeightMapper:
             _short(self._fine_along.matrix(camera.gel_x)), _short(self._fine_across.matrix(camera.gel_z)).T.copy()
         ]  # fmt: skip
         self._fine_places = np.stack(np.meshgrid(*fine, indexing="ij")).reshape(2, -1)
-        self._rest_y = rest[..., 1] - camera.height_zero_y
+        self._rest_y = surface.window_rest[..., 1] - camera.height_zero_y
         down, right = self._along.matrix(camera.gel_x), self._across.matrix(camera.gel_z)
         self.rest = (down @ self._rest_y @ right.T).astype(np.float32)
         self.rest.flags.writeable = False
@@ -200,7 +198,7 @@ def check_covered(surface: Lattice, camera: Camera) -> None:
     """Raise TactileError for a surface without an evenly spaced window, and for a picture that reaches past it."""
     if surface.window is None:
         raise TactileError("surface", "no evenly spaced window", "one", "Use a gel's: sensors.sensor_surface(name)")
-    rest = surface.grid(surface.rest)[surface.window]
+    rest = surface.window_rest
     across, down = camera.pixel_size
     for name, nodes, seen, pixel in (
         ("x", rest[:, 0, 0], camera.gel_x, down),
@@ -216,7 +214,7 @@ def check_covered(surface: Lattice, camera: Camera) -> None:
 
 
 def _short(matrix: np.ndarray) -> np.ndarray:
-    """A spline's matrix in float32, without what rounding would drop.
+    """Convert a spline's matrix to float32, without what rounding would drop.
 
     Far from a node its weights fall below the smallest normal float32, and processors are ten times slower at those.
     """
@@ -231,10 +229,6 @@ def _inverse(by_x: np.ndarray, by_z: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return np.stack([d, -b]) / determinant, np.stack([-c, a]) / determinant
 
 
-def _axis(nodes: np.ndarray) -> EvenSpline:
-    return EvenSpline(nodes[0], (nodes[-1] - nodes[0]) / (len(nodes) - 1), len(nodes))
-
-
 def gel_mapper(camera: Camera | None = None) -> HeightMapper:
     """Return the mapper of the gel that a camera looks at, made once a camera; None for the shipped DIGIT's."""
     return _gel_mapper(camera or load_calibration().camera)
@@ -242,7 +236,7 @@ def gel_mapper(camera: Camera | None = None) -> HeightMapper:
 
 @functools.cache
 def _gel_mapper(camera: Camera) -> HeightMapper:
-    return HeightMapper(sensors.sensor_surface(camera.sensor), camera)
+    return HeightMapper(camera.surface, camera)
 
 
 def height_map(displacement: np.ndarray, camera: Camera | None = None) -> np.ndarray:

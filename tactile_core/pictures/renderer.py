@@ -98,9 +98,7 @@ class Renderer:
         self.dots = None if calibration.markers is None else MarkerField(calibration)
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")
-        self._response = np.ascontiguousarray(
-            calibration.response.matrices(self.camera).transpose(2, 3, 0, 1), np.float32
-        )
+        self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
 
     def __call__(self, height_map: np.ndarray, marks: np.ndarray | None = None) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.

@@ -57,7 +57,7 @@ class Shader:
             background = resting_picture(calibration, np.moveaxis(self._rest_radiance, 0, -1))
         self.background = camera_array(background, (*camera.shape, 3), "background")
         self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
-        self._response = np.ascontiguousarray(calibration.response.matrices(camera).transpose(2, 3, 0, 1), np.float32)
+        self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
 
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""

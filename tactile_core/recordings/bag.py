@@ -69,9 +69,9 @@ def kind_of(start: bytes) -> str | None:
 
 @contextmanager
 def open_bag(path: str, file: BinaryIO, finger: int | None = None) -> Iterator[Bag]:
-    """Open for reading; raises TactileError for damage and what `is_bag_folder` refuses, and without the extra [ros].
+    """Open for reading; raises TactileError for damage, and without the extra [ros].
 
-    file : the opened file, from its start; any where the bag is a folder
+    file : the opened file, from its start; an empty one where the bag is a folder that `is_bag_folder` has passed
     """
     with installed.needing("ros"):
         from rosbags.rosbag1 import Reader as Reader1
@@ -80,8 +80,8 @@ def open_bag(path: str, file: BinaryIO, finger: int | None = None) -> Iterator[B
         from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
     _bound_unpacking()
-    kind = "folder" if is_bag_folder(path) else kind_of(file.read(START_BYTES))
-    openers: dict[str | None, Any] = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
+    kind = kind_of(file.read(START_BYTES)) or "folder"
+    openers: dict[str, Any] = {"ros1": Reader1, "mcap": McapReader, "sqlite": Sqlite3Reader, "folder": Reader2}
     with damage_reported(path, "bag"):
         reader = openers[kind](Path(path))
         reader.open()

@@ -141,6 +141,11 @@ class Calibration:
         _check_range("fit, ball_diameter_mm", self.fit.ball_diameter, 0.0, 0.1)
 
     @property
+    def pixel_response(self) -> np.ndarray:
+        """Response (H, W, 3, 3) at each pixel of the camera, channel by LED."""
+        return self.response.matrices(self.camera)
+
+    @property
     def facing(self) -> np.ndarray:
         """Radiance (3,) of each LED's light on a coating that faces it, levels.
 

@@ -52,7 +52,7 @@ def load_calibration(path: str | os.PathLike | None = None, sensor: str | None =
     be read, is unknown, missing or out of its range, and for a file of another sensor.
     """
     if path is None:
-        return _read_once(calibration_path(sensor or Camera.sensor))
+        return _shipped(sensor or Camera.sensor)
     found = _read(Path(path))
     if sensor not in (None, found.camera.sensor):
         raise TactileError(
@@ -71,8 +71,9 @@ def calibration_path(sensor: str) -> Path:
 
 
 @functools.cache
-def _read_once(file: Path) -> Calibration:
-    return _read(file)
+def _shipped(sensor: str) -> Calibration:
+    file = calibration_path(sensor)
+    return load_calibration(file)
 
 
 def _read(file: Path) -> Calibration:

@@ -13,8 +13,10 @@ import math
 import numpy as np
 
 from ..errors import TactileError
+from ..geometry.lattice import Lattice
 from .descriptor import of_kind
 from .gel_sensor import Gel
+from .gel_shape import shape_of
 
 HEIGHT_ZERO_Y = of_kind("digit", Gel).camera.height_zero_y  # of a DIGIT's cameras
 MOST_PIXELS = 10_000_000  # 2.5 GB for a fast picture; the camera has 76,800 (assumed enough)
@@ -74,6 +76,11 @@ class Camera:
     def height_zero_y(self) -> float:
         """The plane of height zero, y m. Heights grow with y, toward the camera: an indentation raises them."""
         return of_kind(self.sensor, Gel).camera.height_zero_y
+
+    @property
+    def surface(self) -> Lattice:
+        """The resting surface of the gel that it looks at."""
+        return shape_of(self.sensor).surface()
 
     @property
     def shape(self) -> tuple[int, int]:

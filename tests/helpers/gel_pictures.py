@@ -49,4 +49,4 @@ def with_leds(unit, **change):
 
 def levels(unit, radiance) -> np.ndarray:
     """Radiance (H, W, 3) or a difference of it in the picture's grey levels."""
-    return np.einsum("hwcl,hwl->hwc", unit.response.matrices(unit.camera), radiance)
+    return np.einsum("hwcl,hwl->hwc", unit.pixel_response, radiance)

@@ -17,10 +17,10 @@ import pytest
 from PIL import Image
 from plain_unit import plain_unit
 
-from tactile_core.accuracy import Budget
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert, frame_range, results, sampling_error
+from tactile_core.jobs.error_budget import Budget
 from tactile_core.jobs.frame_pass import CHUNK
 from tactile_core.jobs.frames_file import ALWAYS, KEPT
 from tactile_core.mechanics.node_areas import node_areas

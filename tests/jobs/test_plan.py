@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tactile_core.accuracy import Budget
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs import plan
+from tactile_core.jobs.error_budget import Budget
 from tactile_core.mechanics.fast import compliance
 from tactile_core.pictures import presets
 from tactile_core.simulation import tier_choice

@@ -84,7 +84,7 @@ def test_rest_is_the_gel_above_its_lowest_point() -> None:
     assert rest.shape == (320, 240)
     assert 0 <= rest.min() < 20e-6  # our dome is fitted to the mesh that sets zero, 5 um rms
     gel = sensors.digit_surface()
-    nodes = gel.grid(gel.rest)[gel.window].reshape(-1, 3)
+    nodes = gel.window_rest.reshape(-1, 3)
     row, column = DIGIT_CAMERA.to_pixel(nodes[:, 0], nodes[:, 2])
     seen = (row > 0) & (row < 319) & (column > 0) & (column < 239)
     nearest = rest[np.rint(row[seen]).astype(int), np.rint(column[seen]).astype(int)]

@@ -43,7 +43,7 @@ def test_its_lowest_point_is_the_biotac_s():
 
 def test_the_window_is_even_and_holds_the_picture():
     surface, camera = sensors.sensor_surface(NAME), load_calibration(None, NAME).camera
-    rest = surface.grid(surface.rest)[surface.window]
+    rest = surface.window_rest
     steps = np.diff(rest[:, 0, 0]), np.diff(rest[0, :, 2])
     assert all(np.ptp(each) < 1e-9 and each[0] < 0.3501e-3 for each in steps)
     for seen, nodes in ((camera.gel_x, rest[:, 0, 0]), (camera.gel_z, rest[0, :, 2])):

@@ -97,7 +97,7 @@ def test_skin_is_closed_and_as_thick_as_published():
 
 def test_window_of_the_gel_is_an_even_grid():
     gel = sensors.digit_surface()
-    window = gel.grid(gel.rest)[gel.window]
+    window = gel.window_rest
     x, z = window[:, 0, 0], window[0, :, 2]
     np.testing.assert_allclose(window[..., 0], np.broadcast_to(x[:, None], window.shape[:2]), atol=1e-12)
     np.testing.assert_allclose(window[..., 2], np.broadcast_to(z, window.shape[:2]), atol=1e-12)

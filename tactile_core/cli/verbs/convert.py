@@ -88,8 +88,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Convert each recording, going on after a bad one; returns the exit status."""
     one_thread()  # before numpy is imported
-    from ... import accuracy
     from ...jobs import convert, frame_range, results
+    from ...jobs.error_budget import parse_budget
     from ...pictures import presets
     from ...recordings import PrepareOptions, electrode_gains
     from ...recordings.readers import list_fingers
@@ -97,10 +97,10 @@ def run(options: argparse.Namespace) -> int:
 
     prepare = PrepareOptions(**prepare_words(options))
     keep, frames = results.parse_keep(options.keep), frame_range.parse_frames(options.frames)
+    budget = None if options.error is None else parse_budget(options.error)
     answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     paths, failed = list_fingers(options.recordings), 0
-    budget = None if options.error is None else accuracy.parse_budget(options.error)
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     levels = None if budget is None else budget.levels
     preset = presets.FAST if levels is None else presets.fitting(levels)

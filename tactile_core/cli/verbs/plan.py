@@ -40,10 +40,10 @@ def run(options: argparse.Namespace) -> int:
     """Plan and report."""
     import json
 
-    from ... import accuracy
     from ...jobs import plan
+    from ...jobs.error_budget import Budget, parse_budget
 
-    budget = accuracy.Budget() if options.error is None else accuracy.parse_budget(options.error)
+    budget = Budget() if options.error is None else parse_budget(options.error)
     found = plan.plan(options.input, options.keep, budget, options.preset)
     tell(json.dumps(found.as_json(), indent=2) if options.json else "\n".join(found.lines()))
     return 0

@@ -74,14 +74,14 @@ def run(options: argparse.Namespace) -> int:
     """Render the pictures; returns the exit status."""
     engine.check_counts(options, "workers", "restart")
     size = _size(options.size)
-    from ... import accuracy
     from ...jobs import frame_range, render
+    from ...jobs.error_budget import parse_budget
     from ...pictures.mitsuba import variant
 
     wanted = {None: None, "llvm": variant.LLVM, "scalar": variant.SCALAR}[options.variant]
     asked = render.Options(
         preset=options.preset,
-        error=None if options.error is None else accuracy.parse_budget(options.error),
+        error=None if options.error is None else parse_budget(options.error),
         calibration=_calibration(options.calibration, options.gel),
         size=size,
         frames=frame_range.parse_frames(options.frames),

@@ -100,9 +100,9 @@ def _keep(text: str | None) -> tuple[str, ...]:
 
 
 def _bound(text: str) -> float:
-    from ... import accuracy
+    from ...jobs.error_budget import parse_budget
 
-    return accuracy.parse_budget(text).only("um", "Pictures are drawn by `tactile render`")
+    return parse_budget(text).only("um", "Pictures are drawn by `tactile render`")
 
 
 def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> dict[str, str]:
@@ -110,7 +110,7 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> 
 
     Raises TactileError for a long simulation without consent.
     """
-    from ... import accuracy
+    from ...jobs.error_budget import Budget
     from ...jobs.plan import of_scene
     from ...simulation.scene_recording import sensors_of
     from ...simulation.tier_choice import choose_for_scene
@@ -119,7 +119,7 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> 
     for sensor, choice in found.items():
         say(choice.describe(sensor))
     if any(choice.tier != "fast" for choice in found.values()):
-        cost = of_scene(Path(options.scene), keep, accuracy.Budget(um=bound), None)
+        cost = of_scene(Path(options.scene), keep, Budget(um=bound), None)
         agree(f"about {duration(cost.seconds)} and {cost.memory:.0f} MB of memory", cost.seconds, options.yes)
     return {sensor: choice.tier for sensor, choice in found.items()}
 

@@ -6,7 +6,6 @@ import abc
 
 import numpy as np
 
-from ...sensors import sensor_surface
 from ...sensors.calibration import Calibration
 from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of
@@ -27,7 +26,7 @@ class BallPictures(abc.ABC):
     """
 
     def __init__(self, calibration: Calibration) -> None:
-        check_covered(sensor_surface(calibration.camera.sensor), calibration.camera)
+        check_covered(calibration.camera.surface, calibration.camera)
         self.calibration = calibration
         self.camera: Camera = calibration.camera
         x, z = np.meshgrid(self.camera.gel_x, self.camera.gel_z, indexing="ij")

@@ -85,7 +85,7 @@ def square_pixels(camera: Camera) -> Camera:
 
 def camera_planes(unit: Calibration, ambient: np.ndarray) -> dict[str, np.ndarray]:
     """Return the planes (H, W) of an EXR file: response.R.red, ... and ambient.R, ..., which is (H, W, 3) levels."""
-    response = unit.response.matrices(unit.camera).astype(np.float32)
+    response = unit.pixel_response.astype(np.float32)
     planes = {f"ambient.{name}": ambient[..., k] for k, name in enumerate("RGB")}
     for k, name in enumerate("RGB"):
         planes |= {f"response.{name}.{led}": response[..., k, j] for j, led in enumerate(COLOURS)}
