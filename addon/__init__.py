@@ -49,7 +49,7 @@ def register() -> None:
         for part in PARTS:
             part.register()
             done.append(part)
-    except Exception:
+    except Exception:  # whatever it was, it goes on to Blender
         for part in reversed(done):
             part.unregister()
         raise

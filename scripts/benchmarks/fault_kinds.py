@@ -103,7 +103,7 @@ def in_child(folder: Path, cut: int | None) -> bool:
     try:
         with runs.opened(folder, None):
             runs.run(folder, jobs.read(folder), InProcess(folder), None, lambda done, total: None)
-    except BaseException:
+    except BaseException:  # the child of a fork must not go on into its parent's code
         traceback.print_exc()
         os._exit(1)
     os._exit(0)

@@ -41,7 +41,7 @@ def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]
         yield partial
         _sync(partial)
         os.replace(partial, path)
-    except BaseException:
+    except BaseException:  # Ctrl-C, too; raised again
         partial.unlink(missing_ok=True)
         raise
     _sync_folder(path.parent)

@@ -32,7 +32,7 @@ def open_file(path: str | os.PathLike, expected: str = "a regular file") -> Buff
     file = open(path, "rb", opener=_open)  # noqa: SIM115 - the caller closes it
     try:
         _regular(path, os.fstat(file.fileno()), expected)  # it may have been exchanged since
-    except BaseException:
+    except BaseException:  # Ctrl-C, too; raised again
         file.close()
         raise
     return file

@@ -143,7 +143,7 @@ class FramesFile:
         """Raise what the disk refused, also where HDF5 stumbles over it first."""
         try:
             yield
-        except Exception:
+        except Exception:  # raised again; HDF5 gives many types to one cause
             self._disk.check()
             raise
         self._disk.check()

@@ -89,7 +89,7 @@ def _write(file: Path, job: Job, path: str, digest: str) -> int:
             for recording, signals, repeated in _signals(path, job):
                 writer.append(recording, signals, repeated)
             writer.close(digest)
-    except Exception:
+    except Exception:  # raised again, unless the disk knows better
         disk.check()  # HDF5 stumbles over what the disk refused: that is the error to tell
         raise
     finally:

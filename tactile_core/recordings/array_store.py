@@ -121,7 +121,7 @@ def damage_reported(where: str, what: str) -> Iterator[None]:
         yield
     except (TactileError, MemoryError):
         raise
-    except Exception as error:
+    except Exception as error:  # the file libraries raise a dozen types on damaged bytes
         raise TactileError(
             where, f"damaged {what} ({_short(error)})", "a whole file", "Copy or export the recording again"
         ) from error

@@ -104,14 +104,10 @@ def assemble(
     if stamps is None:
         stamps = np.arange(frames) / SAMPLE_RATE
     _check_share(path, np.any(bad, axis=1), problems, row_word)
-    flags = np.where(bad.any(axis=1), Flag.REPAIRED, 0).astype(np.uint16)
-    for problem in problems:
-        flags[problem.frame] |= np.uint16(Flag.REPAIRED)
     notes += tell_problems(problems, row_word)
     seconds, start, more = _seconds(stamps)
     more += _tell_rate(seconds)
     jumps, jump_notes = _time_jumps(seconds, rows, row_word)
-    flags[jumps] |= np.uint16(Flag.TIME_JUMP)
     clean = {key: _finite(value) for key, value in channels.items() if value is not None}
     return Recording(
         name=Path(path).stem,
@@ -121,7 +117,7 @@ def assemble(
         start_time=start,
         electrodes=electrodes,
         rows=rows,
-        flags=flags,
+        flags=_flags(bad, problems, jumps),
         warnings=tuple(notes + more + jump_notes),
         simulated=simulated,
         truth=truth,
@@ -129,6 +125,15 @@ def assemble(
         sensor=sensor,
         **clean,
     )
+
+
+def _flags(bad: np.ndarray, problems: Sequence[Problem], jumps: np.ndarray) -> np.ndarray:
+    """Flag the frames (T,) uint16 that are repaired, and those after which time jumps; bad : (T, 19) bool."""
+    flags = np.where(bad.any(axis=1), Flag.REPAIRED, 0).astype(np.uint16)
+    for problem in problems:
+        flags[problem.frame] |= np.uint16(Flag.REPAIRED)
+    flags[jumps] |= np.uint16(Flag.TIME_JUMP)
+    return flags
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

@@ -7,22 +7,23 @@ import math
 import os
 import sys
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import TactileError
 from ..files import atomic, outside
-from ..files.text_file import read_toml_text, toml_quoted
+from ..files.text_file import read_toml_text
 from . import digit
 from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
+from .calibration_text import FORMAT, as_text
 from .camera import COLOURS, Camera, Led
 from .coating import Coating
-from .descriptor import describe, of_kind
+from .descriptor import of_kind
 from .gel_sensor import Gel
 from .markers import Markers
 
-FORMAT, FORMER = "tactile-calibration-3", "tactile-calibration-1"
+FORMER = "tactile-calibration-1"
 WITHOUT_SPREAD = "tactile-calibration-2"  # whose coatings do not spread light
 SHIPPED = digit.DESCRIPTOR.folder / digit.DESCRIPTOR.camera.calibration
 LARGEST = 1e8  # of a unit's numbers, as the radiance of a spot of 0.05 mm; a fit's errors may be larger
@@ -281,105 +282,4 @@ def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None
 
     Numbers keep six digits. A photograph is named as it lies beside the file.
     """
-    atomic.write_bytes(path, _as_text(calibration).encode())
-
-
-def _as_text(calibration: Calibration) -> str:
-    camera, response, coating = calibration.camera, calibration.response, calibration.coating
-    fit = calibration.fit
-    title = describe(camera.sensor).title
-    lines = [
-        f"# A {title} unit: picture = response(right, down) x radiance of the coating + ambient light, 8-bit values.",
-        "# Image frame: right, down, toward the camera; origin in the picture's middle on the plane of height zero.",
-        f"format = {toml_quoted(FORMAT)}",
-        f"unit = {toml_quoted(calibration.unit)}",
-        *[f"sensor = {toml_quoted(camera.sensor)}"] * (camera.sensor != Camera.sensor),
-        "",
-        "[camera]",
-        f"width_px = {camera.width}",
-        f"height_px = {camera.height}",
-        f"px_per_mm_x = {_digits(camera.px_per_mm_x)}  # at height zero",
-        f"px_per_mm_y = {_digits(camera.px_per_mm_y)}",
-        f"centre_x_mm = {_digits(1e3 * camera.centre_x)}  # of the gel, in the picture's middle",
-        f"centre_z_mm = {_digits(1e3 * camera.centre_z)}",
-        f"apparent_height_mm = {_digits(1e3 * camera.apparent_height)}  # of the pinhole",
-        f"right_z = {camera.right_z}  # the way z goes to the right",
-        f"down_x = {camera.down_x}  # the way x goes down",
-        "",
-        "[leds]  # spheres: right, down, toward the camera; radiance of their surface in levels of their own channel",
-    ]
-    for led in calibration.leds:
-        position = [1e3 * value for value in led.position]
-        place = f"position_mm = {_list(position)}, radius_mm = {_digits(1e3 * led.radius)}"
-        lines.append(f"{led.colour} = {{ {place}, radiance = {_digits(led.radiance)} }}")
-    lines += ["", "[response]  # of the camera, levels a level: a row a channel of the picture, a column an LED"]
-    lines.append(f"centre = {_matrix(response.centre)}")
-    for name, matrix in (("right", response.along_right), ("down", response.along_down)):
-        per_mm = [[1e-3 * value for value in row] for row in matrix]
-        lines.append(f"along_{name}_per_mm = {_matrix(per_mm)}")
-    lines += [
-        "",
-        "[ambient]  # of each LED, held in gel and acrylic, of right^i down^j / (10 mm)^(i + j), by i + j, then j",
-        *[f"{led} = {_list(row)}" for led, row in zip(COLOURS, calibration.ambient, strict=True)],
-        f"rise_per_mm = {_list([1e-3 * share for share in calibration.ambient_rise])}  # more of it on higher gel",
-        "",
-        "[coating]  # diffuse, roughplastic or principled; albedo of each LED's light",
-        f"bsdf = {toml_quoted(coating.bsdf)}",
-        f"albedo = {_list(coating.albedo)}",
-        *[f"{name} = {_digits(getattr(coating, name))}" for name in ("roughness", "gloss", "metallic")],
-        f"spread_mm = {_digits(1e3 * coating.spread)}  # of light, sideways in it: standard deviation",
-        "",
-        "[gel]",
-        f"dome_scale = {_digits(calibration.dome_scale)}  # of the public mesh's dome",
-        f"index = {_digits(calibration.gel_index)}  # of gel and acrylic",
-        "",
-        "[background]  # a photograph of the untouched gel, beside this file, is then the picture at rest",
-        f"photograph = {toml_quoted(Path(calibration.photograph).name)}",
-    ]
-    if calibration.markers is not None:
-        markers = calibration.markers
-        lines += [
-            "",
-            "[markers]  # dots printed on the gel, a square grid in the picture's middle; may be left out",
-            f"rows = {markers.rows}  # down the picture",
-            f"columns = {markers.columns}",
-            f"pitch_mm = {_digits(1e3 * markers.pitch)}",
-            f"diameter_mm = {_digits(1e3 * markers.diameter)}",
-            f"albedo = {_digits(markers.albedo)}  # share of the coating's light: 0 black",
-        ]
-    lines += [
-        "",
-        "[noise]  # standard deviation, grey levels, red, green, blue; used when asked for",
-        f"levels = {_list(calibration.noise)}",
-        "",
-        "[fit]",
-        f"note = {toml_quoted(fit.note)}",
-        f"ball_diameter_mm = {_digits(1e3 * fit.ball_diameter)}",
-        f"photographs = [{', '.join(map(toml_quoted, fit.photographs))}]",
-        f"not_identified = [{', '.join(map(toml_quoted, fit.not_identified))}]",
-        "",
-        "[fit.errors]  # on those photographs",
-        *_named(fit.errors),
-        "",
-        "[fit.standard_errors]  # in each parameter's unit; how units differ (assumed) counts as a measurement",
-        *_named(fit.standard_errors),
-        "",
-    ]
-    return "\n".join(lines)
-
-
-def _named(values: Mapping[str, float]) -> list[str]:
-    return [f"{toml_quoted(name)} = {_digits(value)}" for name, value in values.items()]
-
-
-def _digits(value: float) -> str:
-    """Format a number with six digits as TOML's float or integer."""
-    return f"{value + 0.0:.6g}"
-
-
-def _list(values: Sequence[float]) -> str:
-    return "[" + ", ".join(map(_digits, values)) + "]"
-
-
-def _matrix(rows: Sequence[Sequence[float]]) -> str:
-    return "[" + ", ".join(map(_list, rows)) + "]"
+    atomic.write_bytes(path, as_text(calibration).encode())

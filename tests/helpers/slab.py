@@ -24,4 +24,4 @@ def slab_compliance(x: np.ndarray, z: np.ndarray, y: np.ndarray, material: Mater
     """Its compliance, touchable within ``reach`` m of the middle."""
     mesh, lattice = slab_mesh(x, z, y)
     touchable = np.flatnonzero(np.hypot(lattice.rest[:, 0], lattice.rest[:, 2]) < reach)
-    return Compliance("slab", lattice, touchable, *build(Solid("slab", lattice, touchable, mesh, material)))
+    return Compliance("slab", lattice, touchable, **build(Solid("slab", lattice, touchable, mesh, material)))

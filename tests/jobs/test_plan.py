@@ -96,7 +96,7 @@ def test_matrices_that_are_cached_are_told_with_their_size(monkeypatch, tmp_path
     monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))
     folder = compliance.stored("digit").folder
     folder.mkdir()
-    for name in compliance.Arrays._fields:
+    for name in compliance.ARRAYS:
         (folder / f"{name}.npy").write_bytes(bytes(1_000_000))
     matrices = next(part for part in plan_for(keep="image").parts if part.what == "DIGIT matrices")
     assert matrices.seconds == 0 and "7 MB, cached" in matrices.extent and "2867 surface nodes" in matrices.extent

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 
 import numpy as np
 
-from tactile_core.mechanics.solids.block_pattern import BlockPattern
-from tactile_core.mechanics.solids.finite_strain import State
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, Linearised, State
 from tactile_core.mechanics.solids.neo_hookean import NeoHookean
 from tactile_core.sensors import Material
 
@@ -22,7 +20,7 @@ class _Mesh:
     clamped: np.ndarray
 
 
-class CorotatedTets:
+class CorotatedTets(FiniteStrainSolid):
     """Linear tetrahedra of energy mu |F - R|^2 + lambda / 2 tr(R^T F - I)^2, F = R S; a solid for ``newton``.
 
     Müller, Gross, Interactive Virtual Materials, Graphics Interface 2004; that Isaac Gym's finite elements take this
@@ -41,28 +39,23 @@ class CorotatedTets:
         self.gradient = np.concatenate([-inner.sum(1, keepdims=True), inner], axis=1)  # (e, a, J)
         self.dofs = (3 * mesh.cells[..., None] + np.arange(3)).reshape(len(mesh.cells), 12)
 
-    @functools.cached_property
-    def pattern(self) -> BlockPattern:
-        """Sparsity pattern of the stiffness matrix."""
-        return BlockPattern(self.mesh.cells, self.mesh.clamped)
-
     def rest(self) -> State:
         """Return the state without displacement; this solid has no pressure unknowns."""
-        return State(np.zeros_like(self.mesh.nodes), np.zeros(0))
+        return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 0)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Deformation gradient F (n_cells, 3, 3) and its determinant (n_cells,)."""
+        """Return the deformation gradient F (n_cells, 3, 3) and its determinant (n_cells,)."""
         f = np.einsum("eai,eaj->eij", displacement[self.mesh.cells], self.gradient) + np.eye(3)
         return f, np.linalg.det(f)
 
     def energy(self, state: State) -> float:
-        """Stored elastic energy, J."""
+        """Return the stored elastic energy, J."""
         _, stretch, _ = np.linalg.svd(self.deformation(state.displacement)[0])
         density = self.shear * ((stretch - 1) ** 2).sum(1) + self.lame / 2 * (stretch.sum(1) - 3) ** 2
         return float(density @ self.volume)
 
     def linearise(self, state: State) -> Linearised:
-        """Residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
+        """Compute residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
         f, _ = self.deformation(state.displacement)
         if not (np.linalg.det(f) > 0).all():  # NaN, too
             raise FloatingPointError("a cell is turned inside out")
@@ -71,10 +64,11 @@ class CorotatedTets:
         tangent *= self.volume[:, None, None, None, None]
         half = tangent.swapaxes(1, 2).reshape(-1, 27, 3) @ self.gradient.swapaxes(1, 2)  # (e, J i k, b)
         stiffness = self.gradient @ half.reshape(-1, 3, 36)
-        return Linearised(self, force, stiffness.reshape(-1, 4, 3, 3, 4))
+        none = np.zeros((len(force), 0))  # pressures: none are unknown
+        return Linearised(self, force, force, stiffness.reshape(-1, 4, 3, 3, 4), np.zeros((len(force), 0, 12)), none)
 
     def stress_tangent(self, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """First Piola-Kirchhoff stress (e, 3, 3) Pa and its derivative (e, 3, 3, 3, 3) at F (e, 3, 3) with det F > 0.
+        """Return first Piola-Kirchhoff stress (e, 3, 3) Pa and derivative (e, 3, 3, 3, 3) at F (e, 3, 3), det F > 0.
 
         The derivative of R has the three twists of F's axes as eigenvectors: Smith, de Goes, Kim, ACM Trans. Graph. 38,
         2019, section 4.
@@ -91,29 +85,3 @@ class CorotatedTets:
             size = (self.lame * growth - 2 * self.shear) / (stretch[:, i] + stretch[:, j])
             tangent += size[:, None, None] * twist[:, :, None] * twist[:, None, :]
         return stress, tangent.reshape(-1, 3, 3, 3, 3)
-
-
-@dataclasses.dataclass
-class Linearised:
-    """A solid's equations at one state. force : (n_cells, 12) N; stiffness : (n_cells, 4, 3, 3, 4) N/m."""
-
-    solid: CorotatedTets
-    force: np.ndarray
-    stiffness: np.ndarray
-
-    def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """Internal force (3 n,) N; there is nothing to condense."""
-        size = self.solid.mesh.nodes.size
-        return np.bincount(self.solid.dofs.ravel(), self.force.ravel(), minlength=size)
-
-    def blocks(self) -> np.ndarray:
-        """Tangent stiffness (n_blocks, 3, 3) N/m on the solid's pattern."""
-        return self.solid.pattern.gather(self.stiffness)
-
-    def matrix(self):  # noqa: ANN201 (scipy is imported only where it is needed)
-        """Tangent stiffness, scipy CSC (3 n, 3 n), N/m."""
-        return self.solid.pattern.sparse(self.blocks()).tocsc()
-
-    def pressure_step(self, step: np.ndarray) -> np.ndarray:
-        """Do nothing: the pressures are no unknowns here."""
-        return np.zeros(0)

@@ -57,7 +57,7 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
         _sweep(folder, part)
         try:
             yield
-        except BaseException:
+        except BaseException:  # Ctrl-C, too; raised again
             if made and not jobs.exists(folder):
                 _unmake(folder)
             raise

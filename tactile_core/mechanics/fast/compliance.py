@@ -79,16 +79,8 @@ class Compliance:
         return np.searchsorted(answered, np.where(mirrored, image[self.touchable], self.touchable)), mirrored, image
 
 
-class Arrays(NamedTuple):
-    """Arrays of a ``Compliance`` that are computed and cached."""
-
-    move: np.ndarray
-    watch: np.ndarray
-    watch_gap: np.ndarray
-    pressure: np.ndarray
-    inner_move: np.ndarray
-    inner_watch: np.ndarray
-    inner_pressure: np.ndarray
+# Arrays of a ``Compliance`` that are computed and cached.
+ARRAYS = ("move", "watch", "watch_gap", "pressure", "inner_move", "inner_watch", "inner_pressure")
 
 
 def biotac_compliance() -> Compliance:
@@ -140,7 +132,7 @@ def stored(sensor: str) -> Stored:
     """Return the cache entry of a sensor; builds and loads nothing."""
     solid = _solid(sensor)
     folder = _folder(solid)
-    files = [folder / f"{array}.npy" for array in Arrays._fields]
+    files = [folder / f"{array}.npy" for array in ARRAYS]
     size = sum(file.stat().st_size for file in files) if all(file.is_file() for file in files) else 0
     return Stored(folder, size, len(solid.lattice.rest), len(solid.touchable), len(solid.mesh.nodes))
 
@@ -169,7 +161,7 @@ def _cached(solid: Solid) -> Compliance:
     name, lattice, touchable, mesh, _ = solid
     folder = _folder(solid)
     try:
-        loaded = array_cache.load(folder, Arrays._fields)
+        loaded = array_cache.load(folder, ARRAYS)
     except array_cache.DamagedError:  # not built yet, perhaps by a process that is at it now
         array_cache.claim(folder, _ROOM)
         with lock.awaited(folder.with_name(f".{folder.name}.lock")):
@@ -181,21 +173,20 @@ def _cached(solid: Solid) -> Compliance:
 def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
     """Return what another process built while this one waited, or build it."""
     try:
-        return array_cache.load(folder, Arrays._fields)
+        return array_cache.load(folder, ARRAYS)
     except array_cache.DamagedError as damage:
         if (folder / array_cache.HASHES).exists():
             log.warning("%s: damaged (%s); it is built again", folder, damage)
     log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)
-    arrays = build(solid)
-    array_cache.store(folder, arrays._asdict(), _ROOM)
-    return array_cache.load(folder, Arrays._fields)
+    array_cache.store(folder, build(solid), _ROOM)
+    return array_cache.load(folder, ARRAYS)
 
 
-def build(solid: Solid) -> Arrays:
-    """The arrays of a ``Compliance``, from a solid that is even in z.
+def build(solid: Solid) -> dict[str, np.ndarray]:
+    """Compute the ``ARRAYS`` of a ``Compliance``, by name, from a solid that is even in z.
 
-    Raises ValueError for a solid without mirror symmetry or held
-    nowhere, TactileError where the memory does not suffice.
+    Raises ValueError for a solid without mirror symmetry or held nowhere, TactileError where the memory does not
+    suffice.
     """
     name, lattice, touchable, mesh, material = solid
     sensing = sensing_points_of(name, mesh)
@@ -230,7 +221,7 @@ def build(solid: Solid) -> Arrays:
     except MemoryError as error:
         raise TactileError("compliance", "out of memory", "2.2 GB of free memory", "Close other programs") from error
     inner = inner_move.astype(np.float32), among.astype(np.float32), inner_pressure
-    return Arrays(move, watch, sensing.gap, pressure, *inner)
+    return dict(zip(ARRAYS, (move, watch, sensing.gap, pressure, *inner), strict=True))
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:

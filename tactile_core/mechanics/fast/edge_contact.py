@@ -61,6 +61,7 @@ class EdgeContactProblem(ContactProblem):
 
     @property
     def nodes_near(self) -> np.ndarray:
+        """Sorted touchable indices (n,) of the followed nodes, without the points between them."""
         return self.near[self.near < self._m]
 
     def check_follows(self, contact: Contact) -> None:

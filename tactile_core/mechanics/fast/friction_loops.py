@@ -247,7 +247,6 @@ def advance(  # noqa: ANN201
     return new, new_core
 
 
-@Loop
 def sort(  # noqa: ANN201
     force, core, active, slips, normal, lean, off, gap, core_gap, turned, stuck_again, left, friction, least, noise,  # noqa: ANN001
     gap_tolerance, slip_tolerance, sideways_tolerance, beyond, beyond_wavering, wavers, may_be_empty,  # noqa: ANN001
@@ -257,6 +256,27 @@ def sort(  # noqa: ANN201
     Returns active (k + c,), slips (k,), changed, settled, the largest gap, m, of what touches, and that or the deepest
     place in the indenter. ``force`` of nodes that touch again, ``stuck_again`` and ``left`` (k,) are updated in place.
     may_be_empty : whether no contact at all is an answer
+    """
+    new_active, new_slips, changed, any_active, deepest, widest, wide_slip, tilted, size = _sort_points(
+        force, core, active, slips, normal, lean, off, gap, core_gap, turned, stuck_again, friction, least, noise,
+        gap_tolerance, slip_tolerance, beyond, beyond_wavering, wavers,
+    )  # fmt: skip
+    settled = not changed and (any_active or may_be_empty) and deepest >= -gap_tolerance and widest <= gap_tolerance
+    if settled and wide_slip <= slip_tolerance and tilted <= sideways_tolerance * size:
+        return new_active, new_slips, changed, True, 0.0, 0.0
+    wrong = _come_back(force, active, new_active, new_slips, normal, off, gap, turned, left, friction, least)
+    return new_active, new_slips, changed, False, wrong, max(-deepest, wrong)
+
+
+@Loop
+def _sort_points(  # noqa: ANN202
+    force, core, active, slips, normal, lean, off, gap, core_gap, turned, stuck_again, friction, least, noise,  # noqa: ANN001
+    gap_tolerance, slip_tolerance, beyond, beyond_wavering, wavers,  # noqa: ANN001
+):  # fmt: skip
+    """Sort points into touching and slipping ones, for `sort`.
+
+    Also returns whether any node touched, the least gap of all, the largest gap and slip of what touched, m, how far
+    forces turn with their normals, N, and the size of the whole force, N.
     """
     k, c = force.shape[0], core.shape[0]
     new_active, new_slips = np.empty(k + c, np.bool_), np.zeros(k, np.bool_)
@@ -305,14 +325,16 @@ def sort(  # noqa: ANN201
         touches = core[p] >= -least if active[k + p] else core_gap[p] < -noise
         new_active[k + p] = touches
         changed |= (active[k + p] and not touches) or (not active[k + p] and core_gap[p] < -gap_tolerance)
-    settled = not changed and (any_active or may_be_empty) and deepest >= -gap_tolerance and widest <= gap_tolerance
-    settled = settled and np.sqrt(max(wide_slip, 0.0)) <= slip_tolerance
     size = np.sqrt(whole[0] ** 2 + whole[1] ** 2 + whole[2] ** 2)
-    settled = settled and np.sqrt(tilted) <= sideways_tolerance * size
-    if settled:
-        return new_active, new_slips, changed, settled, 0.0, 0.0
+    wide_slip = np.sqrt(max(wide_slip, 0.0))
+    return new_active, new_slips, changed, any_active, deepest, widest, wide_slip, np.sqrt(tilted), size
+
+
+@Loop
+def _come_back(force, active, new_active, new_slips, normal, off, gap, turned, left, friction, least):  # noqa: ANN001, ANN202
+    """Let nodes that touch again slip, and mark those that left; returns the largest gap, m, of what touches."""
     wrong = 0.0
-    for a in range(k):
+    for a in range(len(left)):
         back = left[a] and new_active[a] and not active[a]
         left[a] = left[a] or (active[a] and not new_active[a])
         if new_active[a]:
@@ -329,4 +351,4 @@ def sort(  # noqa: ANN201
             new_slips[a] = True
             for i in range(3):
                 force[a, i] = least * (turned[a, i] - friction * (off[a, i] - onto * normal[a, i]) / far)
-    return new_active, new_slips, changed, settled, wrong, max(-deepest, wrong)
+    return wrong

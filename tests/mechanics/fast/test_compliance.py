@@ -50,7 +50,7 @@ def scaled_in_part(file):
 
 
 @pytest.mark.parametrize("spoil", [cut, scaled_in_part, pathlib.Path.unlink])
-@pytest.mark.parametrize("name", compliance.Arrays._fields)
+@pytest.mark.parametrize("name", compliance.ARRAYS)
 def test_a_damaged_file_is_built_again_and_told(tiny, tmp_path, caplog, spoil, name):
     first = np.array(tiny().move)
     (file,) = (tmp_path / "cache").glob(f"*/{name}.npy")

@@ -35,7 +35,7 @@ def test_every_force_has_the_answer_of_the_solid(block):
     """Also where the matrix holds only the mirror image's answer."""
     mesh, lattice, answer = block
     touchable = np.flatnonzero(lattice.rest[:, 0] > -1.5e-3)
-    compliance = Compliance("slab", lattice, touchable, *build(Solid("slab", lattice, touchable, mesh, MATERIAL)))
+    compliance = Compliance("slab", lattice, touchable, **build(Solid("slab", lattice, touchable, mesh, MATERIAL)))
     none = np.empty(0, int)
     matrix = ComplianceBlock(compliance, np.arange(len(touchable)), none).matrix
     surface = (3 * mesh.surface[:, None] + np.arange(3)).ravel()
