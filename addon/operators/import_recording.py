@@ -139,14 +139,14 @@ CLASSES = (TACTILE_OT_import_recording, TACTILE_FH_recording)
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     for kind in CLASSES:
         bpy.utils.register_class(kind)
     bpy.types.TOPBAR_MT_file_import.append(_menu)
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     bpy.types.TOPBAR_MT_file_import.remove(_menu)
     for kind in reversed(CLASSES):
         bpy.utils.unregister_class(kind)

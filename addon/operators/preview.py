@@ -104,13 +104,13 @@ class TACTILE_OT_live_picture(TactileOperator):
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     bpy.utils.register_class(TACTILE_OT_live_picture)
     bpy.app.handlers.save_pre.append(_keep_images)
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     switch_off()
     bpy.app.handlers.save_pre.remove(_keep_images)
     bpy.utils.unregister_class(TACTILE_OT_live_picture)

@@ -100,7 +100,7 @@ def _end_idle_workers() -> float:
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     bpy.utils.register_class(TactileRenderEngine)
     bpy.app.handlers.load_pre.append(_end_workers)
     bpy.app.timers.register(_end_idle_workers, first_interval=_LOOK, persistent=True)
@@ -109,7 +109,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     for panel in _panels():
         panel.COMPAT_ENGINES.discard(ID)
     bpy.app.timers.unregister(_end_idle_workers)

@@ -135,7 +135,7 @@ CLASSES = (TACTILE_OT_import_scene, TACTILE_OT_export_scene)
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     for kind in CLASSES:
         bpy.utils.register_class(kind)
     bpy.types.TOPBAR_MT_file_import.append(_menu_import)
@@ -143,7 +143,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     bpy.types.TOPBAR_MT_file_export.remove(_menu_export)
     bpy.types.TOPBAR_MT_file_import.remove(_menu_import)
     for kind in reversed(CLASSES):

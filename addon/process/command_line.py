@@ -164,11 +164,11 @@ _command = None
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     global _command
     _command = bpy.utils.register_cli_command("tactile", main)
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     bpy.utils.unregister_cli_command(_command)

@@ -159,14 +159,14 @@ CLASSES = (TACTILE_OT_add_sensor, TACTILE_OT_add_indenter, TACTILE_OT_use_as_ind
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     for kind in CLASSES:
         bpy.utils.register_class(kind)
     bpy.types.VIEW3D_MT_add.append(_menu)
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     bpy.types.VIEW3D_MT_add.remove(_menu)
     for kind in reversed(CLASSES):
         bpy.utils.unregister_class(kind)

@@ -86,7 +86,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     if bpy.app.timers.is_registered(install):
         bpy.app.timers.unregister(install)
     listed = entry()

@@ -33,7 +33,7 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
     bl_label = "Recording"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Called by Blender."""
+        """Draw the panel; Blender calls it."""
         layout = self.layout
         row = layout.row(align=True)
         row.operator(TACTILE_OT_import_recording.bl_idname, icon="IMPORT")
@@ -102,7 +102,7 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
     bl_label = "Picture"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Called by Blender."""
+        """Draw the panel; Blender calls it."""
         layout = self.layout
         layout.operator(TACTILE_OT_live_picture.bl_idname, icon="HIDE_OFF" if preview.is_on() else "HIDE_ON",
                         depress=preview.is_on())  # fmt: skip
@@ -125,7 +125,7 @@ class TACTILE_PT_parts(_Panel, bpy.types.Panel):
         return properties.of_role(context.scene, "DIGIT", context.object) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Called by Blender."""
+        """Draw the panel; Blender calls it."""
         draw_parts(self.layout, context)
 
 
@@ -143,7 +143,7 @@ class TACTILE_PT_author(_Panel, bpy.types.Panel):
     bl_label = "Author"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Called by Blender."""
+        """Draw the panel; Blender calls it."""
         layout = self.layout
         layout.menu(TACTILE_MT_add.bl_idname, text="Add Sensor or Indenter", icon="ADD")
         thing = properties.of_role(context.scene, "INDENTER", context.object)

@@ -107,7 +107,7 @@ CLASSES = (TACTILE_OT_clear_cache, TactilePreferences)
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     for kind in CLASSES:
         bpy.utils.register_class(kind)
     stored = bpy.context.preferences.addons.get(ID)
@@ -116,6 +116,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     for kind in reversed(CLASSES):
         bpy.utils.unregister_class(kind)

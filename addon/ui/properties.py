@@ -134,14 +134,14 @@ CLASSES = (TactileObject,)
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     for kind in CLASSES:
         bpy.utils.register_class(kind)
     bpy.types.Object.tactile = bpy.props.PointerProperty(type=TactileObject, name="Tactile")
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     del bpy.types.Object.tactile
     for kind in reversed(CLASSES):
         bpy.utils.unregister_class(kind)

@@ -82,12 +82,12 @@ def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> N
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     bpy.utils.register_class(TactileRender)
     bpy.types.Scene.tactile_render = bpy.props.PointerProperty(type=TactileRender, name="Tactile render")
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     del bpy.types.Scene.tactile_render
     bpy.utils.unregister_class(TactileRender)

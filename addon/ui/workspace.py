@@ -95,12 +95,12 @@ def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 def register() -> None:
-    """Called by the package."""
+    """Register what this file declares; the package calls it."""
     bpy.utils.register_class(TACTILE_OT_open_workspace)
     bpy.types.TOPBAR_MT_window.append(_menu)
 
 
 def unregister() -> None:
-    """Called by the package."""
+    """Take back what `register` did; the package calls it."""
     bpy.types.TOPBAR_MT_window.remove(_menu)
     bpy.utils.unregister_class(TACTILE_OT_open_workspace)
