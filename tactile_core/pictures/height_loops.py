@@ -50,13 +50,15 @@ def heights_above(  # noqa: ANN201
     u, v, found = np.empty(4), np.empty(4), np.empty(3, np.float32)
     for n in range(len(x)):
         source_x, source_z, miss_x, miss_z = x[n], z[n], miss[0, n], miss[1, n]
+        xx, xz, zx, zz = to_x[0, n], to_x[1, n], to_z[0, n], to_z[1, n]
         for number in range(most_steps + 1):
             arrived = number == most_steps
             if arrived:
                 lost += 1
             else:
-                source_x -= to_x[0, n] * miss_x + to_x[1, n] * miss_z
-                source_z -= to_z[0, n] * miss_x + to_z[1, n] * miss_z
+                step_x, step_z = -(xx * miss_x + xz * miss_z), -(zx * miss_x + zz * miss_z)
+                source_x += step_x
+                source_z += step_z
                 arrived = max(abs(miss_x), abs(miss_z)) <= tolerance
             row_place = min(max((source_x - start[0]) / step[0], 0.0), float(intervals[0]))
             column_place = min(max((source_z - start[1]) / step[1], 0.0), float(intervals[1]))
@@ -78,5 +80,13 @@ def heights_above(  # noqa: ANN201
             if arrived:
                 heights[n] = found[2]
                 break
+            before_x, before_z = miss_x, miss_z
             miss_x, miss_z = source_x - x[n] + found[0], source_z - z[n] + found[1]
+            change_x, change_z = miss_x - before_x, miss_z - before_z
+            wanted_x, wanted_z = xx * change_x + xz * change_z, zx * change_x + zz * change_z
+            along = step_x * wanted_x + step_z * wanted_z
+            if along != 0:
+                over_x, over_z = (step_x - wanted_x) / along, (step_z - wanted_z) / along
+                row_x, row_z = step_x * xx + step_z * zx, step_x * xz + step_z * zz
+                xx, xz, zx, zz = xx + over_x * row_x, xz + over_x * row_z, zx + over_z * row_x, zz + over_z * row_z
     return heights, lost

@@ -31,7 +31,7 @@ _folded: contextvars.ContextVar[list[int] | None] = contextvars.ContextVar("fold
 
 REFINEMENT = 2  # grid for the sideways search, intervals a node interval; measured in tests/pictures/test_height_map.py
 MOVE_TOLERANCE = 1e-7  # m, of the sideways search: times a slope of 1, below a tenth of a grey level
-MOVE_ITERATIONS = 12  # 2 or 3 do for presses; where 12 do not, the surface folds over itself
+MOVE_ITERATIONS = 12  # 2 or 3 do for presses, 6 for firm grips; where 12 do not, the surface folds over itself
 BEYOND_WINDOW = 1e-3  # m that a picture may reach past the window (17 px/mm: 0.7 mm); the edge is held there
 NEGLIGIBLE = 1e-12  # weight of a node in a pixel, of 1 in all: a hundred-thousandth of float32's rounding
 SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area is about to fold: steps stay finite
@@ -154,23 +154,28 @@ class HeightMapper:
     ) -> tuple[np.ndarray, np.ndarray, int]:
         """Rest places (n,) x, z m of gel points that moved to the refined grid's nodes, and how many were not found.
 
-        Newton's method for X + u(X) = x from X = x, with the Jacobian kept: u changes little over a displacement.
+        Broyden's method (1965) for X + u(X) = x from X = x: Newton's first step, then the Jacobian's inverse is
+        corrected by what each step did, so that nothing is differentiated again.
         coefficients : (2, rows + 2, columns + 2), of the splines of u; to_x, to_z : (2, n), rows of the Jacobian's
         inverse; miss : (2, n) m, u at the start
         """
-        x, z = self._fine_places
-        source_x, source_z = x.copy(), z.copy()
-        active = np.arange(len(x))
+        target = self._fine_places
+        source = target.copy()
+        active, inverse = np.arange(target.shape[1]), np.stack([to_x, to_z])
         for _ in range(MOVE_ITERATIONS):
-            source_x[active] -= (to_x[:, active] * miss).sum(0)
-            source_z[active] -= (to_z[:, active] * miss).sum(0)
-            active = active[np.abs(miss).max(0) > MOVE_TOLERANCE]
+            step = -np.einsum("ijn,jn->in", inverse, miss)
+            source[:, active] += step
+            far = np.abs(miss).max(0) > MOVE_TOLERANCE
+            active, before = active[far], miss[:, far]
+            step, inverse = np.compress(far, step, axis=1), np.compress(far, inverse, axis=2)
             if not len(active):
                 break
-            at_x, at_z = source_x[active], source_z[active]
-            moved = self._look_up(coefficients, at_x, at_z).T
-            miss = np.stack([at_x - x[active], at_z - z[active]]) + moved
-        return source_x, source_z, len(active)
+            miss = source[:, active] - target[:, active] + self._look_up(coefficients, *source[:, active]).T
+            wanted = np.einsum("ijn,jn->in", inverse, miss - before)
+            along = (step * wanted).sum(0)
+            correction = (step - wanted) / np.where(along == 0, np.inf, along)
+            inverse += np.einsum("in,kn,kjn->ijn", correction, step, inverse)
+        return *source, len(active)
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Splines with coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, good to 0.1 nm a mm."""
