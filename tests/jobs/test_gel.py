@@ -243,6 +243,25 @@ def test_a_force_that_falls_to_next_to_nothing_is_found(sensor):
     assert not gel.press(pose, force=1e-6).patch.any()
 
 
+@pytest.mark.parametrize("friction", [0.78, 0.0])
+def test_a_contact_too_large_for_a_step_is_given_in_several(friction, monkeypatch):
+    """A ball of 300 mm diameter at 300 N took minutes: all nodes touch. Here a small one, with less work."""
+    monkeypatch.setattr("tactile_core.jobs.gel._WORK", 2e8 if friction else 2e7)
+    gel = Gel("digit", BALL, friction=friction)
+    pose = gel.touching(-8e-3, 0.0)
+    first = gel.press(pose, force=5.0)
+    assert first.flags == ("force not reached", "too large") and 0.1 < first.force[1] < 5
+    assert np.abs((first.traction * gel.areas[:, None]).sum(axis=0) - first.force).max() < 0.01 * first.force[1]
+    steps = list(gel.follow([pose] * 9, [5.0] * 9))
+    missing = [abs(contact.force[1] - 5) for contact in steps if contact.flags]
+    assert missing == sorted(missing, reverse=True) and steps[-1].flags == ()
+    assert steps[-1].force[1] == pytest.approx(5.0, rel=2e-3)
+    monkeypatch.setattr("tactile_core.jobs.gel._WORK", 0.0)
+    deeper = gel.press(shifted(steps[-1].pose, y=0.2e-3))
+    assert deeper.flags == ("unsolved", "too large") and deeper.force is steps[-1].force
+    assert "too large" in FLAGS
+
+
 def test_flags_tell_what_is_wrong_and_the_loop_goes_on():
     gel = Gel("digit", BALL)
     assert gel.press(gel.touching(-8e-3, 0.0, 0.3e-3)).flags == ("began inside",)

@@ -20,6 +20,26 @@ class UnsolvedError(ArithmeticError):
     """The matrix is not positive definite, or the exchanges do not end."""
 
 
+class ExhaustedError(UnsolvedError):
+    """The ``Work`` that contacts may cost is used up."""
+
+
+@dataclasses.dataclass
+class Work:
+    """Effort that contacts may still cost, ``left``: the cube of the unknowns for each iteration of a solver."""
+
+    left: float = np.inf
+
+    def spend(self, unknowns: int, iterations: int) -> None:
+        """Take off what a solver has used."""
+        self.left -= float(unknowns) ** 3 * iterations
+
+    def check(self) -> None:
+        """Raise ExhaustedError where nothing is left."""
+        if self.left <= 0:
+            raise ExhaustedError("too large a contact for the work it may cost")
+
+
 @dataclasses.dataclass(frozen=True)
 class Pressing:
     """State of an active-set solve.

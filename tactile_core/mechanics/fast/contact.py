@@ -16,7 +16,7 @@ from ...geometry.indenters import Indenter, Pose
 from ..penetration import check_follows
 from ..pose_path import between, same_place
 from . import surface_response
-from .active_set import UnsolvedError
+from .active_set import UnsolvedError, Work
 from .candidates import Candidates
 from .compiled_friction import CompiledFriction
 from .compliance import Compliance
@@ -36,6 +36,7 @@ _CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps 
 _CLOSED = 0.3e-6  # m: gaps closed to this need no further look
 _MOST_ROUNDS = 12  # of taking in nodes
 _DETOURS = (4, 9, 20)  # steps from the start to the goal, where one does not settle: other steps pass other edges
+_FAILS_AFTER = 5  # iterations, assumed, which a solver that ends without a contact does not count
 _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest overlap are first taken to touch
 
 
@@ -52,12 +53,15 @@ class ContactProblem:
 
     Nodes are followed only where the indenter can reach them, ``reach`` m in from the pose at depth 0.
     friction : Coulomb's coefficient; with it a contact depends on the one it goes on from, and on the steps between.
+    work : what contacts may cost, None for as much as they take; a solve raises ExhaustedError where it is used up
     """
 
     def __init__(
-        self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, friction: float = 0.0
-    ) -> None:
+        self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, friction: float = 0.0,
+        work: Work | None = None,
+    ) -> None:  # fmt: skip
         self.compliance, self.indenter, self.pose, self.friction = compliance, indenter, pose, friction
+        self.work = work or Work()
         self._rest = self._resting()
         self._block: ComplianceBlock | None = None
         self._rows = ComplianceRows(compliance, np.empty(0, int))
@@ -192,6 +196,7 @@ class ContactProblem:
         return dataclasses.replace(contact, converged=False)
 
     def _iterate(self, pose, axial_force, before, moved, candidates, shift) -> Try | None:  # noqa: ANN001
+        self.work.check()
         block = self._block
         if block is None or not (
             np.array_equal(block.nodes, candidates.nodes) and np.array_equal(block.inner, candidates.inner)
@@ -209,10 +214,14 @@ class ContactProblem:
             solver = (CompiledFriction if available() else Friction)(
                 block, rest, core_gap, self.indenter, pose, spots, self.friction
             )
+        unknowns = len(active) if self.friction == 0 else len(block.matrix)
         try:
-            return solver.solve(begin, axial_force)
+            found = solver.solve(begin, axial_force)
         except UnsolvedError:
+            self.work.spend(unknowns, _FAILS_AFTER)
             return None
+        self.work.spend(unknowns, found.iterations)
+        return found
 
     def _frictionless(
         self, block: ComplianceBlock, rest: np.ndarray, core_gap: np.ndarray, pose: Pose, candidates: Candidates

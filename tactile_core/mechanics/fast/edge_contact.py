@@ -13,6 +13,7 @@ import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
 from ..penetration import check_follows, penetration_between
+from .active_set import Work
 from .candidates import Candidates
 from .compliance import Compliance
 from .compliance_block import ComplianceBlock
@@ -49,7 +50,9 @@ class _Sprung(Frictionless):
 class EdgeContactProblem(ContactProblem):
     """Contact problem without friction whose candidates are nodes, and from number m on points between them."""
 
-    def __init__(self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float) -> None:
+    def __init__(
+        self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, work: Work | None = None
+    ) -> None:
         self._points = interpolated_points(compliance.surface, compliance.touchable)
         self._m = len(compliance.touchable)
         row, mirrored, image = compliance.answers
@@ -57,7 +60,7 @@ class EdgeContactProblem(ContactProblem):
         own = [np.median(compliance.move[3 * row + axis, 3 * at + axis]) for axis in range(3)]
         self._softness = float(np.mean(own)) / _STIFFNESS
         self._slack = np.repeat([0.0, _SLACK], [self._m, len(self._points.nodes)])
-        super().__init__(compliance, indenter, pose, reach)
+        super().__init__(compliance, indenter, pose, reach, work=work)
 
     @property
     def nodes_near(self) -> np.ndarray:

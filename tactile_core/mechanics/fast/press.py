@@ -14,7 +14,7 @@ from ..force_search import FORCE_TOLERANCE, touch_at_force
 from ..penetration import PenetrationError
 from ..pose_path import same_line
 from ..sharpness import BENDS, sharpest
-from .active_set import UnsolvedError
+from .active_set import ExhaustedError, UnsolvedError, Work
 from .compliance import Compliance
 from .contact import ContactProblem
 from .contact_state import Contact
@@ -48,14 +48,17 @@ class CorrectedPress:
     """An indenter in front of one sensor; contacts follow each other, at depths or at corrected forces.
 
     pose : at first touch; limit : m, the greatest depth; friction : Coulomb's coefficient
+    work : what contacts may cost, None for as much as they take; what is used up ends a solve with ExhaustedError
     """
 
     def __init__(
-        self, compliance: Compliance, indenter: Indenter, pose: Pose, limit: float, friction: float = 0.0
-    ) -> None:
+        self, compliance: Compliance, indenter: Indenter, pose: Pose, limit: float, friction: float = 0.0,
+        work: Work | None = None,
+    ) -> None:  # fmt: skip
         self.compliance, self.pose, self.limit = compliance, pose, limit
-        self.problem = ContactProblem(compliance, indenter, pose, limit, friction)
+        self.problem = ContactProblem(compliance, indenter, pose, limit, friction, work)
         self.last: Contact | None = None
+        self._on_the_way: tuple[Contact, float] | None = None  # of a search, and the fall there
         self._last_power = 1.0
 
     def at_depth(self, depth: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact:
@@ -71,11 +74,21 @@ class CorrectedPress:
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
         """Solve the contact whose corrected force along the motion is ``force`` N; None beyond the limit or if lost."""
         there = pose or self.pose
-        fall = self._surface_drop(there, touches=touches)
+        fall, self._on_the_way = self._surface_drop(there, touches=touches), None
         try:
             return self._guarded_if_needed(lambda: self._at_force(force, there, fall))
         except UnsolvedError:
             return None
+
+    def nearest(self) -> FastContact | None:
+        """Return the last contact, none beyond the limit, that a search for a force found on its way, and stay there.
+
+        None where it found none. Raises PenetrationError as ``at_depth`` does.
+        """
+        if self._on_the_way is None:
+            return None
+        self.last, fall = self._on_the_way
+        return self._with_correction(self.last, fall)
 
     def _guarded_if_needed(self, solve: Callable[[], FastContact | None]) -> FastContact | None:
         """Solve, again with points between nodes where the frictionless nodes alone do not hold the indenter.
@@ -86,10 +99,13 @@ class CorrectedPress:
             found = solve()
             if found is None or found.linear.converged or not self._may_be_guarded():
                 return found
+        except ExhaustedError:
+            raise
         except (PenetrationError, UnsolvedError):
             if not self._may_be_guarded():
                 raise
-        self.problem = EdgeContactProblem(self.compliance, self.problem.indenter, self.pose, self.limit)
+        before = self.problem
+        self.problem = EdgeContactProblem(self.compliance, before.indenter, self.pose, self.limit, before.work)
         self.last = None
         return solve()
 
@@ -130,6 +146,8 @@ class CorrectedPress:
             if close:
                 self.last = contact
                 return self._with_correction(contact, fall)
+            if seen.depth <= self.limit:
+                self._on_the_way = contact, fall
             growth = (force / max(found[1], 1e-12)) ** (1 / self._power(before, found))
             before, goal = found, linear * float(np.clip(growth, 1 / _GROWTH, _GROWTH))
             contact = self.problem.at_pose(pose.moved(contact.depth), contact, goal)
