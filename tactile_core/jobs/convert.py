@@ -132,7 +132,7 @@ def convert(
     clock = Stopwatch()
     with clock.stage("read"):
         columns = None if options.prepare is None else options.prepare.columns
-        recording = recordings.read(recording_path, columns, tools.source)
+        recording = recordings.read(recording_path, columns, tools.source, lean=True)
         _check_order(recording, tools)
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from ..translation.translate import Translation
 
 Solver = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
+BLOCK = 2**16  # frames of signals alone that are looked at at a time
 CHUNK = 64  # frames in memory at a time: about 5 MB of displacements and 20 MB of heights
 SHEET_ARRAYS = (
     "displacement_biotac", "displacement_digit", "force", "confidence", "flags", "expected_error_digit",
@@ -144,7 +145,8 @@ class FramePass:
         self._forces: list[np.ndarray] = []  # that the traction adds up to, and the networks'
         self.folded = 0  # height maps of a gel that folds over itself
         self.share = 0.0  # the deepest move of a node so far, over the gel's thickness
-        chosen = choose_frames(np.abs(signals.change[frames]).mean(axis=1))
+        parts = [frames[start : start + BLOCK] for start in range(0, len(frames), BLOCK)]
+        chosen = choose_frames(np.concatenate([np.abs(signals.change[part]).mean(axis=1) for part in parts]))
         self.shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
 
     def write(self, folder: Path, progress: Callable[[int, int], None]) -> None:

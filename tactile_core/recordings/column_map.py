@@ -49,6 +49,10 @@ class ColumnMap:
     tac: str = ""
     tdc: str = ""
 
+    def names(self) -> set[str]:
+        """Return the names of all mapped columns, in lower case."""
+        return {name.lower() for name in (*self.electrodes, self.time, self.pdc, self.tac, self.tdc) if name}
+
 
 def read(path: str | os.PathLike) -> ColumnMap:
     """Read a map; raises TactileError naming file and field for what is unreadable, unknown or missing."""
@@ -136,7 +140,7 @@ def read_mapped(table: Table, columns: ColumnMap) -> Recording:
     return assemble(
         table.path,
         LAYOUT,
-        electrodes=table.columns(electrodes),
+        electrodes=table.counts(electrodes),
         stamps=SECONDS[columns.time_unit] * table.column(time) if time else None,
         rows=table.lines,
         problems=table.essential([*([time] if time else []), *electrodes]),
@@ -149,7 +153,7 @@ def read_mapped(table: Table, columns: ColumnMap) -> Recording:
 
 def _check_series(table: Table, electrodes: list[str]) -> None:
     """Raise TactileError where the electrodes are 19 of the 24 columns of a BioTac SP."""
-    parts = [NUMBERED.match(name) for name in table.header]
+    parts = [NUMBERED.match(name) for name in (*table.header, *table.left_out)]
     stems = [(found[1], found[3]) for found in parts if found]
     for name in electrodes:
         found = NUMBERED.match(name)

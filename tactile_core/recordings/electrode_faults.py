@@ -57,8 +57,8 @@ def _still(readings: np.ndarray) -> np.ndarray:
     elsewhere too, missing noise shows nothing: only a run over the whole recording counts.
     """
     still = np.zeros(readings.shape, bool)
-    changes = np.diff(readings, axis=0) != 0
-    for j, change in enumerate(changes.T):
+    for j in range(readings.shape[1]):
+        change = np.diff(readings[:, j]) != 0
         bounds = np.r_[0, np.flatnonzero(change) + 1, len(readings)]
         for first, last in zip(bounds, bounds[1:], strict=False):
             if last - first >= DEAD_FRAMES and (last - first == len(readings) or _moves(readings[first:last])):

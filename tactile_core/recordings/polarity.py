@@ -111,7 +111,7 @@ def polarity_of(
 def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float) -> Polarity:
     """Decide by the electrodes' change (19,) counts that goes with a swing of the fluid's pressure, counts."""
     centred = pdc - pdc.mean()
-    slope = (electrodes - electrodes.mean(axis=0)).T @ centred / (centred @ centred)
+    slope = np.array([(column - column.mean(dtype=float)) @ centred for column in electrodes.T]) / (centred @ centred)
     return _decided(slope[None] * swing, "the change that goes with the fluid's pressure")
 
 

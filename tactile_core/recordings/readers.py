@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -29,6 +30,7 @@ from .truncated_cell import shown
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
+PAC = re.compile(r"pac\d+")
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
 
 
@@ -50,12 +52,16 @@ def layouts() -> tuple[ModuleType, ...]:
     return tuple(modules_of(formats.__name__).values())
 
 
-def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = SOURCE) -> Recording:
+def read(
+    path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = SOURCE, lean: bool = False
+) -> Recording:
     """Read a recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
     columns : which column of a CSV file is what, where no known layout has its names; see ``column_map.read``
     sensor : ``"biotac"``, or ``"biotac_sp"`` for one of 24 electrodes
+    lean : a long CSV file leaves out what no translation needs, PAC and columns outside the map, and has its electrodes
+        in single precision where that is exact, as it is of counts: a third of the memory
 
     Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19 or 24) counts, ``pdc``, ``pac``, ``tac``,
     ``tdc`` where the file has them, ``warnings`` for what is odd in it. Nothing is resampled, repaired or dropped.
@@ -82,10 +88,15 @@ def read(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor:
             with open_matlab(where, file) as store:
                 return _read_finger(layout_of(where, container, store.shapes), store, store.shapes, finger)
         reader = table_reader(where, read_header(where, file), columns)
-        found = reader(read_table(where, file))
+        found = reader(read_table(where, file, partial(_unneeded, columns) if lean else None))
         if finger is not None:
             raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
         return found
+
+
+def _unneeded(columns: ColumnMap | None, name: str) -> bool:
+    """Return true for a column that no translation needs."""
+    return name not in columns.names() if columns is not None else PAC.fullmatch(name) is not None
 
 
 def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> str:

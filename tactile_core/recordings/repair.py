@@ -25,7 +25,7 @@ def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
     """
     if not bad.any():
         return values
-    values = values.copy()
+    values = values.astype(float)
     index = np.arange(len(values))
     for j in np.flatnonzero(bad.any(axis=0)):
         good = ~bad[:, j]
@@ -72,13 +72,18 @@ def _short_runs(values: np.ndarray) -> np.ndarray:
     """Glitches of 1 to 5 samples, a column at a time, which bounds the memory of a long recording."""
     frames = len(values)
     found = np.zeros(values.shape, bool)
-    jumping = np.flatnonzero(np.abs(np.diff(values, axis=0)).max(axis=0, initial=0.0) > LIMIT)
+    jumping = [j for j in range(values.shape[1]) if np.abs(_steps(values, j)).max(initial=0.0) > LIMIT]
     for length in range(1, min(SHORT, frames - 2) + 1):
         for j in jumping:
-            _mark_short(values[:, j], found[:, j], length)
+            _mark_short(values[:, j].astype(float), found[:, j], length)
         if not is_time_series(found):
             break
     return found
+
+
+def _steps(values: np.ndarray, j: int) -> np.ndarray:
+    """Return the steps (T - 1,) of one electrode of values (T, C): those of all would take as much memory as they."""
+    return np.diff(values[:, j].astype(float))
 
 
 def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
@@ -124,7 +129,7 @@ def _end_runs(values: np.ndarray) -> np.ndarray:
         return found
     for view, marks in ((values, found), (values[::-1], found[::-1])):
         for j in range(values.shape[1]):
-            head = view[: 2 * END + 2, j]
+            head = view[: 2 * END + 2, j].astype(float)
             for length in range(1, END + 1):
                 jump = abs(head[length] - head[length - 1])
                 rest = head[length:]
@@ -136,10 +141,12 @@ def _end_runs(values: np.ndarray) -> np.ndarray:
 def _stuck_runs(values: np.ndarray) -> np.ndarray:
     """Runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level."""
     found = np.zeros(values.shape, bool)
-    large = np.abs(np.diff(values, axis=0)) > LIMIT
+    large = np.empty((len(values) - 1, values.shape[1]), bool)
+    for column_index in range(values.shape[1]):
+        large[:, column_index] = np.abs(_steps(values, column_index)) > LIMIT
     alone = large.sum(axis=1) <= ALONE
     for j in np.flatnonzero(large.any(axis=0)):
-        column, ended = values[:, j], -1
+        column, ended = values[:, j].astype(float), -1
         for start, end, around in _opposite_jumps(column, np.flatnonzero(large[:, j] & alone)):
             samples = column[start : end + 2, None]
             if start != ended and _is_flat_jump(samples, around)[0] and _leaves_usual(column, start, end + 1):

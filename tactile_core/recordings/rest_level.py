@@ -85,7 +85,7 @@ def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slic
     if windows.pdc is not None:
         start = int(np.argmin(windows.pdc))
     else:
-        start = int(np.argmin(np.max([_spread(column, n) for column in electrodes.T], axis=0)))
+        start = int(np.argmin(np.max([_spread(column.astype(float), n) for column in electrodes.T], axis=0)))
     return slice(start, start + n)
 
 
@@ -99,8 +99,10 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
         return np.broadcast_to(level(electrodes[quiet.mask]), electrodes.shape)
     middles = [0.5 * (a + b - 1) for a, b in quiet.parts]
     levels = np.array([level(electrodes[a:b]) for a, b in quiet.parts])
-    index = np.arange(len(electrodes))
-    return np.column_stack([np.interp(index, middles, levels[:, j]) for j in range(electrodes.shape[1])])
+    index, found = np.arange(len(electrodes)), np.empty(electrodes.shape)
+    for j in range(electrodes.shape[1]):
+        found[:, j] = np.interp(index, middles, levels[:, j])
+    return found
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
@@ -115,7 +117,7 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 def level(samples: np.ndarray) -> np.ndarray:
     """Return the mean (19,) of the middle half of (n, 19) samples: robust as a median, but no whole counts."""
     cut = len(samples) // 4
-    return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0)
+    return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0, dtype=float)
 
 
 def _sums(values: np.ndarray, n: int) -> np.ndarray:
@@ -135,6 +137,7 @@ def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float
     count = len(electrodes) - n + 1
     mean, calm = np.empty((count, electrodes.shape[1])), np.ones(count, bool)
     for j, column in enumerate(electrodes.T):  # one at a time: sums of all would take seven times the recording
+        column = column.astype(float)
         halves = _sums(column, half) / half
         trend = halves[n - half : n - half + count] - halves[:count]
         calm &= (_spread(column, n) <= CALM_STD) & (np.abs(trend) <= CALM_TREND)

@@ -182,8 +182,9 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
         quiet = Quiet(np.zeros(len(readings), bool), (), "the unit's own rest: no calm part near it")
     flags |= saturated(recording, readings, kind, warnings) | dead(recording, readings, warnings)
     slope = (rest[-1] - rest[0]) / recording.duration if recording.duration > 0 else np.zeros(rest.shape[1])
-    frames = _smoothed_over(options, kind)
-    change = smooth(readings - rest, frames)
+    frames, at_start = _smoothed_over(options, kind), rest[0].copy()
+    change = smooth(np.subtract(readings, rest, out=rest if rest.flags.writeable else None), frames)
+    del rest  # whose memory the changes have now, where it had any of its own
     polarity = _polarity(recording, readings, change, kind, quiet, options, rest_known=unit_rest is not None)
     flags |= np.uint16(polarity.doubt)
     warnings += polarity.warnings
@@ -191,7 +192,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     report |= {"polarity": polarity.name, "polarity_evidence": polarity.evidence}
     change *= polarity.sign
     signals = Signals(
-        change=change, rest=rest[0].copy(), drift=slope, electrodes=readings, kind=kind,
+        change=change, rest=at_start, drift=slope, electrodes=readings, kind=kind,
         quiet=quiet.mask, flags=flags, pdc=_pressure_change(recording, kind, quiet, unit_rest),
         warnings=tuple(warnings), report=report, sensor=recording.sensor,
     )  # fmt: skip

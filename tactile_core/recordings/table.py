@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice, pairwise
 from typing import BinaryIO
@@ -29,6 +29,7 @@ class Table:
     header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, header is line 1
     exact : (T,) float64 of the columns that values, if float32, would round, such as time stamps
     start : line after which the rows begin
+    left_out : columns that the file has, which were parsed and are not held
     """
 
     path: str
@@ -39,10 +40,11 @@ class Table:
     warnings: tuple[str, ...] = ()
     exact: dict[int, np.ndarray] = field(default_factory=dict)
     start: int = 0
+    left_out: frozenset[str] = frozenset()
 
     def columns(self, names: list[str], dtype: type = np.float64) -> np.ndarray:
         """Return the values (T, len(names)) of the columns. Raises TactileError naming a column that is missing."""
-        missing = [name for name in names if name not in self.header]
+        missing = [name for name in names if name not in self.header and name not in self.left_out]
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
             raise TactileError(
@@ -56,6 +58,11 @@ class Table:
             for place, column in enumerate(self.header.index(name) for name in names):
                 found[:, place] = self.exact.get(column, self.values[:, column])
         return found
+
+    def counts(self, names: list[str]) -> np.ndarray:
+        """Return `columns`; of a table that leaves others out to be small, in single precision where that is exact."""
+        exact = any(self.header.index(name) in self.exact for name in names if name in self.header)
+        return self.columns(names, np.float32 if self.left_out and not exact else np.float64)
 
     def column(self, name: str) -> np.ndarray:
         """Return the values (T,) float of a column."""
@@ -99,30 +106,35 @@ def read_header(path: str, file: BinaryIO) -> tuple[str, ...]:
     return _header(path, lines)[0]
 
 
-def read_table(path: str, file: BinaryIO) -> Table:
-    """Parse the file, a block at a time. Raises TactileError: not text, empty, no header, no data, twin columns."""
+def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None = None) -> Table:
+    """Parse the file, a block at a time. Raises TactileError: not text, empty, no header, no data, twin columns.
+
+    left_out : whether a column of that name is parsed but not held; of a file of more than one block
+    """
     size = os.fstat(file.fileno()).st_size
     if size > MAX_BYTES:
         found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split the recording"
         raise TactileError(path, found, "a recording of some hours", advice)
     blocks = read_tables(path, file, BLOCK, OVERLAP)
     first, _ = next(blocks)
-    return first if size <= BLOCK else _joined(first, blocks, size)
+    return first if size <= BLOCK else _joined(first, blocks, size, left_out or (lambda name: False))
 
 
-def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int) -> Table:
+def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_out: Callable[[str], bool]) -> Table:
     """Put blocks together in half the memory: what single precision holds exactly, as counts, is kept in it.
 
-    size : bytes of the whole file, from which the number of rows is guessed
+    size : bytes of the whole file, from which the number of rows is guessed; left_out : columns that are not held
     """
-    path, header = first.path, first.header
+    path = first.path
+    held = [column for column, name in enumerate(first.header) if not left_out(name)]
+    header = tuple(first.header[column] for column in held)
     guess = int(1.05 * len(first.values) * size / BLOCK) + 1000
     values, lines = np.empty((guess, len(header)), np.float32), np.empty(guess, int)
     exact: dict[int, list[tuple[int, np.ndarray]]] = {}
     problems: list[Problem] = []
     count = 0
     for table, repeated in chain([(first, 0)], blocks):
-        block = table.values[repeated:]
+        block = table.values[repeated:, held]
         end = count + len(block)
         if end > MAX_FRAMES:
             raise TactileError(path, f"over {MAX_FRAMES:,} data rows", f"at most {MAX_FRAMES:,}", "Split the recording")
@@ -147,7 +159,9 @@ def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int) -> Tab
         for start, part in parts:
             columns[column][start : start + len(part)] = part
     blank = _tell_blank_lines(first.start, lines)
-    return Table(path, header, values, lines, tuple(problems), blank, columns)
+    return Table(
+        path, header, values, lines, tuple(problems), blank, columns, left_out=frozenset({*first.header} - {*header})
+    )
 
 
 def _check_problems(path: str, problems: list[Problem], line: int) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import tracemalloc
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
-from tactile_core.recordings import chunks, table
+from tactile_core.recordings import chunks, rest_level, table
+from tactile_core.recordings.column_map import ColumnMap
 
 
 def joined(path):
@@ -65,3 +69,46 @@ def test_a_long_text_is_read_in_blocks_like_a_short_one(slide_lines, write, monk
     assert found.warnings == whole.warnings and any("line 602" in text for text in found.warnings)
     for name in ("time", "electrodes", "pdc", "pac", "tdc", "rows", "flags"):
         np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
+
+
+def test_a_lean_recording_gives_the_same_signals(slide_lines, write, monkeypatch):
+    monkeypatch.setattr(table, "BLOCK", 20_000)
+    slide_lines[600] = slide_lines[600].replace("2000", "x", 1)  # in PAC, which is left out: told all the same
+    path = write(slide_lines)
+    whole, lean = recordings.read(path), recordings.read(path, lean=True)
+    assert lean.pac is None and whole.pac is not None and lean.warnings == whole.warnings
+    assert lean.electrodes.dtype == np.float32 and whole.electrodes.dtype == np.float64
+    expected, found = recordings.prepare(whole), recordings.prepare(lean)
+    for name in ("change", "rest", "drift", "electrodes", "quiet", "flags", "pdc"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
+    assert found.report == expected.report
+
+
+def test_what_single_precision_rounds_is_kept_in_double(slide_lines, write, monkeypatch):
+    monkeypatch.setattr(table, "BLOCK", 20_000)
+    slide_lines[600] = slide_lines[600][: slide_lines[600].rindex(",", 0, -1) + 1] + "3400.1,"
+    path = write(slide_lines)
+    np.testing.assert_array_equal(recordings.read(path, lean=True).electrodes, recordings.read(path).electrodes)
+
+
+def test_a_lean_mapped_recording_holds_the_columns_of_its_map(slide_lines, write, monkeypatch):
+    monkeypatch.setattr(table, "BLOCK", 20_000)
+    path = write(slide_lines)
+    named = ColumnMap(tuple(f"ele{i}" for i in range(1, 20)), "timestamp", pdc="PDC")
+    whole, lean = recordings.read(path, named), recordings.read(path, named, lean=True)
+    np.testing.assert_array_equal(lean.electrodes, whole.electrodes)
+    np.testing.assert_array_equal(lean.pdc, whole.pdc)
+    with pytest.raises(TactileError, match="column 'touch' is missing"):
+        recordings.read(path, replace(named, tac="touch"), lean=True)
+
+
+def test_rest_that_drifts_is_found_without_a_copy_of_the_recording():
+    electrodes, mask = np.zeros((20_000, 19), np.float32), np.zeros(20_000, bool)
+    mask[:30] = mask[-30:] = True
+    tracemalloc.start()
+    rest = rest_level.baseline(electrodes, rest_level.Quiet(mask, ((0, 30), (19_970, 20_000)), ""), drift=True)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (
+        peak < 1.2 * rest.nbytes
+    )  # with the frames' numbers and one electrode; 2.1 times with all electrodes' columns

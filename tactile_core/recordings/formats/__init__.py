@@ -33,13 +33,18 @@ def share(keys: Collection[str], wanted: Collection[str]) -> float:
 def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
     """Build the recording of a table with pdc, tac and tdc; time, electrodes, channels : the names of their columns.
 
-    Raises TactileError for a missing column, and the errors of ``assemble``.
+    Channels that the table leaves out are None. Raises TactileError for a missing column, and the errors of
+    ``assemble``.
     """
-    columns: dict[str, Any] = {channel: table.columns(names, np.float32) for channel, names in channels.items()}
+    columns: dict[str, Any] = {
+        channel: table.columns(names, np.float32)
+        for channel, names in channels.items()
+        if not table.left_out.issuperset(names)
+    }
     return assemble(
         table.path,
         layout,
-        electrodes=table.columns(electrodes),
+        electrodes=table.counts(electrodes),
         stamps=table.column(time),
         rows=table.lines,
         problems=table.essential([time, *electrodes]),
