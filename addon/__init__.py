@@ -13,6 +13,7 @@ from .operators import (
     set_style,
     simulate,
     snap_to_gel,
+    stale_picture,
     translate_imported,
 )
 from .process import command_line
@@ -29,6 +30,7 @@ PARTS = (
     translate_imported,
     set_style,
     preview,
+    stale_picture,
     render_engine,
     render_setup,
     calibration_objects,

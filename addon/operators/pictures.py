@@ -7,11 +7,13 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
+from ...tactile_core.errors import TactileError
 from ...tactile_core.pictures import height_map, shading
 from ...tactile_core.sensors.calibration import Calibration
 from ..objects import digit_objects, digit_unit, images
 from ..process import tracer_process
-from ..ui import render_settings, reports
+from ..ui import properties, render_settings, reports
+from . import stale_picture
 
 FAST = "fast"
 _shaders: dict[str, shading.Shader] = {}  # one at most: the frames of an animation share it
@@ -50,8 +52,31 @@ def draw(
     return tracer_process.draw(preset, shown.unit, shown.around, heights, stopped, better), heights
 
 
+def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Start the worker of a preset of Mitsuba's, in a window, so that it has compiled before its first picture.
+
+    What a picture cannot be made of is said when one is asked for.
+    """
+    gel = properties.of_role(scene, "DIGIT")
+    if bpy.app.background or gel is None or reports.missing("mitsuba"):
+        return
+    try:
+        preset = render_settings.preset_of(scene)
+        shown = digit_unit.shown_unit(gel, depsgraph, render_settings.calibration_of(scene))
+        if preset != FAST:
+            tracer_process.prepare(preset, shown.unit, shown.around)
+    except (TactileError, OSError):
+        return
+
+
 def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Image:
     """Draw fast picture and height map of the current frame into their datablocks; returns the picture's."""
-    picture, heights = draw(gel, depsgraph, FAST)
+    return show(gel, depsgraph, FAST)
+
+
+def show(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str) -> bpy.types.Image:
+    """Draw picture and height map by a preset into their datablocks; returns the picture's. Raises as ``draw`` does."""
+    picture, heights = draw(gel, depsgraph, preset)
     images.show_heights(heights)
+    stale_picture.remember(gel, depsgraph)
     return images.show_picture(picture)

@@ -10,7 +10,7 @@ from ..objects import images
 from ..process import tracer_process
 from ..ui import properties, render_settings, view
 from ..ui.reports import TactileOperator
-from . import pictures
+from . import pictures, stale_picture
 
 _SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material, bpy.types.ShaderNodeTree)
 _drawing = False  # a picture's own update must not draw another
@@ -36,10 +36,11 @@ def _draw(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) 
         return
     _drawing = True
     try:
-        images.show_picture(pictures.draw(gel, depsgraph, render_settings.preset_of(scene))[0])
+        pictures.show(gel, depsgraph, render_settings.preset_of(scene))
         _failed = ""
     except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
         _failed = str(error)
+        stale_picture.check(scene, depsgraph)
     finally:
         _drawing = False
 

@@ -7,6 +7,7 @@ from ...tactile_core.sensors.camera import COLOURS
 from ..objects import digit_body, digit_materials, digit_unit
 from ..ui import properties, render_settings, reports
 from ..ui.reports import TactileOperator
+from . import pictures
 from .render_engine import ID
 
 
@@ -36,6 +37,7 @@ class TACTILE_OT_set_up_render(TactileOperator):
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
         render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGB"
         scene.camera = digit_body.camera_of(gel)
+        pictures.prepare(scene, context.evaluated_depsgraph_get())
 
 
 class TACTILE_PT_render(bpy.types.Panel):

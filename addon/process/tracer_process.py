@@ -34,6 +34,11 @@ class Tracer:
         self._folder, self._count, self._unit = JobFolder(), 0, ""
         self._job = Job("render", self._folder.path, listening=True, preset=preset)
 
+    def prepare(self, unit: Calibration, around: Surroundings) -> None:
+        """Let the worker make its scene, compile, and draw the gel at rest, before a picture is asked for."""
+        self._tell_unit(unit, around)
+        self._job.tell({"unit": self._unit})
+
     def draw(
         self,
         unit: Calibration,
@@ -113,6 +118,20 @@ def draw(
             raise
         finally:
             _last_used = time.monotonic()
+
+
+def prepare(preset: str, unit: Calibration, around: Surroundings) -> None:
+    """Start the worker of a preset, which lives on for its first picture; not while another draws."""
+    global _last_used
+    if preset in _kept or not _in_use.acquire(blocking=False):
+        return
+    try:
+        close_all()
+        _kept[preset] = Tracer(preset)
+        _kept[preset].prepare(unit, around)
+        _last_used = time.monotonic()
+    finally:
+        _in_use.release()
 
 
 def close_idle() -> None:

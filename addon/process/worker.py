@@ -195,14 +195,16 @@ def _result(folder: Path, picked: list[str]) -> None:
 def render(folder: Path, job: dict, progress: Progress) -> None:
     """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8.
 
-    Unit and surroundings are those in the folder, read when the line names others than the one before. Noisier pictures
-    come first, where the preset has some.
+    A line without a number of a picture lets the renderer get ready alone. Unit and surroundings are those in the
+    folder, read when the line names others than the one before. Noisier pictures come first, where the preset has some.
     """
     renderer, known = None, None
     for line in sys.stdin:
         asked = json.loads(line)
         if renderer is None or asked["unit"] != known:
             renderer, known = _renderer(folder, job["preset"]), asked["unit"]
+        if "picture" not in asked:  # it gets ready
+            continue
         for picture in renderer.refined(np.load(folder / "heights.npy", allow_pickle=False)):
             np.save(folder / "partial.npy", picture)
             (folder / "partial.npy").replace(folder / "picture.npy")

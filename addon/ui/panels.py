@@ -7,14 +7,14 @@ import bpy
 
 from ...tactile_core.translation import trust_words
 from ..objects import style_nodes, styles
-from ..operators import preview, render_setup, snap_to_gel
+from ..operators import preview, render_setup, snap_to_gel, stale_picture
 from ..operators.import_recording import TACTILE_OT_import_recording
 from ..operators.preview import TACTILE_OT_live_picture
 from ..operators.render_setup import draw_parts, draw_settings
 from ..operators.scene_files import TACTILE_OT_export_scene, TACTILE_OT_import_scene
 from ..operators.simulate import TACTILE_OT_simulate
 from ..operators.translate_imported import TACTILE_OT_translate
-from . import properties
+from . import properties, view
 from .add_menu import TACTILE_MT_add
 from .reports import missing
 from .workspace import TACTILE_OT_open_workspace
@@ -23,7 +23,7 @@ from .workspace import TACTILE_OT_open_workspace
 class _Panel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
-    bl_category = "Tactile"
+    bl_category = view.TAB
 
 
 class TACTILE_PT_recording(_Panel, bpy.types.Panel):
@@ -106,6 +106,8 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
         layout = self.layout
         layout.operator(TACTILE_OT_live_picture.bl_idname, icon="HIDE_OFF" if preview.is_on() else "HIDE_ON",
                         depress=preview.is_on())  # fmt: skip
+        if stale_picture.is_stale():
+            layout.label(text="The picture is out of date", icon="INFO")
         if preview.failure():
             layout.label(text=preview.failure(), icon="ERROR")
         draw_settings(layout, context)

@@ -26,7 +26,10 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 class TactileRender(bpy.types.PropertyGroup):
     """Render settings of each scene."""
 
-    preset: bpy.props.EnumProperty(name="Preset", description="How exactly the picture is made", items=PRESETS)
+    preset: bpy.props.EnumProperty(
+        name="Preset", description="How exactly the picture is made", items=PRESETS,
+        update=lambda settings, context: _prepare(settings, context),
+    )  # fmt: skip
     calibration: bpy.props.StringProperty(
         name="Calibration", description="File of one DIGIT unit (tactile calibrate); empty: the one of the preferences",
         subtype="FILE_PATH", options=_RELATIVE, update=lambda settings, context: _take_calibration(settings, context),
@@ -79,6 +82,14 @@ def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> N
     for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
         if digit_body.leds_of(gel) and gel.library is None:
             digit_body.reset(gel, unit)
+
+
+def _prepare(settings: TactileRender, context: bpy.types.Context) -> None:
+    """Let the worker of the preset that was chosen get ready."""
+    from ..operators import pictures
+
+    if settings.id_data == context.scene:
+        pictures.prepare(context.scene, context.evaluated_depsgraph_get())
 
 
 def register() -> None:

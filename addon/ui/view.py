@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 from collections.abc import Sequence
 
@@ -20,6 +19,8 @@ _UNTOUCHED = (
 )
 _SHARE = 0.68  # of a 3D view that it keeps beside the picture
 DRAWN = 0.2  # s, until a split view is drawn in its new size
+_FIRST = 2.0  # s, until a sidebar is drawn, of a busy machine too
+TAB = "Tactile"
 _MARGIN = 1.1  # of a view, around what is looked at
 
 
@@ -87,14 +88,36 @@ def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window
 
 
 def open_tab(context: bpy.types.Context) -> None:
-    """Open the sidebar with the tab "Tactile" in each 3D view; older Blenders open the sidebar alone."""
+    """Open the sidebar with the tab "Tactile" in each 3D view.
+
+    Older Blenders let no script choose a tab. There, one whose sidebar was never opened opens it on the first tab.
+    """
     for area in context.window.screen.areas if context.window else ():
         if area.type == "VIEW_3D":
             area.spaces.active.show_region_ui = True
-            for region in area.regions:
-                if region.type == "UI":
-                    with contextlib.suppress(AttributeError, TypeError):
-                        region.active_panel_category = "Tactile"
+            for region in (region for region in area.regions if region.type == "UI"):
+                try:
+                    region.active_panel_category = TAB
+                except (AttributeError, TypeError):
+                    _stand_first()
+
+
+class TACTILE_PT_first(bpy.types.Panel):
+    """Puts its tab before all others: those of panels without a header come first"""
+
+    bl_idname, bl_label = "TACTILE_PT_first", ""
+    bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", TAB
+    bl_options = {"HIDE_HEADER"}  # noqa: RUF012 (Blender reads plain class attributes)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Called by Blender."""
+
+
+def _stand_first() -> None:
+    """Let the tab be the first until the sidebar is drawn."""
+    if not TACTILE_PT_first.is_registered:
+        bpy.utils.register_class(TACTILE_PT_first)
+        bpy.app.timers.register(lambda: bpy.utils.unregister_class(TACTILE_PT_first), first_interval=_FIRST)
 
 
 def fit_timeline(context: bpy.types.Context) -> None:

@@ -208,6 +208,19 @@ def test_an_idle_worker_ends_after_a_minute(part, monkeypatch):
     assert worker.poll() is not None and not process._kept
 
 
+def test_a_worker_gets_ready_before_its_first_picture(part):
+    process = part("addon.process.tracer_process")
+    unit = part("tactile_core.sensors.calibration_file").load_calibration()
+    heights = part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
+    nothing = part("tactile_core.pictures.mitsuba.surroundings").NOTHING
+    process.prepare("fast", unit, nothing)
+    ready = process._kept["fast"]
+    picture = process.draw("fast", unit, nothing, heights, lambda: False, lambda picture: None)
+    assert process._kept["fast"] is ready
+    np.testing.assert_array_equal(picture, part("tactile_core.pictures.renderer").Renderer(preset="fast")(heights))
+    process.close_all()
+
+
 def test_another_file_ends_the_workers(part):
     process = part("addon.process.tracer_process")
     process._kept["fast"] = process.Tracer("fast")

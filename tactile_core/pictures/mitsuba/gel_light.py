@@ -147,6 +147,8 @@ class GelLight:
         mi = activate(LLVM)
         import drjit as dr
 
+        # Of a new scope: the order of the code, and so whether it is compiled again, hangs less on what is still alive.
+        dr.detail.new_scope(dr.JitBackend.LLVM)
         hit = self._scene.ray_intersect(ray)
         place = mi.Point2f(hit.p.x * self._per_mm[0] + 0.5, hit.p.y * self._per_mm[1] + 0.5)
         right, down = self._slopes.eval(place)
@@ -227,6 +229,7 @@ class GelLight:
             start, toward = camera_rays(self.unit, right, camera.down[row] + aside[1] * camera.pixel_size[1])
             ray = mi.RayDifferential3f(mi.Ray3f(mi.Point3f(start), mi.Vector3f(toward)))
             light, _, _ = self._paths.sample(self._scene, sampler, ray)
+            dr.eval(light)  # else each sum would trace the paths again
             total += np.stack([np.array(dr.block_sum(light[k], PATHS_A_PASS)) for k in range(3)])
             mean = total / ((number + 1) * PATHS_A_PASS)
             yield mean.T.reshape(*camera.shape, 3).astype(np.float32)

@@ -75,6 +75,7 @@ def bounced(
     for lit in direct(mi, scene, emitters, far, 1, (mi.Float(number) + 0.5) / DIRECTIONS, lobe):
         light += dr.select(far.is_valid() & dr.any(own > 0), lit.open * lit.share, 0)
     light *= own
+    dr.eval(light)  # else each sum would trace the rays again, by a kernel of its own
     sums = [dr.block_sum(light[k], DIRECTIONS) for k in range(3)]
     dr.eval(*sums)
     return np.stack([np.array(each) for each in sums], -1) / DIRECTIONS

@@ -1,0 +1,123 @@
+"""A picture of another dent, or by other lights, than the scene shows now is dimmed until it is drawn again."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ...tactile_core.errors import TactileError
+from ..objects import digit_objects, digit_unit, images
+from ..ui import properties, render_settings
+
+DIM = 0.3  # of a stale picture's brightness
+_STALE = "tactile_stale"  # property of the picture's datablock in a saved file
+_STILL = 1e-7  # m, of displacements that are read back from float32 coordinates
+_SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material, bpy.types.ShaderNodeTree)
+
+
+@dataclasses.dataclass
+class _Known:
+    """What the picture was drawn of: displacement (n, 3) m and unit, None where unknown; its pixels while it is dim."""
+
+    drawn: tuple[np.ndarray, str] | None = None
+    bright: np.ndarray | None = None
+
+
+_known = _Known()
+
+
+def remember(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Remember what the picture has just been drawn of."""
+    _known.drawn, _known.bright = _state(gel, depsgraph), None
+
+
+def is_stale() -> bool:
+    """Return whether the picture is dimmed."""
+    return _known.bright is not None
+
+
+def check(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Dim the picture if the scene has left what it was drawn of, and give it its light back on return."""
+    image, gel = bpy.data.images.get(images.PICTURE), properties.of_role(scene, "DIGIT")
+    if image is None or gel is None or _known.drawn is None:
+        return
+    try:
+        moved, unit = _state(gel, depsgraph)
+        stale = unit != _known.drawn[1] or np.abs(moved - _known.drawn[0]).max() > _STILL
+    except TactileError:  # of a gel or a lamp that has no picture
+        stale = True
+    if stale == is_stale():
+        return
+    if stale:
+        _known.bright = np.empty(4 * image.size[0] * image.size[1], np.float32)
+        image.pixels.foreach_get(_known.bright)
+        pixels = _known.bright * np.tile(np.float32([DIM, DIM, DIM, 1]), len(_known.bright) // 4)
+    else:
+        pixels, _known.bright = _known.bright, None
+    image.pixels.foreach_set(pixels)
+    image.update()
+
+
+def _state(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[np.ndarray, str]:
+    shown = digit_unit.shown_unit(gel, depsgraph, render_settings.calibration_of(depsgraph.scene))
+    return digit_objects.displacement_of(gel, depsgraph), repr(shown.unit)
+
+
+@persistent
+def _frame_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    """Called by Blender at each change of the frame."""
+    from . import preview
+
+    if depsgraph is not None and not preview.is_on() and not bpy.app.is_job_running("RENDER"):
+        check(scene, depsgraph)
+
+
+@persistent
+def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Called by Blender at each change of the scene."""
+    if any(isinstance(update.id, _SEEN) for update in depsgraph.updates):
+        _frame_changed(scene, depsgraph)
+
+
+@persistent
+def _note(*_: object) -> None:
+    """Let a file that is saved know whether its picture is dim; called by Blender."""
+    image = bpy.data.images.get(images.PICTURE)
+    if image is not None:
+        image[_STALE] = is_stale()
+
+
+@persistent
+def _take_up(*_: object) -> None:
+    """Take the picture of an opened file to be of the frame it opens on, unless it was dim; called by Blender."""
+    image, gel = bpy.data.images.get(images.PICTURE), properties.of_role(bpy.context.scene, "DIGIT")
+    _known.drawn = _known.bright = None
+    if image is not None and gel is not None and not image.get(_STALE, False):
+        try:
+            _known.drawn = _state(gel, bpy.context.evaluated_depsgraph_get())
+        except TactileError:  # its picture says nothing of a gel that has none
+            return
+
+
+def _handlers() -> list[tuple[list, Callable]]:
+    known = bpy.app.handlers
+    found = [(known.save_pre, _note), (known.load_post, _take_up)]
+    if not bpy.app.background:  # where nobody sees it
+        found += [(known.frame_change_post, _frame_changed), (known.depsgraph_update_post, _changed)]
+    return found
+
+
+def register() -> None:
+    """Called by the package."""
+    for handlers, function in _handlers():
+        handlers.append(function)
+
+
+def unregister() -> None:
+    """Called by the package."""
+    for handlers, function in _handlers():
+        handlers.remove(function)
