@@ -21,9 +21,10 @@ Translate touch between robot fingertips: BioTac electrode recordings become the
 of a DIGIT, and the pictures that the DIGIT's camera would have seen."""
 
 EPILOG = """\
-example:
+examples:
   tactile info touch.csv                   what the recording holds, and what is wrong with it
   tactile convert touch.csv --out results  pictures in results/touch/images, numbers in results/touch/frames.h5
+  tactile scenes copy press_roll_slide     a recording to try with: scenes/press_roll_slide/press_roll_slide.h5
 
 `tactile VERB --help` explains a verb. Exit status: 0 done, 2 bad input, 130 interrupted, 143 or 129 stopped by
 SIGTERM or SIGHUP."""

@@ -52,7 +52,7 @@ def agree(cost: str, seconds: float, agreed: bool) -> None:
         sys.stderr.flush()
         if sys.stdin.readline().strip().lower() in ("y", "yes"):
             return
-    raise TactileError("the cost", cost, "a word that it may begin", "Add --yes, or allow a larger --error")
+    raise TactileError("the cost", cost, f"at most {LONG:g} s, or --yes", "Add --yes, or allow a larger --error")
 
 
 @contextmanager

@@ -209,7 +209,7 @@ def claim(path: str | os.PathLike) -> None:
         found = f"a name of {len(os.fsencode(path.name))} bytes, which cannot be written"
         raise TactileError(path.parent, found, "at most 255, as file systems take", "Choose a shorter --out")
     if os.path.lexists(path):
-        raise TactileError(path, "exists already", "a new file", "Remove it or choose another name")
+        raise TactileError(path, "exists already", "a new name", "Remove it or choose another name")
     with writing(path, "a place in a writable folder", "Choose another --out"):
         path.parent.mkdir(parents=True, exist_ok=True)
         probe = _beside(path, "probe")

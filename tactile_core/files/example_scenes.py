@@ -61,7 +61,7 @@ def _about(scene: Path) -> str:
     """Return a scene's description; of a folder without a scene, what it holds."""
     file = scene / _SCENE
     if not file.is_file():
-        return ", ".join(sorted(each.name for each in scene.iterdir()))
+        return ", ".join(sorted(each.name for each in scene.iterdir() if each.name[0] not in "._"))
     return str(tomllib.loads(file.read_text(encoding="utf-8")).get("description", ""))
 
 

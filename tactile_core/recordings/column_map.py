@@ -78,7 +78,7 @@ def read(path: str | os.PathLike) -> ColumnMap:
     if not different == len(columns.electrodes) == ELECTRODES:
         held = f"{len(columns.electrodes)} names, {different} different ones"
         raise TactileError(
-            f"{file}, electrodes", held, f"{ELECTRODES}, of E1 to E{ELECTRODES}", "Name each column once"
+            f"{file}, electrodes", held, f"{ELECTRODES}, of E1 to E{ELECTRODES}", "Write each column's name there once"
         )
     return columns
 

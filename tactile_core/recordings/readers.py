@@ -231,7 +231,8 @@ def _check_file(path: str) -> None:
         advice = "Simulate it first: tactile simulate" if scene else "Name the recording inside the folder"
         raise TactileError(path, "a scene" if scene else "a folder", "one recording file", advice)
     if not os.path.exists(path):
-        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT or bag)", "Check the path")
+        advice = "Check the path; to try with a recording that ships: tactile scenes copy press_roll_slide"
+        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT or bag)", advice)
     if not os.path.isfile(path):
         raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT or bag)")
 

@@ -51,7 +51,7 @@ class Table:
                 f"{self.path}, line 1",
                 f"column {missing[0]!r}{more} is missing",
                 f"{names[0]} .. {names[-1]}" if len(names) > 1 else names[0],
-                "Export the recording again with all columns",
+                "Export all columns, or name those there are in a map: tactile info FILE --columns map.toml writes one",
             )
         found: np.ndarray = np.empty((len(self.values), len(names)), dtype)
         with np.errstate(over="ignore"):

@@ -38,8 +38,12 @@ def test_a_wheel_s_scenes_are_found_by_its_list_of_files(elsewhere, tmp_path, mo
     file = tmp_path / "share/tactile/scenes/press/scene.toml"
     file.parent.mkdir(parents=True)
     file.write_text('description = "A ball."')
+    script = tmp_path / "share/tactile/scenes/grasp/grasp.py"
+    for each in (script, script.parent / "__pycache__" / "grasp.pyc"):  # as pip leaves them
+        each.parent.mkdir(parents=True)
+        each.touch()
     monkeypatch.setattr(example_scenes, "_installed_files", lambda: [tmp_path / "x" / "scene.toml", file])
-    assert example_scenes.described() == ["press  A ball."]
+    assert example_scenes.described() == ["grasp  grasp.py", "press  A ball."]
 
 
 def test_an_installation_without_scenes_says_so(elsewhere, monkeypatch):
