@@ -4,6 +4,7 @@ import pytest
 from gel_pictures import works
 from plain_unit import plain_unit
 
+from tactile_core.pictures.calibrate import ball_pictures
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR
 
 
@@ -11,6 +12,12 @@ from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR
 def variant(request) -> str:
     """Each variant in turn."""
     return works(request.param)
+
+
+@pytest.fixture
+def coarse_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have fits look at pictures of 60 x 80 pixels rather than 120 x 160, for what does not depend on how fine."""
+    monkeypatch.setattr(ball_pictures, "WORKING_WIDTH", 60)
 
 
 @pytest.fixture(scope="session")

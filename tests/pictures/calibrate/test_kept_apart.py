@@ -9,6 +9,8 @@ from pressed_unit import PLACES, write_photographs
 from tactile_core.cli.main import main
 from tactile_core.sensors.calibration_file import write_calibration
 
+pytestmark = pytest.mark.usefixtures("coarse_fits")
+
 
 @pytest.fixture
 def start(tmp_path):
