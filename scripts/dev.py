@@ -1,7 +1,7 @@
 """Set up and run the project on a fresh machine, with the standard library alone (Linux, macOS, Windows).
 
     python3 scripts/dev.py demo                     convert the recording that ships; results in out/demo/
-    python3 scripts/dev.py test                     check the style, then run the tests
+    python3 scripts/dev.py test                     check the style, then run the tests, on up to four cores
     python3 scripts/dev.py test --train             the same with torch, so that the training tests run too
     python3 scripts/dev.py test tests/cli/test_cli.py -x    what is not known here goes to pytest
     python3 scripts/dev.py check                    check style and types (ruff, mypy)
@@ -32,6 +32,8 @@ DEMO_RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 TEST_PACKAGES = ("pytest", "pytest-timeout")
 # What the extension's tests need beside bpy; 4.2 to 5.0 were built for the first numpy's binary interface.
 BLENDER_PACKAGES = (*TEST_PACKAGES, "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree")
+WORKERS = 4  # processes of tests at most; each takes up to 4 GB
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 BLENDER_SECONDS = 1800  # some Blenders hang at exit (4.5 where an operator stays registered): no run may last longer
 # What a command of the same name as its extra runs, by `python -m`.
 TOOLS = {
@@ -133,13 +135,21 @@ def run_demo(folder: Path) -> int:
 
 
 def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
-    """Ruff, then pytest, whatever ruff says; the status of the first that fails."""
+    """Ruff, then pytest, whatever ruff says; the status of the first that fails.
+
+    The whole suite runs in as many processes as there are cores, up to WORKERS, of one thread each.
+    """
     extras = ("plain" if options.numpy else "dev", *(("train",) if options.train else ()))
     python = install(options.venv, extras, options.numpy)
+    variables, workers = environment(), min(os.cpu_count() or 1, WORKERS)
+    if set(pytest_arguments) <= {"-q", "-v"} and workers > 1:
+        pytest_arguments = [*pytest_arguments, "-n", str(workers), "--dist", "worksteal"]
+        for name in THREADS:
+            variables.setdefault(name, "1")
     failed = []
     for command in (["ruff", "check", "."], ["pytest", *pytest_arguments]):
         say(" ".join(command))
-        status = subprocess.call([str(python), "-m", *command], cwd=str(ROOT), env=environment())
+        status = subprocess.call([str(python), "-m", *command], cwd=str(ROOT), env=variables)
         failed += [status] if status else []
     return failed[0] if failed else 0
 

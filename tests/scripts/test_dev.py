@@ -179,6 +179,25 @@ def test_tools_run_after_one_another_and_the_first_failure_counts(command, dev, 
     assert pip == [((command,), None)]
 
 
+@pytest.mark.parametrize(
+    ("asked", "cores", "added"),
+    [
+        ([], 2, ["-n", "2", "--dist", "worksteal"]),
+        (["-q"], 64, ["-n", "4", "--dist", "worksteal"]),
+        ([], 1, []),
+        (["tests/cli", "-x"], 2, []),
+    ],
+)
+def test_the_whole_suite_runs_on_every_core(asked, cores, added, dev, pip, venv, monkeypatch):
+    ran = []
+    monkeypatch.setattr(dev.os, "cpu_count", lambda: cores)
+    monkeypatch.setattr(dev.subprocess, "call", lambda command, **more: ran.append((command[2:], more["env"])) or 0)
+    assert dev.main(["test", "--venv", str(venv), *asked]) == 0
+    command, variables = ran[-1]
+    assert command == ["pytest", *asked, *added]
+    assert variables.get("OMP_NUM_THREADS") == "1" or not added
+
+
 def test_the_root_file_of_the_blender_extension_does_not_disturb_pytest(tmp_path):
     (tmp_path / "pyproject.toml").write_bytes((ROOT / "pyproject.toml").read_bytes())
     (tmp_path / "__init__.py").write_text("from .addon import register, unregister\n")
