@@ -44,23 +44,30 @@ class Disk(io.RawIOBase):
             return self._file.tell() if size is None else size
 
     def readinto(self, buffer: Any) -> int:
+        """Read into a buffer like any file."""
         return self._file.readinto(buffer)
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Move like any file; returns the place, bytes."""
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
+        """Return the place in the file, bytes."""
         return self._file.tell()
 
     def readable(self) -> bool:
+        """Return true: HDF5 reads back what it wrote."""
         return True
 
     def writable(self) -> bool:
+        """Return true."""
         return True
 
     def seekable(self) -> bool:
+        """Return true."""
         return True
 
     def close(self) -> None:
+        """Close the file; what failed before is for `check` to raise."""
         self._file.close()
         super().close()

@@ -91,6 +91,7 @@ def register(mi: Any, variant: str) -> None:
             self.points = properties.get("points", 4)
 
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> tuple:
+            """Return the direct light of each ray; called by Mitsuba."""
             hit = scene.ray_intersect(ray, active)
             light = mi.Color3f(0)
             for lit in direct(mi, scene, scene.emitters(), hit, self.points, sampler.next_1d()):
@@ -98,6 +99,7 @@ def register(mi: Any, variant: str) -> None:
             return light, hit.is_valid(), []
 
         def to_string(self) -> str:
+            """Return what Mitsuba prints of it."""
             return f"LedIntegrator[points={self.points}]"
 
     mi.register_integrator(NAME, LedIntegrator)
