@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+import importlib.util
 import os
+import struct
 import zlib
+from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
@@ -12,10 +16,46 @@ import numpy as np
 # none. Measured, a frame of the simulated recording with the shipped background (profile_verbs.py, ``png_*``):
 # 40 kB in 4.8 ms; zlib's level 1: 54 kB in 5.2, level 3: 47 kB in 8.7, level 4: 42 kB in 7.7, level 6: 38 kB in 20.7.
 PACKING = {"compress_level": 1, "compress_type": zlib.Z_HUFFMAN_ONLY}
+# Where the extra [fast] is installed libdeflate packs: 39 kB in 2.3 ms where the other takes 5.4; level 2: 40 in 2.0.
+# With the camera's noise drawn into them pictures take a fifth more space than by Huffman coding alone.
+LEVEL = 3
+UP = 2  # PNG's filter of each row: less the row above, modulo 256
 
 
 def write_png(file: str | os.PathLike | BinaryIO, picture: np.ndarray) -> None:
     """Write a picture (H, W, 3) uint8 to a path or an open file. Raises OSError where the disk refuses."""
-    from PIL import Image
+    if not _has_libdeflate():
+        from PIL import Image
 
-    Image.fromarray(picture).save(file, "PNG", **PACKING)
+        Image.fromarray(picture).save(file, "PNG", **PACKING)
+        return
+    content = _packed(picture)
+    if isinstance(file, str | os.PathLike):
+        Path(file).write_bytes(content)
+    else:
+        file.write(content)
+
+
+@functools.cache
+def _has_libdeflate() -> bool:
+    return importlib.util.find_spec("deflate") is not None
+
+
+def _packed(picture: np.ndarray) -> bytes:
+    """Pack a picture (H, W, 3) uint8 by libdeflate, every row filtered by the one above."""
+    import deflate
+
+    height, width, _ = picture.shape
+    rows = picture.reshape(height, -1)
+    filtered = np.empty((height, 1 + rows.shape[1]), np.uint8)
+    filtered[:, 0], filtered[0, 1:] = UP, rows[0]
+    np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
+    depth, color = 8, 2  # bits of a value; red, green, blue
+    chunks = [
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, depth, color, 0, 0, 0)),
+        (b"IDAT", bytes(deflate.zlib_compress(filtered.data, LEVEL))),
+        (b"IEND", b""),
+    ]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks
+    )
