@@ -11,6 +11,7 @@ import numpy as np
 from ..sensors.camera import Camera
 
 FINE = 2.5  # coarse pixels in a standard deviation: the sum of such Gaussians is even to 1e-8 of its size
+BLOCK = 80  # pixels whose weights are one product of matrices; half of all weights are zeros that it leaves out
 REACH = 4.0  # standard deviations; beyond lie 6e-5 of the light
 
 
@@ -21,15 +22,23 @@ class CoatingSpread:
         self._none = deviation == 0
         if not self._none:
             right, down = camera.pixel_size
-            self._step_down, self._down = _means(camera.height, deviation / down)
-            self._step_right, self._right = _means(camera.width, deviation / right)
+            self._step_down, means = _means(camera.height, deviation / down)
+            self._down = _blocks(means)
+            self._step_right, means = _means(camera.width, deviation / right)
+            self._right = _blocks(means)
 
     def __call__(self, pictures: np.ndarray) -> np.ndarray:
         """Pictures (..., H, W) float32, evened out; near an edge, the mean of what is in the picture."""
         if self._none:
             return pictures
-        sums = _summed(pictures.swapaxes(-1, -2), self._step_right).swapaxes(-1, -2)
-        return self._down @ _summed(sums, self._step_down) @ self._right.T
+        sums = _summed(_summed(pictures.swapaxes(-1, -2), self._step_right).swapaxes(-1, -2), self._step_down)
+        across = np.empty((*sums.shape[:-1], pictures.shape[-1]), np.float32)
+        for pixels, runs, weights in self._right:
+            np.matmul(sums[..., runs], weights.T, out=across[..., pixels])
+        spread = np.empty(pictures.shape, np.float32)
+        for pixels, runs, weights in self._down:
+            np.matmul(weights, across[..., runs, :], out=spread[..., pixels, :])
+        return spread
 
 
 def _summed(pictures: np.ndarray, step: int) -> np.ndarray:
@@ -55,3 +64,14 @@ def _means(count: int, deviation: float) -> tuple[int, np.ndarray]:
     weights[np.arange(count), np.arange(count) // step] += 1e-12  # a width far below a pixel leaves its own alone
     weights /= (weights * (ends - starts)).sum(1, keepdims=True)
     return step, weights.astype(np.float32)
+
+
+def _blocks(weights: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]:
+    """Cut weights (count, n) into blocks of pixels: which these are, the runs that have weight there, the weights."""
+    blocks = []
+    for start in range(0, len(weights), BLOCK):
+        part = weights[start : start + BLOCK]
+        with_weight = np.flatnonzero(part.any(0))
+        runs = slice(with_weight[0], with_weight[-1] + 1)
+        blocks.append((slice(start, start + len(part)), runs, np.ascontiguousarray(part[:, runs])))
+    return blocks

@@ -18,6 +18,7 @@ from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .coating_spread import CoatingSpread
 from .height_map import of_unit, rest_height_map
 from .lamp_loops import lamp_light
+from .level_loops import in_picture
 from .perspective import Perspective, slopes
 from .perspective_loops import seen_surface
 
@@ -62,6 +63,8 @@ class Shader:
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
         change = self._radiance(height_map)
+        if available():
+            return in_picture(change, self._rest_radiance, self._response, self.background, np.float32(LARGEST_LEVEL))
         change -= self._rest_radiance
         picture = np.empty((*self.camera.shape, 3), np.uint8)
         for channel in range(len(COLOURS)):

@@ -7,6 +7,7 @@ import pytest
 from gel_pictures import Press, works
 from plain_unit import plain_unit
 
+from tactile_core.pictures import coating_spread
 from tactile_core.pictures.coating_spread import CoatingSpread
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.variant import LLVM
@@ -24,6 +25,14 @@ def test_a_soft_edge_is_evened_out_as_by_a_gaussian(size):
     expected = np.broadcast_to(100 * ndtr(camera.right / 0.5e-3), ramp.shape)
     inside = np.abs(camera.right) < 3e-3  # at the picture's edge there is nothing beyond
     np.testing.assert_allclose(found[..., inside], expected[..., inside], atol=0.15)  # measured 0.05 to 0.1 levels
+
+
+def test_blocks_of_weights_give_what_all_weights_give(monkeypatch):
+    light = np.random.default_rng(2).uniform(0, 255, (3, *plain_unit().camera.shape)).astype(np.float32)
+    found = CoatingSpread(plain_unit().camera, 0.4e-3)(light)
+    monkeypatch.setattr(coating_spread, "BLOCK", 10_000)
+    whole = CoatingSpread(plain_unit().camera, 0.4e-3)(light)
+    np.testing.assert_allclose(found, whole, atol=2e-4)  # levels of 255, float32's rounding of a sum
 
 
 def test_even_light_and_no_spread_change_nothing():
