@@ -130,7 +130,9 @@ class SheetFigure:
         """Draw maps of (k, N, 3) m on the unrolled skin; largest : m where colours end; contact_center : (k, 2) m."""
         plan, faces = unrolling.unrolled_nodes(sensor), sensors.sensor_surface(sensor).faces
         faces = faces[np.isfinite(plan[faces]).all((1, 2))]
-        self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, contact_center)
+        row = self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, contact_center)
+        for axes in row:
+            axes.set_xticks([])  # half of a sheet's time goes into ticks: only those with numbers are drawn
 
     def gel_row(self, label: str, displacement: np.ndarray, contact_center: np.ndarray | None) -> None:
         """Draw maps of (k, M, 3) m on the gel, with the border of its picture; contact_center : (k, 2) m."""
@@ -143,7 +145,6 @@ class SheetFigure:
         for each in axes:
             each.plot(z[[0, 1, 1, 0, 0]] * 1e3, x[[0, 0, 1, 1, 0]] * 1e3, color="white", linewidth=0.8,
                       linestyle=(0, (2, 2)))  # fmt: skip
-            each.tick_params(labelbottom=True)
             each.set_xlabel("z, mm", size=7, labelpad=0)
         self.top += Z_AXIS - GAP
 
@@ -178,7 +179,9 @@ class SheetFigure:
             axes.set_xlim(np.array(z)[:: self.camera.right_z] * 1e3)
             axes.set_ylim(np.array(x)[:: -self.camera.down_x] * 1e3)
             axes.set_facecolor("0.93")
-            axes.tick_params(length=2.5, labelsize=7, labelbottom=False, labelleft=k == 0)
+            axes.tick_params(length=2.5, labelsize=7)
+            if k:
+                axes.set_yticks([])
             row.append(axes)
         row[0].set_ylabel(f"{label}\nx, mm", labelpad=2)
         self._color_bar(colors, height)
