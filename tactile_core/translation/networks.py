@@ -10,8 +10,8 @@ force  head, from the BioTac's latent       pressure and error  heads, from the 
 
 Results are computed in blocks of `BLOCK` frames, padded with zeros, so that a frame gives the same numbers whatever
 part of a recording it is asked for with: the matrix products then have the same shape (equal bits with OpenBLAS as
-measured by the tests' machines; where a BLAS splits work otherwise, equal to a relative 1e-5). A frame alone goes by
-itself, in a twentieth of the time, and is equal to a relative 1e-5.
+measured on most machines; where a BLAS rounds by a row's place in the block, as on some processors without AVX-512,
+equal to 1e-5 of the largest number). A frame alone goes by itself, in a twentieth of the time, and is as equal.
 """
 
 from __future__ import annotations

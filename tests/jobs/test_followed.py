@@ -36,12 +36,19 @@ def arrays(file):
         return {name: found[name][:] for name in (*ARRAYS, "frame")}
 
 
+def alike(found, whole):
+    """Whether arrays are equal to 1e-5 of the largest number: blocks of the networks' passes begin elsewhere.
+
+    Some processors' matrix products round by a row's place in the block: 6e-7 of the largest number was measured.
+    """
+    return np.allclose(found, whole, rtol=0, atol=1e-5 * np.nanmax(np.abs(whole)), equal_nan=True)
+
+
 @pytest.mark.parametrize("frames", ["70:75", "::37", "300:"])
 def test_frames_are_the_same_whichever_are_asked_for(root, tmp_path, whole, frames):
     some = converted(root, tmp_path, "--frames", frames)
     for name in ARRAYS:
-        # Blocks of the networks' passes begin elsewhere, see ``networks``; states are equal bit by bit.
-        assert np.allclose(some[name], whole[name][some["frame"]], rtol=1e-5, atol=1e-9, equal_nan=True), name
+        assert alike(some[name], whole[name][some["frame"]]), name
 
 
 def test_shards_are_the_same_as_a_conversion(root, tmp_path, whole):
@@ -52,7 +59,7 @@ def test_shards_are_the_same_as_a_conversion(root, tmp_path, whole):
     assert len(shards) > 1
     for name in ARRAYS:
         found = np.concatenate([shard[name] for shard in shards])
-        assert np.allclose(found, whole[name], rtol=1e-5, atol=1e-9, equal_nan=True), name
+        assert alike(found, whole[name]), name
 
 
 def test_following_steadies_the_place_and_finds_the_touched_frames(root, whole, apart):
