@@ -53,5 +53,5 @@ def test_spread_is_found_again_and_albedo_is_named_as_hardly_seen(unit, tmp_path
     found = calibrate(photographs, 2 * BALL, start, unit="small").calibration
     assert found.fit.note.startswith("Mitsuba")
     assert found.coating.spread == pytest.approx(0.25e-3, abs=0.04e-3)
-    # Three presses tell a fifth of an albedo by the bounce: from 0.5 it was 0.51, of 120 x 160 pixels.
+    # Three presses show a fifth of what is assumed of albedos: of 120 x 160 pixels 0.51 was found, from 0.5.
     assert 0.5 < found.coating.albedo[0] < 0.8 and "albedo" in found.fit.not_identified

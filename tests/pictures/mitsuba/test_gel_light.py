@@ -39,9 +39,9 @@ def drawn(unit, preset=DIRECT, surroundings=NOTHING) -> np.ndarray:
 
 @pytest.mark.parametrize("coating", COATINGS, ids=lambda coating: coating.bsdf)
 def test_our_integrator_is_near_mitsubas_paths(small, coating):
-    """Means of 10 x 10 pixels, at rest and under a press of 1.2 mm: the paths' noise is 0.1 to 0.2 levels there."""
+    """Means of 10 x 10 pixels, at rest and under a press of 1.2 mm: the paths' noise is 0.15 to 0.3 levels there."""
     unit = dataclasses.replace(small, coating=coating)
-    truth, errors = drawn(unit, dataclasses.replace(REFERENCE, paths=16)), []
+    truth, errors = drawn(unit, dataclasses.replace(REFERENCE, paths=8)), []
     for preset in (DIRECT, STANDARD, QUALITY):
         off = np.stack([levels(unit, each) for each in drawn(unit, preset) - truth])
         errors.append(np.sqrt(np.mean(off.reshape(2, 8, 10, 6, 10, 3).mean((2, 4)) ** 2, axis=(1, 2, 3))))
