@@ -32,7 +32,7 @@ LYING = """
   </worldbody>
 </mujoco>
 """
-CORNERS = " ".join(f"{x} {y} {z}" for x in (-0.006, 0.006) for y in (-0.005, 0.005) for z in (-0.004, 0.004))
+CORNERS = " ".join(f"{x} {y} {z}" for x in (-4e-3, 4e-3) for y in (-3.5e-3, 3.5e-3) for z in (-2.5e-3, 2.5e-3))
 GEOMS = {
     "sphere": 'type="sphere" size="0.006"',
     "box": 'type="box" size="0.006 0.005 0.004"',
