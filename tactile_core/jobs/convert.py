@@ -1,10 +1,11 @@
-"""The main job: a recording becomes DIGIT pictures, deformations and a note, in a folder of its own."""
+"""The main job: a recording becomes a gel's pictures, deformations and a note, in a folder of its own."""
 
 from __future__ import annotations
 
 import dataclasses
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from ..recordings import PrepareOptions, Recording
     from ..recordings.electrode_gains import SensorFile
     from ..translation.answer import Answer
+    from ..translation.translate import Translator
     from .error_budget import Budget
 
 
@@ -53,25 +55,25 @@ def load_tools(
     variant: str | None = None,
     answer: Answer | None = None,
     gel: Gel = TRANSLATED,
-    target: str | None = None,
+    target: str = TARGET,
     source: str | None = SOURCE,
 ) -> Tools:
-    """Load the weights, shipped or of a folder, and the camera and lights of a DIGIT, the shipped unit's or a file's.
+    """Load the weights, shipped or of a folder, and camera and lights of a gel, the unit's that ships or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
     answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``
-    gel : the networks', or the found contact solved on the DIGIT (``solved_gel``)
-    target : the sensor that the weights must translate to; None for the DIGIT
+    gel : the networks', or the found contact solved on the target (``solved_gel``), as for any target to which the
+        shipped weights do not lead
+    target : the gel, to which the weights must translate unless it is solved
     source : the sensor whose recordings they must translate; None for whichever they do
     Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
     ``renderer.Renderer`` raises.
     """
     from ..pictures import height_map, shading
     from ..sensors.calibration_file import load_calibration
-    from ..translation import translate
 
-    translator = translate.load_translator(weights, answer, target, source)
-    unit = load_calibration(calibration, translator.target)
+    translator, solves = load_networks(weights, answer, gel, target, source)
+    unit = load_calibration(calibration, target)
     mapper = height_map.gel_mapper(unit.camera)
     dots = None
     if preset == "fast" and unit.markers is None:
@@ -82,19 +84,28 @@ def load_tools(
         shade = Renderer(unit, preset, variant)
         dots = shade.dots
     solve: Solver | None = None
-    if gel == SOLVED:
-        if translator.target != TARGET:
-            raise TactileError("--gel solved", f"asked of {translator.target}", f"{TARGET}, which alone is solved")
+    if solves:
         from . import solved_gel
 
-        solved_gel.prepare()
-        solve = solved_gel.solved
+        solved_gel.prepare(target)
+        solve = partial(solved_gel.solved, gel=target, found_on=translator.target)
     asked = translator.answer
     posterior = translator.posterior if asked.follows else None
     drawn = translator.plausible if asked.samples else None
-    named, pair = (translator.card, translator.sha256), (translator.source, translator.target)
+    named, pair = (translator.card, translator.sha256), (translator.source, target, translator.target)
     drawing = mapper, shade, preset, unit.camera
     return Tools(translator, *named, *drawing, posterior, drawn, asked, solve, dots, *pair)
+
+
+def load_networks(
+    weights: str | os.PathLike | None, answer: Answer | None, gel: Gel, target: str, source: str | None
+) -> tuple[Translator, bool]:
+    """Load the networks, and tell whether the target is solved under the contacts that they find; see `load_tools`."""
+    from ..translation import translate
+
+    led = None if gel == SOLVED or weights is None else target
+    translator = translate.load_translator(weights, answer, led, source)
+    return translator, gel == SOLVED or translator.target != target
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,7 +144,7 @@ def convert(
     with clock.stage("read"):
         columns = None if options.prepare is None else options.prepare.columns
         recording = recordings.read(recording_path, columns, tools.source, lean=True)
-        _check_order(recording, tools)
+        check_order(recording, tools.answer)
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
         finger = split(os.fspath(recording_path))[1]
@@ -162,9 +173,9 @@ def convert(
     return Done(Path(folder), made.warnings(), added, made.describe_expected_error(), made.describe_traction())
 
 
-def _check_order(recording: Recording, tools: Tools) -> None:
+def check_order(recording: Recording, answer: Answer) -> None:
     """Raise TactileError for snapshots through which a contact is to be followed."""
-    if tools.answer.follows and np.isnan(recording.time).all():
+    if answer.follows and np.isnan(recording.time).all():
         found = "snapshots, which do not follow each other"
         raise TactileError(recording.path, found, "frames in order", "Translate each alone: --frames-apart")
 

@@ -14,7 +14,7 @@ from ..files.png_writer import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import folds_counted
 from ..recordings import flags
-from ..sensors import PRESSURE_PER_COUNT, SOURCE, TARGET
+from ..sensors import PRESSURE_PER_COUNT, SOURCE, TARGET, title
 from ..sensors.camera import Camera
 from ..translation.answer import Answer
 from ..translation.card_errors import doubt
@@ -22,7 +22,7 @@ from ..translation.contact_track import Evidence, Tracked
 from ..translation.gel_place import beyond_picture
 from . import results
 from .contact_sheet import Contents, choose_frames, contact_sheet
-from .frames_file import FramesFile, kept
+from .frames_file import FramesFile, described, kept
 from .sampling_error import depth_share
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ REMARKABLE = {
     "undecided_place": "by its own signals the contact may as well lie elsewhere",
     "two_contacts": "the signals look like two contacts at once; the translation shows one",
     "unexplained": "the signals resemble no contact's: rest was perhaps taken under load (--tare, --sensor)",
-    "gel_not_solved": "no contact was solved on the gel, which is the networks' there",
+    "gel_not_solved": "no contact was solved on the gel, which is the networks' there, or at rest if they have none",
 }
 
 
@@ -64,6 +64,7 @@ class Tools:
     solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
     dots : on the gel that is drawn; None: it has none
     source, target : the sensor whose recordings are translated, and the gel
+    found_on : the gel of the networks, on which contacts are found that are solved on another
     """
 
     translate: Callable[..., Translation]
@@ -80,14 +81,24 @@ class Tools:
     dots: MarkerField | None = None
     source: str = SOURCE
     target: str = TARGET
+    found_on: str = TARGET
 
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """Draw the picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
         return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
 
+    def gel_of(self, translation: Translation) -> np.ndarray:
+        """Return the displacements (T, M, 3) m of the gel that is drawn: the networks', or solved."""
+        arrays = _arrays(translation)
+        return (arrays if self.solve is None else self.solve(arrays))["displacement_digit"]
+
     def marker_motion(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Return gels' array of frames.h5, displaced by (T, M, 3) m; TactileError for a unit without dots."""
         return {"marker_motion": self.needed_dots().motion(displacement)}
+
+    def describe_gel(self) -> tuple[str, ...]:
+        """Say that contacts are solved on another gel than that of the networks, where they are."""
+        return describe_gel(self.target, self.found_on)
 
     def needed_dots(self) -> MarkerField:
         """Return the unit's dots; raises TactileError where it has none."""
@@ -110,15 +121,28 @@ class Tools:
         return Tracked(read_posteriors, count)
 
 
+def describe_gel(target: str, found_on: str) -> tuple[str, ...]:
+    """Say that contacts found on one gel are solved on another; nothing where both are the same."""
+    if target == found_on:
+        return ()
+    return (
+        f"no networks lead to the {title(target)}: its gel is solved under the contacts found on a {title(found_on)}'s",
+    )
+
+
 def translated(signals: Signals, tools: Tools, tracked: Tracked | None, frames: np.ndarray) -> dict[str, np.ndarray]:
     """Translate `signals` to arrays, T first, by the names of frames.h5; frames : (T,) in the recording."""
     translation = tools.translate(signals) if tracked is None else tools.translate(signals, tracked(frames))
-    arrays = {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
+    arrays = _arrays(translation)
     if tools.plausible is not None:
         arrays |= tools.plausible(signals, frames)
     arrays |= {"electrodes": signals.electrodes, "pressure_measured": PRESSURE_PER_COUNT * signals.pdc}
     arrays["flags"] = arrays["flags"] | signals.flags | beyond_picture(arrays["contact_center"], tools.camera)
     return arrays if tools.solve is None else tools.solve(arrays)
+
+
+def _arrays(translation: Translation) -> dict[str, np.ndarray]:
+    return {field.name: getattr(translation, field.name) for field in dataclasses.fields(translation)}
 
 
 class FramePass:
@@ -178,7 +202,9 @@ class FramePass:
     def warnings(self) -> tuple[str, ...]:
         """Return warnings for the user: of the recording, and of its translated frames."""
         found = [*self.signals.warnings, *self.tools.answer.describe_shift(), *filter(None, [doubt(self.tools.card)])]
-        for name, meaning in REMARKABLE.items():
+        found += self.tools.describe_gel()
+        for name, words in REMARKABLE.items():
+            meaning = described(words, (self.tools.source, self.tools.target))
             if self.flagged[name]:
                 found.append(f"{self.flagged[name]} of {len(self.frames)} frames: {meaning} (flag {name})")
         if self.folded:
@@ -186,11 +212,13 @@ class FramePass:
         return tuple(found)
 
     def describe_expected_error(self) -> str:
-        """Describe the translation's own error on the DIGIT: the median of the frames in contact."""
+        """Describe the translation's own error on the gel: the median of the frames in contact."""
         errors = np.concatenate(self._errors, axis=1)
         if not errors.shape[1]:
             return "no frame is in contact, so the translation expects no error"
         expected, bound = 1e3 * np.median(errors, axis=1)
+        if np.isnan(expected):
+            return "the translation's own error is not known on this gel, which no networks lead to"
         return (
             f"the translation itself, beside this: the worst node of its gel is off by {expected:.2f} mm in half of "
             f"such contacts, by less than {bound:.2f} mm in 95 of 100"

@@ -48,9 +48,11 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
         "recording": about["recording"].encode(errors="replace").decode(),
         "simulated": about["simulated"], **_identity(job, index, number, frames),
     }  # fmt: skip
+    pair = tools.source, tools.target
     with atomic.new_file(file, shared=True) as partial:
         keep = tuple(job.recipe.keep)
-        with FramesFile(partial, stop - start, kept(keep, tools.answer), attributes, room=checksummed.ROOM) as out:
+        words, room = kept(keep, tools.answer), checksummed.ROOM
+        with FramesFile(partial, stop - start, words, attributes, room=room, pair=pair) as out:
             for first in range(0, stop - start, CHUNK):
                 rows = slice(first, first + CHUNK)
                 out.write(first, _arrays(signals, time, rows, start, keep, tools, tracked))
@@ -97,7 +99,7 @@ def _arrays(
     if "traction" in keep:
         from .gel_traction import gel_traction  # with all of contact mechanics
 
-        arrays |= gel_traction(arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]))
+        arrays |= gel_traction(arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]), tools.target)
     if "marker_motion" in keep:
         arrays |= tools.marker_motion(arrays["displacement_digit"])
     if "height" in keep or "image" in keep:

@@ -88,7 +88,8 @@ def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]
 def named(name: str, pair: tuple[str, str]) -> str:
     """Return the name of a dataset of frames of another source than a BioTac, or another gel than a DIGIT's."""
     stem, _, role = name.rpartition("_")
-    return f"{stem}_{pair[PAIR.index(role)]}" if role in PAIR else name
+    sensor = dict(zip(PAIR, pair, strict=True)).get(role)
+    return f"{stem}_{sensor}" if sensor else name
 
 
 def described(meaning: str, pair: tuple[str, str]) -> str:

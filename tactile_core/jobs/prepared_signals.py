@@ -1,7 +1,7 @@
 """A recording's signals, ready for the networks, in a sealed file that shards read a few rows of.
 
-Datasets, T first: ``time`` float64 s; ``change`` float64 and ``electrodes`` float32 (T, 19) counts; ``quiet`` bool;
-``flags`` uint16; ``pdc`` float64 counts. ``part`` (P,) first frame of each part of the recording, ``rest`` (P, 19)
+Datasets, T first: ``time`` float64 s; ``change`` float64 and ``electrodes`` float32 (T, e) counts; ``quiet`` bool;
+``flags`` uint16; ``pdc`` float64 counts. ``part`` (P,) first frame of each part of the recording, ``rest`` (P, e)
 counts. ``about``: JSON of what is reported of the recording. Chunks carry checksums, so a shard reads no damaged ones.
 """
 
@@ -11,7 +11,7 @@ import dataclasses
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, NotRequired, TypedDict
 
 import msgspec
 import numpy as np
@@ -26,8 +26,9 @@ from ..recordings.fingers import split
 from ..recordings.flags import Flag
 from ..recordings.polarity import AUTO
 from ..recordings.signals import Rest
-from ..sensors import ELECTRODES
-from ..sensors.fluid_sensor import FALLS
+from ..sensors import SOURCE
+from ..sensors.fluid_sensor import FALLS, MOST_ELECTRODES
+from .convert import check_order
 from .engine import job as jobs
 from .engine.inputs import content_hash
 
@@ -58,6 +59,7 @@ class About(TypedDict):
     prepared: list[dict[str, Any]]
     sha256: str
     frames: int
+    sensor: NotRequired[str]
 
 
 def make(folder: Path, job: Job, index: int) -> tuple[int, bool]:
@@ -101,19 +103,20 @@ def _write(file: Path, job: Job, path: str, digest: str) -> int:
 def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
     """Prepare each part of a recording; also yields the number of its frames that the part before had."""
     options, rest, rest_pdc = job.recipe.prepare.options(), None, np.nan
-    sensor = job.recipe.sensor
-    unit = None if sensor is None else sensor.gains_for(path, split(path)[1], "--sensor")
+    sensor, source = job.recipe.sensor, job.recipe.source
+    unit = None if sensor is None else sensor.gains_for(path, split(path)[1], "--sensor", source)
     if unit is not None:
         options = dataclasses.replace(options, rest=unit.rest())
     evidence, doubts = "", np.uint16(0)
-    for part in read_parts(path, options.columns):
+    for part in read_parts(path, options.columns, source):
         recording = part.recording
+        check_order(recording, job.recipe.answer)
         if rest is not None and options.tare not in (None, "none"):  # frames that the user named lie in the first part
             options = dataclasses.replace(options, tare=slice(0, len(recording)))
         signals = prepare(recording, options)
         if rest is None:
             if options.polarity == AUTO and signals.flags[0] & DOUBTS:
-                options, evidence = _one_polarity(path, options)
+                options, evidence = _one_polarity(path, options, source)
                 signals = prepare(recording, options)
             factor, polarity = (signals.report[name] for name in ("counts_per_unit", "polarity"))
             doubts = np.uint16(0) if evidence else signals.flags[0] & DOUBTS
@@ -130,9 +133,9 @@ def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
         yield recording, signals, part.repeated
 
 
-def _one_polarity(path: str, options: PrepareOptions) -> tuple[PrepareOptions, str]:
+def _one_polarity(path: str, options: PrepareOptions, sensor: str) -> tuple[PrepareOptions, str]:
     """Options that name the polarity of the first part that shows it, and the evidence; as they are where none does."""
-    for part in read_parts(path, options.columns):
+    for part in read_parts(path, options.columns, sensor):
         signals = prepare(part.recording, options)
         if not signals.flags[0] & DOUBTS:
             name, evidence = (signals.report[each] for each in ("polarity", "polarity_evidence"))
@@ -195,6 +198,7 @@ class _Writer:
             self._about |= {
                 "recording": recording.name, "layout": recording.layout, "simulated": recording.simulated,
                 "start_time": recording.start_time, "kind": signals.kind,
+                "sensor": recording.sensor,
             }  # fmt: skip
         self._parts.append((self.count, signals.rest))
         self._about["warnings"] += [text for text in signals.warnings if text not in self._about["warnings"]]
@@ -239,7 +243,13 @@ class Prepared:
             rest = file["rest"][part]
             time = arrays.pop("time")
             return time, Signals(
-                rest=rest, drift=np.zeros_like(rest), kind=about["kind"], warnings=(), report={}, **arrays
+                rest=rest,
+                drift=np.zeros_like(rest),
+                kind=about["kind"],
+                warnings=(),
+                report={},
+                sensor=about.get("sensor", SOURCE),
+                **arrays,
             )
 
         about = self.about()
@@ -264,9 +274,11 @@ def _check(path: Path, file: h5py.File) -> None:
     """Raise ValueError or TactileError for other arrays than ours, whose rows would take more memory."""
     import h5py
 
-    count = len(file["time"])
+    count, electrodes = len(file["time"]), file["rest"].shape[1]
+    if not 0 < electrodes <= MOST_ELECTRODES:
+        raise ValueError(f"rest of {electrodes} electrodes")
     wide = {"change", "electrodes"}
-    shapes = {name: (count, ELECTRODES) if name in wide else (count,) for name in COLUMNS}
+    shapes = {name: (count, electrodes) if name in wide else (count,) for name in COLUMNS}
     for name in (*COLUMNS, "part", "rest", "about"):
         if not isinstance(file.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"{name} is a link")

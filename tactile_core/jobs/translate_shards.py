@@ -34,6 +34,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     """Translate some frames."""
     recipe = job.recipe
     unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant, recipe.answer, recipe.gel)
+    unit += recipe.source, recipe.target
     return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit))
 
 
@@ -58,12 +59,14 @@ def _tools(
     variant: str,
     answer: Answer,
     gel: Gel,
+    source: str,
+    target: str,
 ) -> Tools:
     """Load the networks and the unit, once a process. Raises TactileError where they are not those of the job."""
     from .convert import load_tools
 
     check_unit(calibration, unit_sha256)
-    tools = load_tools(weights, calibration, preset, variant or None, answer, gel)
+    tools = load_tools(weights, calibration, preset, variant or None, answer, gel, target, source)
     if tools.sha256 != sha256:
         found, advice = f"sha256 {tools.sha256[:12]}...", "Use the weights that the job was made with"
         raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)

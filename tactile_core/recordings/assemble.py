@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import ELECTRODES, SAMPLE_RATE, SOURCE, title
-from ..sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
+from ..sensors import SAMPLE_RATE, SOURCE, describe, electrode_count, title
+from ..sensors.descriptor import names as known_sensors
+from ..sensors.fluid_sensor import Fluid
 from .flags import Flag
 from .recording import Recording, Truth
 
@@ -24,7 +25,6 @@ OTHER_RATE = 1.6  # times the usual rate, or a share of it, from which on it is 
 MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 STAMP_UNITS = ((1e17, 1e-9, "nanoseconds"), (1e14, 1e-6, "microseconds"), (1e11, 1e-3, "milliseconds"))  # of unix time
 MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory
-COUNTS = {SOURCE: ELECTRODES, "biotac_sp": SP_ELECTRODES}  # of electrodes
 SHOWN = 8  # problems spelled out one by one; more are counted
 
 
@@ -45,24 +45,16 @@ class BadRows(TactileError):
 
 def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -> None:
     """Raise for another number of electrodes than a sensor has. source says where the count was seen."""
-    wanted = COUNTS[sensor]
+    wanted = electrode_count(sensor)
     if count == wanted:
         return
-    if sensor != SOURCE:
-        raise TactileError(f"{path}, {source}", f"{count} electrodes", f"the {wanted} electrodes of a {title(sensor)}")
-    if count == SP_ELECTRODES:
-        raise TactileError(
-            f"{path}, {source}",
-            "24 electrodes: a BioTac SP",
-            "the 19 electrodes of a BioTac",
-            "Translate it with weights of a BioTac SP: tactile convert --weights (docs/extend.md)",
-        )
-    raise TactileError(
-        f"{path}, {source}",
-        f"{count} electrodes",
-        "the 19 electrodes of a BioTac",
-        "Check which sensor made this recording",
-    )
+    found, advice = f"{count} electrodes", "Check which sensor made this recording"
+    others = (other for each in known_sensors() if isinstance(other := describe(each), Fluid))
+    like = next((other.title for other in others if other.electrodes.count == count), "")
+    if like:
+        found += f": a {like}"
+        advice = f"Translate it with weights of a {like} (docs/extend.md)"
+    raise TactileError(f"{path}, {source}", found, f"the {wanted} electrodes of a {title(sensor)}", advice)
 
 
 def assemble(
@@ -157,7 +149,8 @@ def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
 
 def _check_size(path: str, electrodes: np.ndarray, sensor: str) -> None:
     if electrodes.ndim != 2:
-        raise TactileError(f"{path}, electrodes", f"an array of shape {electrodes.shape}", "(frames, 19)")
+        expected = f"(frames, {electrode_count(sensor)})"
+        raise TactileError(f"{path}, electrodes", f"an array of shape {electrodes.shape}", expected)
     if len(electrodes) == 0:
         raise TactileError(
             path, "no data rows", "at least one frame", "Check that the recording was written to its end"

@@ -1,4 +1,4 @@
-"""Describe recordings of a BioTac SP, 24 electrodes a finger."""
+"""Describe recordings of a sensor of which no unit has been seen at rest, as the BioTac SP, 24 electrodes a finger."""
 
 from __future__ import annotations
 

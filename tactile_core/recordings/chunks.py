@@ -6,7 +6,9 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from ..sensors import SOURCE, title
 from .array_store import Store, open_hdf5
+from .assemble import check_electrodes
 from .bag import open_bag, read_bag
 from .column_map import ColumnMap, refuse_other
 from .readers import layout_of, names, opened, read, table_reader
@@ -27,28 +29,31 @@ class Part:
     repeated: int
 
 
-def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> Iterator[Part]:
+def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = SOURCE) -> Iterator[Part]:
     """Yield the parts of a recording in order, times counted from the first frame of all. NPZ files are read whole.
 
-    columns : of a CSV file that no layout knows, as of `read`
+    columns, sensor : as of `read`
 
     Raises TactileError like `readers.read`.
     """
     path = os.fspath(path)
     shift, time = 0.0, None
-    for part in _parts(path, columns):
+    for part in _parts(path, columns, sensor):
         if part.repeated and time is not None:
             shift = time[-part.repeated]
+        if part.recording.sensor != sensor:
+            other = title(part.recording.sensor)
+            check_electrodes(path, part.recording.electrodes.shape[1], f"a {other}'s recording", sensor)
         time = part.recording.time + shift
         yield replace(part, recording=replace(part.recording, time=time))
 
 
-def _parts(path: str, columns: ColumnMap | None) -> Iterator[Part]:
+def _parts(path: str, columns: ColumnMap | None, sensor: str) -> Iterator[Part]:
     with opened(path) as (container, where, finger, file):
         refuse_other(path, container, columns)
-        if container == "csv" and os.path.getsize(path) > TEXT_BYTES:
-            reader = table_reader(path, read_header(path, file), columns)
-            for table, repeated in read_tables(path, file, TEXT_BYTES, CONTEXT):
+        if container == "csv" and os.path.getsize(where) > TEXT_BYTES:
+            reader = table_reader(where, read_header(where, file), columns, sensor, finger)
+            for table, repeated in read_tables(where, file, TEXT_BYTES, CONTEXT):
                 yield Part(reader(table), repeated)
         elif container == "hdf5":
             with open_hdf5(path) as store:
@@ -59,7 +64,7 @@ def _parts(path: str, columns: ColumnMap | None) -> Iterator[Part]:
                 for recording, repeated in read_bag(bag, layout, PART_FRAMES, CONTEXT):
                     yield Part(recording, repeated)
         else:
-            yield Part(read(path, columns), 0)
+            yield Part(read(path, columns, sensor), 0)
 
 
 def _of_store(store: Store) -> Iterator[Part]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..sensors import SOURCE
 from .polarity import patterns, spread_out, touching, unit
 
 MOST = 2000  # frames looked at, evenly spread
@@ -21,13 +22,13 @@ FEWEST = 15  # different contacts: one press and its noise are like up to a doze
 LEFT, MORE = 0.1856, 0.2076
 
 
-def unexplained_share(change: np.ndarray) -> tuple[float, int]:
+def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
     """Return the mean share of changes (n, 19) counts that no simulated contact explains, and of how many contacts."""
     if not len(change):
         return 0.0, 0
     change = change[spread_out(len(change), MOST)]
     chosen = unit(change)
-    known = patterns()
+    known = patterns(sensor)
     like = chosen @ known.T
     near = known[np.argpartition(-like, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]]
     products = near @ near.transpose(0, 2, 1) + RIDGE * np.eye(NEIGHBOURS)
@@ -45,9 +46,9 @@ def limit(contacts: int) -> float:
     return LEFT + MORE / float(np.sqrt(contacts))
 
 
-def doubt(change: np.ndarray) -> str:
+def doubt(change: np.ndarray, sensor: str = SOURCE) -> str:
     """Say why changes in contact (n, 19) counts, of a typical unit, are doubted; empty where they are not."""
-    left, contacts = unexplained_share(change)
+    left, contacts = unexplained_share(change, sensor)
     if contacts < FEWEST or left <= limit(contacts):
         return ""
     return (

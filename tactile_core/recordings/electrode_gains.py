@@ -14,8 +14,9 @@ from msgspec import Meta
 from ..errors import TactileError
 from ..files import atomic
 from ..files.text_file import read_toml_text, toml_quoted
-from ..sensors import COUNT_MAX, SOURCE, divider
-from .assemble import COUNTS
+from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
+from ..sensors.descriptor import of_kind
+from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
 from .fingers import FINGERS
 from .recording import Recording
 from .signals import PrepareOptions, Rest, Signals, doubt_law, prepare
@@ -25,7 +26,7 @@ OLD_FORMAT = "tactile-sensor-1"  # its offsets were of counts that rise where a 
 LEAST, MOST = 0.2, 5.0  # a gain beyond is a broken channel or a match gone wrong, not a unit (assumed)
 LARGEST_OFFSET = 500.0  # counts; a raw reading's rest is never that near to a change (assumed)
 ADVICE = "Make it again with `tactile adapt`"
-Row = Annotated[list[float], Meta(min_length=min(COUNTS.values()), max_length=max(COUNTS.values()))]
+Row = Annotated[list[float], Meta(min_length=1, max_length=MOST_ELECTRODES)]
 
 
 class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
@@ -53,7 +54,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
     """Calibration of one unit, or of the units of a hand's fingers, each in its own section.
 
-    sensor : of the units, "biotac" or "biotac_sp", which has a rest and no gains
+    sensor : of the units, "biotac" or another, which has a rest and no gains
     """
 
     format: str
@@ -75,8 +76,9 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     ) -> ElectrodeGains:
         """Return the unit that made a sensor's recording. Raises TactileError where the file has no section for it."""
         if self.sensor != sensor:
-            found = f"a unit of {COUNTS[self.sensor]} electrodes, {self.sensor!r}"
-            raise TactileError(where, found, f"one of {COUNTS[sensor]} electrodes, {sensor!r}, as {recording} is of")
+            found = f"a unit of {electrode_count(self.sensor)} electrodes, {self.sensor!r}"
+            expected = f"one of {electrode_count(sensor)} electrodes, {sensor!r}, as {recording} is of"
+            raise TactileError(where, found, expected)
         name = "unit" if finger is None else f"finger{finger}"
         sections = self.sections()
         if name in sections:
@@ -107,8 +109,9 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
     offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
     change = (signals.typical - offset) / np.array(sensor.gain)
-    if signals.kind == "raw" and signals.sensor == SOURCE:  # another's changes are its own, see `Signals.typical`
-        change = divider.of_unit(change, signals.rest)
+    rest = typical_rest(signals.sensor)
+    if signals.kind == "raw" and rest is not None:
+        change = divider.of_unit(change, signals.rest, rest)
     return doubt_law(dataclasses.replace(signals, change=change, report={**signals.report, "sensor": applied}))
 
 
@@ -133,8 +136,10 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
     """Raise TactileError naming the field that is out of range."""
     if sensor.format != FORMAT:
         raise TactileError(f"{where}, format", repr(sensor.format), repr(FORMAT), ADVICE)
-    if sensor.sensor not in COUNTS:
-        raise TactileError(f"{where}, sensor", repr(sensor.sensor), " or ".join(map(repr, COUNTS)), ADVICE)
+    try:
+        electrodes = of_kind(sensor.sensor, Fluid).electrodes.count
+    except TactileError as error:
+        raise TactileError(f"{where}, sensor", f"{sensor.sensor!r}, {error.found}", error.expected, ADVICE) from error
     if not sensor.sections():
         raise TactileError(where, "no section", "[unit], or [finger0], [finger1], ...", ADVICE)
     limits = {
@@ -144,8 +149,8 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
     for name, section in sensor.sections().items():
         for field, (least, most) in limits.items():
             held = getattr(section, field)
-            if held is not None and len(held) != COUNTS[sensor.sensor]:
-                expected = f"{COUNTS[sensor.sensor]}, the electrodes of {sensor.sensor!r}"
+            if held is not None and len(held) != electrodes:
+                expected = f"{electrodes}, the electrodes of {sensor.sensor!r}"
                 raise TactileError(f"{where}, {name}.{field}", f"{len(held)} numbers", expected, ADVICE)
             for electrode, value in enumerate(held or (), start=1):
                 if not least <= value <= most:  # false for nan
@@ -157,13 +162,15 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
 
 def write(path: str | os.PathLike, sensor: SensorFile) -> None:
     """Write a sensor file, whole or not at all; equal sensors give equal bytes."""
+    name, last = title(sensor.sensor), f"E{electrode_count(sensor.sensor)}"
     lines = [
-        "# A BioTac against the simulated one: reading - rest = gain * simulated change + offset, E1 to E19.",
+        f"# A {name} against the simulated one: reading - rest = gain * simulated change + offset, E1 to {last}.",
         "# Used by: tactile convert RECORDING --sensor THIS_FILE",
         f"format = {toml_quoted(sensor.format)}",
     ]
-    if sensor.sensor != SOURCE:
-        lines[:2] = ["# Rest of a BioTac SP, E1 to E24. Used by: tactile info RECORDING --sensor THIS_FILE"]
+    if typical_rest(sensor.sensor) is None:
+        lines[:2] = [f"# Rest of a {name}, E1 to {last}. Used by: tactile info RECORDING --sensor THIS_FILE"]
+    if "sensor" in msgspec.to_builtins(sensor):  # left out where it is the default
         lines.append(f"sensor = {toml_quoted(sensor.sensor)}")
     for name, section in sensor.sections().items():
         lines += ["", f"[{name}]", f"note = {toml_quoted(section.note)}"]

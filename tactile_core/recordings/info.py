@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..sensors import ELECTRODES, SOURCE, title
+from ..sensors import electrode_count, title, typical_rest
 from .biotac_sp import describe_sp
 from .fingers import split
 from .flags import Flag, names
@@ -25,7 +25,7 @@ def describe(
 ) -> str:
     """Describe sensor, channels, rate, duration, tare, gaps and suspicious samples with their lines, as a short table.
 
-    A BioTac SP's is described by its readings alone. unit : rest and gains, of `tactile adapt`
+    By its readings alone where no unit of its sensor has been seen at rest. unit : rest and gains, of `tactile adapt`
     Raises TactileError where the file is no recording, or of another sensor than the unit's.
     """
     columns = None if options is None else options.columns
@@ -33,7 +33,7 @@ def describe(
     recording = read(path, columns, sensor)
     finger = split(os.fspath(path))[1]
     gains = None if unit is None else unit.gains_for(path, finger, "--sensor", sensor)
-    if sensor != SOURCE:
+    if typical_rest(sensor) is None:
         return describe_sp(recording, gains)
     signals = prepare(recording, options)
     if gains is not None:
@@ -54,7 +54,7 @@ def _rows(recording: Recording, signals: Signals) -> list[tuple[str, str]]:
     origin = "simulated: " + str(recording.about.get("note", "")) if recording.simulated else "not marked as simulated"
     return [
         ("layout", recording.layout),
-        ("sensor", f"BioTac, {ELECTRODES} electrodes; {origin}"),
+        ("sensor", f"{title(recording.sensor)}, {electrode_count(recording.sensor)} electrodes; {origin}"),
         ("channels", _channels(recording)),
         ("frames", f"{len(recording)} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
         ("rate", f"{recording.rate:.2f} Hz (median)" if len(recording) > 1 else "one frame only"),
@@ -130,6 +130,6 @@ def _flags(flags: np.ndarray) -> str:
 
 def _electrode_table(signals: Signals) -> list[str]:
     """Rest, least and largest change of each electrode, in counts."""
-    head = "  electrode " + "".join(f"{j + 1:>6}" for j in range(ELECTRODES))
+    head = "  electrode " + "".join(f"{j + 1:>6}" for j in range(len(signals.rest)))
     rows = [("rest", signals.rest), ("least", signals.change.min(axis=0)), ("largest", signals.change.max(axis=0))]
     return [head] + [f"  {label:<10}" + "".join(f"{value:>6.0f}" for value in values) for label, values in rows]

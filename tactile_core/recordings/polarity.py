@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..files.shipped import shipped
+from ..errors import TactileError
+from ..sensors import SOURCE, contacts_of
 from ..sensors.fluid_sensor import FALLS, POLARITIES, RISES
 from .flags import Flag
 
 AUTO = "auto"
-PATTERNS = "contact_patterns.npy"  # (P, 19) counts, changes of simulated contacts as raw readings have them
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a change says nothing
 # Counts of PDC, 0.55 kPa, that pressure must swing by. Under a steady grip the electrodes' drift is larger than what
 # pressure shows it: of 36 real fingers (PHAC-2, trials 01 to 03) those that swing less are wrong in 4 of 19 cases,
@@ -83,15 +83,17 @@ def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
 
 
 def polarity_of(
-    change: np.ndarray, quiet: np.ndarray, electrodes: np.ndarray, pdc: np.ndarray | None, *, rest_known: bool = False
-) -> Polarity:
+    change: np.ndarray, quiet: np.ndarray, electrodes: np.ndarray, pdc: np.ndarray | None, *,
+    rest_known: bool = False, sensor: str = SOURCE,
+) -> Polarity:  # fmt: skip
     """Detect the polarity of a signed recording; "falls" and not sure where it shows nothing.
 
     change : (T, 19) counts against rest; quiet : (T,) bool, frames that rest was taken from, none where it is a guess
     electrodes : (T, 19) counts, repaired; pdc : (T,) counts, or None; rest_known : true if rest is the unit's own
+    sensor : whose, one with simulated contacts in its descriptor
     """
     frames = np.flatnonzero(touching(change) & ~quiet)
-    contacts = by_contacts(change[frames[spread_out(len(frames), MOST)]])
+    contacts = by_contacts(change[frames[spread_out(len(frames), MOST)]], sensor)
     if pdc is not None and not (len(pdc) >= FEWEST and bool(np.isfinite(pdc).all()) and np.ptp(pdc) > 0):
         pdc = None
     swing = 0.0 if pdc is None else float(np.subtract(*np.percentile(pdc, [95, 5])))
@@ -99,7 +101,7 @@ def polarity_of(
         # Nothing was pressed, or the grip was steady: then what looks like rest may be a contact.
         found = f"the fluid's pressure changes by {swing:.0f} counts, less than {SWING:.0f}"
         return Polarity(FALLS, f"assumed: {found}", False)
-    shown = [_by_pressure(electrodes, pdc, swing)] if pdc is not None and swing >= SWING else []
+    shown = [_by_pressure(electrodes, pdc, swing, sensor)] if pdc is not None and swing >= SWING else []
     shown += [contacts] if contacts is not None and (rest_known or quiet.any()) else []
     sure = [found for found in shown if found.sure]
     if sure and len({found.name for found in sure}) == 1:
@@ -108,18 +110,18 @@ def polarity_of(
     return Polarity(FALLS, f"assumed: {evidence}", False)
 
 
-def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float) -> Polarity:
+def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float, sensor: str) -> Polarity:
     """Decide by the electrodes' change (19,) counts that goes with a swing of the fluid's pressure, counts."""
     centred = pdc - pdc.mean()
     slope = np.array([(column - column.mean(dtype=float)) @ centred for column in electrodes.T]) / (centred @ centred)
-    return _decided(slope[None] * swing, "the change that goes with the fluid's pressure")
+    return _decided(slope[None] * swing, "the change that goes with the fluid's pressure", sensor)
 
 
-def by_contacts(touches: np.ndarray) -> Polarity | None:
+def by_contacts(touches: np.ndarray, sensor: str = SOURCE) -> Polarity | None:
     """Decide by changes in contact (n, 19) counts against a known rest; None if there are too few."""
     if len(touches) < FEWEST:
         return None
-    return _decided(touches[spread_out(len(touches), MOST)], "the change in contact")
+    return _decided(touches[spread_out(len(touches), MOST)], "the change in contact", sensor)
 
 
 def touching(change: np.ndarray) -> np.ndarray:
@@ -136,8 +138,8 @@ def spread_out(count: int, most: int) -> np.ndarray:
     return np.linspace(0, count - 1, min(count, most)).astype(int)
 
 
-def _decided(changes: np.ndarray, what: str) -> Polarity:
-    falls, rises = likeness(changes), likeness(-changes)
+def _decided(changes: np.ndarray, what: str, sensor: str) -> Polarity:
+    falls, rises = likeness(changes, sensor), likeness(-changes, sensor)
     name = FALLS if falls >= rises else RISES
     evidence = f"{what} is like simulated contacts by {falls:.2f} if counts fall, by {rises:.2f} if they rise"
     return Polarity(name, evidence, max(falls, rises) >= LIKE and _apart(min(falls, rises), max(falls, rises)))
@@ -148,20 +150,26 @@ def _apart(less: float, more: float) -> bool:
     return more - less >= MARGIN or np.sqrt((1 - more**2) / max(1 - less**2, 1e-12)) <= LEFT
 
 
-def likeness(changes: np.ndarray) -> float:
+def likeness(changes: np.ndarray, sensor: str = SOURCE) -> float:
     """Return the mean cosine of changes (n, 19) counts to the nearest simulated contact, in the networks' scale."""
-    return float((unit(changes) @ patterns().T).max(axis=1).mean())
+    return float((unit(changes) @ patterns(sensor).T).max(axis=1).mean())
 
 
-def contact_signals() -> np.ndarray:
-    """Load the changes (P, 19) float64 counts of simulated contacts, as raw readings have them."""
-    return np.load(shipped(PATTERNS), allow_pickle=False).astype(np.float64)
+def contact_signals(sensor: str = SOURCE) -> np.ndarray:
+    """Return the changes (P, e) float64 counts of simulated contacts, as raw readings have them.
+
+    Raises TactileError for a sensor whose descriptor has none.
+    """
+    found = contacts_of(sensor)
+    if found is None:
+        raise TactileError(f"sensor {sensor!r}", "no simulated contacts", "a table that [electrodes] contacts names")
+    return found
 
 
 @functools.cache
-def patterns() -> np.ndarray:
+def patterns(sensor: str = SOURCE) -> np.ndarray:
     """Return unit vectors (P, 19) of simulated contacts, in the networks' scale."""
-    return unit(contact_signals())
+    return unit(contact_signals(sensor))
 
 
 def unit(changes: np.ndarray) -> np.ndarray:

@@ -16,10 +16,10 @@ from ..errors import TactileError
 from ..files import outside
 from ..files.hdf5_checked import SIGNATURE
 from ..files.registry import modules_of
-from ..sensors import SOURCE
+from ..sensors import SOURCE, electrode_count, title
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
-from .assemble import COUNTS, check_electrodes
+from .assemble import check_electrodes
 from .bag import START_BYTES, fingers_of, is_bag_folder, kind_of, open_bag, read_bag
 from .column_map import ColumnMap, read_mapped, refuse_other
 from .fingers import named, split
@@ -59,7 +59,7 @@ def read(
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
     columns : which column of a CSV file is what, where no known layout has its names; see ``column_map.read``
-    sensor : ``"biotac"``, or ``"biotac_sp"`` for one of 24 electrodes
+    sensor : ``"biotac"``, or another with a descriptor, as ``"biotac_sp"`` of 24 electrodes
     lean : a long CSV file leaves out what no translation needs, PAC and columns outside the map, and has its electrodes
         in single precision where that is exact, as it is of counts: a third of the memory
 
@@ -71,8 +71,14 @@ def read(
     >>> len(recording), recording.rate, recording.electrodes.shape
     """
     path = os.fspath(path)
-    if sensor != SOURCE:
-        return _read_sp(path, columns, sensor)
+    found = _read(path, columns, sensor, lean)
+    if found.sensor != sensor:
+        check_electrodes(path, found.electrodes.shape[1], f"a {title(found.sensor)}'s recording", sensor)
+    return found
+
+
+def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Recording:
+    """Read a recording of whichever sensor a file that is no CSV holds; a CSV of another is refused at its header."""
     with opened(path) as (container, where, finger, file):
         refuse_other(path, container, columns)
         if container == "hdf5":
@@ -86,12 +92,9 @@ def read(
                 return next(read_bag(bag, layout_of(where, container, bag.topics)))[0]
         if container == "mat":
             with open_matlab(where, file) as store:
-                return _read_finger(layout_of(where, container, store.shapes), store, store.shapes, finger)
-        reader = table_reader(where, read_header(where, file), columns)
-        found = reader(read_table(where, file, partial(_unneeded, columns) if lean else None))
-        if finger is not None:
-            raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
-        return found
+                return _read_finger(layout_of(where, container, store.shapes), store, finger)
+        reader = table_reader(where, read_header(where, file), columns, sensor, finger)
+        return reader(read_table(where, file, partial(_unneeded, columns) if lean else None))
 
 
 def _unneeded(columns: ColumnMap | None, name: str) -> bool:
@@ -115,21 +118,9 @@ def _sensor(layout: ModuleType) -> str:
     return getattr(layout, "SENSOR", SOURCE)
 
 
-def _read_sp(path: str, columns: ColumnMap | None, sensor: str) -> Recording:
-    """Read one finger of a BioTac SP's file. Raises TactileError for a file of another sensor."""
-    if sensor not in COUNTS:
-        raise TactileError("read, sensor", repr(sensor), " or ".join(COUNTS))
-    if sensor_of(path, columns) != sensor:
-        found = read(path, columns)
-        check_electrodes(path, found.electrodes.shape[1], "a BioTac's recording", sensor)
-    with opened(path) as (_, where, finger, file):
-        table = read_table(where, file)
-        return _read_finger(layout_of(where, "csv", table.header), table, table.header, finger)
-
-
-def _read_finger(layout: ModuleType, store: Store | Table, held: Collection[str], finger: int | None) -> Recording:
+def _read_finger(layout: ModuleType, store: Store | Table, finger: int | None) -> Recording:
     """Read one finger of a hand: the requested one, or the first; a warning names the others."""
-    known = layout.fingers(held)
+    known = layout.fingers(store.header if isinstance(store, Table) else store.shapes)
     chosen = known[0] if finger is None else finger
     if chosen not in known:
         listed = ", ".join(map(str, known))
@@ -176,9 +167,14 @@ def list_fingers(paths: Iterable[str | os.PathLike[str]]) -> list[str]:
 
 
 def _fingers_of_table(header: tuple[str, ...]) -> tuple[int, ...]:
-    """Fingers of a BioTac SP's file; none of others, also of those whose columns a map names."""
-    known = [layout for layout in layouts() if _sensor(layout) != SOURCE and layout.score(header) >= RECOGNISED]
+    """Fingers of a file whose layout holds hands; none of others, also of those whose columns a map names."""
+    known = [layout for layout in layouts() if _holds_hands(layout) and layout.score(header) >= RECOGNISED]
     return known[0].fingers(header) if known else ()
+
+
+def _holds_hands(layout: ModuleType) -> bool:
+    """Return true for a layout of tables that may hold several fingers."""
+    return layout.CONTAINER == "csv" and hasattr(layout, "fingers")
 
 
 def names(store: Store) -> set[str]:
@@ -248,16 +244,24 @@ def _container(start: bytes) -> str:
     return "npz" if start.startswith(ZIP_STARTS) else "csv"
 
 
-def table_reader(path: str, header: Collection[str], columns: ColumnMap | None) -> Callable[[Table], Recording]:
-    """Return what makes a BioTac's recording of a CSV file's table: the map, or the layout that knows its header.
+def table_reader(
+    path: str, header: Collection[str], columns: ColumnMap | None, sensor: str = SOURCE, finger: int | None = None
+) -> Callable[[Table], Recording]:
+    """Return what makes a sensor's recording of a CSV file's table: the map, or the layout that knows its header.
 
-    Raises TactileError for a BioTac SP's file.
+    Raises TactileError for another sensor's file, and for a finger of a file of one.
     """
-    if columns is None:
+    if columns is not None:
+        reader = partial(read_mapped, columns=columns)
+    else:
         layout = layout_of(path, "csv", header)
-        check_electrodes(path, COUNTS[_sensor(layout)], "line 1")
-        return layout.read
-    return partial(read_mapped, columns=columns)
+        check_electrodes(path, electrode_count(_sensor(layout)), "line 1", sensor)
+        if _holds_hands(layout):
+            return partial(_read_finger, layout, finger=finger)
+        reader = layout.read
+    if finger is not None:
+        raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
+    return reader
 
 
 def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import SOURCE, divider, title
+from ..sensors import SOURCE, contacts_of, divider, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, POLARITIES, Fluid
 from . import contact_law
@@ -133,12 +133,12 @@ class Signals:
 
     @property
     def typical(self) -> np.ndarray:
-        """Change (T, 19) counts, converted to a unit that rests at ``sensors.REST_COUNTS``, the networks' input.
+        """Change (T, 19) counts, converted to a unit that rests at ``sensors.typical_rest``, the networks' input.
 
         Only raw readings show their unit's rest counts; other changes are not converted, nor are those of a sensor of
         which no unit has been seen at rest: see `relative_to`.
         """
-        if self.kind != "raw" or self.sensor != SOURCE:
+        if self._converted_to() is None:
             return self.change
         found = np.empty(self.change.shape)
         for start in range(0, len(found), BLOCK):
@@ -151,8 +151,12 @@ class Signals:
 
     def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
         """Change (n, 19) counts of some frames alone, as ``typical`` has them."""
-        own = self.kind != "raw" or self.sensor != SOURCE
-        return self.change[rows] if own else divider.typical(self.change[rows], self.rest)
+        rest = self._converted_to()
+        return self.change[rows] if rest is None else divider.typical(self.change[rows], self.rest, rest)
+
+    def _converted_to(self) -> np.ndarray | None:
+        """Counts at rest (e,) of the unit that changes are converted to; None where they are not."""
+        return typical_rest(self.sensor) if self.kind == "raw" else None
 
 
 def prepare(recording: Recording, options: PrepareOptions | None = None) -> Signals:
@@ -202,16 +206,16 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
 def doubt_law(signals: Signals) -> Signals:
     """Flag the frames in contact, and warn, where together they resemble no simulated ones; undoes an older doubt.
 
-    Simulated ones of other sensors than a BioTac come with their weights: their law is not judged.
+    Simulated ones of a sensor whose descriptor has none come with its weights: their law is not judged.
     """
-    if signals.kind not in ("raw", "tared") or signals.sensor != SOURCE:
+    if signals.kind not in ("raw", "tared") or contacts_of(signals.sensor) is None:
         return signals
     contact = ~signals.quiet
     for start in range(0, len(contact), BLOCK):
         rows = slice(start, start + BLOCK)
         contact[rows] &= touching(signals.typical_of(rows))
     frames = np.flatnonzero(contact)
-    words = contact_law.doubt(signals.typical_of(frames[spread_out(len(frames), contact_law.MOST)]))
+    words = contact_law.doubt(signals.typical_of(frames[spread_out(len(frames), contact_law.MOST)]), signals.sensor)
     flags = signals.flags & ~np.uint16(Flag.LAW_DOUBTED)
     if words:
         flags[contact] |= np.uint16(Flag.LAW_DOUBTED)
@@ -264,16 +268,14 @@ def _polarity(
 ) -> Polarity:  # fmt: skip
     if kind == "rectified":
         return Polarity(FALLS, "the sign is lost", True)
-    if recording.sensor != SOURCE:
-        return choose(
-            _polarity_of_sensor(recording.sensor, kind), options.polarity, recording.about.get("polarity", "")
-        )
-    shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known)
+    if contacts_of(recording.sensor) is None:
+        return choose(polarity_of_sensor(recording.sensor, kind), options.polarity, recording.about.get("polarity", ""))
+    shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known, sensor=recording.sensor)
     return choose(shown, options.polarity, recording.about.get("polarity", ""))
 
 
-def _polarity_of_sensor(sensor: str, kind: str) -> Polarity:
-    """The polarity of a sensor's raw readings, as its descriptor has it; of other kinds assumed."""
+def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
+    """Return the polarity of a sensor's raw readings, as its descriptor has it; of other kinds assumed."""
     reading = of_kind(sensor, Fluid).readout.polarity
     raw = f"raw counts of a {title(sensor)}"
     return Polarity(reading, raw, True) if kind == "raw" else Polarity(reading, f"assumed: as {raw}", False)

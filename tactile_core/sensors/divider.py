@@ -38,7 +38,7 @@ def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) 
     return reading(growth(rest + change, rest), to) - to
 
 
-def of_unit(change: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Convert changes of a unit at ``REST_COUNTS`` to one at rest counts (19,): the inverse of ``typical``."""
+def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) -> np.ndarray:
+    """Convert changes of a unit at counts ``of`` (19,) to one at rest counts (19,): the inverse of ``typical``."""
     rest = np.clip(rest, *_RESTS)
-    return reading(growth(REST_COUNTS + change, REST_COUNTS), rest) - rest
+    return reading(growth(of + change, of), rest) - rest

@@ -42,11 +42,8 @@ def places_of(name: str) -> Places:
 
     Raises TactileError for a sensor without electrodes, and for a table that is missing or bad.
     """
-    found = of_kind(name, Fluid)
-    table, own = found.electrodes.places, os.environ.get(OWN)
-    path = found.folder / table
-    if not path.is_file() and own:
-        path = Path(own) / name / table
+    found, path = of_kind(name, Fluid), table_of(name)
+    table = found.electrodes.places
     if not path.is_file():
         raise TactileError(
             path, "there is no such file", f"the places of the electrodes of a {found.title}",
@@ -57,6 +54,34 @@ def places_of(name: str) -> Places:
         expected = f"the {found.electrodes.count} of the descriptor of {name!r}"
         raise TactileError(path, f"{len(places.sensing)} electrodes that are read", expected)
     return places
+
+
+def table_of(name: str) -> Path:
+    """Return the path of a sensor's table of electrodes, in whose place there may be nothing."""
+    found, own = of_kind(name, Fluid), os.environ.get(OWN)
+    path = found.folder / found.electrodes.places
+    return path if path.is_file() or not own else Path(own) / name / found.electrodes.places
+
+
+def typical_rest(name: str) -> np.ndarray | None:
+    """Return the counts (e,) of a sensor's typical unit without contact; None where no unit has been seen at rest.
+
+    Raises TactileError for a sensor without electrodes, and for a table that is bad.
+    """
+    rest = places_of(name).rest_counts if table_of(name).is_file() else np.array([np.nan])
+    return rest if np.isfinite(rest).all() else None
+
+
+@functools.cache
+def contacts_of(name: str) -> np.ndarray | None:
+    """Load the changes (P, e) float64 counts of simulated contacts, as raw readings have them; None without a table.
+
+    Raises TactileError for a sensor without electrodes.
+    """
+    found = of_kind(name, Fluid)
+    if not found.electrodes.contacts:
+        return None
+    return np.load(found.folder / found.electrodes.contacts, allow_pickle=False).astype(np.float64)
 
 
 def read_places(path: Path) -> Places:

@@ -89,11 +89,14 @@ class Electrodes:
     """The electrodes on the core. places : table of names, places and counts at rest, see ``electrodes``; radius : m
 
     count : of those that are read, which signals are as wide as
+    contacts : counts that simulated contacts change by, which show a recording's polarity and faults; empty where the
+        networks alone bring such
     """
 
     places: str = file_beside()
     count: int = number(above=0, below=MOST_ELECTRODES)
     radius: float = number("mm", above=0)
+    contacts: str = file_beside(or_none=True)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ..recordings.electrode_faults import named_electrodes
 from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit
 from ..recordings.fingers import split
 from ..recordings.readers import each_finger, sensor_of
-from ..sensors import SOURCE
+from ..sensors import typical_rest
 from . import reference_signals
 from .gain_matching import PRIOR, Match, match
 from .reference_signals import ReferenceSignals
@@ -94,8 +94,9 @@ def adapt_hand(
     if len(found) > 1:
         raise TactileError(paths[0], f"recordings of {' and '.join(sorted(found))} together", "one sensor")
     units = _units(paths)
-    if found != {SOURCE}:
-        return _rests_sp(units), ("no gains: networks of this sensor, which they need, do not ship",)
+    sensor = found.pop()
+    if typical_rest(sensor) is None:
+        return _rests_alone(units, sensor), ("no gains: networks of this sensor, which they need, do not ship",)
     sections: dict[str, Any] = {}
     warnings: list[str] = []
     for finger, files in sorted(units.items(), key=lambda unit: unit[0] or 0):
@@ -118,14 +119,14 @@ def _units(paths: Sequence[str | os.PathLike]) -> dict[int | None, list[str]]:
     return units
 
 
-def _rests_sp(units: dict[int | None, list[str]]) -> SensorFile:
-    """Rest of each unit, without gains."""
+def _rests_alone(units: dict[int | None, list[str]], sensor: str) -> SensorFile:
+    """Rest of each unit of a sensor, without gains."""
     sections: dict[str, Any] = {}
     for finger, files in sorted(units.items(), key=lambda unit: unit[0] or 0):
-        rest = find_rest_sp([read(path, sensor="biotac_sp") for path in files])
+        rest = find_rest_sp([read(path, sensor=sensor) for path in files])
         note = f"median of each electrode's least loaded tenth, {rest.recordings} contacts"
         sections["unit" if finger is None else f"finger{finger}"] = _rest_alone(rest, note)
-    return SensorFile(FORMAT, **sections, sensor="biotac_sp")
+    return SensorFile(FORMAT, **sections, sensor=sensor)
 
 
 def _rest(recordings: Sequence[Recording]) -> UnitRest | None:

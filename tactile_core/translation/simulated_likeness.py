@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..recordings.polarity import TOUCHING, contact_signals
+from ..sensors import SOURCE
 
 # Shares of the signal's length: what two contacts leave at most, and how much more one leaves. Chosen on 4,000 contacts
 # of training pairs and sums of two: 1 % of the contacts are marked, and a third of the sums.
@@ -47,9 +48,9 @@ def patterns_of(signals: np.ndarray) -> Patterns:
 
 
 @functools.cache
-def shipped_patterns() -> Patterns:
-    """Return those of a BioTac that ship."""
-    return patterns_of(contact_signals())
+def shipped_patterns(sensor: str = SOURCE) -> Patterns:
+    """Return those of a sensor that lie beside its descriptor."""
+    return patterns_of(contact_signals(sensor))
 
 
 def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None) -> np.ndarray:

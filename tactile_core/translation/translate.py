@@ -27,7 +27,7 @@ from .lost_signs import recovered
 from .network_sizes import PLACE, SURFACES
 from .networks import Networks
 from .posterior import Posterior, touches
-from .simulated_likeness import Patterns, patterns_of, residual_shares, two_contacts, unlike
+from .simulated_likeness import Patterns, patterns_of, residual_shares, shipped_patterns, two_contacts, unlike
 from .weights import ADVICE
 
 # Frames that differ from training in kind, not in degree, are worth little.
@@ -291,19 +291,18 @@ def _check_pair(card: dict[str, Any], source: str | None, target: str | None, wh
         advice = "`tactile convert` takes them, with recordings of that sensor"
         expected = f"networks that translate recordings of {source}"
         raise TactileError(where, f"networks of {' and '.join(known)}", expected, advice)
-    if known[1] != (target or TARGET):
-        raise TactileError(
-            where, f"networks of {' and '.join(known)}", f"networks that translate to {target or TARGET}"
-        )
+    if target not in (None, known[1]):
+        advice = "Train some (docs/extend.md), or solve the gel under the contact that these find: --gel solved"
+        raise TactileError(where, f"networks of {' and '.join(known)}", f"networks that translate to {target}", advice)
 
 
 def load_translator(
-    folder: str | os.PathLike | None = None, answer: Answer | None = None, target: str | None = None,
+    folder: str | os.PathLike | None = None, answer: Answer | None = None, target: str | None = TARGET,
     source: str | None = SOURCE,
 ) -> Translator:  # fmt: skip
     """Load the networks of a weights folder, the shipped ones by default, with options of the estimate.
 
-    target : the gel that they must translate to; None for the DIGIT
+    target : the gel that they must translate to; None for whichever they do
     source : the sensor whose recordings they must translate; None for whichever they do
     Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces, and for
     a target that is no sensor or not theirs.
@@ -320,6 +319,8 @@ def load_translator(
                 f"{card_file}, {key}", f"{str(nets.card.get(key))[:12]}...",
                 f"{here[:12]}..., the surface of this version", "Use weights trained with this version of the sensors",
             )  # fmt: skip
-    if nets.source == SOURCE:
-        return Translator(nets, answer)
-    return Translator(nets, answer, patterns_of(reference_signals.read(folder or networks.WEIGHTS_FOLDER).typical))
+    if sensors.contacts_of(nets.source) is None:
+        known = patterns_of(reference_signals.read(folder or networks.WEIGHTS_FOLDER).typical)
+    else:
+        known = shipped_patterns(nets.source)
+    return Translator(nets, answer, known)

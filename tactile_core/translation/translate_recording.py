@@ -36,7 +36,8 @@ def translate(
         frames, so a frame's values do not depend on which others are requested
     prepare : options for repair, rest level and kind of the signals; None detects them
     sensor : file of `tactile adapt` with the rest and gains of this BioTac; None assumes a typical unit
-    weights : folder of networks; None for those that ship
+    weights : folder of networks, which name their sensors; None for those that ship. Of another gel than a DIGIT's,
+        ``..._digit`` are that gel's
     answer : options of the estimate (shift on the gel, mean in place of the most plausible contact); None for default
 
     Returns a :class:`Translation`, arrays with the T requested frames first: ``displacement_biotac`` (T, 3650, 3) m,
@@ -65,7 +66,7 @@ def translate(
 @lru_cache(maxsize=2)
 def _shared_translator(weights: str | None, answer: Answer) -> Translator:
     """Load networks once a process: 13 MB, a quarter of a second."""
-    return load_translator(weights, answer, source=None)
+    return load_translator(weights, answer, None, None)
 
 
 def _prepared(recording: Recording, options: PrepareOptions | None, sensor: str | os.PathLike[str] | None) -> Signals:

@@ -38,11 +38,11 @@ def is_guess(confidence: float, flags: int) -> bool:
 def in_words(confidence: float, flags: int, expected_error: float) -> str:
     """Return a frame's line: "guess: rectified recording, expected error 0.40 mm".
 
-    confidence : 0..1; flags : bits of ``Flag``; expected_error : m, of the largest node
+    confidence : 0..1; flags : bits of ``Flag``; expected_error : m, of the largest node, NaN where it is not known
     """
     reasons = [words for bit, words in (_DOUBTS | _REMARKS).items() if flags & bit]
     guess = is_guess(confidence, flags)
     if guess and not any(flags & bit for bit in _DOUBTS):
         reasons.insert(0, _UNLIKE)
     head = ": ".join(["guess" if guess else "as in training", *filter(None, [", ".join(reasons[:_REASONS])])])
-    return f"{head}, expected error {1e3 * expected_error:.2f} mm"
+    return f"{head}, " + (f"expected error {1e3 * expected_error:.2f} mm" if expected_error >= 0 else "error not known")

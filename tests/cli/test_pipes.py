@@ -40,6 +40,7 @@ CASES = {
     ("batch", "--columns"): ["batch {csv} --out {out} --columns {x.toml}"],
     ("watch", "--columns"): ["watch {csv} --play --speed 0 --out {out} --columns {x.toml}"],
     ("watch", "--sensor"): ["watch {csv} --play --speed 0 --out {out} --sensor {x.toml}"],
+    ("watch", "--calibration"): ["watch {csv} --play --speed 0 --out {out} --calibration {x.toml}"],
     ("watch", "--camera"): ["watch {csv} --play --speed 0 --out {out} --camera {x.mp4}"],
     ("info", "--sensor"): ["info {csv} --sensor {x.toml}"],
     ("info", "--columns"): ["info {csv} --columns {x.toml}"],

@@ -20,7 +20,7 @@ def write(tmp_path):
     """write(sign) -> a CSV of 20 s: rest, a contact from 5 s on, held to the end; sign -1: rest minus reading."""
 
     def make(sign):
-        contact = np.load(polarity.shipped(polarity.PATTERNS)).astype(float)[7]
+        contact = polarity.contact_signals()[7]
         strength = np.clip((np.arange(2000) - 500) / 300, 0, 1)
         noise = np.random.default_rng(0).normal(0, 1, (2000, 19))
         rows = np.full((2000, len(SLIDE_HEADER)), 2000.0)

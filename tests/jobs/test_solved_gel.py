@@ -1,17 +1,21 @@
-"""The found contact solved on the DIGIT, in place of the networks' gel."""
+"""The found contact solved on the DIGIT, in place of the networks' gel, or on a gel that no networks lead to."""
 
 import importlib.util
 
 import h5py
 import numpy as np
 import pytest
+from PIL import Image
 
-from tactile_core import accuracy, sensors
+from tactile_core import accuracy, recordings, sensors
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.jobs import solved_gel
+from tactile_core.mechanics.placement import Placement
 from tactile_core.recordings.flags import Flag
+from tactile_core.sensors.calibration_file import load_calibration
+from tactile_core.translation.networks import WEIGHTS_FOLDER
 
 RECORDING = "scenes/press_roll_slide/press_roll_slide.h5"
 needs_scipy = pytest.mark.skipif(importlib.util.find_spec("scipy") is None, reason="needs scipy, of the extra [fem]")
@@ -28,7 +32,6 @@ def arrays(gels, force, center):
 def pressed():
     """A ball of 5 mm pressed into the middle of the gel under 1 N."""
     pytest.importorskip("scipy", reason="contacts are solved with scipy, of the extra [fem]")
-    from tactile_core.mechanics.placement import Placement
     from tactile_core.mechanics.solve import solve
 
     return solve("digit", Sphere(5e-3), Placement(-8e-3, 1e-3), force=1.0)
@@ -63,6 +66,67 @@ def test_a_conversion_solves_the_frames_it_is_asked_for(request, tmp_path):
     # The networks' passes of one frame and of several are equal to a relative 1e-5 (``networks``).
     assert np.allclose(*gels, rtol=0, atol=1e-4 * accuracy.height(gels[1]).max())
     assert not (found["few"]["flags"] & Flag.GEL_NOT_SOLVED).any()
+
+
+MINI = "gelsight_mini"
+
+
+def test_a_contact_found_on_one_gel_is_solved_on_another(pressed):
+    from tactile_core.mechanics.solve import solve
+
+    place = Placement(-8e-3, 1e-3)
+    true = solve(MINI, Sphere(5e-3), place, force=1.0).displacement[None]
+    gel = pressed.displacement
+    center = accuracy.dent_center(gel[None], sensors.digit_surface().rest)[0]
+    beside = [-19e-3, 0]  # on the DIGIT's gel, beyond the other's
+    force = [pressed.force, [0, 0, 0], pressed.force]
+    given = arrays([gel, gel, gel], force, [center, [np.nan, np.nan], beside])
+    given |= {"latent_digit": np.ones((3, 4)), "expected_error_digit": np.ones(3), "error_bound_digit": np.ones(3)}
+    found = solved_gel.solved(given, MINI, "digit")
+    moved = found["displacement_digit"]
+    assert moved.shape == (3, len(sensors.sensor_surface(MINI).rest), 3) and not moved[1:].any()
+    assert accuracy.rms_in_contact(moved[:1], true)[0] < 0.05 * accuracy.height(true).max()
+    assert found["flags"].tolist() == [0, 0, int(Flag.GEL_NOT_SOLVED | Flag.BEYOND_DIGIT)]
+    assert np.isnan(found["expected_error_digit"]).all() and "latent_digit" not in found
+
+
+@pytest.fixture(scope="module")
+def short(request, tmp_path_factory):
+    """30 frames without contact and 4 of the shipped recording's first press, as an NPZ."""
+    pytest.importorskip("scipy", reason="contacts are solved with scipy, of the extra [fem]")
+    whole = recordings.read(request.config.rootpath / RECORDING)
+    path = tmp_path_factory.mktemp("short") / "short.npz"
+    np.savez(path, electrodes=whole.electrodes[[*range(30), *range(74, 82, 2)]])
+    return str(path)
+
+
+def test_every_verb_that_translates_takes_any_gel(short, tmp_path, capsys):
+    """Without networks that lead there, and it is said; all three agree."""
+    assert main(["convert", short, "--to", MINI, "--keep", "displacement,traction", "--out", str(tmp_path / "a")]) == 0
+    said = capsys.readouterr().err
+    assert "no networks lead to the GelSight Mini: its gel is solved under the contacts found on a DIGIT's" in said
+    assert main(["batch", short, "--to", MINI, "--keep", "displacement,traction", "--out", str(tmp_path / "b")]) == 0
+    assert "no networks lead to the GelSight Mini" in capsys.readouterr().err
+    file = next((tmp_path / "b" / "shards").glob("*.h5"))
+    with h5py.File(tmp_path / "a" / "short" / "frames.h5") as whole, h5py.File(file) as shard:
+        for name in (f"displacement_{MINI}", f"traction_{MINI}", "force"):
+            np.testing.assert_array_equal(whole[name][:], shard[name][:], err_msg=name)
+        assert accuracy.height(whole[f"displacement_{MINI}"][-4:]).max(axis=1).min() > 100e-6
+        assert np.isnan(shard[f"expected_error_{MINI}"][:]).all()
+    picture = tmp_path / "now.png"
+    words = ["--play", "--speed", "0", "--to", MINI, "--out", str(picture)]
+    assert main(["watch", short, *words]) == 0
+    camera = load_calibration(None, MINI).camera
+    with Image.open(picture) as shown:
+        assert shown.size == (camera.width, camera.height)
+    assert "no networks lead to the GelSight Mini" in capsys.readouterr().err
+
+
+def test_weights_that_lead_elsewhere_are_refused_unless_the_gel_is_solved(short, tmp_path, capsys):
+    words = ["convert", short, "--to", MINI, "--weights", str(WEIGHTS_FOLDER), "--keep", "", "--frames", "30:31"]
+    assert main([*words, "--out", str(tmp_path / "a")]) == 2
+    assert "networks that translate to gelsight_mini. Train some (docs/extend.md), or" in capsys.readouterr().err
+    assert main([*words, "--gel", "solved", "--out", str(tmp_path / "b")]) == 0
 
 
 def test_a_missing_library_is_named(monkeypatch):

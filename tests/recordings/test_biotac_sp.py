@@ -1,6 +1,7 @@
 """Recordings of a BioTac SP: read and described, never taken for those of a BioTac, nor the reverse."""
 
 import dataclasses
+from pathlib import Path
 
 import fake_tools
 import h5py
@@ -10,7 +11,9 @@ import pytest
 from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.jobs import convert
+from tactile_core.jobs import convert, frame_shard, prepared_signals
+from tactile_core.jobs.engine import inputs, recipes
+from tactile_core.jobs.engine import job as jobs
 from tactile_core.recordings import PrepareOptions, electrode_gains, info
 from tactile_core.recordings.column_map import ColumnMap
 from tactile_core.recordings.readers import each_finger, sensor_of
@@ -100,9 +103,9 @@ def test_nineteen_of_its_columns_are_no_biotac(stem, counts, write):
 
 def test_a_biotac_is_no_biotac_sp(press, in_layout):
     for layout in ("csv_slide", "npz_electrodes"):
-        with pytest.raises(TactileError, match="19 electrodes; expected the 24 electrodes of a BioTac SP"):
+        with pytest.raises(TactileError, match="19 electrodes: a BioTac; expected the 24 electrodes of a BioTac SP"):
             read_sp(in_layout(layout, press))
-    with pytest.raises(TactileError, match="read, sensor: 'digit'; expected biotac or biotac_sp"):
+    with pytest.raises(TactileError, match="sensor 'digit': of kind gel; expected a sensor of kind fluid"):
         recordings.read(in_layout("npz_electrodes", press), sensor="digit")
 
 
@@ -170,7 +173,34 @@ def test_tools_of_it_convert_its_recordings_alone(counts, write, press, in_layou
         convert.convert(f"{grasp}#0", tmp_path / "grasp", convert.Options(), tools)
     alone = dataclasses.replace(tools, answer=Answer(frames_apart=True))
     convert.convert(f"{grasp}#0", tmp_path / "grasp", convert.Options(keep=()), alone)
-    with pytest.raises(TactileError, match="19 electrodes; expected the 24 electrodes of a BioTac SP"):
+    with pytest.raises(TactileError, match="19 electrodes: a BioTac; expected the 24 electrodes of a BioTac SP"):
         convert.convert(in_layout("csv_slide", press), tmp_path / "biotac", convert.Options(), tools)
     with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19 electrodes of a BioTac"):
         convert.convert(slip, tmp_path / "other", convert.Options(), fake_tools.tools())
+
+
+def test_a_job_and_a_live_view_take_its_recordings(counts, write, tmp_path, monkeypatch, capsys):
+    tools = dataclasses.replace(fake_tools.tools(), source="biotac_sp")
+    slip = written(write, SLIP, [*counts[:1]] * 40 + [*(counts[:10] - 200)])
+    recipe = recipes.Translate(["displacement"], "0" * 64, source="biotac_sp")
+    job = jobs.make(inputs.hashed([Path(slip)], lambda done, total: None), recipe, None)
+    jobs.write(tmp_path / "job", job)
+    for folder in (jobs.PREPARED, jobs.SHARDS):
+        (tmp_path / "job" / folder).mkdir(exist_ok=True)
+    assert prepared_signals.make(tmp_path / "job", job, 0) == (50, True)
+    assert frame_shard.make(tmp_path / "job", job, 0, 0, tools)
+    done = convert.convert(slip, tmp_path / "slip", convert.Options(keep=("displacement",)), tools)
+    file = jobs.shard_file(tmp_path / "job", job.inputs[0].name, 0)
+    with h5py.File(file) as shard, h5py.File(done.folder / "frames.h5") as whole:
+        for name in ("electrodes", "displacement_biotac_sp", "flags"):
+            np.testing.assert_array_equal(shard[name][:], whole[name][:], err_msg=name)
+    grasp = written(lambda lines: write(lines, "grasp.csv"), GRASP, [["ball", 1, *row, *row, *row] for row in counts])
+    other = jobs.make(inputs.hashed([Path(grasp)], lambda done, total: None), recipe, None)
+    with pytest.raises(TactileError, match="snapshots, which do not follow each other"):
+        prepared_signals.make(tmp_path / "job", other, 0)
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: tools)
+    words = ["--play", "--speed", "0", "--out", str(tmp_path / "now.png")]
+    assert main(["watch", slip, *words]) == 0
+    said = capsys.readouterr()
+    assert "50 frames: " in said.out and "falls: raw counts of a BioTac SP" in said.err.replace("fall: ", "falls: ")
+    assert main(["watch", slip, "--idle", "0.1", "--out", str(tmp_path / "now.png")]) == 0

@@ -17,7 +17,7 @@ from tactile_core.recordings.flags import Flag
 def pressed(sign: float, *, pdc: bool, frames: int = 400, seed: int = 0, swing: float = 100.0) -> recordings.Recording:
     """Rest, simulated contacts one after another, rest; whole counts of rest 3,300 plus or minus the change."""
     random = np.random.default_rng(seed)
-    contacts = np.load(polarity.shipped(polarity.PATTERNS)).astype(float)
+    contacts = polarity.contact_signals()
     chosen = contacts[random.choice(len(contacts), 8, replace=False)]
     strength = np.clip(np.sin(np.linspace(0, 8 * np.pi, frames - 120)), 0, 1)
     change = np.zeros((frames, 19))

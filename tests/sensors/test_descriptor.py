@@ -153,12 +153,19 @@ def test_an_even_number_of_rows_is_refused(tmp_path):
         descriptor.read(changed(tmp_path, "rim_base = 6", "rim_base = 5", "digit"))
 
 
+def names_one(side):
+    """Whether a side of a comparison is a sensor's name, or `SOURCE`, `TARGET` or `PAIR`."""
+    constant = getattr(side, "id", getattr(side, "attr", ""))  # a name, or the last part of a dotted one
+    literal = isinstance(side, ast.Constant) and side.value in descriptor.names()
+    return literal or constant in ("SOURCE", "TARGET", "PAIR")
+
+
 def compared(path, root=PACKAGE):
-    """Lines of a file that compare something with the name of a sensor that ships."""
+    """Lines of a file that compare something with the name of a sensor that ships, or with a constant for one."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Compare):
             sides = (side for each in (node.left, *node.comparators) for side in getattr(each, "elts", [each]))
-            if any(isinstance(side, ast.Constant) and side.value in descriptor.names() for side in sides):
+            if any(names_one(side) for side in sides):
                 yield f"{path.relative_to(root)}:{node.lineno}"
 
 
@@ -169,5 +176,10 @@ def test_nothing_branches_on_a_sensor_s_name():
 
 def test_a_branch_on_a_name_would_be_found(tmp_path):
     path = tmp_path / "some.py"
-    path.write_text('if sensor == "digit" or sensor not in ("biotac", "other"):\n    pass\n')
-    assert len(list(compared(path, tmp_path))) == 2
+    for line, count in (
+        ('if sensor == "digit" or sensor not in ("biotac", "other"):', 2),
+        ("if sensor != SOURCE or found != {sensors.TARGET}:", 2),
+        ("if sensor != other:", 0),
+    ):
+        path.write_text(f"{line}\n    pass\n")
+        assert len(list(compared(path, tmp_path))) == count, line

@@ -240,7 +240,7 @@ def test_a_sensor_file_comes_back(tmp_path):
     [
         ({"format": "tactile-sensor-9"}, "tactile-sensor-2"),
         ({"format": "tactile-sensor-1"}, "counts that rise where a film thins"),
-        ({"gain": ONES[:18]}, "length"),
+        ({"gain": ONES[:18]}, "18 numbers; expected 19"),
         ({"gain": [0.0, *ONES[1:]]}, r"unit\.gain, E1: 0; expected 0.2 to 5"),
         ({"gain": [*ONES[:18], float("nan")]}, "gain, E19: nan"),
         ({"offset_counts": [1e4, *ZEROS[1:]]}, "offset_counts, E1"),

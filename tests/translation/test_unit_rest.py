@@ -20,7 +20,7 @@ REST = np.linspace(3100.0, 3500.0, 19)
 def held(strength: float, seed: int, *, pdc: bool = True, drift: float = 3.0) -> recordings.Recording:
     """A steady grip of a simulated contact, 2 s, by a unit whose rest drifts a little from recording to recording."""
     random = np.random.default_rng(seed)
-    contacts = np.load(polarity.shipped(polarity.PATTERNS)).astype(float)
+    contacts = polarity.contact_signals()
     contact = contacts[np.argsort(np.abs(contacts).max(axis=1))[-40 + seed % 30]]
     level = REST + drift * random.standard_normal(19) + strength * contact
     pressure = 1000 + 200 * strength + random.normal(0, 0.7, 200)

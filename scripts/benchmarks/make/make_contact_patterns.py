@@ -1,4 +1,4 @@
-"""Make tactile_core/data/contact_patterns.npy: the electrodes' response to simulated contacts, which shows polarities.
+"""Make the BioTac's contact_patterns.npy: the electrodes' response to simulated contacts, which shows polarities.
 
     python scripts/benchmarks/make/make_contact_patterns.py [WEIGHTS]     of the weights that ship, or of others
 
@@ -14,8 +14,7 @@ import sys
 import numpy as np
 
 from tactile_core.files import atomic
-from tactile_core.files.shipped import shipped
-from tactile_core.recordings.polarity import PATTERNS
+from tactile_core.sensors import SOURCE, describe
 from tactile_core.translation import networks, reference_signals
 
 
@@ -24,7 +23,8 @@ def main(arguments: list[str]) -> int:
     folder = arguments[0] if arguments else networks.WEIGHTS_FOLDER
     content = io.BytesIO()
     np.save(content, reference_signals.read(folder).typical.astype(np.float16))
-    atomic.write_bytes(shipped(PATTERNS), content.getvalue())
+    found = describe(SOURCE)
+    atomic.write_bytes(found.folder / found.electrodes.contacts, content.getvalue())
     return 0
 
 

@@ -16,6 +16,7 @@ from .common import (
     prepare_arguments,
     prepare_words,
     progress_argument,
+    target_argument,
 )
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ RECIPE = (  # option, its value where it is not given
     *((name, None) for name in ("kind", "counts_per_unit", "smooth", "columns")),
     *(("tare", "auto"), ("no_drift", False), ("polarity", "auto")),
     *(("frames_apart", False), ("answer", "likely"), ("mount_shift", None), ("samples", 0)),
-    ("gel", "translated"),
+    *(("gel", "translated"), ("target", "digit")),
 )
 
 
@@ -59,6 +60,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         metavar="WORDS",
         help="out of latent,displacement,height,image,traction,marker_motion (default: latent,displacement)",
     )
+    target_argument(verb)
     verb.add_argument("--shard-frames", type=int, metavar="N", help="frames a shard (default: 1000)")
     answer_arguments(verb)
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
@@ -131,38 +133,42 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
 
 def _recipe(options: argparse.Namespace) -> Translate:
     """Return the recipe that the options describe."""
-    from ...jobs import results
+    from ...jobs import convert, results
     from ...jobs.engine.inputs import unit_hash
     from ...jobs.engine.recipes import MAX_SHARD_FRAMES, SHARD_FRAMES, Prepare, Translate
+    from ...jobs.frame_pass import describe_gel
     from ...pictures.mitsuba.variant import variant_for
     from ...recordings import electrode_gains
-    from ...translation import translate
+    from ...sensors.calibration_file import load_calibration
     from ...translation.answer import parse_answer
 
     keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
     prepare = Prepare(**prepare_words(options))
     prepare.options().check()
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
-    sha256 = translate.load_translator(options.weights).sha256
+    network, solves = convert.load_networks(options.weights, None, options.gel, options.target, None)
     frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
     if frames > MAX_SHARD_FRAMES:
         raise TactileError("--shard-frames", str(frames), f"1 to {MAX_SHARD_FRAMES}")
-    if options.gel == results.SOLVED:
+    if solves:
         from ...jobs import solved_gel
 
         solved_gel.check_installed()
+    gel = load_calibration(options.calibration, options.target)
+    for sentence in describe_gel(options.target, network.target):
+        say(sentence)
     unit = "" if options.calibration is None else unit_hash(Path(options.calibration))
     preset = options.preset or "fast"
     if options.preset is not None and "image" not in keep:
         raise TactileError("--preset", preset, "--keep image", "Keep the pictures that it makes")
     if "marker_motion" in keep:
         from ...pictures.marker_field import MarkerField
-        from ...sensors.calibration_file import load_calibration
 
-        MarkerField(load_calibration(options.calibration))  # refused here where the unit has no dots
+        MarkerField(gel)  # refused here where the unit has no dots
     pictures = unit, preset, variant_for(preset)
     answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
-    return Translate(list(keep), sha256, frames, prepare, sensor, *pictures, answer, options.gel)
+    pair = network.source, options.target
+    return Translate(list(keep), network.sha256, frames, prepare, sensor, *pictures, answer, options.gel, *pair)
 
 
 def _status(folder: Path, job: Job) -> int:

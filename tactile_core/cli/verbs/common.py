@@ -117,8 +117,20 @@ def answer_arguments(verb: argparse.ArgumentParser) -> None:
         "--gel",
         choices=("translated", "solved"),
         default="translated",
-        help="the DIGIT's gel as the networks translate it, or by contact mechanics: a ball of the dent's curvature at"
+        help="the gel as the networks translate it, or by contact mechanics: a ball of the dent's curvature at"
         " the found place and force, some 10 ms a frame; needs the extra [fem] (default: translated)",
+    )
+
+
+def target_argument(verb: argparse.ArgumentParser) -> None:
+    """Add ``--to``."""
+    verb.add_argument(
+        "--to",
+        dest="target",
+        default="digit",
+        metavar="SENSOR",
+        help="gel to translate to, any with a descriptor; one that no networks lead to is solved by contact mechanics"
+        " (default: %(default)s)",
     )
 
 

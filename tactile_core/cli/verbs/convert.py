@@ -16,6 +16,7 @@ from .common import (
     prepare_arguments,
     prepare_words,
     progress_argument,
+    target_argument,
 )
 
 BRIEF = "recordings to DIGIT pictures"
@@ -73,12 +74,10 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
     prepare_arguments(verb)
     verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
-    verb.add_argument(
-        "--to", dest="target", default="digit", metavar="SENSOR", help="gel to translate to (default: %(default)s)"
-    )
+    target_argument(verb)
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
     verb.add_argument(
-        "--calibration", metavar="FILE", help="DIGIT that is drawn, by `tactile calibrate`, instead of the shipped one"
+        "--calibration", metavar="FILE", help="unit that is drawn, by `tactile calibrate`, instead of the shipped one"
     )
     answer_arguments(verb)
     error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import say, tell
-from .common import NOTHING, columns_argument, columns_of, polarity_argument
+from .common import NOTHING, columns_argument, columns_of, polarity_argument, target_argument
 
 if TYPE_CHECKING:
     import numpy as np
@@ -80,6 +80,10 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         help="frames without contact, of the first 10 s, that give the resting reading (default: found automatically)",
     )
     verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
+    target_argument(verb)
+    verb.add_argument(
+        "--calibration", metavar="FILE", help="unit that is drawn, by `tactile calibrate`, instead of the shipped one"
+    )
     verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
 
 
@@ -102,9 +106,13 @@ def run(options: argparse.Namespace) -> int:
     columns = columns_of(options)
     refuse_other(path, container, columns)
     speed = 1.0 if options.speed is None else options.speed
-    source = _played(path, speed, columns) if playing else _followed(options, columns)
+    tools = load_tools(options.weights, options.calibration, target=options.target, source=None)
+    source = _played(path, speed, columns, tools.source) if playing else _followed(options, columns, tools.source)
     tare = None if options.tare == "auto" else options.tare
-    view = live.View(load_tools(options.weights), options.rate, options.polarity, tare, _unit(options.sensor, path))
+    unit = _unit(options.sensor, path, tools.source)
+    view = live.View(tools, options.rate, options.polarity, tare, unit)
+    for sentence in tools.describe_gel():
+        say(sentence)
     with contextlib.ExitStack() as opened:
         camera = None
         if options.camera is not None:
@@ -159,21 +167,21 @@ def _check(options: argparse.Namespace) -> None:
             raise TactileError(options.rosbag_play, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
 
 
-def _unit(sensor: str | None, path: str) -> ElectrodeGains | None:
+def _unit(sensor: str | None, path: str, of: str) -> ElectrodeGains | None:
     """Return the unit of the sensor file that made this recording; None without a file."""
     if sensor is None:
         return None
     from ...recordings import electrode_gains
     from ...recordings.fingers import split
 
-    return electrode_gains.read(sensor).gains_for(path, split(path)[1], sensor)
+    return electrode_gains.read(sensor).gains_for(path, split(path)[1], sensor, of)
 
 
-def _followed(options: argparse.Namespace, columns: ColumnMap | None) -> Rows:
+def _followed(options: argparse.Namespace, columns: ColumnMap | None, sensor: str) -> Rows:
     """Yield new rows of a growing file and their arrival time; None from time to time while there are none."""
     from ...jobs.live import Growing
 
-    growing, last, bad = Growing(options.recording, columns), time.perf_counter(), 0
+    growing, last, bad = Growing(options.recording, columns, sensor), time.perf_counter(), 0
     while options.idle is None or time.perf_counter() - last < options.idle:
         came = time.perf_counter()
         rows = growing.poll()
@@ -187,12 +195,12 @@ def _followed(options: argparse.Namespace, columns: ColumnMap | None) -> Rows:
         yield rows, came
 
 
-def _played(path: str, speed: float, columns: ColumnMap | None) -> Rows:
+def _played(path: str, speed: float, columns: ColumnMap | None, sensor: str) -> Rows:
     """The rows of a finished recording when their time has come, a part of it in memory; speed 0: one after another."""
     from ...recordings.chunks import read_parts
 
     began = time.perf_counter()
-    for part in read_parts(path, columns):
+    for part in read_parts(path, columns, sensor):
         recording, done = part.recording, part.repeated
         while done < len(recording):
             ahead = recording.time[done] / speed - (time.perf_counter() - began) if speed else 0.0

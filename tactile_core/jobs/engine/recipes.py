@@ -11,6 +11,7 @@ from ...files.version import __version__
 from ...recordings import PrepareOptions
 from ...recordings.column_map import ColumnMap
 from ...recordings.electrode_gains import SensorFile
+from ...sensors import SOURCE, TARGET
 from ...translation.answer import Answer
 from ..results import TRANSLATED, Gel
 
@@ -41,7 +42,8 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames a shard
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
-    answer : which contact a frame is answered by; gel : the networks', or the contact solved on the DIGIT
+    answer : which contact a frame is answered by; gel : the networks', or the contact solved on the target
+    source, target : the sensors
     """
 
     keep: list[str]
@@ -54,6 +56,8 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     variant: str = ""
     answer: Answer = Answer()
     gel: Gel = TRANSLATED
+    source: str = SOURCE
+    target: str = TARGET
     version: str = __version__
 
 
@@ -68,8 +72,8 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
     surfaces: list[str]
     files: list[str]
     electrodes: Literal["sheet", "gap"] = "sheet"
-    source: str = "biotac"
-    target: str = "digit"
+    source: str = SOURCE
+    target: str = TARGET
     version: str = __version__
 
 

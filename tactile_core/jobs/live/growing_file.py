@@ -11,9 +11,11 @@ from ...errors import TactileError
 from ...files import outside
 from ...recordings.assemble import MAX_BAD_SHARE, BadRows
 from ...recordings.column_map import ColumnMap
+from ...recordings.fingers import split
 from ...recordings.readers import table_reader
 from ...recordings.recording import Recording
 from ...recordings.table import Header, read_lines
+from ...sensors import SOURCE
 
 MOST = 2**24  # bytes taken at a time, so that a file that is long already costs bounded memory
 MAX_LINE = 2**20
@@ -23,9 +25,13 @@ FEW = 20  # rows, 0.2 s, of which any number may be bad at once: a program that 
 class Growing:
     """A CSV recording that another program is writing, in any of the text layouts."""
 
-    def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None) -> None:
-        """Raise TactileError where there is no such file; columns : as of `recordings.read`."""
-        self._path, self._columns = Path(path), columns
+    def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None, sensor: str = SOURCE) -> None:
+        """Raise TactileError where there is no such file; columns, sensor : as of `recordings.read`.
+
+        ``path#1`` follows finger 1 of a file of several.
+        """
+        file, self._finger = split(os.fspath(path))
+        self._path, self._columns, self._sensor = Path(file), columns, sensor
         self._place, self._rest, self._lines = 0, b"", 0
         self._header: Header | None = None
         self.rows, self.bad = 0, 0  # that came; of them passed over
@@ -53,7 +59,7 @@ class Growing:
             return None
         self.rows += len(table.lines)
         try:
-            return table_reader(str(self._path), table.header, self._columns)(table)
+            return table_reader(str(self._path), table.header, self._columns, self._sensor, self._finger)(table)
         except BadRows:
             self.bad += len(table.lines)
             if self.bad > max(FEW, MAX_BAD_SHARE * self.rows):

@@ -10,8 +10,8 @@ from ...recordings.flags import Flag
 from ...recordings.polarity import AUTO, TOUCHING, Polarity, polarity_of
 from ...recordings.rest_level import find_quiet, level, tare_frames, window_frames
 from ...recordings.signal_kind import detect
-from ...recordings.signals import Rest, Signals
-from ...sensors import ELECTRODES, SAMPLE_RATE
+from ...recordings.signals import Rest, Signals, polarity_of_sensor
+from ...sensors import SAMPLE_RATE, SOURCE, contacts_of, electrode_count
 from ...sensors.fluid_sensor import FALLS, POLARITIES
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ class LiveSignals:
     rate : Hz; polarity : "falls", "rises" or "auto", which is decided by the first contacts, and "falls" until then
     tare : frames of the first LONGEST s to take rest from, "A:B"; "none" takes the file's own zero
     unit : gains and offsets to take off, and its rest, which is taken where the first window is not calm near it
+    sensor : whose counts they are
 
     Raises TactileError for a tare of other frames.
     """
@@ -37,11 +38,12 @@ class LiveSignals:
         polarity: str = AUTO,
         tare: str | None = None,
         unit: ElectrodeGains | None = None,
+        sensor: str = SOURCE,
     ) -> None:
-        self._rate, self._unit = rate, unit
+        self._rate, self._unit, self._sensor = rate, unit, sensor
         self._zero = tare == "none"
         self._tare = None if tare is None or self._zero else tare_frames(tare, round(LONGEST * rate))
-        self._seen, self._pdc, self._looked_at = np.empty((0, 19)), np.empty(0), 0
+        self._seen, self._pdc, self._looked_at = np.empty((0, electrode_count(sensor))), np.empty(0), 0
         self.polarity = _stated_polarity(polarity, "as given")
         self.rest: np.ndarray | None = None
         self.kind, self.found = "raw", ""
@@ -76,7 +78,7 @@ class LiveSignals:
             return
         self.kind, _ = detect(self._seen)
         if self._zero:
-            self.rest, self.found = np.zeros(ELECTRODES), "the file's own zero, as asked for"
+            self.rest, self.found = np.zeros(self._seen.shape[1]), "the file's own zero, as asked for"
             return
         quiet = find_quiet(self._seen, None, self._rate, self.kind)
         known = None if self._unit is None or self.kind != "raw" else self._unit.rest()
@@ -99,23 +101,28 @@ class LiveSignals:
         """Decide the polarity from the frames so far, repeated from time to time; once it is sure it stays."""
         if self.kind == "rectified":
             self.polarity = Polarity(FALLS, "the sign is lost", True)
-        if self.polarity.sure or len(self._seen) < self._looked_at + AGAIN:
-            return
+        if not self.polarity.sure and contacts_of(self._sensor) is None:
+            self.polarity = polarity_of_sensor(self._sensor, self.kind)
+        elif not self.polarity.sure and len(self._seen) >= self._looked_at + AGAIN:
+            self._look()
+
+    def _look(self) -> None:
+        """Look at what the frames show."""
         self._looked_at = len(self._seen)
         change = self._seen - self.rest
         still = np.sqrt(np.square(change).sum(axis=1)) < TOUCHING
         pdc = self._pdc if np.isfinite(self._pdc).all() else None
-        self.polarity = polarity_of(change, still, self._seen, pdc)
+        self.polarity = polarity_of(change, still, self._seen, pdc, sensor=self._sensor)
 
     def signals(self, electrodes: np.ndarray) -> Signals:
         """Return the signals of frames (T, 19) counts; call when rest is known."""
         flags = Flag.RECTIFIED if self.kind == "rectified" else 0
         count = len(electrodes)
         signals = Signals(
-            change=self.polarity.sign * (electrodes - self.rest), rest=self.rest, drift=np.zeros(19),
+            change=self.polarity.sign * (electrodes - self.rest), rest=self.rest, drift=np.zeros_like(self.rest),
             electrodes=electrodes, kind=self.kind,
             quiet=np.zeros(count, bool), flags=np.full(count, flags, np.uint16), pdc=np.full(count, np.nan),
-            warnings=(), report={},
+            warnings=(), report={}, sensor=self._sensor,
         )  # fmt: skip
         if self._unit is None:
             return signals

@@ -57,7 +57,7 @@ class View:
         unit: ElectrodeGains | None = None,
     ) -> None:
         """Take the recording's rate, Hz, and what `LiveSignals` takes."""
-        self._tools, self._signals, self._rate = tools, LiveSignals(rate, polarity, tare, unit), rate
+        self._tools, self._signals, self._rate = tools, LiveSignals(rate, polarity, tare, unit, tools.source), rate
         self._follow = Follower()
         self.frames, self.passed = 0, 0
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
@@ -80,9 +80,10 @@ class View:
             return None
         self.passed += len(rows) - 1
         translation = self._translation(self._signals.signals(newest(rows)[None]))
+        gel = self._tools.gel_of(translation)
         with folds_counted():  # a line for each such picture would hide the latencies
-            heights = self._tools.height_map(translation.displacement_digit)
-        picture = self._tools.shade(heights[0])
+            heights = self._tools.height_map(gel)
+        picture = self._tools.draw(heights[0], gel[0])
         latency, work = time.perf_counter() - came, time.thread_time() - began
         shown = Shown(self.frames - 1, picture, translation.force[0], latency, work)
         self.latencies.append((latency, work))

@@ -85,7 +85,8 @@ def finished(finished_once, tmp_path) -> tuple[Path, jobs.Job]:
 @pytest.fixture
 def command(monkeypatch, capsys):
     """command("day1", "--out", "job") -> status and output of `tactile batch` in this process, with fake workers."""
-    monkeypatch.setattr(translate, "load_translator", lambda weights=None: SimpleNamespace(sha256="0" * 64))
+    networks = SimpleNamespace(sha256="0" * 64, source="biotac", target="digit")
+    monkeypatch.setattr(translate, "load_translator", lambda *words: networks)
     monkeypatch.setattr(local, "WORKER_COMMAND", COMMAND)
 
     def call(*words):

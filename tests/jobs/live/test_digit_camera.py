@@ -58,7 +58,7 @@ def test_a_lying_picture_is_turned_upright_and_black_when_the_camera_is_gone(vid
 
 
 def test_watch_goes_on_when_the_camera_vanishes_and_says_so_once(video, slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     path = video(1)
     opened = live.DigitCamera(path)
     wait_for(lambda: opened.lost)

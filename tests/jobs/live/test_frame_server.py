@@ -88,7 +88,7 @@ def test_watch_publishes_every_picture(slide_csv, monkeypatch, capsys):
             published.append(None)
 
     monkeypatch.setattr(live, "FrameServer", Server)
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     assert main(["watch", str(slide_csv(frames=90)), "--play", "--speed", "0", "--serve", "7311"]) == 0
     assert "serving frames at tcp://127.0.0.1:7311" in capsys.readouterr().err
     *frames, end = published

@@ -94,7 +94,7 @@ def test_another_file_of_the_same_name_is_told(slide_csv, tmp_path):
 
 
 def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     electrodes = recordings.read(slide_csv(frames=40)).electrodes
     np.savez(tmp_path / "gap.npz", electrodes=electrodes, time=np.r_[0.0, 1e6 + np.arange(39) / 100])
     monkeypatch.setattr(watch, "time", clock := Clock())
@@ -122,7 +122,7 @@ def test_without_a_quiet_part_rest_is_guessed_in_the_end():
 
 
 def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     monkeypatch.setattr(watch, "time", Clock())
     for more in (["--idle", "0.2"], ["--play"], ["--play", "--speed", "4"], ["--play", "--speed", "0"]):
         out = tmp_path / "now.png"
@@ -163,7 +163,7 @@ def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
 
 
 def test_watch_takes_a_map_a_tare_and_a_sensor(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     monkeypatch.setattr(watch, "time", Clock())
     own, columns, sensor = tmp_path / "own.csv", tmp_path / "map.toml", tmp_path / "sensor.toml"
     own.write_text(slide_csv(frames=90).read_text(encoding="utf-8").replace("ele", "taxel "), encoding="utf-8")
@@ -178,7 +178,7 @@ def test_watch_takes_a_map_a_tare_and_a_sensor(slide_csv, tmp_path, monkeypatch,
 
 
 def test_watch_without_a_display_says_what_to_do(slide_csv, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     monkeypatch.setenv("MPLBACKEND", "agg")
     import matplotlib
 
@@ -202,7 +202,7 @@ def test_a_window_that_is_closed_ends_the_watch(slide_csv, monkeypatch, capsys):
             pyplot.close(window)
         return exists(window)
 
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     monkeypatch.setattr(pyplot, "get_backend", lambda: "a window's")
     monkeypatch.setattr(pyplot, "show", lambda block: shown.append(block))
     monkeypatch.setattr(pyplot, "fignum_exists", look)
@@ -215,7 +215,7 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
     pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
     import bags
 
-    monkeypatch.setattr(convert, "load_tools", lambda weights=None, answer=None: fake_tools.tools())
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     electrodes = 3000 + np.random.default_rng(2).normal(0, 1, (60, 19))
     still = np.full(60, 2000.0)
     press = SimpleNamespace(time=np.arange(60) / 100, electrodes=electrodes, pdc=still, tac=still, tdc=still)
@@ -248,7 +248,7 @@ def test_words_that_do_not_go_together_are_told(words, said, capsys):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_polarity_is_found_by_pressure_and_assumed_until_then(sign):
-    contact = np.load(polarity.shipped(polarity.PATTERNS)).astype(float)[7]
+    contact = polarity.contact_signals()[7]
     strength = np.r_[np.zeros(60), np.clip(np.sin(np.linspace(0, 9, 200)), 0, 1)]
     noise = np.random.default_rng(0).normal(0, 1, (260, 19))
     electrodes, pdc = 3300 + sign * strength[:, None] * contact + noise, 1000 + 100 * strength
