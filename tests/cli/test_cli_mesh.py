@@ -159,6 +159,12 @@ def test_a_tilt_that_presses_from_elsewhere_is_refused(tilt, mesh):
     assert status == 2 and "--tilt-deg" in err and "-45 to 45" in err
 
 
+def test_a_press_by_a_mesh_is_led_to_a_scene(mesh, tmp_path):
+    (tmp_path / "star.stl").write_bytes(b"\xff" * 90)
+    status, _, err = mesh("digit", "--press", "star.stl", "--depth-mm", "0.3", "--out", "m.ply")
+    assert status == 2 and "star.stl: a mesh file; expected sphere, cylinder, or a scene" in err and "user_mesh" in err
+
+
 @pytest.mark.parametrize("option", ["--frames", "--press"])
 def test_an_empty_value_is_not_taken_for_none(option, mesh):
     status, _, err = mesh("digit", option, "", "--out", "m.ply")

@@ -122,12 +122,16 @@ def _indenter(options: argparse.Namespace) -> Indenter:
 
 
 def _of_scene(options: argparse.Namespace) -> Indenter:
+    from ...geometry.indenters.mesh_file import SUFFIXES
     from ...simulation.scene import load_scene
 
     if options.diameter is not None:
         raise TactileError("--diameter", "given with a scene", "--press sphere or --press cylinder")
     if not os.path.exists(options.press):
         raise TactileError("--press", repr(options.press), "sphere, cylinder, or a scene file that exists")
+    if os.path.splitext(options.press)[1].lower() in SUFFIXES:
+        advice = 'Write a scene with kind = "mesh", as `tactile scenes copy user_mesh` has one'
+        raise TactileError(options.press, "a mesh file", "sphere, cylinder, or a scene", advice)
     specs = {spec.name: spec for spec in load_scene(options.press)[0].indenters}
     name = next(iter(specs)) if options.indenter is None else options.indenter
     if name not in specs:

@@ -58,7 +58,7 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
         try:
             yield
         except BaseException:  # Ctrl-C, too; raised again
-            if made and not jobs.exists(folder):
+            if made and not (folder / jobs.PREPARED).exists():
                 _unmake(folder)
             raise
         finally:
@@ -67,8 +67,8 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
 
 def _unmake(folder: Path) -> None:
-    """Remove a folder that holds nothing but our locks, after a job that was refused."""
-    if all(path.name.startswith(lock.FILE) for path in folder.iterdir()):
+    """Remove a folder that holds nothing but our locks and a job that never began, after that was refused."""
+    if all(path.name.startswith((lock.FILE, jobs.FILE)) for path in folder.iterdir()):
         with contextlib.suppress(OSError):
             for path in folder.iterdir():
                 path.unlink()
@@ -97,9 +97,9 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
 def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:
     """Run like `run`; raises OSError."""
     work = _Work(folder, job, part)
-    for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
-        (folder / name).mkdir(exist_ok=True)
-    with place:
+    with place:  # which may be refused: the folders say that the job has begun
+        for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
+            (folder / name).mkdir(exist_ok=True)
         for task in work.first_tasks():
             place.submit(task)
         for task, reply in place.results(work.awaited):

@@ -174,6 +174,18 @@ def test_a_scheduler_elsewhere_without_tls_has_to_be_asked_for(address, tmp_path
         Cluster(tmp_path, fine)
 
 
+@pytest.mark.parametrize("address", ["tcp://10.0.0.1:8786", "tls://127.0.0.1:1"], ids=["without TLS", "no answer"])
+def test_a_refused_cluster_leaves_no_job(address, tmp_path, monkeypatch):
+    monkeypatch.setattr(dask_cluster, "wait", lambda: 0.1)
+    np.savez(tmp_path / "heights.npz", height_map=np.zeros((60, 8, 6)))
+    asked = Options(preset="fast")
+    with pytest.raises(TactileError, match=address):
+        render_in_parts(
+            tmp_path / "heights.npz", tmp_path / "out", asked, lambda folder: Cluster(folder, address), print
+        )
+    assert [each.name for each in tmp_path.iterdir()] == ["heights.npz"]
+
+
 @pytest.mark.parametrize("insecure", [False, True])
 def test_a_queue_s_scheduler_speaks_tls_and_keeps_its_dashboard_to_itself(insecure, tmp_path, monkeypatch):
     pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
