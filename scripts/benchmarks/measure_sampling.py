@@ -51,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     rows = printed(as_rows(found))
     if not options.quick:
         how = "scripts/benchmarks/measure_sampling.py: heights between nodes, full-tier presses of five indenters"
-        atomic.write_json(TABLE, {"how": how, "versions": provenance.versions(), **found})
+        atomic.write_json(TABLE, {"how": how, "gel": sensors.TARGET, "versions": provenance.versions(), **found})
     return finished(rows, options.json)
 
 

@@ -15,7 +15,7 @@ from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.stopwatch import Stopwatch
 from ..sensors import SOURCE, TARGET
-from . import results
+from . import results, sampling_error
 from .frame_pass import FramePass, Solver, Tools
 from .frame_range import frames_text, select
 from .results import SOLVED, TRANSLATED, Gel
@@ -140,6 +140,8 @@ def convert(
     from ..recordings import electrode_gains
     from ..recordings.fingers import split
 
+    if options.error is not None and options.error.um is not None:
+        sampling_error.check_gel(tools.target)
     clock = Stopwatch()
     with clock.stage("read"):
         columns = None if options.prepare is None else options.prepare.columns
@@ -184,8 +186,6 @@ def _added(options: Options, made: FramePass) -> str:
     """Describe the toolkit's own error in displacements or heights; raises TactileError for more than is allowed."""
     if options.error is None or options.error.um is None:
         return ""
-    from . import sampling_error
-
     return sampling_error.check(options.error.um, made.share if {"height", "image"} & set(options.keep) else None)
 
 

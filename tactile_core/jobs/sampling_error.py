@@ -10,14 +10,14 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.shipped import shipped
-from ..sensors import TARGET, shape_of
+from ..sensors import TARGET, shape_of, title
 
 TABLE = shipped("sampling.json")
 
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Read the results of ``scripts/benchmarks/measure_sampling.py``; bins of depth over thickness, m."""
+    """Read the results of ``scripts/benchmarks/measure_sampling.py``; bins of depth over thickness, m; of one gel."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
@@ -37,6 +37,14 @@ def _bin_of(share: float) -> dict[str, float]:
 def rounding() -> float:
     """Return the largest change, um, that float32 makes in a translated gel."""
     return 1e6 * measured()["float32_m"]
+
+
+def check_gel(gel: str) -> None:
+    """Raise TactileError for a gel on which the error was not measured."""
+    known = measured()["gel"]
+    if gel != known:
+        found = f"a bound in um on a {title(gel)}, where heights between nodes were not measured"
+        raise TactileError("--error", found, f"one on a {title(known)}, or one in levels alone", "Leave out the um")
 
 
 def check(bound: float, share: float | None) -> str:
