@@ -30,6 +30,7 @@ OF_RECORDING = results.KEEPABLE
 # ``compliance.build`` asks for, and the size of the files.
 BUILD_S, BUILD_MB, MATRICES_MB = {"biotac": 42.0, "digit": 18.0}, 2200.0, {"biotac": 342.0, "digit": 151.0}
 
+NETWORKS = "signals to skin to gel; force, pressure, expected error"  # what a translation runs, in words
 TRACTION_MS, TRACTION_KB = 1.5, 0.7  # a frame of the shipped recording, measured on one core
 # Of memory more than the fast tier's, peak of the process (measured: scenes/press on the DIGIT, 147 contacts).
 TIER_MB = {"fast": 0.0, "full": 650.0, "reference": 3100.0}
@@ -210,8 +211,7 @@ def _contacts(sensor: str, choice: Any, contacts: int, rough: bool, kept: int) -
 
 def _translation(frames: int, keep: str, verb: str) -> list[Part]:
     part = _part(f"convert_{keep}")
-    nets = ", ".join(("SVB", "S2MPN", "MVB", "M2MPN", "MVD", "force", "pressure", "error"))
-    extent = f"{frames} frames; {nets}; surfaces {' and '.join(network_sizes.SURFACES)}; contact sheet"
+    extent = f"{frames} frames; {NETWORKS}; surfaces {' and '.join(network_sizes.SURFACES)}; contact sheet"
     seconds = part["start"] + part["ms"] * frames / 1e3
     return [Part("networks", verb, extent, seconds, part["mb"], part["kb"] * frames / 1e3)]
 

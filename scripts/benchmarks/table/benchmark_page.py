@@ -38,7 +38,8 @@ losses and rates, and as many passes over the data as about the CPU time of our 
 networks in place of 300. So the rows tell what a budget buys, not how far those networks come in hours. Their times
 above are those of a lean rewrite (sparse matrices, Clenshaw); ACROSS's own classes, which are no part of this
 project, took 183 to 246 ms a frame on such a machine, as reported to us. Errors: um rms over moving nodes of the test
-contacts, solved by the full tier.
+contacts, solved by the full tier. MVB and MVD code a mesh of the BioTac and of the DIGIT and
+decode it (autoencoders), S2MPN takes signals to the BioTac's code, M2MPN that to the DIGIT's; chain is all of them.
 
 | step | ACROSS's shapes | ours | baseline |
 |---|---|---|---|
