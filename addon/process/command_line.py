@@ -32,11 +32,15 @@ def main(arguments: list[str]) -> int:
     if not inputs:
         print("tactile: error: nothing to do: no recording, scene or .blend there", file=sys.stderr)
         return 1
-    failed = []
+    failed, made = [], {}
     for path in inputs:
         work = VERBS[options.verb] if options.verb != "batch" else _for(path)
         try:
             folder = _folder(options.out, path)
+            first = made.setdefault(str(folder).casefold(), path)  # macOS and Windows fold case in file names
+            if first != path:
+                advice = "Rename one, or convert them into different --out folders"
+                raise TactileError(folder, f"is the result of {first}", "one name for each result folder", advice)
             work(path, folder, options)
             print(folder)
         except (TactileError, RuntimeError, OSError) as error:  # Blender's operators raise RuntimeError

@@ -51,6 +51,15 @@ def test_an_older_result_is_kept_unless_told(run, slide_csv, tmp_path, capfd):
     assert run("convert", path, "--out", tmp_path / "out", "--frames", "60:62", "--overwrite") == 0
 
 
+def test_a_second_input_of_the_same_name_overwrites_nothing(run, slide_csv, tmp_path, capfd):
+    for name in "ab":
+        (tmp_path / name).mkdir()
+    paths = [slide_csv(folder=tmp_path / name) for name in "ab"]
+    assert run("convert", *paths, "--out", tmp_path / "out", "--frames", "60:62", "--overwrite") == 1
+    said = capfd.readouterr().err
+    assert f"{tmp_path / 'out' / 'touch'}: is the result of {paths[0]}" in said and "1 of 2 failed" in said
+
+
 def test_nothing_to_do_is_an_error(run, tmp_path):
     assert run("batch", tmp_path, "--out", tmp_path / "out") == 1
 
