@@ -290,7 +290,7 @@ def test_an_interrupted_run_leaves_nothing_and_a_killed_one_is_cleared_by_the_ne
 def sampled(monkeypatch):
     """Heights between nodes add 2 um to 20 % of the thickness, 3 um deeper; rounding 0.001 um."""
     bins = [{"depth_share_to": 0.2, "rms_95_m": 2e-6}, {"depth_share_to": 0.6, "rms_95_m": 3e-6}]
-    monkeypatch.setattr(sampling_error, "measured", lambda: {"bins": bins, "float32_m": 1e-9})
+    monkeypatch.setattr(sampling_error, "measured", lambda: {"bins": bins, "float32_m": 1e-9, "gel": "digit"})
 
 
 def test_heights_are_as_exact_as_they_are(sampled):
