@@ -10,6 +10,7 @@ what each may load are in ``CASES``; tests/scripts/test_profile_verbs.py runs th
 from __future__ import annotations
 
 import dataclasses
+import importlib.util
 import io
 import json
 import os
@@ -81,12 +82,15 @@ class Case(NamedTuple):
 
 
 SOLVING = "numpy h5py msgspec scipy"
+WATCHING = (
+    "numpy PIL" if importlib.util.find_spec("deflate") is None else "numpy"
+)  # libdeflate packs PNG without Pillow
 BALL = "--press sphere --diameter 7 --depth-mm 0.3"
 CASES = (
     Case("help", "--help"),
     Case("info", "info {}/touch.csv", "numpy"),
     Case("convert", "convert {}/touch.csv --out {}/converted --frames :10", "numpy h5py msgspec PIL matplotlib"),
-    Case("watch", "watch {}/touch.csv --out {}/now.png --idle 0.1", "numpy PIL"),
+    Case("watch", "watch {}/touch.csv --out {}/now.png --idle 0.1", WATCHING),
     Case("batch", "batch {}/touch.csv --out {}/job", "numpy h5py msgspec"),
     Case("export", "export {}/job --to npz --out {}/exported", "numpy h5py msgspec"),
     Case("adapt", f"adapt {RECORDING} --out {{}}/sensor.toml", "numpy h5py msgspec"),

@@ -71,7 +71,7 @@ def _contacts(moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str)
     surface = sensors.sensor_surface(gel)
     rest, normals, patches = surface.rest, node_normals(surface.rest, surface.faces), contact_patch(moved, surface)
     deepest = np.einsum("tni,ni->tn", moved, normals).argmin(axis=1)
-    for frame in np.flatnonzero(np.isfinite(center[:, 0]) & (size > 0)):
+    for frame in map(int, np.flatnonzero(np.isfinite(center[:, 0]) & (size > 0))):
         x, z = map(float, center[frame])
         node = deepest[frame]
         radius = patch_radius((rest + moved[frame])[patches[frame]], OUTWARD)

@@ -33,9 +33,9 @@ def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
     """Translate some frames."""
     recipe = job.recipe
-    unit = (job.calibration, recipe.calibration, recipe.preset, recipe.variant, recipe.answer, recipe.gel)
-    unit += recipe.source, recipe.target
-    return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit))
+    unit = job.calibration, recipe.calibration, recipe.preset, recipe.variant
+    way = recipe.answer, recipe.gel, recipe.source, recipe.target
+    return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit, *way))
 
 
 def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
