@@ -82,9 +82,8 @@ class Case(NamedTuple):
 
 
 SOLVING = "numpy h5py msgspec scipy"
-WATCHING = (
-    "numpy PIL" if importlib.util.find_spec("deflate") is None else "numpy"
-)  # libdeflate packs PNG without Pillow
+# Libdeflate packs PNG without Pillow.
+WATCHING = "numpy PIL" if importlib.util.find_spec("deflate") is None else "numpy"
 BALL = "--press sphere --diameter 7 --depth-mm 0.3"
 CASES = (
     Case("help", "--help"),
