@@ -6,6 +6,9 @@ import pytest
 
 from tactile_core import sensors
 from tactile_core.jobs.contact_sheet import Contents, choose_frames, contact_sheet
+from tactile_core.jobs.sheet_figure import CAPTION_LINE, FOOT, MOST_CAPTION_LINES, SheetFigure
+from tactile_core.recordings.flags import Flag
+from tactile_core.sensors.calibration_file import load_calibration
 
 
 @pytest.fixture
@@ -103,3 +106,18 @@ def test_frames_are_the_strongest_that_lie_apart() -> None:
     strength[31] = np.nan
     assert 29 in choose_frames(strength)
     assert len(choose_frames(np.full(30, np.nan))) == 6
+
+
+def test_captions_touch_neither_each_other_nor_the_line_below_them() -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure = SheetFigure(6, load_calibration().camera, [], False, pressure=False)
+    figure.top = figure.height - CAPTION_LINE * (MOST_CAPTION_LINES + 0.5) - FOOT
+    pairs = [Flag.UNEXPLAINED | Flag.OUT_OF_RANGE, Flag.BEYOND_PICTURE | Flag.POLARITY_ASSUMED, Flag.RECTIFIED]
+    flags = np.array([int(flag) for flag in (*pairs, *pairs)], np.uint16)
+    figure.captions(np.full((6, 3), 9.0), np.linspace(0, 1, 6), flags, np.full(6, 1e-3))
+    renderer = FigureCanvasAgg(figure.figure).get_renderer()
+    boxes = [text.get_window_extent(renderer) for text in figure.figure.texts]
+    assert len(boxes) == 7
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+    assert min(box.y0 for box in boxes) >= 0
