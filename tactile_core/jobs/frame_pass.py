@@ -230,7 +230,7 @@ class FramePass:
             return ""
         from .gel_traction import describe_miss
 
-        return describe_miss(*np.concatenate(self._forces, axis=1))
+        return describe_miss(*np.concatenate(self._forces, axis=1), solved=self.tools.solve is not None)
 
     def _press(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Compute tractions of translated frames, where they are kept."""
@@ -239,9 +239,7 @@ class FramePass:
         from .gel_traction import gel_traction  # with all of contact mechanics
 
         with self.clock.stage("traction"):
-            found = gel_traction(
-                arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]), self.tools.target
-            )
+            found = gel_traction(arrays, self.tools.target)
         self._forces.append(np.stack([found["traction_force"], arrays["force"]]))
         return found
 

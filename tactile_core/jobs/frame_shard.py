@@ -99,7 +99,7 @@ def _arrays(
     if "traction" in keep:
         from .gel_traction import gel_traction  # with all of contact mechanics
 
-        arrays |= gel_traction(arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0]), tools.target)
+        arrays |= gel_traction(arrays, tools.target)
     if "marker_motion" in keep:
         arrays |= tools.marker_motion(arrays["displacement_digit"])
     if "height" in keep or "image" in keep:

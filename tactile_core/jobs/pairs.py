@@ -10,7 +10,7 @@ import functools
 import os
 import pathlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +54,7 @@ def make_pairs(
     place: Callable[[pathlib.Path], Place] | None = None,
     electrodes: str = SHEET,
     pair: tuple[str, str] = PAIR,
+    keep: Sequence[str] = (),
 ) -> None:
     """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
 
@@ -61,16 +62,17 @@ def make_pairs(
         ``tactile batch``, which is removed at the end; the file's card (``pairs_card``) is written beside it.
     workers : processes, this one alone for 1; place : where blocks are made instead, from the job's folder
     electrodes : the law of their counts, of ``law.LAWS``; pair : the sensors, source and target
+    keep : words of ``pairs_file.KEEPABLE``
     Raises TactileError for a bad scene, count, or for parts of another scene or seed.
     """
     out = pathlib.Path(out)
-    job, names, text = plan(scene_path, count, seed, out, electrodes, pair)
+    job, names, text = plan(scene_path, count, seed, out, electrodes, pair, keep)
     compliance_of(pair[1]), compliance_of(pair[0])  # built once here, not by every worker at the same time
     with result_parts.begun(out, job) as folder:
         open_place = place or (InProcess if workers == 1 else lambda folder: Local(folder.resolve(), workers))
         where = open_place(folder)
         result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
-        merge(blocks(folder, job), count, out, text, seed, names, electrodes, pair)
+        merge(blocks(folder, job), count, out, text, seed, names, electrodes, pair, keep)
         atomic.write_json(card_path(out), card(out, *pair))
         result_parts.finished(folder)
 
@@ -82,6 +84,7 @@ def plan(
     out: pathlib.Path,
     electrodes: str = SHEET,
     pair: tuple[str, str] = PAIR,
+    keep: Sequence[str] = (),
 ) -> tuple[jobs.Job, list[str], str]:
     """Return the job, the names of the indenters and the scene's text; raises as ``make_pairs``."""
     source, target = pair
@@ -95,7 +98,7 @@ def plan(
         spec.build()  # an impossible one is refused before anything is written
     atomic.claim(out)
     surfaces = [sensors.sensor_surface(sensor).sha256 for sensor in pair]
-    job = jobs.make(inputs, Pairs(count, seed, surfaces, files, electrodes, source, target), None)
+    job = jobs.make(inputs, Pairs(count, seed, surfaces, files, electrodes, source, target, list(keep)), None)
     return job, [spec.name for spec in scene.indenters], text
 
 
@@ -117,7 +120,8 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     recipe = job.recipe
     pair = recipe.source, recipe.target
     presses = range(number * BLOCK, (number + 1) * BLOCK)
-    rows = [row for press in presses for row in press_rows(scene, recipe.seed, press, recipe.electrodes, pair)]
+    way = recipe.electrodes, pair, recipe.keep
+    rows = [row for press in presses for row in press_rows(scene, recipe.seed, press, *way)]
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
     array_pack.write(file, columns | {COUNT: np.int64(len(rows))})
     return True

@@ -45,6 +45,8 @@ def prepare(gel: str = TARGET) -> None:
 def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TARGET) -> dict[str, np.ndarray]:
     """Replace the gels of translated frames, by the names of frames.h5, T first; frames without contact stay.
 
+    Frames that were solved have the contact's own traction beside (``traction_digit``), the others zero.
+
     gel : the sensor that is solved; found_on : that of the networks
     A frame that has no solution keeps the networks' gel and is flagged ``GEL_NOT_SOLVED``. Each is solved by itself.
     On another gel than the networks' it is at rest there, contacts beside it are flagged as beyond it, the networks'
@@ -53,13 +55,15 @@ def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TAR
     moved, flags, center = arrays["displacement_digit"], arrays["flags"].copy(), arrays["contact_center"]
     own = gel == found_on
     found = moved.copy() if own else np.zeros((len(moved), len(sensors.sensor_surface(gel).rest), 3), moved.dtype)
+    traction = np.zeros(found.shape, np.float32)
     size = np.linalg.norm(arrays["force"], axis=1)
     for frame, contact in _contacts(moved, center, size, found_on):
         try:
-            found[frame] = contact.on_gel(gel).displacement
+            solution = contact.on_gel(gel)
+            found[frame], traction[frame] = solution.displacement, solution.traction
         except TactileError:  # a place off the gel, or a force that it does not bear within 60 % of its thickness
             flags[frame] |= np.uint16(Flag.GEL_NOT_SOLVED)
-    changed = arrays | {"displacement_digit": found, "flags": flags}
+    changed = arrays | {"displacement_digit": found, "traction_digit": traction, "flags": flags}
     return changed if own else _on_another(changed, gel)
 
 

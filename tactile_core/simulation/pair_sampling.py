@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -25,7 +25,12 @@ _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping on
 
 
 def press_rows(
-    scene: Scene, seed: int, press: int, electrodes: str = SHEET, pair: tuple[str, str] = PAIR
+    scene: Scene,
+    seed: int,
+    press: int,
+    electrodes: str = SHEET,
+    pair: tuple[str, str] = PAIR,
+    keep: Sequence[str] = (),
 ) -> list[dict[str, np.ndarray]]:
     """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
 
@@ -33,7 +38,7 @@ def press_rows(
     with its slide, at the force it had reached, by the same way on both sensors. A scene with ``depth_steps`` pairs
     contacts of the same depth in place of those of the same force.
 
-    electrodes : their law, of ``law.LAWS``; pair : the sensors, source and target
+    electrodes : their law, of ``law.LAWS``; pair : the sensors, source and target; keep : see ``pair_row``
     """
     spec = scene.pairs
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
@@ -49,7 +54,7 @@ def press_rows(
             "slide": np.array(step.slide, np.float32),
             "place": stood,
         }
-        rows.append({**named, **pair_row(biotac, digit, electrodes, pair)})
+        rows.append({**named, **pair_row(biotac, digit, electrodes, pair, keep)})
     return rows
 
 
@@ -113,11 +118,20 @@ def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET
 
 
 def pair_row(
-    biotac: Solution, digit: Solution, electrodes: str = SHEET, pair: tuple[str, str] = PAIR
+    biotac: Solution,
+    digit: Solution,
+    electrodes: str = SHEET,
+    pair: tuple[str, str] = PAIR,
+    keep: Sequence[str] = (),
 ) -> dict[str, np.ndarray]:
-    """Arrays stored of one paired contact, as in the file, see ``units``. Electrodes' films are not corrected."""
+    """Arrays stored of one paired contact, as in the file, see ``units``. Electrodes' films are not corrected.
+
+    keep : fields of both solutions to store beside, of ``pairs_file.KEEPABLE``
+    """
     source, target = pair
+    both = (source, biotac), (target, digit)
     return {
+        **{f"{word}_{name}": getattr(found, word).astype(np.float32) for word in keep for name, found in both},
         f"displacement_{source}": quantise(biotac.displacement),
         f"displacement_{target}": quantise(digit.displacement),
         "signal": signal_of(biotac, electrodes, source).astype(np.float32),

@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import pathlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,15 +48,18 @@ DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
 SCALED = ("displacement_biotac", "displacement_digit")
 SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 
+KEEPABLE = {"traction": "Pa"}  # what a file may hold beside, of each sensor's surface, with its unit
 _NODES = "_nodes_sha256"  # after a sensor's name, the attribute that says which nodes its surface has
 
 
-def units(source: str = SOURCE, target: str = TARGET) -> dict[str, str]:
+def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) -> dict[str, str]:
     """Return the unit of each dataset that is written; the leading axis counts contacts.
 
-    Datasets are named after the two sensors. A place is (x, z) on the gel's plane, tilt and heading.
+    Datasets are named after the two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words
+    of ``KEEPABLE``, of what is written beside
     """
-    return {
+    fields = {f"{word}_{sensor}": KEEPABLE[word] for word in keep for sensor in (source, target)}
+    return fields | {
         f"displacement_{source}": "m", f"displacement_{target}": "m", "signal": "counts", "gap": "m", "force": "N",
         f"force_{target}": "N", "pressure": "Pa", f"depth_{source}": "m", f"depth_{target}": "m",
         "contact_center": "m", "place": "m, m, rad, rad", "slide": "m", f"contact_patch_{source}": "1",
@@ -274,19 +278,19 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
 
 def merge(
     files: list[pathlib.Path], count: int, out: pathlib.Path, text: str, seed: int, names: list[str],
-    electrodes: str = SHEET, pair: tuple[str, str] = PAIR,
+    electrodes: str = SHEET, pair: tuple[str, str] = PAIR, keep: Sequence[str] = (),
 ) -> None:  # fmt: skip
     """Join the blocks in order into one HDF5 file, cut to ``count`` contacts; written beside and renamed.
 
-    pair : the sensors, source and target
+    pair : the sensors, source and target; keep : words of ``KEEPABLE``
     """
     try:
-        _write_merged(files, count, out, text, seed, names, electrodes, pair)
+        _write_merged(files, count, out, text, seed, names, electrodes, pair, keep)
     except (OSError, RuntimeError) as error:  # h5py reports a full disk as either
         raise no_room(out, error) from error
 
 
-def _write_merged(files, count, out, text, seed, names, electrodes, pair) -> None:  # noqa: ANN001
+def _write_merged(files, count, out, text, seed, names, electrodes, pair, keep) -> None:  # noqa: ANN001
     import h5py
 
     with atomic.new_file(out) as partial, Disk(partial) as disk, h5py.File(disk, "w") as file:
@@ -295,7 +299,7 @@ def _write_merged(files, count, out, text, seed, names, electrodes, pair) -> Non
             **{f"{sensor}{_NODES}": sensors.sensor_surface(sensor).sha256 for sensor in pair}, "polarity": FALLS,
             "electrodes": electrodes,
         })  # fmt: skip
-        done, unit_of = 0, units(*pair)
+        done, unit_of = 0, units(pair[0], pair[1], keep)
         for path in files:
             block = array_pack.read(path)
             take = min(int(block["count"]), count - done)

@@ -14,6 +14,7 @@ from tactile_core.jobs.engine import result_parts
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine.local import InProcess
 from tactile_core.jobs.pairs import make_pairs, plan, wanted
+from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve
 from tactile_core.simulation import pairs_file
@@ -234,7 +235,7 @@ def test_a_slide_to_where_the_sensor_falls_away_stays_finite(request):
 
 
 def test_a_gel_of_ones_own_is_one_folder(request, scene, tmp_path, monkeypatch):
-    """As docs/extend.md says: TACTILE_SENSORS names the folder; here the example, with a coarser lattice."""
+    """As docs/extend.md says: TACTILE_SENSORS names the folder; the example, with a coarser lattice and traction."""
     import h5py
 
     example = request.config.rootpath / "scenes/sensors/flat_gel/sensor.toml"
@@ -243,9 +244,13 @@ def test_a_gel_of_ones_own_is_one_folder(request, scene, tmp_path, monkeypatch):
     (tmp_path / "coarse_gel/sensor.toml").write_text(text, encoding="utf-8")
     monkeypatch.setenv("TACTILE_SENSORS", str(tmp_path))
     out = tmp_path / "pairs.h5"
-    make_pairs(scene, 5, 7, out, pair=("biotac", "coarse_gel"))
+    make_pairs(scene, 5, 7, out, pair=("biotac", "coarse_gel"), keep=["traction"])
     with h5py.File(out) as file:
-        assert set(file) == set(pairs_file.units("biotac", "coarse_gel"))
+        assert set(file) == {*pairs_file.units("biotac", "coarse_gel"), "traction_biotac", "traction_coarse_gel"}
+        for sensor, force in (("biotac", file["force"][:]), ("coarse_gel", file["force_coarse_gel"][:])):
+            assert file[f"traction_{sensor}"].attrs["unit"] == "Pa"
+            total = np.einsum("tnk,n->tk", file[f"traction_{sensor}"][:], node_areas(sensor))
+            np.testing.assert_allclose(total, force, atol=1e-5 * np.abs(force).max())  # float32 of thousands of nodes
         assert file.attrs["coarse_gel_nodes_sha256"] == sensors.sensor_surface("coarse_gel").sha256
         moved, depth = file["displacement_coarse_gel"][()], file["depth_coarse_gel"][()]
     # quadratic nodes 1 mm apart need not touch where a ball's apex does: a part of the depth is seen, never more

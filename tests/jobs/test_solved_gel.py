@@ -12,6 +12,7 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.jobs import solved_gel
+from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration_file import load_calibration
@@ -56,10 +57,12 @@ def test_frames_without_contact_or_solution_keep_their_gel(pressed):
 def test_a_conversion_solves_the_frames_it_is_asked_for(request, tmp_path):
     path, found = str(request.config.rootpath / RECORDING), {}
     for name, words in {"few": ["--frames", "60:240:60"], "fewer": ["--frames", "120:121"]}.items():
-        out = ["--out", str(tmp_path / name), "--keep", "displacement", "--gel", "solved"]
+        out = ["--out", str(tmp_path / name), "--keep", "displacement,traction", "--gel", "solved"]
         assert main(["convert", path, *words, *out]) == 0
         with h5py.File(tmp_path / name / "press_roll_slide" / "frames.h5") as file:
             found[name] = {each: file[each][:] for each in ("displacement_digit", "frame", "flags")}
+            total, force = (np.linalg.norm(file[each][:], axis=1) for each in ("traction_force", "force"))
+            np.testing.assert_allclose(total, force, rtol=0.01)  # solved under that force along the motion
     one = np.flatnonzero(found["few"]["frame"] == 120)
     gels = found["few"]["displacement_digit"][one], found["fewer"]["displacement_digit"]
     assert accuracy.height(gels[1]).max() > 50e-6
@@ -109,8 +112,11 @@ def test_every_verb_that_translates_takes_any_gel(short, tmp_path, capsys):
     assert "no networks lead to the GelSight Mini" in capsys.readouterr().err
     file = next((tmp_path / "b" / "shards").glob("*.h5"))
     with h5py.File(tmp_path / "a" / "short" / "frames.h5") as whole, h5py.File(file) as shard:
-        for name in (f"displacement_{MINI}", f"traction_{MINI}", "force"):
+        for name in (f"displacement_{MINI}", f"traction_{MINI}", "traction_force", "force"):
             np.testing.assert_array_equal(whole[name][:], shard[name][:], err_msg=name)
+        total = np.einsum("tnk,n->tk", whole[f"traction_{MINI}"][:], node_areas(MINI))
+        sizes = (np.linalg.norm(each, axis=1) for each in (total, whole["force"][:]))
+        np.testing.assert_allclose(*sizes, rtol=0.01)  # solved under the force along the motion; across it is friction
         assert accuracy.height(whole[f"displacement_{MINI}"][-4:]).max(axis=1).min() > 100e-6
         assert np.isnan(shard[f"expected_error_{MINI}"][:]).all()
     picture = tmp_path / "now.png"

@@ -1,6 +1,7 @@
 """Dots on a gel: where the surface carries them, in the picture too, and nothing of them where there are none."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from tactile_core.errors import TactileError
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.marker_field import MarkerField
 from tactile_core.pictures.renderer import Renderer
+from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 from tactile_core.sensors.markers import Markers
 
+DOTTED_MINI = Path(__file__).parents[2] / "scenes/calibrations/gelsight_mini_dots.toml"
 DOTS = Markers(rows=5, columns=4, pitch=2e-3, diameter=0.6e-3, albedo=0.1)
 REST = sensors.digit_surface().rest
 
@@ -23,9 +26,9 @@ def unit():
     return dataclasses.replace(plain_unit(), markers=DOTS)
 
 
-def dent(depth: float, aside: tuple[float, float]) -> np.ndarray:
-    """A smooth dent that drags the gel along: displacement (M, 3) m."""
-    share = np.exp(-((REST[:, 0] + 7e-3) ** 2 + (REST[:, 2] - 0.5e-3) ** 2) / 3e-3**2)
+def dent(depth: float, aside: tuple[float, float], places: np.ndarray = REST) -> np.ndarray:
+    """A smooth dent that drags the gel along: displacement (M, 3) m of places (M, 3) m at rest."""
+    share = np.exp(-((places[:, 0] + 7e-3) ** 2 + (places[:, 2] - 0.5e-3) ** 2) / 3e-3**2)
     return share[:, None] * np.array([aside[0], depth, aside[1]])
 
 
@@ -66,19 +69,51 @@ def test_an_even_shift_is_exact_on_domes_of_any_height(unit):
         np.testing.assert_allclose(field.motion(moved[None])[0], expected, atol=1e-3)  # px: float32 of 200
 
 
-@pytest.mark.parametrize("preset", ["fast", "standard"])
-def test_pictures_show_the_dots_where_they_are(preset, unit):
+def printed(unit: Calibration) -> np.ndarray:
+    """Where a unit's dots lie on the resting gel (n, 3) m, by its numbers alone."""
+    dots, camera, shape = unit.markers, unit.camera, sensors.shape_of(unit.camera.sensor)
+    down, right = (dots.pitch * (np.arange(n) - (n - 1) / 2) for n in (dots.rows, dots.columns))
+    x, z = np.meshgrid(camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right, indexing="ij")
+    return np.stack([x.ravel(), shape.descriptor.body.back_y - shape.dome_height(x, z).ravel(), z.ravel()], -1)
+
+
+@pytest.mark.parametrize("which", ["digit", "gelsight_mini"])
+def test_motion_is_the_displacement_of_the_printed_place(which, unit):
+    """A displacement that is known between nodes, too, seen by a pinhole: interpolation leaves 0.02 px of 5."""
+    unit = unit if which == "digit" else load_calibration(DOTTED_MINI, which)
+    places, camera = printed(unit), unit.camera
+    height = unit.dome_scale * (places[:, 1] - camera.height_zero_y)
+    seen = []
+    for depth, aside in ((0.0, (0.0, 0.0)), (0.4e-3, (0.3e-3, -0.2e-3))):
+        moved = dent(depth, aside, places)
+        row, column = camera.to_pixel(*(places + moved)[:, [0, 2]].T, height + moved[:, 1])
+        seen.append(np.stack([column, row], -1))
+    field = MarkerField(unit)
+    motion = field.motion(dent(0.4e-3, (0.3e-3, -0.2e-3), sensors.sensor_surface(which).rest)[None])[0]
+    assert np.abs(motion).max() > 4
+    np.testing.assert_allclose(field.rest, seen[0], atol=0.02)
+    np.testing.assert_allclose(motion, seen[1] - seen[0], atol=0.02)
+
+
+def test_the_dotted_mini_is_the_one_that_ships_with_dots():
+    plain, dotted = load_calibration(None, "gelsight_mini"), load_calibration(DOTTED_MINI)
+    assert dataclasses.replace(dotted, markers=None, unit=plain.unit) == plain and dotted.markers.count == 63
+
+
+@pytest.mark.parametrize(("which", "preset"), [("digit", "fast"), ("digit", "standard"), ("mini", "standard")])
+def test_pictures_show_the_dots_where_they_are(which, preset, unit):
     if preset != "fast":
         pytest.importorskip("mitsuba")
+    unit = unit if which == "digit" else load_calibration(DOTTED_MINI)
     dotted, plain = Renderer(unit, preset), Renderer(dataclasses.replace(unit, markers=None), preset)
-    moved = dent(0.3e-3, (0.2e-3, 0.3e-3))
+    moved = dent(0.3e-3, (0.2e-3, 0.3e-3), sensors.sensor_surface(unit.camera.sensor).rest)
     shown, bare = (renderer.render(moved).astype(float).sum(-1) for renderer in (dotted, plain))
     places = dotted.dots.rest + dotted.dots.motion(moved[None])[0]
     off = [centre_of_dark(shown / bare, place) - place for place in places]
     # A dent that stretches a dot shifts the middle of its image by a little: 0.1 px; what is seen is whole levels.
     assert np.abs(dotted.dots.motion(moved[None])).max() > 4 and np.abs(off).max() < 0.15
     inside = shown[tuple(np.rint(places[:, ::-1]).astype(int).T)] / bare[tuple(np.rint(places[:, ::-1]).astype(int).T)]
-    np.testing.assert_allclose(inside, DOTS.albedo, atol=0.02)  # of 400 levels, each rounded
+    np.testing.assert_allclose(inside, unit.markers.albedo, atol=0.02)  # of 400 levels, each rounded
 
 
 def test_heights_alone_do_not_say_where_dots_are(unit):

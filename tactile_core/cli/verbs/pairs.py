@@ -42,6 +42,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         metavar="SENSOR",
         help="gel that is looked at (default: %(default)s); your own is a folder in $TACTILE_SENSORS",
     )
+    verb.add_argument(
+        "--keep", metavar="WORDS", help="traction: the force field on both surfaces, too, Pa on each node, float32"
+    )
     electrodes_argument(verb)
     engine.parts_arguments(verb)
     progress_argument(verb)
@@ -52,19 +55,21 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     engine.check_counts(options, "workers", "restart")
     check_seed(options.seed)
-    from ...jobs import pairs
+    from ...jobs import pairs, results
     from ...jobs.engine import result_parts
+    from ...simulation.pairs_file import KEEPABLE
 
     pair = options.source, options.target
+    keep = () if options.keep is None else results.parse_words(options.keep, tuple(KEEPABLE))
     if options.plan:
-        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes, pair)
+        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes, pair, keep)
         tell(str(result_parts.write(options.out, job)))
         return 0
     place = engine.place_or_none(options)
     with bar("pairs", "block", options.progress) as shown:
         pairs.make_pairs(
             options.scene, options.count, options.seed, options.out, progress=shown, place=place,
-            electrodes=options.electrodes, pair=pair,
+            electrodes=options.electrodes, pair=pair, keep=keep,
         )  # fmt: skip
     tell(options.out)
     return 0

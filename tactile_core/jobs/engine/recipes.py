@@ -64,7 +64,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
 class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """A scene to paired contacts. surfaces : sha256 of both sensors' nodes; files : of the meshes.
 
-    electrodes : the law of their counts; source, target : the sensors
+    electrodes : the law of their counts; source, target : the sensors; keep : words of ``pairs_file.KEEPABLE``
     """
 
     count: Annotated[int, Meta(ge=1)]
@@ -74,6 +74,7 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
     electrodes: Literal["sheet", "gap"] = "sheet"
     source: str = SOURCE
     target: str = TARGET
+    keep: list[Literal["traction"]] = []
     version: str = __version__
 
 

@@ -8,6 +8,7 @@ from benchmarks.mechanics import comsol
 
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.electrodes.law import GAP, SHEET, rest_counts, signal_of
+from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve
 from tactile_core.sensors import descriptor, excitation_electrodes
@@ -58,11 +59,14 @@ def test_counts_fall_where_it_is_squeezed():
 
 def test_a_press_gives_pairs_with_the_digit():
     scene, _ = load_scene(SCENE)
-    rows = press_rows(scene, 3, 1, SHEET, (NAME, "digit"))
+    rows = press_rows(scene, 3, 1, SHEET, (NAME, "digit"), keep=["traction"])
     assert len(rows) > 3 and rows[0]["signal"].shape == (24,)
     for row in rows:
         ratio = np.linalg.norm(row["force"]) / np.linalg.norm(row["force_digit"])
         assert 0.5 < ratio < 2  # the same along the motion; across it by friction, which differs
+        for sensor, force in ((NAME, row["force"]), ("digit", row["force_digit"])):
+            total = node_areas(sensor) @ row[f"traction_{sensor}"]
+            np.testing.assert_allclose(total, force, atol=1e-5 * np.linalg.norm(force))  # float32 of thousands of nodes
     assert f"displacement_{NAME}" in rows[0] and rows[-1]["contact_patch_digit"].any()
 
 
