@@ -86,7 +86,8 @@ def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str,
     if "expected_error_um" not in told:
         return "", False
     trust = told["confidence"], int(told.get("flags", 0))
-    return trust_words.in_words(*trust, 1e-6 * told["expected_error_um"]), trust_words.is_guess(*trust)
+    words = trust_words.in_words(*trust, 1e-6 * told["expected_error_um"], skin["force"])
+    return words, trust_words.is_guess(*trust)
 
 
 def _wrapped(text: str, width: int) -> list[str]:

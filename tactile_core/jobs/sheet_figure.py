@@ -218,7 +218,7 @@ class SheetFigure:
         confidence (k,) 0..1, flags (k,), expected_error (k,) m : for `trust_words.in_words`
         """
         for k in range(self.columns):
-            trust = in_words(confidence[k], flags[k], expected_error[k])
+            trust = in_words(confidence[k], flags[k], expected_error[k], force[k])
             lines = [f"force {np.linalg.norm(force[k]):.2f} N", *trust.replace(", ", ",\n").split("\n")]
             text = "\n".join(textwrap.fill(line, CAPTION_LETTERS) for line in lines)
             color = MARK if is_guess(confidence[k], flags[k]) else "black"

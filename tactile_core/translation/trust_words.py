@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from ..recordings.flags import Flag
 
 LOW_CONFIDENCE = 0.5  # assumed: frames of less are guesses
 _REASONS = 2  # at most in a line, the gravest first
-_UNLIKE = "signals unlike training"
+_UNLIKE, _SILENT = "signals unlike training", "no contact"
 # What makes a frame a guess, the gravest first; then what is only worth saying.
 _DOUBTS = {
     Flag.UNEXPLAINED: "rest perhaps under load",
@@ -35,14 +39,21 @@ def is_guess(confidence: float, flags: int) -> bool:
     return bool(confidence < LOW_CONFIDENCE or any(flags & bit for bit in _DOUBTS))
 
 
-def in_words(confidence: float, flags: int, expected_error: float) -> str:
-    """Return a frame's line: "guess: rectified recording, expected error 0.40 mm".
+def in_words(confidence: float, flags: int, expected_error: float, force: Sequence[float] | np.ndarray) -> str:
+    """Return a frame's line: "guess: rectified recording, expected error 0.40 mm", or "no contact".
 
     confidence : 0..1; flags : bits of ``Flag``; expected_error : m, of the largest node, NaN where it is not known
+    force : (3,) N of the translation, zero where it finds no contact; of a gel at rest no error is told
     """
     reasons = [words for bit, words in (_DOUBTS | _REMARKS).items() if flags & bit]
-    guess = is_guess(confidence, flags)
+    guess, touching = is_guess(confidence, flags), bool(np.any(force))
     if guess and not any(flags & bit for bit in _DOUBTS):
         reasons.insert(0, _UNLIKE)
-    head = ": ".join(["guess" if guess else "as in training", *filter(None, [", ".join(reasons[:_REASONS])])])
-    return f"{head}, " + (f"expected error {1e3 * expected_error:.2f} mm" if expected_error >= 0 else "error not known")
+    reasons = reasons[:_REASONS]
+    if guess and not touching:
+        reasons.insert(0, _SILENT)
+    verdict = "guess" if guess else "as in training" if touching else _SILENT
+    line = ": ".join([verdict, *filter(None, [", ".join(reasons)])])
+    if not touching:
+        return line
+    return f"{line}, " + (f"expected error {1e3 * expected_error:.2f} mm" if expected_error >= 0 else "error not known")

@@ -51,14 +51,22 @@ def test_the_panel_s_words_on_trust_are_the_contact_sheet_s(gel, part):
     bpy.context.scene.frame_set(80)
     skin, found = bpy.context.scene.objects["BioTac skin"], _translation(part)
     in_words = part("tactile_core.translation.trust_words").in_words
-    words = in_words(found.confidence[40], found.flags[40], found.expected_error_digit[40])
+    words = in_words(found.confidence[40], found.flags[40], found.expected_error_digit[40], found.force[40])
     assert part("addon.ui.panels").trust_of(skin, gel) == (words, False)
+
+
+def test_the_panel_says_that_a_silent_frame_has_no_contact(gel, part):
+    silent = int(np.flatnonzero(~_translation(part).force.any(axis=1))[0])
+    bpy.context.scene.frame_set(40 + silent)
+    words, _ = part("addon.ui.panels").trust_of(bpy.context.scene.objects["BioTac skin"], gel)
+    assert "no contact" in words and "expected error" not in words
 
 
 def test_flags_are_kept_frame_by_frame(scene, part):
     thing = bpy.data.objects.new("gel", None)
     scene.collection.objects.link(thing)
     values = {"confidence": np.ones(2), "expected_error_um": np.full(2, 370.0), "flags": np.array([0, 4], np.uint16)}
+    values["force"] = np.full((2, 3), 0.1)
     part("addon.objects.custom_properties").write(thing, values, np.array([10.0, 20.0]))
     said = {}
     for frame in (10, 19, 20):

@@ -20,10 +20,24 @@ from tactile_core.translation.trust_words import in_words, is_guess
     ],
 )
 def test_trust_is_one_line_of_plain_words(confidence: float, flags: int, words: str) -> None:
-    assert in_words(confidence, flags, 370e-6) == words
+    assert in_words(confidence, flags, 370e-6, (0.0, 0.2, 0.0)) == words
 
 
+@pytest.mark.parametrize(
+    ("confidence", "flags", "words"),
+    [
+        (1.0, 0, "no contact"),
+        (1.0, Flag.POLARITY_ASSUMED, "no contact: polarity assumed"),
+        (1.0, Flag.UNEXPLAINED, "guess: no contact, rest perhaps under load"),
+        (0.2, 0, "guess: no contact, signals unlike training"),
+    ],
+)
+def test_a_silent_frame_is_said_to_be_one_and_told_no_error(confidence: float, flags: int, words: str) -> None:
+    assert in_words(confidence, flags, 0.0, (0.0, 0.0, 0.0)) == words
+
+
+@pytest.mark.parametrize("force", [(0.0, 0.2, 0.0), (0.0, 0.0, 0.0)])
 @pytest.mark.parametrize("flag", Flag)
-def test_every_flag_is_said(flag: Flag) -> None:
-    assert in_words(1.0, flag, 0.0) != in_words(1.0, 0, 0.0)
-    assert is_guess(1.0, flag) == in_words(1.0, flag, 0.0).startswith("guess: ")
+def test_every_flag_is_said(flag: Flag, force: tuple[float, ...]) -> None:
+    assert in_words(1.0, flag, 0.0, force) != in_words(1.0, 0, 0.0, force)
+    assert is_guess(1.0, flag) == in_words(1.0, flag, 0.0, force).startswith("guess: ")
