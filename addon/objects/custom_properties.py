@@ -8,12 +8,14 @@ import numpy as np
 from ..operators.recording_data import Translated
 from . import curves
 
+UNKNOWN = -1e-6  # m, of an expected error: a keyed property holds no NaN
 ABOUT = {
-    "electrodes": "Change of the 19 electrodes against rest, counts",
+    "electrodes": "Change of the electrodes against rest, counts",
     "pdc": "Fluid pressure as recorded, counts",
     "force": "Force of the object on the BioTac, N, along the finger, across it, and into the pad (negative Z)",
     "confidence": "1: signals like those of the training, 0: far from them",
-    "expected_error_um": "Largest node error of this surface that half of such frames stay below, micrometres",
+    "expected_error_um": "Largest node error of this surface that half of such frames stay below, micrometres;"
+    " below 0 where it is not known",
     "flags": "What is remarkable about the frame, as bits; the tab Tactile says it in words",
 }
 

@@ -1,4 +1,4 @@
-"""A DIGIT's body round its gel: three LEDs, camera, acrylic and housing, as children of the gel."""
+"""The body of a gel's sensor, as a DIGIT: three LEDs, camera, acrylic and housing, as children of the gel."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ import math
 import bpy
 import numpy as np
 
+from ...tactile_core import sensors
 from ...tactile_core.pictures.mitsuba.window import ACRYLIC
-from ...tactile_core.sensors import digit
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
-from ...tactile_core.sensors.camera import HEIGHT_ZERO_Y, Camera, Led
+from ...tactile_core.sensors.camera import Camera, Led
 from ..ui import properties
 from . import digit_materials, held_light, image_frame, led_receivers, surfaces
 
-CAMERA = "DIGIT camera"
 _CHIP = np.array([1.6e-3, 0.8e-3, 0.6e-3])  # m, sides of an LED package (0603)
 _WALL = 1.5e-3  # m of housing beyond the LEDs' reach, and its depth below them
 _DEPTH = 13e-3  # m from the gel's lowest point to the housing's lower end: below the LEDs (assumed)
@@ -50,7 +49,8 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
                 _place_led(_add_led(gel, led), gel, led, unit)
         _add_shell(gel, unit)
     if camera_of(gel) is None:
-        lens = _child(gel, CAMERA, bpy.data.cameras.new(CAMERA), "NONE")
+        name = f"{sensors.title(unit.camera.sensor)} camera"
+        lens = _child(gel, name, bpy.data.cameras.new(name), "NONE")
         place_camera(lens, gel, unit.camera)
     if held_light.NODE not in coating_of(gel).node_tree.nodes:
         _hold_light(gel, unit)
@@ -97,7 +97,7 @@ def watts_per_brightness(per_metre: float) -> float:
 
 
 def place_camera(lens: bpy.types.Object, gel: bpy.types.Object, camera: Camera) -> None:
-    """Put a camera where the DIGIT's own seems to be, with its angle of view."""
+    """Put a camera where the sensor's own seems to be, with its angle of view."""
     per_metre, high = gel.tactile.per_metre, camera.apparent_height
     lens.location = image_frame.to_gel([[0, 0, high]], camera, per_metre)[0]
     # It looks up into the gel, its own -Z along the scene's Z; the fingertip, -X, is up in the picture.
@@ -160,11 +160,13 @@ def _place_led(thing: bpy.types.Object, gel: bpy.types.Object, led: Led, unit: C
 
 def _add_shell(gel: bpy.types.Object, unit: Calibration) -> None:
     """Acrylic under the gel; a cover round it and four walls that enclose the LEDs, open below."""
-    outline = _outline()
-    top, bottom = digit.BACK_Y, digit.BACK_Y + ACRYLIC
-    _add_solid(gel, "DIGIT acrylic", _prism(outline, top, bottom), digit_materials.acrylic())
+    camera = unit.camera
+    outline, title = _outline(camera.sensor), sensors.title(camera.sensor)
+    top = sensors.shape_of(camera.sensor).back_y
+    bottom = top + ACRYLIC
+    _add_solid(gel, f"{title} acrylic", _prism(outline, top, bottom), digit_materials.acrylic())
     rim = _wide(outline, unit)
-    cover, wall = HEIGHT_ZERO_Y + _RIM, HEIGHT_ZERO_Y + _DEPTH
+    cover, wall = camera.height_zero_y + _RIM, camera.height_zero_y + _DEPTH
     count = len(outline)
     rings = [(outline, cover), (rim, cover), (rim, wall)]
     nodes = np.concatenate([_at(points, level) for points, level in rings])
@@ -174,7 +176,7 @@ def _add_shell(gel: bpy.types.Object, unit: Calibration) -> None:
         np.stack([k * count + index, k * count + after, (k + 1) * count + after, (k + 1) * count + index], -1)
         for k in range(len(rings) - 1)
     ]
-    _add_solid(gel, "DIGIT housing", (nodes, _triangles(np.concatenate(quads))), digit_materials.housing())
+    _add_solid(gel, f"{title} housing", (nodes, _triangles(np.concatenate(quads))), digit_materials.housing())
 
 
 def _add_solid(gel, name: str, mesh: tuple[np.ndarray, np.ndarray], material: bpy.types.Material) -> None:  # noqa: ANN001
@@ -189,12 +191,11 @@ def _add_solid(gel, name: str, mesh: tuple[np.ndarray, np.ndarray], material: bp
     thing.color = material.diffuse_color
 
 
-def _outline() -> np.ndarray:
-    """The gel's outline (n, 2) m, x and z: a half circle at the tip, corners at the base."""
-    angle = np.linspace(np.pi / 2, 3 * np.pi / 2, 49)
-    x, z = digit.ARC_X + digit.HALF_WIDTH * np.cos(angle), digit.HALF_WIDTH * np.sin(angle)
-    tip = np.stack([x, z], -1)
-    return np.concatenate([tip, [[digit.X_BASE, -digit.HALF_WIDTH], [digit.X_BASE, digit.HALF_WIDTH]]])
+def _outline(sensor: str) -> np.ndarray:
+    """The gel's outline (n, 2) m, x and z, from the side of +z over the tip: the border of its lattice."""
+    surface = sensors.sensor_surface(sensor)
+    grid = surface.grid(surface.rest)[..., [0, 2]]
+    return np.concatenate([grid[::-1, -1], grid[0, -2::-1], grid[1:, 0], grid[-1, 1:-1]])
 
 
 def _wide(outline: np.ndarray, unit: Calibration) -> np.ndarray:
@@ -220,9 +221,11 @@ def _prism(outline: np.ndarray, top: float, bottom: float) -> tuple[np.ndarray, 
     count, index = len(outline), np.arange(len(outline))
     after = np.roll(index, -1)
     sides = _triangles(np.stack([index, after, count + after, count + index], -1))
-    fan = np.stack([np.zeros(count - 2, int), index[1:-1], index[2:]], -1)
-    nodes = np.concatenate([_at(outline, top), _at(outline, bottom)])
-    return nodes, np.concatenate([sides, fan[:, ::-1], fan + count])
+    middle = outline.mean(axis=0, keepdims=True)  # inside: no outline here is bent inward
+    nodes = np.concatenate([_at(outline, top), _at(outline, bottom), _at(middle, top), _at(middle, bottom)])
+    upper = np.stack([np.full(count, 2 * count), after, index], -1)
+    lower = np.stack([np.full(count, 2 * count + 1), count + index, count + after], -1)
+    return nodes, np.concatenate([sides, upper, lower])
 
 
 def _triangles(quads: np.ndarray) -> np.ndarray:

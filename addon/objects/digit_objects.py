@@ -1,4 +1,4 @@
-"""A DIGIT's gel in the scene, and its displacement read back from whatever moves it."""
+"""A sensor's gel in the scene, and its displacement read back from whatever moves it."""
 
 from __future__ import annotations
 
@@ -12,20 +12,29 @@ from . import axes, mesh_cache, styles, surfaces
 from .style_nodes import DISPLACEMENT
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
+_BEHIND = 50e-3  # m between the gels of one skin along the finger: more than a housing is long
 BESIDE = 7.1e-3 + 23e-3 + 5e-3  # m: half widths of BioTac (docs/sources.md) and of a housing round the LEDs, a gap
 
 
-def add_gel(group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None) -> bpy.types.Object:
-    """Add the resting gel, beside a BioTac's skin where there is one."""
-    surface = sensors.digit_surface()
-    gel = surfaces.new_mesh_object("DIGIT gel", axes.to_blender(surface.rest, per_metre), surface.faces)
-    properties.set_up(gel, "DIGIT", per_metre)
+def add_gel(
+    group: bpy.types.Collection,
+    per_metre: float,
+    beside: bpy.types.Object | None = None,
+    sensor: str = sensors.TARGET,
+) -> bpy.types.Object:
+    """Add the resting gel of a sensor, beside a skin where there is one, behind the collection's other gels."""
+    surface = sensors.sensor_surface(sensor)
+    name = f"{sensors.title(sensor)} gel"
+    gel = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)
+    properties.set_up(gel, "DIGIT", per_metre, sensor)
+    others = sum(thing.tactile.role == "DIGIT" for thing in group.objects)
     group.objects.link(gel)
     surfaces.paint(gel, GEL_COLOUR)
     styles.get_ready(gel)
     if beside is not None:
         gel.location = beside.location
         gel.location.y += BESIDE * per_metre
+    gel.location.x += others * _BEHIND * per_metre
     return gel
 
 
@@ -35,7 +44,7 @@ def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np
     Raises TactileError where modifiers have changed the number of vertices, or lack the file that moves the gel.
     """
     mesh_cache.check(gel)
-    rest = sensors.digit_surface().rest
+    rest = properties.surface_of(gel).rest
     mesh = gel.evaluated_get(depsgraph).data
     vertices = mesh.vertices
     if len(vertices) != len(rest):

@@ -1,4 +1,4 @@
-"""Nineteen small balls under the skin, coloured by their signal."""
+"""Small balls under the skin, one an electrode, coloured by their signal."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ _HIGH, _LOW = np.array([0.9, 0.05, 0.02]), np.array([0.02, 0.15, 0.9])  # film t
 def add_markers(
     skin: bpy.types.Object, group: bpy.types.Collection, change: np.ndarray, frames: np.ndarray
 ) -> list[bpy.types.Object]:
-    """Add the markers E1..E19, children of the skin; red where the reading rose, blue where it fell.
+    """Add the markers E1, E2, ..., children of the skin; red where the reading rose, blue where it fell.
 
-    change : (T, 19) counts; the strongest colour stands for the recording's largest change
+    change : (T, e) counts; the strongest colour stands for the recording's largest change
     """
     colours = colours_of(change)
     ball = _ball(skin.tactile.per_metre)
     markers = []
-    for k, place in enumerate(axes.to_blender(sensors.electrodes(), skin.tactile.per_metre)):
+    places = sensors.electrodes(properties.sensor_name(skin))
+    for k, place in enumerate(axes.to_blender(places, skin.tactile.per_metre)):
         marker = bpy.data.objects.new(f"E{k + 1}", ball)
         properties.set_up(marker, "ELECTRODE", skin.tactile.per_metre)
         group.objects.link(marker)
@@ -39,10 +40,10 @@ def add_markers(
 
 
 def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> None:
-    """Let the skin's nodes know the change (T, 19), counts, of the electrode that is nearest to each."""
-    rest = sensors.biotac_surface().rest
+    """Let the skin's nodes know the change (T, e), counts, of the electrode that is nearest to each."""
+    rest, places = properties.surface_of(skin).rest, sensors.electrodes(properties.sensor_name(skin))
     # An electrode shows where the skin is nearest to it.
-    over = rest[np.linalg.norm(rest[:, None] - sensors.electrodes(), axis=-1).argmin(0)]
+    over = rest[np.linalg.norm(rest[:, None] - places, axis=-1).argmin(0)]
     distance = np.linalg.norm(rest[:, None] - over, axis=-1)
     for name, kind, values in ((NEAREST, "INT", distance.argmin(1).astype(np.int32)),
                                (DISTANCE, "FLOAT", distance.min(1).astype(np.float32))):  # fmt: skip
@@ -53,7 +54,7 @@ def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -
 
 
 def colours_of(change: np.ndarray) -> np.ndarray:
-    """Convert (T, 19) counts to (T, 19, 3) colours, grey at rest."""
+    """Convert (T, e) counts to (T, e, 3) colours, grey at rest."""
     share = change / max(float(np.abs(change).max(initial=0.0)), 1.0)
     strength = np.sqrt(np.abs(share))[..., None]  # light touches show too
     return _REST + strength * (np.where(share[..., None] > 0, _HIGH, _LOW) - _REST)

@@ -10,11 +10,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...tactile_core import sensors
 from ...tactile_core.pictures.background import by_led, open_radiance, resting_picture
 from ...tactile_core.pictures.mitsuba.direct_light import lookup
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
-from ...tactile_core.sensors.camera import COLOURS, HEIGHT_ZERO_Y
+from ...tactile_core.sensors.camera import COLOURS
 from ...tactile_core.sensors.unrolling import node_normals
 from . import digit_materials
 
@@ -45,8 +44,8 @@ def held_light(unit: Calibration) -> np.ndarray:
     diagonal = np.arange(3)
     levels[..., diagonal, diagonal] += resting_picture(unit, radiance) - levels.sum(-1)  # a photograph's
     camera = unit.camera
-    x, y, z = sensors.digit_surface().rest.T
-    look_up = lookup(*camera.to_pixel(x, z, y - HEIGHT_ZERO_Y), camera.shape)
+    x, y, z = camera.surface.rest.T
+    look_up = lookup(*camera.to_pixel(x, z, y - camera.height_zero_y), camera.shape)
     maps = np.ascontiguousarray(levels.reshape(*camera.shape, 9).transpose(2, 0, 1))
     held = np.stack([look_up(part) for part in maps], -1).reshape(-1, 3, 3)
     held[:, diagonal, diagonal] -= _lamp_light(unit)
@@ -55,12 +54,12 @@ def held_light(unit: Calibration) -> np.ndarray:
 
 def _lamp_light(unit: Calibration) -> np.ndarray:
     """Levels (n, 3) that each LED's lamp gives the gel's nodes as Blender has them, by Lambert's law."""
-    surface, camera = sensors.digit_surface(), unit.camera
+    surface, camera = unit.camera.surface, unit.camera
 
     def in_image(points: np.ndarray) -> np.ndarray:
         return np.stack([camera.right_z * points[:, 2], camera.down_x * points[:, 0], points[:, 1]], -1)
 
-    middle = np.array([[camera.centre_x, HEIGHT_ZERO_Y, camera.centre_z]])
+    middle = np.array([[camera.centre_x, camera.height_zero_y, camera.centre_z]])
     places, inward = in_image(surface.rest - middle), -in_image(node_normals(surface.rest, surface.faces))
     light = np.empty((len(places), 3))
     for k, led in enumerate(unit.leds):

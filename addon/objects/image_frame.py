@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...tactile_core.sensors.camera import HEIGHT_ZERO_Y, Camera
+from ...tactile_core.sensors.camera import Camera
 from . import axes
 
 
@@ -12,11 +12,11 @@ def to_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
     """Convert places (..., 3) m, image frame (right, down, toward the camera), to the gel object's axes and units."""
     right, down, toward = np.moveaxis(np.asarray(places, float), -1, 0)
     x, z = camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right
-    return axes.to_blender(np.stack([x, HEIGHT_ZERO_Y + toward, z], -1), per_metre)
+    return axes.to_blender(np.stack([x, camera.height_zero_y + toward, z], -1), per_metre)
 
 
 def from_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
     """Convert places in the gel object's axes and units to the image frame, float64 m, the inverse of ``to_gel``."""
     x, y, z = np.moveaxis(axes.to_sensor(places, per_metre), -1, 0)
     right, down = camera.right_z * (z - camera.centre_z), camera.down_x * (x - camera.centre_x)
-    return np.stack([right, down, y - HEIGHT_ZERO_Y], -1)
+    return np.stack([right, down, y - camera.height_zero_y], -1)

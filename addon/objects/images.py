@@ -5,7 +5,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-PICTURE, HEIGHTS = "DIGIT picture", "DIGIT height map"
+from ...tactile_core import sensors
+from ..ui import properties
+
+_PICTURE, _HEIGHTS = "{} picture", "{} height map"  # of a sensor
 
 
 def new_image(name: str, width: int, height: int, *, floats: bool = False) -> bpy.types.Image:
@@ -30,25 +33,35 @@ def fill(image: bpy.types.Image, values: np.ndarray) -> None:
     image.update()
 
 
-def show_picture(picture: np.ndarray) -> bpy.types.Image:
-    """Show the picture (H, W, 3) uint8 in its datablock."""
-    image = new_image(PICTURE, picture.shape[1], picture.shape[0])
+def picture_of(gel: bpy.types.Object) -> bpy.types.Image | None:
+    """Return the picture of a gel's sensor, if it was drawn."""
+    return bpy.data.images.get(_PICTURE.format(_title(gel)))
+
+
+def _title(gel: bpy.types.Object) -> str:
+    return sensors.title(properties.sensor_name(gel))
+
+
+def show_picture(gel: bpy.types.Object, picture: np.ndarray) -> bpy.types.Image:
+    """Show the picture (H, W, 3) uint8 of a gel in its sensor's datablock."""
+    image = new_image(_PICTURE.format(_title(gel)), picture.shape[1], picture.shape[0])
     image.use_fake_user = True  # kept in the file, even while no editor shows it
     fill(image, picture.astype(np.float32) / 255)
     return image
 
 
-def show_heights(heights: np.ndarray) -> bpy.types.Image:
-    """Show the height map (H, W) m in its datablock, in millimetres."""
-    image = new_image(HEIGHTS, heights.shape[1], heights.shape[0], floats=True)
+def show_heights(gel: bpy.types.Object, heights: np.ndarray) -> bpy.types.Image:
+    """Show the height map (H, W) m of a gel in its sensor's datablock, in millimetres."""
+    image = new_image(_HEIGHTS.format(_title(gel)), heights.shape[1], heights.shape[0], floats=True)
     image.use_fake_user = True
     fill(image, 1e3 * heights)
     return image
 
 
 def pack() -> None:
-    """Pack picture and height map, so that a saved file holds them as they are."""
-    for name in (PICTURE, HEIGHTS):
+    """Pack pictures and height maps, so that a saved file holds them as they are."""
+    titles = [title for _, title, _ in properties.sensor_items(gels_only=True)]
+    for name in [form.format(title) for title in titles for form in (_PICTURE, _HEIGHTS)]:
         image = bpy.data.images.get(name)
         # Blender 5.0 empties an image that is packed again without a change.
         if image is not None and (image.packed_file is None or image.is_dirty):

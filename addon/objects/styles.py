@@ -11,8 +11,8 @@ from . import style_nodes, surfaces
 MODIFIER = "Tactile style"
 STYLES = (
     ("DISPLACEMENT", "Displacement", "Colour by how far each place has moved"),
-    ("CONTACT_PATCH", "Contact Patch", "Colour what is touched; of a DIGIT's gel"),
-    ("ELECTRODES", "Electrodes", "Colour round each electrode by how far its reading has changed; of a BioTac's skin"),
+    ("CONTACT_PATCH", "Contact Patch", "Colour what is touched; of a gel"),
+    ("ELECTRODES", "Electrodes", "Colour round each electrode by how far its reading has changed; of a skin"),
     ("NONE", "Material", "Show the surface's own material"),
 )
 _ONLY = {"CONTACT_PATCH": "DIGIT", "ELECTRODES": "BIOTAC"}  # style -> the one role that has it

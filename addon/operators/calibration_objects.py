@@ -15,7 +15,7 @@ class _OnGel:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return true where there is a gel."""
-        if properties.of_role(context.scene, "DIGIT", context.object) is None:
+        if properties.gel_of(context.scene, context.object) is None:
             cls.poll_message_set("Translate a recording first, or add a DIGIT")
             return False
         return True
@@ -29,9 +29,9 @@ class TACTILE_OT_reset_to_calibration(_OnGel, TactileOperator):
 
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
-        gel = properties.of_role(context.scene, "DIGIT", context.object)
+        gel = properties.gel_of(context.scene, context.object)
         properties.check_own(gel)
-        digit_body.reset(gel, render_settings.calibration_of(context.scene))
+        digit_body.reset(gel, render_settings.calibration_of(context.scene, properties.sensor_name(gel)))
 
 
 class TACTILE_OT_save_as_calibration(_OnGel, TactileOperator, ExportHelper):
@@ -46,8 +46,8 @@ class TACTILE_OT_save_as_calibration(_OnGel, TactileOperator, ExportHelper):
 
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
-        gel = properties.of_role(context.scene, "DIGIT", context.object)
-        base = render_settings.calibration_of(context.scene)
+        gel = properties.gel_of(context.scene, context.object)
+        base = render_settings.calibration_of(context.scene, properties.sensor_name(gel))
         shown = digit_unit.shown_unit(gel, context.evaluated_depsgraph_get(), base)
         path = bpy.path.abspath(self.filepath)
         unit = dataclasses.replace(shown.unit, unit=f"{base.unit}, changed in Blender") if shown.unit != base else base

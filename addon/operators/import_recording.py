@@ -1,4 +1,4 @@
-"""File > Import > BioTac Recording, and the same by drag and drop."""
+"""File > Import > BioTac Recording, and the same by drag and drop; of other sensors by weights that read them."""
 
 import os
 
@@ -8,10 +8,11 @@ from bpy_extras.io_utils import ImportHelper
 
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
+from ...tactile_core.sensors.electrodes import table_of
 from ..objects import axes, biotac_objects, custom_properties, electrode_markers, motion
 from ..ui import properties, timeline, view
 from ..ui.progress import shown
-from ..ui.properties import MOTIONS, POLARITIES, POLARITY_HELP
+from ..ui.properties import MOTIONS, POLARITIES, POLARITY_HELP, WEIGHTS_HELP
 from ..ui.reports import TactileOperator
 from . import recording_data
 
@@ -21,7 +22,7 @@ LONG = 2000  # frames; beyond it a mesh cache loads and saves faster than shape 
 
 
 class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
-    """Import a BioTac recording as an animated skin with its core and electrodes"""
+    """Import a recording of a BioTac, or of the sensor that weights read, as an animated skin with its electrodes"""
 
     bl_idname = "tactile.import_recording"
     bl_label = "Import BioTac Recording"
@@ -38,6 +39,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
     frames: bpy.props.StringProperty(
         name="Frames", description="Part of the recording, A:B:STEP as in Python; a colon alone takes all", default=":"
     )
+    weights: bpy.props.StringProperty(name="Weights", description=WEIGHTS_HELP, subtype="DIR_PATH")
     first_frame: bpy.props.IntProperty(
         name="First Frame", description="Scene frame on which the recording's frame 0 is put", default=0
     )
@@ -57,15 +59,17 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         if self.motion == "MESH_CACHE" and not bpy.data.is_saved:
             raise TactileError(path, "a mesh cache of an unsaved file", "a saved .blend", "Save it first")
         with shown(context) as progress:
-            found = recording_data.load(path, self.tare, self.frames, progress, self.polarity)
-        scene = context.scene
+            found = recording_data.load(path, self.tare, self.frames, progress, self.polarity, self.weights)
+        scene, source = context.scene, found.translator.source
+        placed = table_of(source).is_file()
+        if placed:
+            sensors.electrodes(source)  # a bad table is refused before anything is made
         view.hide_untouched(scene)
         kept = self._keep_scene(scene)
         frames = self.first_frame + found.chosen.astype(float)
-        skin = self._objects(scene, path, found, frames)
-        summary = motion.animate(
-            skin, sensors.biotac_surface().rest, found.translation.displacement_biotac, frames, self.motion
-        )
+        skin = self._objects(scene, path, found, frames, placed)
+        rest, moved = properties.surface_of(skin).rest, found.translation.displacement_biotac
+        summary = motion.animate(skin, rest, moved, frames, self.motion)
         if self.set_timeline:
             timeline.set_timeline(scene, found.recording.rate, int(frames[0]), int(frames[-1]))
             firmest = np.linalg.norm(found.translation.force, axis=1).argmax()
@@ -74,6 +78,9 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         view.open_tab(context)
         there = [thing for thing in scene.objects if thing.tactile.role in ("BIOTAC", "DIGIT") and thing != skin]
         view.show(context, [skin], there)
+        if not placed:
+            advice = "Name the folder of your own sensors in Preferences"
+            self.report({"WARNING"}, f"No electrodes are shown: there is no {table_of(source)}. {advice}")
         for warning in found.signals.warnings:
             self.report({"WARNING"}, warning)
         if len(frames) > LONG and self.motion != "MESH_CACHE":
@@ -98,21 +105,22 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         return context.window_manager.invoke_props_dialog(self, **asked)
 
     def _objects(
-        self, scene: bpy.types.Scene, path: str, found: recording_data.Translated, frames: np.ndarray
+        self, scene: bpy.types.Scene, path: str, found: recording_data.Translated, frames: np.ndarray, placed: bool
     ) -> bpy.types.Object:
         group = biotac_objects.new_collection(scene, found.recording.name)
         before = [thing for thing in scene.objects if thing.tactile.role == "BIOTAC"]
-        skin = biotac_objects.add_skin(group, axes.units_per_metre(scene))
+        skin = biotac_objects.add_skin(group, axes.units_per_metre(scene), found.translator.source)
         if before:  # beside the last pair of sensors
             skin.location = before[-1].location
             skin.location.y -= _APART * skin.tactile.per_metre
         about = skin.tactile
         about.recording = bpy.path.relpath(path) if bpy.data.is_saved else os.path.abspath(path)
         about.tare, about.frames, about.first_frame = self.tare, self.frames, self.first_frame
-        about.polarity = self.polarity
+        about.polarity, about.weights = self.polarity, self.weights
         biotac_objects.add_core(group, skin)
-        electrode_markers.add_markers(skin, group, found.signals.change, frames)
-        electrode_markers.add_counts(skin, found.signals.change, frames)
+        if placed:
+            electrode_markers.add_markers(skin, group, found.signals.change, frames)
+            electrode_markers.add_counts(skin, found.signals.change, frames)
         custom_properties.write(skin, custom_properties.columns(found), frames)
         return skin
 

@@ -42,7 +42,8 @@ def draw(
     up to the one that is returned, are given to better(). Raises TactileError, and ``tracer_process.Stopped`` where
     stopped() is true.
     """
-    shown = digit_unit.shown_unit(gel, depsgraph, render_settings.calibration_of(depsgraph.scene, size))
+    unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel), size)
+    shown = digit_unit.shown_unit(gel, depsgraph, unit)
     heights = height_map.height_map(digit_objects.displacement_of(gel, depsgraph), shown.unit.camera)
     if preset == FAST:
         return shader_of(shown.unit)(heights), heights
@@ -57,12 +58,13 @@ def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
     What a picture cannot be made of is said when one is asked for.
     """
-    gel = properties.of_role(scene, "DIGIT")
+    gel = properties.gel_of(scene)
     if bpy.app.background or gel is None or reports.missing("mitsuba"):
         return
     try:
         preset = render_settings.preset_of(scene)
-        shown = digit_unit.shown_unit(gel, depsgraph, render_settings.calibration_of(scene))
+        unit = render_settings.calibration_of(scene, properties.sensor_name(gel))
+        shown = digit_unit.shown_unit(gel, depsgraph, unit)
         if preset != FAST:
             tracer_process.prepare(preset, shown.unit, shown.around)
     except (TactileError, OSError):
@@ -77,6 +79,6 @@ def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.I
 def show(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str) -> bpy.types.Image:
     """Draw picture and height map by a preset into their datablocks; returns the picture's. Raises as ``draw`` does."""
     picture, heights = draw(gel, depsgraph, preset)
-    images.show_heights(heights)
+    images.show_heights(gel, heights)
     stale_picture.remember(gel, depsgraph)
-    return images.show_picture(picture)
+    return images.show_picture(gel, picture)

@@ -31,7 +31,7 @@ def failure() -> str:
 def _draw(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     """Called at each change of the frame."""
     global _failed, _drawing
-    gel = properties.of_role(scene, "DIGIT")
+    gel = stale_picture.shown_gel(scene)
     if gel is None or depsgraph is None or _drawing:
         return
     _drawing = True
@@ -78,7 +78,7 @@ def _handlers() -> list[tuple[list, Callable]]:
 
 
 class TACTILE_OT_live_picture(TactileOperator):
-    """Draw the DIGIT's picture by the preset at every change, in the Image Editor; press again to stop"""
+    """Draw the gel's picture by the preset at every change, in the Image Editor; press again to stop"""
 
     bl_idname = "tactile.live_picture"
     bl_label = "Live Picture"
@@ -87,7 +87,7 @@ class TACTILE_OT_live_picture(TactileOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return true where there is a gel to look at, or the picture is on: it can always be switched off."""
-        if not is_on() and properties.of_role(context.scene, "DIGIT") is None:
+        if not is_on() and properties.gel_of(context.scene) is None:
             cls.poll_message_set("Translate a recording first, or add a DIGIT")
             return False
         return True
@@ -97,7 +97,7 @@ class TACTILE_OT_live_picture(TactileOperator):
         if is_on():
             switch_off()
             return
-        gel = properties.of_role(context.scene, "DIGIT", context.object)
+        gel = properties.gel_of(context.scene, context.object)
         image = pictures.update(gel, context.evaluated_depsgraph_get())
         for handlers, function in _handlers():
             handlers.append(function)

@@ -7,15 +7,18 @@ import functools
 import os
 from collections.abc import Callable
 
+import bpy
 import numpy as np
 
 from ...tactile_core import recordings
+from ...tactile_core.errors import TactileError
 from ...tactile_core.jobs import frame_range
 from ...tactile_core.recordings import PrepareOptions, Recording, Signals
 from ...tactile_core.recordings.polarity import AUTO
 from ...tactile_core.translation import translate
 from ...tactile_core.translation.contact_track import Evidence, Tracked
 from ...tactile_core.translation.translate import Translation
+from ...tactile_core.translation.weights import CARD_NAME
 from ..process import recording_reader
 
 CHUNK = 64  # frames between two steps of the progress: the networks' own block
@@ -23,29 +26,43 @@ CHUNK = 64  # frames between two steps of the progress: the networks' own block
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Translated:
-    """A recording, which frames of it (T,), their signals and what they become."""
+    """A recording, which frames of it (T,), their signals and what they become by which networks."""
 
+    translator: translate.Translator
     recording: Recording
     chosen: np.ndarray
     signals: Signals
     translation: Translation
 
 
-@functools.cache
-def translator() -> translate.Translator:
-    """Return the shipped networks, loaded once."""
-    return translate.load_translator()
+@functools.lru_cache(maxsize=2)
+def _translator(weights: str, _changed: int) -> translate.Translator:
+    """Load networks once, the shipped ones for an empty text, whichever sensors they lead between."""
+    return translate.load_translator(weights or None, target=None, source=None)
 
 
-def load(path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str = AUTO) -> Translated:
+def translator_of(weights: str) -> translate.Translator:
+    """Return the networks in a folder, or those that ship. Raises TactileError for what are none."""
+    folder = bpy.path.abspath(weights) if weights else ""
+    try:
+        changed = os.stat(os.path.join(folder, CARD_NAME)).st_mtime_ns if folder else 0
+    except OSError:
+        changed = 0  # the loader says what is wrong
+    return _translator(folder, changed)
+
+
+def load(
+    path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str = AUTO, weights: str = ""
+) -> Translated:
     """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there."""
+    known = translator_of(weights)
     try:
         changed = os.stat(path).st_mtime_ns
     except OSError:
         changed = 0  # the reader says what is wrong
-    key = (path, changed, tare, frames, polarity)
+    key = (path, changed, tare, frames, polarity, known.sha256)
     if key not in _KEPT:
-        found = _translated(path, tare, frames, progress, polarity)
+        found = _translated(known, path, tare, frames, progress, polarity)
         _KEPT.clear()
         _KEPT[key] = found
     return _KEPT[key]
@@ -54,18 +71,28 @@ def load(path: str, tare: str, frames: str, progress: Callable[[float], None], p
 _KEPT: dict[tuple, Translated] = {}  # the last one: importing and translating ask for the same
 
 
-def _translated(path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str) -> Translated:
-    recording = recording_reader.read(path)
+def _translated(
+    translator: translate.Translator,
+    path: str,
+    tare: str,
+    frames: str,
+    progress: Callable[[float], None],
+    polarity: str,
+) -> Translated:
+    recording = recording_reader.read(path, translator.source)
+    if np.isnan(recording.time).all():
+        found, advice = "snapshots, which do not follow each other", "Use `tactile convert --frames-apart`"
+        raise TactileError(path, found, "frames in order", advice)
     chosen = frame_range.select(frame_range.parse_frames(frames), len(recording))
     options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)
     signals = recordings.prepare(recording, options)
 
     def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Evidence]:
-        return recording.time[start:stop], translator().posterior(signals.at(slice(start, stop)))
+        return recording.time[start:stop], translator.posterior(signals.at(slice(start, stop)))
 
     tracked, parts = Tracked(read_posteriors, len(recording)), []
     for start in range(0, len(chosen), CHUNK):
         frames = chosen[start : start + CHUNK]
-        parts.append(translator()(signals.at(frames), tracked(frames)))
+        parts.append(translator(signals.at(frames), tracked(frames)))
         progress(min(1.0, (start + CHUNK) / len(chosen)))
-    return Translated(recording, chosen, signals.at(chosen), Translation.joined(parts))
+    return Translated(translator, recording, chosen, signals.at(chosen), Translation.joined(parts))

@@ -19,7 +19,7 @@ _OWN_KIND = ("eevee", "cycles", "freestyle", "hair", "grease", "motion_blur", "s
 
 
 class TactileRenderEngine(bpy.types.RenderEngine):
-    """Pictures of the scene's DIGIT gel, as its camera sees it"""
+    """Pictures of a gel as its sensor's camera sees it: that of the scene's camera, else the first"""
 
     bl_idname = ID
     bl_label = "Tactile DIGIT (Mitsuba)"
@@ -48,7 +48,7 @@ class TactileRenderEngine(bpy.types.RenderEngine):
 
     def _picture(self, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
         scene = depsgraph.scene
-        gel = properties.of_role(scene, "DIGIT")
+        gel = properties.gel_of(scene)
         if gel is None:
             raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
         share = scene.render.resolution_percentage / 100

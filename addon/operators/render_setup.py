@@ -1,4 +1,4 @@
-"""Set Up Render: everything that makes a rendered file hold the DIGIT's own 8-bit values; and the engine's panel."""
+"""Set Up Render: everything that makes a rendered file hold the camera's own 8-bit values; and the engine's panel."""
 
 import bpy
 
@@ -12,7 +12,7 @@ from .render_engine import ID
 
 
 class TACTILE_OT_set_up_render(TactileOperator):
-    """Render the DIGIT's picture: engine, 240 x 320 pixels, colours as the camera gives them, a camera in the gel"""
+    """Render what a gel's camera sees: engine, its size in pixels, colours as it gives them, a camera in the gel"""
 
     bl_idname = "tactile.set_up_render"
     bl_label = "Set Up Render"
@@ -20,11 +20,11 @@ class TACTILE_OT_set_up_render(TactileOperator):
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
         scene = context.scene
-        gel = properties.of_role(scene, "DIGIT", context.object)
+        gel = properties.gel_of(scene, context.object)
         if gel is None:
             raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
         properties.check_own(gel)
-        unit = render_settings.calibration_of(scene)
+        unit = render_settings.calibration_of(scene, properties.sensor_name(gel))
         digit_body.add_body(gel, unit)
         camera = unit.camera
         render = scene.render
@@ -77,7 +77,7 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
 
 def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the DIGIT's LEDs and coating, and what puts them back or keeps them; nothing without a DIGIT."""
-    gel = properties.of_role(context.scene, "DIGIT", context.object)
+    gel = properties.gel_of(context.scene, context.object)
     if gel is None:
         return
     layout.use_property_split = True

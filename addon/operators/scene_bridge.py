@@ -42,8 +42,8 @@ def indenter_of(context: bpy.types.Context) -> bpy.types.Object:
 
 
 def sensor_of(context: bpy.types.Context) -> bpy.types.Object:
-    """Return the sensor that places refer to: the DIGIT's gel, else the BioTac's skin. Raises TactileError."""
-    found = properties.of_role(context.scene, "DIGIT") or properties.of_role(context.scene, "BIOTAC")
+    """Return the sensor that places refer to: the gel, else the skin. Raises TactileError."""
+    found = properties.gel_of(context.scene) or properties.of_role(context.scene, "BIOTAC")
     if found is None:
         raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
     return found

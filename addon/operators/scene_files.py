@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ..objects import axes, biotac_objects, curves, digit_body, digit_objects, indenter_objects
-from ..ui import render_settings, timeline, view
+from ..ui import properties, render_settings, timeline, view
 from ..ui.reports import TactileOperator, require
 from . import scene_bridge
 
@@ -43,7 +43,7 @@ class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
         skin = biotac_objects.add_skin(group, axes.units_per_metre(scene))
         biotac_objects.add_core(group, skin)
         gel = digit_objects.add_gel(group, skin.tactile.per_metre, skin)
-        digit_body.add_body(gel, render_settings.calibration_of(scene))
+        digit_body.add_body(gel, render_settings.calibration_of(scene, properties.sensor_name(gel)))
         things = [indenter_objects.add_indenter(group, spec, skin.tactile.per_metre) for spec in found.indenters]
         for thing in things:
             thing.parent, thing.location.z = gel, _HOVER * skin.tactile.per_metre

@@ -9,13 +9,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...tactile_core import sensors
 from ...tactile_core.translation import contact_patch
 from ..objects import axes, curves, custom_properties, frame_attribute, motion
 from ..ui import properties, view
 from . import pictures, set_style
 
 STANDING = "{} simulated"
+MOVED = "moved "  # before a sensor's name, in a worker's result
 _BOUNDS = {"sphere": "SPHERE", "cylinder": "CYLINDER"}  # Blender's outlines; the others are boxes
 
 
@@ -23,9 +23,9 @@ _BOUNDS = {"sphere": "SPHERE", "cylinder": "CYLINDER"}  # Blender's outlines; th
 class Result:
     """Result of a simulation.
 
-    seconds (T,), force (T, 3) N; apex (T, 3) m, turn (T, 3, 3): where the indenter stood, on the DIGIT if any.
+    seconds (T,), force (T, 3) N; apex (T, 3) m, turn (T, 3, 3): where the indenter stood, on the gel if any.
 
-    moved : displacement (T, n, 3) m of each sensor that was solved, by ``"biotac"`` and ``"digit"``
+    moved : displacement (T, n, 3) m of each sensor that was solved, by their names
     picked : which tiers, in words, where a bound was given
     """
 
@@ -37,10 +37,20 @@ class Result:
     picked: tuple[str, ...]
 
 
+def sensors_in(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """List the scene's sensors, the first of each name, skins before gels."""
+    found: dict[str, bpy.types.Object] = {}
+    for role in ("BIOTAC", "DIGIT"):
+        for thing in scene.objects:
+            if thing.tactile.role == role:
+                found.setdefault(properties.sensor_name(thing), thing)
+    return list(found.values())
+
+
 def read(folder: Path) -> Result:
     """Read the result in a job's folder."""
     with np.load(folder / "result.npz") as stored:
-        moved = {sensor: stored[sensor] for sensor in ("biotac", "digit") if sensor in stored}
+        moved = {name.removeprefix(MOVED): stored[name] for name in stored.files if name.startswith(MOVED)}
         picked = tuple(str(text) for text in stored["picked"])
         return Result(stored["seconds"], stored["force"], stored["apex"], stored["axes"], moved, picked)
 
@@ -55,21 +65,18 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
     sample = np.abs((frames - scene.frame_start)[:, None] / rate - seconds[None, :]).argmin(axis=1)
     sentences = [*result.picked]
     force = result.force[sample][:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
-    for role, surface, moved in (
-        ("BIOTAC", sensors.biotac_surface(), result.moved.get("biotac")),
-        ("DIGIT", sensors.digit_surface(), result.moved.get("digit")),
-    ):
-        sensor = properties.of_role(scene, role)
-        if sensor is None or moved is None:  # it was added, or removed, while the other process worked
+    for sensor in sensors_in(scene):
+        moved = result.moved.get(properties.sensor_name(sensor))
+        if moved is None:  # it was added while the other process worked
             continue
-        before = sensor.tactile.largest
+        surface, before = properties.surface_of(sensor), sensor.tactile.largest
         sentences.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
         custom_properties.write(sensor, {"force": force}, frames)
-        if role == "DIGIT":
+        if sensor.tactile.role == "DIGIT":
             patch = contact_patch.contact_patch(moved[sample], surface)
             frame_attribute.add(sensor, frame_attribute.PATCH, patch, frames[0], 1.0)
         set_style.follow(sensor, before)
-        if role == "DIGIT":
+        if sensor == properties.gel_of(scene):
             view.show_picture(context, pictures.update(sensor, context.evaluated_depsgraph_get()))
     if thing.tactile.press_by == "HEIGHT":
         curves.write_curve(thing, "tactile.force", frames, np.linalg.norm(force, axis=1))

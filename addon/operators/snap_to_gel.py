@@ -28,14 +28,11 @@ def depth_of(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.t
         return None
     try:
         place = _place(thing, sensor, depsgraph)
-        apex, direction = _touch(_name(sensor), thing.tactile.spec, *np.round(place[[0, 2]], 7), thing.tactile.tilt)
+        name, (x, z) = properties.sensor_name(sensor), np.round(place[[0, 2]], 7)
+        apex, direction = _touch(name, thing.tactile.spec, x, z, thing.tactile.tilt)
     except TactileError:
         return None
     return float((place - apex) @ direction)
-
-
-def _name(sensor: bpy.types.Object) -> str:
-    return "digit" if sensor.tactile.role == "DIGIT" else "biotac"
 
 
 def _place(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
@@ -85,7 +82,8 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
         properties.check_own(thing)
         depsgraph = context.evaluated_depsgraph_get()
         place = _place(thing, sensor, depsgraph)
-        pose = _pose(_name(sensor), self._built(thing, sensor, depsgraph), place[0], place[2], thing.tactile.tilt)
+        name, built = properties.sensor_name(sensor), self._built(thing, sensor, depsgraph)
+        pose = _pose(name, built, place[0], place[2], thing.tactile.tilt)
         moved = pose.apex + 1e-3 * self.depth * pose.direction - place
         world = sensor.matrix_world.to_3x3() @ Vector(axes.to_blender(moved, sensor.tactile.per_metre))
         matrix = thing.matrix_world.copy()

@@ -21,8 +21,12 @@ _SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material
 
 @dataclasses.dataclass
 class _Known:
-    """What the picture was drawn of: displacement (n, 3) m and unit, None where unknown; its pixels while it is dim."""
+    """What the picture was drawn of: gel, its displacement (n, 3) m and unit, None where unknown.
 
+    bright : its pixels while it is dim
+    """
+
+    gel: str = ""
     drawn: tuple[np.ndarray, str] | None = None
     bright: np.ndarray | None = None
 
@@ -32,7 +36,13 @@ _known = _Known()
 
 def remember(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     """Remember what the picture has just been drawn of."""
-    _known.drawn, _known.bright = _state(gel, depsgraph), None
+    _known.gel, _known.drawn, _known.bright = gel.name, _state(gel, depsgraph), None
+
+
+def shown_gel(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the gel whose picture was drawn last, else the one that is meant."""
+    last = scene.objects.get(_known.gel)
+    return last if last is not None and last.tactile.role == "DIGIT" else properties.gel_of(scene)
 
 
 def is_stale() -> bool:
@@ -42,12 +52,14 @@ def is_stale() -> bool:
 
 def check(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Dim the picture if the scene has left what it was drawn of, and give it its light back on return."""
-    image, gel = bpy.data.images.get(images.PICTURE), properties.of_role(scene, "DIGIT")
+    gel = shown_gel(scene)
+    image = None if gel is None else images.picture_of(gel)
     if image is None or gel is None or _known.drawn is None:
         return
     try:
         moved, unit = _state(gel, depsgraph)
-        stale = unit != _known.drawn[1] or np.abs(moved - _known.drawn[0]).max() > _STILL
+        other = moved.shape != _known.drawn[0].shape  # a gel of another sensor
+        stale = other or unit != _known.drawn[1] or np.abs(moved - _known.drawn[0]).max() > _STILL
     except TactileError:  # of a gel or a lamp that has no picture
         stale = True
     if stale == is_stale():
@@ -63,7 +75,8 @@ def check(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def _state(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[np.ndarray, str]:
-    shown = digit_unit.shown_unit(gel, depsgraph, render_settings.calibration_of(depsgraph.scene))
+    unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel))
+    shown = digit_unit.shown_unit(gel, depsgraph, unit)
     return digit_objects.displacement_of(gel, depsgraph), repr(shown.unit)
 
 
@@ -86,7 +99,8 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @persistent
 def _note(*_: object) -> None:
     """Let a file that is saved know whether its picture is dim; called by Blender."""
-    image = bpy.data.images.get(images.PICTURE)
+    gel = shown_gel(bpy.context.scene)
+    image = None if gel is None else images.picture_of(gel)
     if image is not None:
         image[_STALE] = is_stale()
 
@@ -94,8 +108,9 @@ def _note(*_: object) -> None:
 @persistent
 def _take_up(*_: object) -> None:
     """Take the picture of an opened file to be of the frame it opens on, unless it was dim; called by Blender."""
-    image, gel = bpy.data.images.get(images.PICTURE), properties.of_role(bpy.context.scene, "DIGIT")
-    _known.drawn = _known.bright = None
+    _known.gel, _known.drawn, _known.bright = "", None, None
+    gel = properties.gel_of(bpy.context.scene)
+    image = None if gel is None else images.picture_of(gel)
     if image is not None and gel is not None and not image.get(_STALE, False):
         try:
             _known.drawn = _state(gel, bpy.context.evaluated_depsgraph_get())

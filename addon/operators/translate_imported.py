@@ -1,63 +1,108 @@
-"""Translate the imported recording to a DIGIT's at the press of one button."""
+"""Translate the imported recording to a gel's at the press of one button."""
 
 import bpy
+import numpy as np
 
-from ...tactile_core import sensors
+from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import contact_patch, gel_place
 from ..objects import custom_properties, digit_body, digit_objects, frame_attribute, motion
+from ..process.jobs import Job, JobFolder
 from ..ui import properties, render_settings, timeline, view
 from ..ui.progress import shown
-from ..ui.reports import TactileOperator
+from ..ui.reports import require
 from . import pictures, recording_data, set_style
+from .job_operator import JobOperator
+
+_READ = ("displacement_digit", "contact_center", "force", "flags")  # of a translation, to solve its contacts
 
 
-class TACTILE_OT_translate(TactileOperator):
-    """Translate the BioTac recording: add a DIGIT's gel that moves as it would have, with its contact patch"""
+class TACTILE_OT_translate(JobOperator):
+    """Translate the recording: add a gel that moves as it would have, with its contact patch"""
 
     bl_idname = "tactile.translate"
-    bl_label = "Translate to DIGIT"
+    bl_label = "Translate"
+
+    to: bpy.props.EnumProperty(
+        name="To", description="Which gel; the networks' own, the DIGIT for those that ship, unless another is chosen."
+        " On another the contact that they find is solved", items=lambda _self, _context: properties.sensor_items(True),
+    )  # fmt: skip
+    stopped = "Translation stopped; the scene is as it was"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return true where there is a BioTac to translate."""
+        """Return true where there is a skin with a recording."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         if skin is None or not skin.tactile.recording:
             cls.poll_message_set("Import a BioTac recording first, or simulate one in a saved file")
             return False
         return True
 
-    def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+    def begin(self, context: bpy.types.Context) -> None:
+        """See ``JobOperator``: only a gel that no networks lead to is waited for."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
         properties.check_own(skin)
         about = skin.tactile
         with shown(context) as progress:
             path = bpy.path.abspath(about.recording)
-            found = recording_data.load(path, about.tare, about.frames, progress, about.polarity)
-        frames = about.first_frame + found.chosen / about.samples
-        group = properties.home_of(skin)
-        # A gel that is there keeps its LEDs, coating and camera as the user has set them.
-        there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")
-        gel = next(there, None) or digit_objects.add_gel(group, about.per_metre, skin)
-        digit_body.add_body(gel, render_settings.calibration_of(context.scene))
-        surface, moved = sensors.digit_surface(), found.translation.displacement_digit
-        before = gel.tactile.largest
-        summary = motion.animate(gel, surface.rest, moved, frames, about.motion)
+            found = recording_data.load(path, about.tare, about.frames, progress, about.polarity, about.weights)
+        own = found.translator.target
+        self._skin, self._target = skin.name, self.to.lower() if self.properties.is_property_set("to") else own
+        self._found = found
+        unit = render_settings.calibration_of(context.scene, self._target)
+        beside = gel_place.beyond_picture(found.translation.contact_center, unit.camera)
+        self._moved, self._flags = found.translation.displacement_digit, found.translation.flags | beside
+        self._error = found.translation.expected_error_digit
+        if self._target != own:
+            require("scipy")
+            self._folder = JobFolder()
+            arrays = {name: getattr(found.translation, name) for name in _READ}
+            np.savez(self._folder.path / "frames.npz", **arrays)
+            self._job = Job("solve_gel", self._folder.path, gel=self._target, found_on=own)
+
+    def finish(self, context: bpy.types.Context) -> None:
+        """See ``JobOperator``."""
+        if self._job is not None:
+            with np.load(self._folder.path / "gel.npz") as stored:
+                self._moved, self._flags = stored["displacement"], self._flags | stored["flags"]
+            self._error = np.full(len(self._moved), custom_properties.UNKNOWN)
+            from ...tactile_core.jobs.frame_pass import describe_gel
+
+            for words in describe_gel(self._target, self._found.translator.target):
+                self.report({"WARNING"}, words)
+        skin = context.scene.objects.get(self._skin)
+        if skin is None:
+            raise TactileError(self._skin, "no longer in the scene", "the skin that was translated")
+        frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
+        gel = _gel_beside(skin, self._target)
+        digit_body.add_body(gel, render_settings.calibration_of(context.scene, self._target))
+        summary = self._animate(gel, frames, skin.tactile.motion)
+        low = timeline.mark_low_confidence(context.scene, self._found.translation.confidence, frames)
+        view.show(context, [skin, gel])
+        view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))
+        self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
+
+    def _animate(self, gel: bpy.types.Object, frames: np.ndarray, how: str) -> str:
+        """Let the gel move, with its contact patch and what is told of each frame; returns a sentence."""
+        surface, before = properties.surface_of(gel), gel.tactile.largest
+        summary = motion.animate(gel, surface.rest, self._moved, frames, how)
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0
-        patch = contact_patch.contact_patch(moved, surface)
+        patch = contact_patch.contact_patch(self._moved, surface)
         frame_attribute.add(gel, frame_attribute.PATCH, patch, frames[0], step)
         set_style.follow(gel, before)
-        values = custom_properties.columns(found)
-        told_of_gel = {"expected_error_um": 1e6 * found.translation.expected_error_digit}
-        told_of_gel |= {name: values[name] for name in ("force", "confidence")}
-        seen_by = render_settings.calibration_of(context.scene).camera
-        told_of_gel["flags"] = values["flags"] | gel_place.beyond_picture(found.translation.contact_center, seen_by)
-        custom_properties.write(gel, told_of_gel, frames)
-        low = timeline.mark_low_confidence(context.scene, found.translation.confidence, frames)
-        view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))
-        view.show(context, [skin, gel])
-        self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
+        values = custom_properties.columns(self._found)
+        told = {name: values[name] for name in ("force", "confidence")}
+        told |= {"expected_error_um": 1e6 * self._error, "flags": self._flags}
+        custom_properties.write(gel, told, frames)
+        return summary
+
+
+def _gel_beside(skin: bpy.types.Object, sensor: str) -> bpy.types.Object:
+    """Return the skin's gel of a sensor; one that is there keeps its LEDs, coating and camera as the user set them."""
+    group = properties.home_of(skin)
+    there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")
+    same = next((thing for thing in there if properties.sensor_name(thing) == sensor), None)
+    return same or digit_objects.add_gel(group, skin.tactile.per_metre, skin, sensor)
 
 
 register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_translate,))

@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...tactile_core.errors import TactileError
+from ..ui import properties
 
 DESCRIPTION = """\
 Convert recordings, simulate scenes and render pictures inside Blender, unattended. Each input gets the folder
@@ -56,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="blender -b --command tactile", description=DESCRIPTION, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
+    gels = [name.lower() for name, _, _ in properties.sensor_items(gels_only=True)]
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
     for name, brief, what in (
         ("convert", "recordings to .blend files with both sensors", "recording: CSV, HDF5 or NPZ"),
@@ -72,6 +74,13 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument("--tare", default="auto", help="of recordings: auto, none or frames A:B")
         verb.add_argument("--polarity", choices=("auto", "falls", "rises"), default="auto",
                           help="of recordings: what counts do where a film thins")  # fmt: skip
+        verb.add_argument(
+            "--weights",
+            type=Path,
+            metavar="FOLDER",
+            help="networks, which name the sensor of the recordings (default: those that ship)",
+        )
+        verb.add_argument("--to", choices=gels, help="gel of recordings (default: the weights')")
         verb.add_argument("--frames", default=":", help="of recordings: A:B:STEP")
         verb.add_argument("--seed", type=int, default=0, help="of simulated noise")
         verb.add_argument("--overwrite", action="store_true", help="write into result folders that exist")
@@ -105,8 +114,9 @@ def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
     """Write a recording as a .blend."""
     _fresh()
     words = {"tare": options.tare, "frames": options.frames, "polarity": options.polarity}
-    bpy.ops.tactile.import_recording(filepath=str(path.resolve()), **words)
-    bpy.ops.tactile.translate()
+    weights = "" if options.weights is None else str(options.weights.resolve())
+    bpy.ops.tactile.import_recording(filepath=str(path.resolve()), weights=weights, **words)
+    bpy.ops.tactile.translate(**({} if options.to is None else {"to": options.to.upper()}))
     _claimed(folder, options)
     _finish(folder, options, options.pictures)
 

@@ -15,15 +15,18 @@ import numpy as np
 
 from ...tactile_core import recordings
 from ...tactile_core.recordings import Recording, Truth
+from ...tactile_core.sensors import SOURCE
 from .jobs import Job, JobFolder
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _LOOK = 0.05  # s between two looks at the worker
 
 
-def read(path: str | os.PathLike) -> Recording:
+def read(path: str | os.PathLike, sensor: str = SOURCE) -> Recording:
     """See ``tactile_core.recordings.read``."""
-    return _read_elsewhere(os.fspath(path)) if _is_hdf5(path) and not _hdf5_works() else recordings.read(path)
+    if _is_hdf5(path) and not _hdf5_works():
+        return _read_elsewhere(os.fspath(path), sensor)
+    return recordings.read(path, sensor=sensor)
 
 
 def _is_hdf5(path: str | os.PathLike) -> bool:
@@ -46,10 +49,10 @@ def _hdf5_works() -> bool:
     return True
 
 
-def _read_elsewhere(path: str) -> Recording:
+def _read_elsewhere(path: str, sensor: str = SOURCE) -> Recording:
     """Raise TactileError as the reader does."""
     with JobFolder() as folder:
-        job = Job("read", folder, path=path)
+        job = Job("read", folder, path=path, sensor=sensor)
         while not job.poll(_LOOK):
             pass
         about = json.loads((folder / "about.json").read_text(encoding="utf-8"))

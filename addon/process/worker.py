@@ -75,13 +75,12 @@ def simulate(folder: Path, job: dict, progress: Progress) -> None:
         simulate_recording(scene, out, job["seed"], progress, keep=job["keep"], tiers=tiers)
     except TactileError as error:
         raise _in_scene(error, folder, job, depths) from error
-    _result(folder, [choice.describe(sensor) for sensor, choice in choices.items()])
+    _result(folder, job["placed_on"], [choice.describe(sensor) for sensor, choice in choices.items()])
 
 
 def _stages(used: tuple[str, ...], by_height: bool, um: float | None) -> Iterator[None]:
     """Name each stage of a simulation at each step, with its number: "Solving the contacts, 3 of 3"."""
-    surface = {"biotac": "the skin's", "digit": "the gel's"}
-    names = [f"Preparing {surface[sensor]} compliance (computed once, then kept)" for sensor in used if um is None]
+    names = [_preparing(sensor) for sensor in used if um is None]
     names += ["Finding the forces of the heights"] * by_height + ["Choosing the tiers"] * (um is not None)
     names.append("Solving the contacts")
     for k, name in enumerate(names):
@@ -89,8 +88,14 @@ def _stages(used: tuple[str, ...], by_height: bool, um: float | None) -> Iterato
         yield
 
 
+def _preparing(sensor: str) -> str:
+    from tactile_core.sensors import title
+
+    return f"Preparing the {title(sensor)}'s compliance (computed once, then kept)"
+
+
 def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[float]:
-    """Replace the scene's forces by those that the DIGIT answers at each depth; returns the depths, m."""
+    """Replace the scene's forces by those that job["placed_on"] answers at each depth; returns the depths, m."""
     import msgspec
 
     from tactile_core.errors import TactileError
@@ -104,15 +109,15 @@ def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[fl
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     with np.load(folder / "heights.npz") as stored:
         apexes = stored["apex"]
-    points, depths = [], []
+    points, depths, sensor = [], [], job["placed_on"]
     for k, (point, apex) in enumerate(zip(spec.points, apexes, strict=True)):
         place = Placement(point.x_mm * 1e-3, point.z_mm * 1e-3, np.radians(spec.tilt_deg))
-        pose = pose_at("digit", indenter, place)
+        pose = pose_at(sensor, indenter, place)
         depth = float((apex - pose.apex) @ pose.direction)
         force = 0.0
         if depth > 0:
             try:
-                solution = solve("digit", indenter, place, depth=depth, friction=spec.friction)
+                solution = solve(sensor, indenter, place, depth=depth, friction=spec.friction)
             except TactileError as error:
                 raise _at_frame(spec.indenter, job, k, _too_deep(depth, error), error.expected, LIFT) from error
             force = max(solution.axial_force, 0.0)
@@ -157,10 +162,10 @@ def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -
     return _at_frame(spec.indenter, job, k, found, error.expected, LIFT)
 
 
-def _result(folder: Path, picked: list[str]) -> None:
+def _result(folder: Path, sensor: str, picked: list[str]) -> None:
     """The truth; what was picked, in words; and apex (T, 3) m and axes (T, 3, 3) of the indenter.
 
-    It is lowered until it touches the dented gel: on the DIGIT, or on the BioTac where that alone was solved.
+    It is lowered until it touches the dented surface of the sensor on which it is placed.
     """
     from tactile_core import sensors
     from tactile_core.mechanics.placement import Placement, pose_at
@@ -171,9 +176,7 @@ def _result(folder: Path, picked: list[str]) -> None:
     spec = scene.recording
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     seconds, truth = read_truth(folder / "recording.h5")
-    moved = {"biotac": truth.displacement_biotac, "digit": truth.displacement_digit}
-    moved = {sensor: values for sensor, values in moved.items() if values is not None}
-    sensor = "digit" if "digit" in moved else "biotac"
+    moved = truth.displacements
     columns = [(p.time_s, p.x_mm, p.z_mm) for p in spec.points]
     times, x, z = np.array(columns).T
     rest = sensors.sensor_surface(sensor).rest
@@ -189,7 +192,7 @@ def _result(folder: Path, picked: list[str]) -> None:
         apex.append(pose.apex), axes.append(pose.axes)
     arrays = {"apex": np.array(apex), "axes": np.array(axes), "seconds": seconds, "force": truth.force}
     arrays["picked"] = np.array(picked, np.str_)
-    np.savez(folder / "result.npz", **arrays, **moved)
+    np.savez(folder / "result.npz", **arrays, **{f"moved {name}": values for name, values in moved.items()})
 
 
 def render(folder: Path, job: dict, progress: Progress) -> None:
@@ -226,6 +229,27 @@ def _renderer(folder: Path, preset: str) -> Any:
     return Renderer(load_calibration(folder / "unit.toml"), preset, surroundings=around)
 
 
+def solve_gel(folder: Path, job: dict, progress: Progress) -> None:
+    """Solve the contacts of frames.npz, which networks found on the gel job["found_on"], on the gel job["gel"].
+
+    FOLDER/gel.npz then holds displacement (T, n, 3) m and flags (T,).
+    """
+    from tactile_core.jobs import solved_gel
+
+    say(stage=f"{_preparing(job['gel'])}, 1 of 2", done=0, total=1)
+    solved_gel.prepare(job["gel"])
+    say(stage="Solving the contacts, 2 of 2", done=0, total=1)
+    with np.load(folder / "frames.npz") as stored:
+        arrays = dict(stored)
+    count, moved, flags = len(arrays["flags"]), [], []
+    for start in range(0, count, BLOCK):
+        part = {name: values[start : start + BLOCK] for name, values in arrays.items()}
+        found = solved_gel.solved(part, job["gel"], job["found_on"])
+        moved.append(found["displacement_digit"]), flags.append(found["flags"])
+        progress(min(start + BLOCK, count), count)
+    np.savez(folder / "gel.npz", displacement=np.concatenate(moved), flags=np.concatenate(flags))
+
+
 def variant(folder: Path, job: dict, progress: Progress) -> None:
     """Write FOLDER/variant.txt: which variant of Mitsuba this machine runs, and why, in a sentence."""
     from tactile_core.pictures.mitsuba.variant import LLVM, OLDEST_LLVM, choose_variant
@@ -239,10 +263,10 @@ def variant(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def read(folder: Path, job: dict, progress: Progress) -> None:
-    """Read the recording at job["path"] into arrays.npz and about.json, for ``recording_reader``."""
+    """Read the recording of job["sensor"] at job["path"] into arrays.npz and about.json, for ``recording_reader``."""
     from tactile_core import recordings
 
-    found = recordings.read(job["path"])
+    found = recordings.read(job["path"], sensor=job["sensor"])
     whole = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
     truth = whole.pop("truth")
     if truth is not None:
@@ -256,7 +280,8 @@ def read(folder: Path, job: dict, progress: Progress) -> None:
 
 LIFT = "Lift it there"
 STEPS = 8  # of sinking by the free distance; each leaves a small part of it, far below a pixel after eight
-JOBS = {"simulate": simulate, "render": render, "read": read, "variant": variant}
+BLOCK = 16  # frames whose contacts are solved between two reports
+JOBS = {"simulate": simulate, "solve_gel": solve_gel, "render": render, "read": read, "variant": variant}
 
 if __name__ == "__main__":
     sys.exit(main(Path(sys.argv[1])))

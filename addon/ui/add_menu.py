@@ -9,10 +9,6 @@ from ..operators.scene_bridge import sensor_of
 from . import properties, render_settings, view
 from .reports import TactileOperator, require
 
-SENSORS = (
-    ("BIOTAC", "BioTac", "A BioTac's skin with its core"),
-    ("DIGIT", "DIGIT", "A DIGIT's gel"),
-)
 # Each shape's own file says how the menu shows it, and which of the sizes below sets which of its fields.
 FORMS = {kind: form for kind, form in forms().items() if form.label}
 _ABOVE = 10e-3  # m over the sensors' frame: 1.7 mm above the pads, in the middle of both (docs/sources.md, Frame)
@@ -25,7 +21,8 @@ class TACTILE_OT_add_sensor(TactileOperator):
     bl_idname = "tactile.add_sensor"
     bl_label = "Add Sensor"
 
-    sensor: bpy.props.EnumProperty(name="Sensor", description="Which sensor to add", items=SENSORS)
+    sensor: bpy.props.EnumProperty(name="Sensor", description="Which sensor to add",
+                                   items=lambda _self, _context: properties.sensor_items())  # fmt: skip
     millimetres: bpy.props.BoolProperty(
         name="Scene in Millimetres", description="Set the scene's unit to 1 mm; else its own unit is kept", default=True
     )
@@ -33,22 +30,24 @@ class TACTILE_OT_add_sensor(TactileOperator):
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
         scene = context.scene
-        if properties.of_role(scene, self.sensor) is not None:
+        name = self.sensor.lower()
+        role = properties.role_of(name)
+        if any(thing.tactile.role == role and properties.sensor_name(thing) == name for thing in scene.objects):
             raise TactileError(self.sensor, "already in the scene", "one of each sensor", "Use a scene for each pair")
         view.hide_untouched(scene)
         if self.millimetres:
             axes.use_millimetres(scene)
         group, per_metre = context.collection, axes.units_per_metre(scene)
-        if self.sensor == "BIOTAC":
-            thing = biotac_objects.add_skin(group, per_metre)
+        if role == "BIOTAC":
+            thing = biotac_objects.add_skin(group, per_metre, name)
             biotac_objects.add_core(group, thing)
             gel = properties.of_role(scene, "DIGIT")
             if gel is not None:
                 thing.location = gel.location
                 thing.location.y -= digit_objects.BESIDE * per_metre
         else:
-            thing = digit_objects.add_gel(group, per_metre, properties.of_role(scene, "BIOTAC"))
-            digit_body.add_body(thing, render_settings.calibration_of(scene))
+            thing = digit_objects.add_gel(group, per_metre, properties.of_role(scene, "BIOTAC"), name)
+            digit_body.add_body(thing, render_settings.calibration_of(scene, name))
         view.show(context, [thing])
 
 
@@ -143,7 +142,7 @@ class TACTILE_MT_add(bpy.types.Menu):
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Called by Blender."""
-        for name, label, _ in SENSORS:
+        for name, label, _ in properties.sensor_items():
             self.layout.operator(TACTILE_OT_add_sensor.bl_idname, text=label, icon="OUTLINER_OB_META").sensor = name
         self.layout.separator()
         for kind, form in FORMS.items():

@@ -17,8 +17,8 @@ _PACKAGE = __package__.rsplit(".", 2)[0]
 _CATALOG = "7e0a52a2-5f4c-4c1b-9a55-1f6f0d0f6a29"
 _CATALOGS = f"# Asset catalogs of the extension Tactile\n\nVERSION 1\n\n{_CATALOG}:Tactile:Tactile\n"
 DESCRIPTIONS = {
-    "DISPLACEMENT": "Colours a BioTac's skin or a DIGIT's gel by how far each place has moved",
-    "CONTACT_PATCH": "Colours what is touched of a DIGIT's gel",
+    "DISPLACEMENT": "Colours a skin or a gel by how far each place has moved",
+    "CONTACT_PATCH": "Colours what is touched of a gel",
     "ELECTRODES": "Colours a BioTac's skin round its electrodes by the change of each reading",
     "FORCE_ARROW": "For a mesh 1 unit high on its tip: follows a force, with its tip in a sensor's dent",
 }

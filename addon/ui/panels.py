@@ -44,12 +44,15 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
             box.prop(skin.tactile, "recording", text="")
             box.prop(skin.tactile, "tare")
             box.prop(skin.tactile, "polarity")
-        layout.operator(TACTILE_OT_translate.bl_idname, icon="MOD_MESHDEFORM")
+            box.prop(skin.tactile, "weights")
+        row = layout.row(align=True)
+        row.operator(TACTILE_OT_translate.bl_idname, icon="MOD_MESHDEFORM")
+        row.operator_menu_enum(TACTILE_OT_translate.bl_idname, "to", text="", icon="DOWNARROW_HLT")
         row = layout.row(align=True)
         row.operator_menu_enum("tactile.set_style", "style", icon="COLOR")
         row.operator("tactile.force_arrow", text="", icon="EMPTY_SINGLE_ARROW")
-        for role in ("BIOTAC", "DIGIT"):
-            _exaggeration(layout, properties.of_role(context.scene, role, context.object))
+        _exaggeration(layout, skin)
+        _exaggeration(layout, properties.gel_of(context.scene, context.object))
         _numbers(layout, context, skin)
 
 
@@ -70,7 +73,7 @@ def _numbers(layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.t
     size = sum(part * part for part in skin["force"]) ** 0.5
     column = layout.column(align=True)
     column.label(text=f"Force {size:.3f} N", icon="FORCE_FORCE")
-    words, guess = trust_of(skin, properties.of_role(context.scene, "DIGIT", skin))
+    words, guess = trust_of(skin, properties.gel_of(context.scene, context.object or skin))
     icon = "ERROR" if guess else "CHECKMARK"
     for line in _wrapped(words, context.region.width):
         column.label(text=line, icon=icon)
@@ -97,7 +100,7 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 class TACTILE_PT_picture(_Panel, bpy.types.Panel):
-    """Picture that the DIGIT's camera sees"""
+    """Picture that the gel's camera sees"""
 
     bl_idname = "TACTILE_PT_picture"
     bl_label = "Picture"
@@ -115,7 +118,7 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
 
 
 class TACTILE_PT_parts(_Panel, bpy.types.Panel):
-    """LEDs and coating of the DIGIT"""
+    """LEDs and coating of the gel's sensor"""
 
     bl_idname = "TACTILE_PT_parts"
     bl_label = "Lights and Coating"
@@ -125,7 +128,7 @@ class TACTILE_PT_parts(_Panel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return true where there is a DIGIT."""
-        return properties.of_role(context.scene, "DIGIT", context.object) is not None
+        return properties.gel_of(context.scene, context.object) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel; Blender calls it."""
@@ -177,7 +180,7 @@ def _indenter(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy
 
 def _depth(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object) -> None:
     """Draw how deep an indenter stands in the resting gel on this frame, and the button that puts it there."""
-    sensor = properties.of_role(context.scene, "DIGIT") or properties.of_role(context.scene, "BIOTAC")
+    sensor = properties.gel_of(context.scene) or properties.of_role(context.scene, "BIOTAC")
     if sensor is not None and not missing("msgspec"):
         depth = snap_to_gel.depth_of(thing, sensor, context.evaluated_depsgraph_get())
         if depth is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 
 from ...tactile_core.files import cache
+from ...tactile_core.sensors.descriptor import OWN
 from .reports import ADVICE, MODULES, TactileOperator, missing
 
 ID = __package__.rsplit(".", 2)[0]  # the extension, not this package in it
@@ -52,13 +53,14 @@ def size_of(folder: Path) -> int:
 
 def _llvm_changed(preferences: bpy.types.AddonPreferences, _context: bpy.types.Context) -> None:
     preferences.verdict = ""
-    _set_llvm(preferences.llvm)
+    _tell(preferences)
 
 
-def _set_llvm(path: str) -> None:
-    """Name LLVM's library to the processes that draw; an empty path leaves the environment as it is."""
-    if path:
-        os.environ[LLVM_VARIABLE] = bpy.path.abspath(path)
+def _tell(preferences: bpy.types.AddonPreferences) -> None:
+    """Name LLVM's library and the folder of sensors to this process and its workers; empty ones leave what is set."""
+    for variable, path in ((LLVM_VARIABLE, preferences.llvm), (OWN, preferences.sensors)):
+        if path:
+            os.environ[variable] = bpy.path.abspath(path)
 
 
 class TactilePreferences(bpy.types.AddonPreferences):
@@ -73,6 +75,10 @@ class TactilePreferences(bpy.types.AddonPreferences):
     llvm: bpy.props.StringProperty(
         name="LLVM Library", description="libLLVM.so, LLVM-C.dll or libLLVM.dylib, version 18 or newer, which makes"
         " Mitsuba's presets several times faster; empty: the system's", subtype="FILE_PATH", update=_llvm_changed,
+    )  # fmt: skip
+    sensors: bpy.props.StringProperty(
+        name="Own Sensors", description="Folder with sensors of your own, each a folder with its sensor.toml, and with"
+        " tables that do not ship, as a BioTac SP's electrodes", subtype="DIR_PATH", update=lambda self, _: _tell(self),
     )  # fmt: skip
     verdict: bpy.props.StringProperty(name="Verdict", description="What the last check of LLVM has found")
 
@@ -90,6 +96,7 @@ class TactilePreferences(bpy.types.AddonPreferences):
         column = self.layout.column()
         column.use_property_split = True
         column.prop(self, "calibration")
+        column.prop(self, "sensors")
         column.prop(self, "llvm")
         row = column.row()
         row.label(text=self.verdict or "LLVM: not checked yet", icon="INFO")
@@ -112,7 +119,7 @@ def register() -> None:
         bpy.utils.register_class(kind)
     stored = bpy.context.preferences.addons.get(ID)
     if stored is not None and stored.preferences is not None:
-        _set_llvm(stored.preferences.llvm)
+        _tell(stored.preferences)
 
 
 def unregister() -> None:

@@ -1,11 +1,15 @@
 """Properties that the add-on stores in a .blend: the role of each object, and the path of its recording."""
 
+import functools
 import math
 
 import bpy
 
+from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
+from ...tactile_core.geometry.lattice import Lattice
 from ...tactile_core.mechanics.placement import FRICTION
+from ...tactile_core.sensors import descriptor
 
 FORMAT = 2  # of these properties; raised when an older file needs to be read differently. 2: friction and tilt
 
@@ -14,18 +18,19 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 ROLES = (
     ("NONE", "None", "Nothing of this add-on"),
-    ("BIOTAC", "BioTac skin", "The skin of an imported or simulated BioTac"),
-    ("DIGIT", "DIGIT gel", "The gel of a translated or simulated DIGIT"),
-    ("CORE", "BioTac core", "The rigid core under the skin"),
+    # The names of files of former versions, of any sensor of skin and fluid, and of any gel.
+    ("BIOTAC", "Skin", "The skin of an imported or simulated sensor of skin and fluid, as the BioTac"),
+    ("DIGIT", "Gel", "The gel of a translated or simulated sensor, as the DIGIT"),
+    ("CORE", "Core", "The rigid core under the skin"),
     ("ELECTRODE", "Electrode", "A marker of one electrode"),
     ("INDENTER", "Indenter", "A body that presses"),
-    ("LED", "LED", "A lamp of the DIGIT"),
-    ("BODY", "DIGIT body", "A part of the DIGIT that is there to be seen"),
+    ("LED", "LED", "A lamp of a gel's sensor"),
+    ("BODY", "Body", "A part of a gel's sensor that is there to be seen"),
     ("TWIN", "Simulated indenter", "Where the simulation had the indenter"),
     ("LEGEND", "Legend", "A colour bar, an arrow, or a light to look by"),
 )
 PRESS_BY = (
-    ("HEIGHT", "Height", "It presses as deep as it is moved into the DIGIT's gel"),
+    ("HEIGHT", "Height", "It presses as deep as it is moved into the gel"),
     ("FORCE", "Force", "It presses with the keyframed force, wherever its height is"),
 )
 MOTIONS = (
@@ -34,6 +39,9 @@ MOTIONS = (
     ("MESH_CACHE", "Mesh Cache", "A PC2 file beside the saved .blend: for recordings of thousands of frames"),
 )
 
+
+OF_ROLE = {"BIOTAC": sensors.SOURCE, "DIGIT": sensors.TARGET}  # the sensors of objects that name none
+WEIGHTS_HELP = "Folder of the networks, which name their two sensors; empty: those that ship"
 
 POLARITY_HELP = "What the electrodes' counts do where the film over them thins"
 POLARITIES = (
@@ -54,6 +62,8 @@ class TactileObject(bpy.types.PropertyGroup):
     )
     tare: bpy.props.StringProperty(name="Tare", description="Frames without contact A:B, auto or none", default="auto")
     polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_HELP, items=POLARITIES)
+    sensor: bpy.props.StringProperty(name="Sensor", description="Whose skin or gel it is, as its descriptor is named")
+    weights: bpy.props.StringProperty(name="Weights", description=WEIGHTS_HELP, subtype="DIR_PATH", options=_RELATIVE)
     frames: bpy.props.StringProperty(name="Frames", description="Part of the recording, A:B:STEP", default=":")
     motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
     colour: bpy.props.StringProperty(name="Colour", description="Which LED of the calibration this is")
@@ -88,21 +98,62 @@ class TactileObject(bpy.types.PropertyGroup):
     )  # fmt: skip
 
 
-def set_up(thing: bpy.types.Object, role: str, per_metre: float) -> TactileObject:
-    """Mark an object of ours."""
+def set_up(thing: bpy.types.Object, role: str, per_metre: float, sensor: str = "") -> TactileObject:
+    """Mark an object of ours; sensor : of skins and gels."""
     about = thing.tactile
-    about.role, about.per_metre, about.format = role, per_metre, FORMAT
+    about.role, about.per_metre, about.sensor, about.format = role, per_metre, sensor, FORMAT
     return about
+
+
+def sensor_name(thing: bpy.types.Object) -> str:
+    """Name the sensor of a skin or a gel; those of former files are the BioTac's and the DIGIT's."""
+    return thing.tactile.sensor or OF_ROLE[thing.tactile.role]
+
+
+def surface_of(thing: bpy.types.Object) -> Lattice:
+    """Return the resting surface of a skin or a gel. Raises TactileError for a sensor that is not known here."""
+    return sensors.sensor_surface(sensor_name(thing))
+
+
+def role_of(sensor: str) -> str:
+    """Return the role of a sensor's surface. Raises TactileError for a name that is none."""
+    return "DIGIT" if sensors.is_gel(sensor) else "BIOTAC"
+
+
+def sensor_items(gels_only: bool = False) -> list[tuple[str, str, str]]:
+    """List the sensors with a descriptor for a menu, the usual pair first."""
+    return _items(descriptor.names(), gels_only)
+
+
+@functools.cache  # Blender needs the texts to live on
+def _items(names: tuple[str, ...], gels_only: bool) -> list[tuple[str, str, str]]:
+    found = []
+    for name in sorted(names, key=lambda name: (name not in sensors.PAIR, name)):
+        try:
+            gel, title = sensors.is_gel(name), sensors.title(name)
+        except TactileError:  # a descriptor of the user's own that is wrong; `tactile info --sensor` says what
+            continue
+        if gel or not gels_only:
+            found.append((name.upper(), title, f"{title}: {'a gel' if gel else 'skin and fluid'}"))
+    return found
 
 
 def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
     """Return the scene's object of a role: ``near`` itself, else one in its collections, else the scene's first."""
-    if near is not None:
-        beside = [near, *(thing for group in near.users_collection for thing in group.objects)]
-        found = next((thing for thing in beside if thing.tactile.role == role), None)
-        if found is not None and scene.objects.get(found.name) is not None:
-            return found
-    return next((thing for thing in scene.objects if thing.tactile.role == role), None)
+    return _beside(scene, role, near) or next((thing for thing in scene.objects if thing.tactile.role == role), None)
+
+
+def _beside(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None) -> bpy.types.Object | None:
+    beside = [near, *(thing for group in near.users_collection for thing in group.objects)] if near is not None else ()
+    found = next((thing for thing in beside if thing.tactile.role == role), None)
+    return found if found is not None and scene.objects.get(found.name) is not None else None
+
+
+def gel_of(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
+    """Return the gel that is meant: by ``near`` as in ``of_role``, else the scene camera's, else the scene's first."""
+    seen = None if scene.camera is None else scene.camera.parent
+    seen = seen if seen is not None and seen.tactile.role == "DIGIT" else None
+    return _beside(scene, "DIGIT", near) or seen or of_role(scene, "DIGIT")
 
 
 def home_of(thing: bpy.types.Object) -> bpy.types.Collection:

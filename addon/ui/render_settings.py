@@ -1,15 +1,16 @@
-"""Settings of a scene's DIGIT pictures: preset, unit, largest error."""
+"""Settings of a scene's pictures: preset, unit, largest error."""
 
 import importlib.util
 
 import bpy
 
+from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ...tactile_core.jobs.error_budget import Budget, parse_budget
 from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.calibration import Calibration
 from ..objects import digit_body
-from . import preferences
+from . import preferences, properties
 
 _FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
 _MITSUBA = (
@@ -31,8 +32,9 @@ class TactileRender(bpy.types.PropertyGroup):
         update=lambda settings, context: _prepare(settings, context),
     )  # fmt: skip
     calibration: bpy.props.StringProperty(
-        name="Calibration", description="File of one DIGIT unit (tactile calibrate); empty: the one of the preferences",
-        subtype="FILE_PATH", options=_RELATIVE, update=lambda settings, context: _take_calibration(settings, context),
+        name="Calibration", description="File of one unit (tactile calibrate); empty: that of the sensor, or of the"
+        " preferences for a DIGIT", subtype="FILE_PATH", options=_RELATIVE,
+        update=lambda settings, context: _take_calibration(settings, context),
     )  # fmt: skip
     error: bpy.props.StringProperty(
         name="Largest Error", description="Largest error that the toolkit itself may add: 50um of a simulated surface,"
@@ -58,30 +60,37 @@ def preset_of(scene: bpy.types.Scene) -> str:
     return presets.cheapest(levels, variant.LLVM)
 
 
-def calibration_of(scene: bpy.types.Scene, size: tuple[int, int] | None = None) -> Calibration:
-    """Return the unit whose file a scene names, else the preferences', its picture (width, height) pixels large.
+def calibration_of(scene: bpy.types.Scene, sensor: str, size: tuple[int, int] | None = None) -> Calibration:
+    """Return a gel's unit, its picture (width, height) pixels large: of the file that a scene names for such a gel.
 
-    Raises TactileError.
+    Else the preferences', of a DIGIT, or that of the sensor's descriptor. Raises TactileError, also for a file of a
+    sensor that the scene has no gel of.
     """
-    path = scene.tactile_render.calibration or preferences.default_calibration(bpy.context)
+    path = scene.tactile_render.calibration
+    if not path and sensor == sensors.TARGET:
+        path = preferences.default_calibration(bpy.context)
+    file = bpy.path.abspath(path) if path else None
+    gels = {properties.sensor_name(thing) for thing in scene.objects if thing.tactile.role == "DIGIT"}
     try:
-        unit = calibration_file.load_calibration(bpy.path.abspath(path) if path else None)
+        unit = calibration_file.load_calibration(file, None if file else sensor)
+        if unit.camera.sensor != sensor:  # a file of another gel in the scene is that one's alone
+            unit = calibration_file.load_calibration(None if unit.camera.sensor in gels else file, sensor)
     except TactileError as error:
         advice = "Choose another as Calibration in the tab Tactile, or leave it empty"
-        raise TactileError(error.where, error.found, "a calibration file", advice) from error
+        expected = f"a calibration file of a {sensors.title(sensor)}"
+        raise TactileError(error.where, error.found, expected, advice) from error
     return unit if size is None else unit.at_size(*size)
 
 
 def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> None:
     """Put LEDs, coating and camera to those of the file that was chosen; one that is none is reported by a render."""
     scene = settings.id_data
-    try:
-        unit = calibration_of(scene)
-    except TactileError:
-        return
     for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
         if digit_body.leds_of(gel) and gel.library is None:
-            digit_body.reset(gel, unit)
+            try:
+                digit_body.reset(gel, calibration_of(scene, properties.sensor_name(gel)))
+            except TactileError:
+                continue
 
 
 def _prepare(settings: TactileRender, context: bpy.types.Context) -> None:

@@ -6,7 +6,8 @@ import functools
 
 import bpy
 
-from . import view
+from ..objects import images
+from . import properties, view
 from .reports import TactileOperator
 
 NAME = "Tactile"
@@ -17,7 +18,7 @@ _LOOKS = 50
 
 
 class TACTILE_OT_open_workspace(TactileOperator):
-    """Open a workspace with the sensors, the DIGIT's picture, properties and a timeline; it is made once a file"""
+    """Open a workspace with the sensors, the gel's picture, properties and a timeline; it is made once a file"""
 
     bl_idname = "tactile.open_workspace"
     bl_label = "Tactile Workspace"
@@ -73,7 +74,8 @@ def arrange(window: bpy.types.Window) -> None:
     _split(window, kept, "HORIZONTAL", _TIMELINE, "TIMELINE")
     picture = _split(window, kept, "VERTICAL", _LEFT, "IMAGE_EDITOR")
     _split(window, picture, "HORIZONTAL", _BELOW, "PROPERTIES")
-    picture.spaces.active.image = bpy.data.images.get("DIGIT picture")
+    gel = properties.gel_of(window.scene)
+    picture.spaces.active.image = None if gel is None else images.picture_of(gel)
     with bpy.context.temp_override(window=window):
         view.open_tab(bpy.context)
         view.look_again(bpy.context)

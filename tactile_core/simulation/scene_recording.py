@@ -19,7 +19,7 @@ from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement, on_gel
 from ..mechanics.solve import Sensor, Solution, Tier, solve
 from ..recordings import Truth, write_simulated
-from ..sensors import TARGET, descriptor
+from ..sensors import SOURCE, TARGET, descriptor
 from ..sensors.readout import Wiring, readings
 from .scene import RecordingSpec, Scene, load_scene
 
@@ -27,13 +27,14 @@ PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL mode
 _STILL_COUNT = 2000  # TDC and TAC, not simulated: a constant reading
 
 DEFAULT = ("electrodes", "displacement_biotac", "displacement_digit")
+ELECTRODES_OF = SOURCE  # whose counts are simulated
 _FIELDS = ("displacement", "traction")  # of a sensor
 
 
 def outputs() -> dict[str, Sensor]:
     """Return what a file may hold beside time, force and, with a gel, the contact's centre; and whose each is."""
     fields = {f"{field}_{sensor}": sensor for sensor in descriptor.names() for field in _FIELDS}
-    return {"electrodes": "biotac", **fields}
+    return {"electrodes": ELECTRODES_OF, **fields}
 
 
 class _Frame(NamedTuple):

@@ -32,9 +32,10 @@ def test_a_scene_without_calibration_takes_the_preferences(preferences, scene, p
     bpy.ops.tactile.add_sensor(sensor="DIGIT")
     bpy.data.lights["LED red"].energy *= 2
     bpy.ops.tactile.save_as_calibration(filepath=str(own))
-    shipped = settings.calibration_of(scene)
+    shipped = settings.calibration_of(scene, "digit")
     preferences.calibration = str(own)
-    assert settings.calibration_of(scene).leds[0].radiance == pytest.approx(2 * shipped.leds[0].radiance, rel=1e-5)
+    found = settings.calibration_of(scene, "digit").leds[0].radiance
+    assert found == pytest.approx(2 * shipped.leds[0].radiance, rel=1e-5)
 
 
 def test_the_verdict_on_llvm_names_a_library_that_is_not_there(preferences, monkeypatch):

@@ -1,0 +1,97 @@
+"""Base of the operators whose work is done in another process while Blender stays usable."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import bpy
+
+from ..process.jobs import Job, JobFolder
+from ..ui.reports import Refused, TactileOperator, reported
+
+_STEP = 0.1  # s between two looks at the worker
+
+
+class JobOperator(TactileOperator):
+    """``begin`` starts a job, or none where there is nothing to wait for; ``finish`` takes its result."""
+
+    stopped: ClassVar[str] = "Stopped; the scene is as it was"
+    _job: Job | None = None
+    _folder: JobFolder | None = None
+    _timer: bpy.types.Timer | None = None
+
+    def begin(self, context: bpy.types.Context) -> None:
+        """Set ``_folder`` and ``_job``; raises TactileError."""
+        raise NotImplementedError
+
+    def finish(self, context: bpy.types.Context) -> None:
+        """Put the result into the scene; raises TactileError."""
+        raise NotImplementedError
+
+    def work(self, context: bpy.types.Context) -> None:
+        """Do it without a window, or from a script: waits for the end."""
+        try:
+            self.begin(context)
+            while self._job is not None and not self._job.poll(_STEP):
+                pass
+            self.finish(context)
+        finally:
+            self._close(context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Do it from the window: goes on while Blender stays usable."""
+        try:
+            with reported(self):
+                self.begin(context)
+                if self._job is None:
+                    self.finish(context)
+        except Refused:
+            self._close(context)
+            return {"CANCELLED"}
+        if self._job is None:
+            return {"FINISHED"}
+        self._timer = context.window_manager.event_timer_add(_STEP, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        context.window_manager.progress_begin(0, 100)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Called by Blender for each event."""
+        if event.type == "ESC":
+            self._close(context)
+            self.report({"WARNING"}, self.stopped)
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        try:
+            with reported(self):
+                over = self._job.poll()
+                share = round(100 * self._job.share)
+                context.window_manager.progress_update(share)
+                context.workspace.status_text_set(f"{self._job.stage}: {share} %   (Esc stops)")
+                if over:
+                    self.finish(context)
+        except Refused:
+            self._close(context)
+            return {"CANCELLED"}
+        if over:
+            self._close(context)
+            return {"FINISHED"}
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop the job when Blender closes or another file is opened."""
+        self._close(context)
+
+    def _close(self, context: bpy.types.Context) -> None:
+        if self._job is not None:
+            self._job.cancel()
+            self._job = None
+        if self._folder is not None:
+            self._folder.close()
+            self._folder = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            context.window_manager.progress_end()
+            context.workspace.status_text_set(None)
+            self._timer = None
