@@ -1,8 +1,8 @@
-"""Contact as Isaac Gym computed it: linear tetrahedra, co-rotated linear law, no fluid, on a mesh the user gives.
+"""Contact as Isaac Gym computed it: linear tetrahedra, co-rotated linear law, no fluid, on the public meshes.
 
-For those who hold data made that way. Linear tetrahedra lock (docs/sources.md, Mechanics): forces come out about twice
-too high on the public BioTac mesh, which the published modulus does not undo. Differences to Isaac Gym that remain:
-equilibrium is found exactly instead of stepped in time, and there is no friction.
+A benchmark of what data made that way are off by. Linear tetrahedra lock (docs/sources.md, Mechanics): forces come out
+about twice too high on the public BioTac mesh, which the published modulus does not undo. Differences to Isaac Gym that
+remain: equilibrium is found exactly instead of stepped in time, and there is no friction.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ import numpy as np
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Indenter, Pose, mesh_file
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
-from tactile_core.mechanics.finite_strain.solved_contact import ContactState
 from tactile_core.mechanics.pose_path import between
-from tactile_core.sensors import Material, biotac, digit
+from tactile_core.sensors import Material, digit
 
 from .corotated_tets import CorotatedTets
 from .tet_file import TetMesh
@@ -29,10 +28,8 @@ SKIN = Material(youngs=1.552e6, poisson=0.316)  # fitted on such a mesh by Naran
 MAX_DEPTH = 2.5e-3  # m: the fluid's greatest depth under the pad (docs/sources.md), for the core's contact is left out
 LOAD_STEP = 0.3e-3  # m, as for the BioTac's own mesh
 _ON_CORE = 0.02e-3  # m, nodes this close to the core are glued to it, as in hex_mesh: 532 nodes of the public mesh
-_BASE_CAP_X = 4.9e-3  # m, the inner base cap rests on the core (public mesh)
 _ON_BACK = 0.01e-3  # m, of the DIGIT's flat back (assumed; the public mesh's back is flat to 1 nm)
 _FAR = 50e-3  # m, an indenter that meets nothing within this way misses the sensor
-_FORCE_TOLERANCE, _SEARCH_STEPS = 1e-3, 12  # relative, of the search for a force
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,21 +50,12 @@ class Solution:
     report: dict[str, Any]
 
 
-def attached_to(sensor: str, mesh: TetMesh) -> np.ndarray:
-    """Mark nodes (n,) bool of a mesh in the sensors' frame that are glued to the BioTac's core or to the DIGIT's back.
+def on_back(mesh: TetMesh) -> np.ndarray:
+    """Mark nodes (n,) bool of a DIGIT's mesh in the sensors' frame that are glued to the gel's back.
 
-    The core is our own table of it: on the public mesh 354 nodes, of which 294 are among the 532 that ``near_body``
-    finds with the core's own mesh; the others lie on the far side and at the base.
     Raises TactileError where that leaves too few to hold the mesh or none to move: it stands in another frame.
     """
-    x, y, z = mesh.nodes.T
-    if sensor == "digit":
-        return _held(sensor, y > digit.BACK_Y - _ON_BACK)
-    radius = np.hypot(y - biotac.AXIS_Y, z)
-    core = biotac.core_radius(x, np.arctan2(z, biotac.AXIS_Y - y))
-    on_core = (np.nan_to_num(core, nan=-1.0) >= radius - _ON_CORE) | (x > _BASE_CAP_X)
-    boundary = np.isin(np.arange(len(x)), mesh.surface)
-    return _held(sensor, on_core & boundary & _on_inner_side(mesh.nodes))
+    return _held("digit", mesh.nodes[:, 1] > digit.BACK_Y - _ON_BACK)
 
 
 def near_body(mesh: TetMesh, path: str | os.PathLike) -> np.ndarray:
@@ -100,16 +88,6 @@ def _held(what: str, held: np.ndarray) -> np.ndarray:
     return held
 
 
-def _on_inner_side(nodes: np.ndarray) -> np.ndarray:
-    """Nodes nearer to the inner than to the outer skin."""
-    import scipy.spatial
-
-    inner, outer = (
-        scipy.spatial.cKDTree(biotac.skin_surface(layer).rest).query(nodes)[0] for layer in ("inner", "outer")
-    )
-    return inner < outer
-
-
 def first_touch(mesh: TetMesh, indenter: Indenter, pose: Pose) -> Pose:
     """The pose moved along its direction to where the indenter first touches a node of the mesh.
 
@@ -125,87 +103,34 @@ def first_touch(mesh: TetMesh, indenter: Indenter, pose: Pose) -> Pose:
     raise TactileError("isaac-like press", "the indenter misses the mesh", "a pose in front of it")
 
 
-class Press:
-    """An indenter that presses a mesh here and there; each contact goes on from the last one that was solved."""
-
-    def __init__(
-        self, mesh: TetMesh, attached: np.ndarray, indenter: Indenter, pose: Pose, material: Material = SKIN
-    ) -> None:
-        """Take attached : (n,) bool, nodes that do not move; pose : clear of the mesh, or at first touch."""
-        self.solid = CorotatedTets(mesh, attached, material)
-        skin = np.setdiff1d(mesh.surface, np.flatnonzero(attached))
-        self.indenter = indenter
-        self.contact = FiniteStrainContact(self.solid, skin, indenter, pose)
-        self.last: ContactState = self.contact.start()
-
-    def lift(self, pose: Pose) -> None:
-        """Take the indenter off and put it at another pose, clear of the mesh."""
-        self.last = dataclasses.replace(self.contact.start(), pose=pose)
-
-    def at_depth(self, pose: Pose, depth: float) -> Solution:
-        """The contact ``depth`` m beyond the first touch at ``pose``.
-
-        Not converged, and as deep as it went, where equilibrium ends before. Raises TactileError for a depth that is no
-        number from 0 to MAX_DEPTH.
-        """
-        if not 0 <= depth <= MAX_DEPTH:
-            found, expected = f"{depth * 1e3:g} mm", f"0 to {MAX_DEPTH * 1e3:g} mm"
-            raise TactileError("isaac-like press, depth", found, expected, "Contact with the core is not modelled")
-        begin, goal, ended = self.last.pose, pose.moved(depth), ""
-        count = max(int(np.ceil(np.linalg.norm(goal.apex - begin.apex) / LOAD_STEP - 1e-6)), 1)
-        for part in np.arange(1, count + 1) / count:
-            try:
-                self.last = self.contact.move(between(begin, goal, part), self.last, LOAD_STEP)
-            except TactileError as error:
-                ended = str(error)
-                break
-        reached = float((self.last.pose.apex - pose.apex) @ pose.direction) if ended else depth
-        return self.solution(reached, ended)
-
-    def at_force(self, pose: Pose, force: float, guess: float = 0.2e-3) -> Solution:
-        """The contact of an axial force, N, with the first touch at ``pose``; ``guess`` m of its depth.
-
-        Not converged where no depth up to MAX_DEPTH gives it.
-        """
-        goal, depth = force ** (2 / 3), guess
-        low, high = (0.0, 0.0), None
-        for _ in range(_SEARCH_STEPS):  # regula falsi on F^(2/3), nearly straight in the depth
-            solution = self.at_depth(pose, depth)
-            found = max(float(solution.force @ pose.direction), 0.0)
-            if not solution.converged or abs(found - force) <= _FORCE_TOLERANCE * force:
-                return solution
-            root = found ** (2 / 3)
-            if root < goal:
-                low = (depth, root)
-            else:
-                high = (depth, root)
-            if high is not None:
-                depth = low[0] + (goal - low[1]) * (high[0] - low[0]) / (high[1] - low[1])
-            else:
-                grown = depth * goal / max(root, 1e-12)
-                depth = min(max(grown, 1.05 * depth), depth + LOAD_STEP, MAX_DEPTH)
-        return dataclasses.replace(solution, converged=False)
-
-    def solution(self, depth: float, ended: str = "") -> Solution:
-        """The last contact, ``depth`` m from first touch; ``ended`` : why it went no deeper."""
-        touch, mesh = self.last, self.solid.mesh
-        report = {
-            "method": "isaac-like: linear tetrahedra, co-rotated linear law, no fluid, no friction",
-            "nodes": len(mesh.nodes), "cells": len(mesh.cells), "attached": int(mesh.clamped.sum()),
-            "touching": len(touch.nodes), "iterations": touch.iterations, "ended": ended,
-        }  # fmt: skip
-        patch = np.zeros(len(mesh.nodes), bool)
-        patch[touch.nodes] = True
-        return Solution(touch.state.displacement, touch.force, patch, depth, not ended, report)
-
-
 def press(
     mesh: TetMesh, attached: np.ndarray, indenter: Indenter, pose: Pose, depth: float, material: Material = SKIN
 ) -> Solution:
     """Press an indenter into a mesh, ``depth`` m beyond first touch, which may lie off ``pose`` along its motion.
 
-    attached : (n,) bool, nodes that do not move. Raises TactileError for an indenter that misses the mesh and for a
-    depth that is no number from 0 to MAX_DEPTH.
+    attached : (n,) bool, nodes that do not move. Not converged, and as deep as it went, where equilibrium ends before.
+    Raises TactileError for an indenter that misses the mesh and for a depth that is no number from 0 to MAX_DEPTH.
     """
+    if not 0 <= depth <= MAX_DEPTH:
+        found, expected = f"{depth * 1e3:g} mm", f"0 to {MAX_DEPTH * 1e3:g} mm"
+        raise TactileError("isaac-like press, depth", found, expected, "Contact with the core is not modelled")
     touching = first_touch(mesh, indenter, pose)
-    return Press(mesh, attached, indenter, touching, material).at_depth(touching, depth)
+    skin = np.setdiff1d(mesh.surface, np.flatnonzero(attached))
+    contact = FiniteStrainContact(CorotatedTets(mesh, attached, material), skin, indenter, touching)
+    last, ended, goal = contact.start(), "", touching.moved(depth)
+    count = max(int(np.ceil(depth / LOAD_STEP - 1e-6)), 1)
+    for part in np.arange(1, count + 1) / count:
+        try:
+            last = contact.move(between(touching, goal, part), last, LOAD_STEP)
+        except TactileError as error:
+            ended = str(error)
+            break
+    reached = float((last.pose.apex - touching.apex) @ touching.direction) if ended else depth
+    report = {
+        "method": "isaac-like: linear tetrahedra, co-rotated linear law, no fluid, no friction",
+        "nodes": len(mesh.nodes), "cells": len(mesh.cells), "attached": int(attached.sum()),
+        "touching": len(last.nodes), "iterations": last.iterations, "ended": ended,
+    }  # fmt: skip
+    patch = np.zeros(len(mesh.nodes), bool)
+    patch[last.nodes] = True
+    return Solution(last.state.displacement, last.force, patch, reached, not ended, report)

@@ -39,7 +39,7 @@ def rows(quick: bool, data: Path) -> Iterator[Row]:
         yield from _biotac(mesh, held, [0.3e-3] if quick else [0.3e-3, 0.8e-3, 1.2e-3])
     if (data / "digit_mesh" / "digit_gel.mesh").exists():
         mesh = _read_medit(data / "digit_mesh" / "digit_gel.mesh")
-        yield from _digit(mesh, isaac_like.attached_to("digit", mesh), [0.3e-3] if quick else [0.3e-3, 0.6e-3])
+        yield from _digit(mesh, isaac_like.on_back(mesh), [0.3e-3] if quick else [0.3e-3, 0.6e-3])
 
 
 def _biotac(mesh: TetMesh, held: np.ndarray, depths: list[float]) -> Iterator[Row]:
