@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 
 from ..terminal import say, tell
-from .common import NOTHING, columns_argument, columns_of, polarity_argument
+from .common import NOTHING, columns_argument, columns_of, polarity_argument, weights_argument
 
-BRIEF = "rest, gains and offsets of a sensor, from its recordings"
+BRIEF = "fit rest, gains and offsets of a BioTac unit to its recordings"
 TEXT = """\
 Fit a gain and an offset to each electrode of a BioTac, so that its readings in contact look like the simulated ones
 that the networks were trained on. Recordings of one sensor are taken together; what touched it need not be known. The
@@ -29,11 +29,11 @@ LEAVES = NOTHING
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("recordings", nargs="+", metavar="RECORDING", help="of one sensor, in any known layout")
+    verb.add_argument("recordings", nargs="+", metavar="RECORDING", help="recordings of one unit, in any known layout")
     verb.add_argument("--out", required=True, metavar="FILE", help="new TOML file to write")
     polarity_argument(verb)
     columns_argument(verb)
-    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+    weights_argument(verb)
 
 
 def run(options: argparse.Namespace) -> int:

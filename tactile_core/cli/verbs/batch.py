@@ -16,21 +16,21 @@ from .common import (
     prepare_arguments,
     prepare_words,
     progress_argument,
-    target_argument,
+    unit_arguments,
 )
 
 if TYPE_CHECKING:
     from ...jobs.engine.job import Job
     from ...jobs.engine.recipes import Translate
 
-BRIEF = "many recordings to shards, resumable, on one machine or many"
+BRIEF = "translate many recordings, resumable, on one machine or many"
 TEXT = """\
 Convert recordings into the job folder DIR:
   job.json      inputs and their hashes, weights, options; written once
-  shards/       HDF5, some frames of one recording each, in the layout of frames.h5; pictures inside
-  aside/        what could not be done and why; the next run tries it again
+  shards/       HDF5 files, each of some frames of one recording, laid out as frames.h5; pictures are inside
+  aside/        recordings and shards that failed, and why; the next run tries them again
   manifest.json all shards and their hashes, once the job is done
-Only what is missing or damaged is made, so the same command continues after any interruption; without INPUTS it does
+Only missing or damaged shards are made, so the same command continues after any interruption; without INPUTS it does
 not check whether recordings changed. The bytes do not depend on the number of workers. INPUTS are files, folders, globs
 (quoted) and @LIST, a text file with one path a line."""
 EPILOG = """\
@@ -53,27 +53,26 @@ RECIPE = (  # option, its value where it is not given
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; none: go on with the job in DIR")
+    verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; without any, the job in DIR goes on")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder of the job")
     verb.add_argument(
         "--keep",
         metavar="WORDS",
-        help="out of latent,displacement,height,image,traction,marker_motion (default: latent,displacement)",
+        help="outputs, out of latent,displacement,height,image,traction,marker_motion (default: latent,displacement)",
     )
-    target_argument(verb)
-    verb.add_argument("--shard-frames", type=int, metavar="N", help="frames a shard (default: 1000)")
+    unit_arguments(verb)
+    verb.add_argument("--shard-frames", type=int, metavar="N", help="frames in a shard (default: 1000)")
     answer_arguments(verb)
-    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
-    verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
-    verb.add_argument("--calibration", metavar="FILE", help="the DIGIT whose pictures to make (`tactile calibrate`)")
-    verb.add_argument("--preset", choices=PRESETS, help="of the pictures, see `tactile render --help` (default: fast)")
+    verb.add_argument(
+        "--preset", choices=PRESETS, help="preset of the pictures, as of `tactile render` (default: fast)"
+    )
     prepare_arguments(verb)
     engine.place_arguments(verb)
-    verb.add_argument("--array", metavar="I/N", help="do part I of N, from 0, beside other processes that do theirs")
+    verb.add_argument("--array", metavar="I/N", help="do part I of N alone (from 0), others do the rest")
     doing = verb.add_mutually_exclusive_group()
     doing.add_argument("--plan", action="store_true", help="write job.json and stop")
-    doing.add_argument("--status", action="store_true", help="say how far the job is; reads files, changes nothing")
-    doing.add_argument("--verify", action="store_true", help="read every shard; status 2 if one is damaged or gone")
+    doing.add_argument("--status", action="store_true", help="print how much of the job is done; changes nothing")
+    doing.add_argument("--verify", action="store_true", help="read every shard; exit status 2 if one is damaged")
     progress_argument(verb)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ...pictures.calibrate.photographs import Photographs
     from ...sensors.calibration import Calibration
 
-BRIEF = "camera, lights and colours of a gel, from presses of a ball"
+BRIEF = "fit camera, lights and colours of a gel to photographs of a ball"
 TEXT = """\
 Fit a unit's calibration to photographs of a ball pressed into its gel, anywhere and to any depth: positions of camera
 and lights, their extent, colours, scale. Without a photograph of the untouched gel, its median over the photographs
@@ -26,9 +26,9 @@ not determine stay near those of --start, and are named. Writes the calibration,
 
 The fit ends on Mitsuba's own pictures, with the light of one bounce, where LLVM works; --quick leaves that out.
 
-With --test, a calibration is tried on photographs instead: place and depth of each press are fitted, all else is the
-calibration's, and the picture is compared with the photograph. The baseline is the background alone.
-Rows named through also fit light that comes through the coating where the ball touches it; the others leave it out."""
+With --test, a calibration is tested on photographs instead: only place and depth of each press are fitted, and the
+picture is compared with the photograph. The baseline is the background alone. Rows named `through` also fit the light
+that comes through the coating where the ball touches it; the others leave it out."""
 EPILOG = """\
 examples:
   tactile calibrate presses/ --ball-diameter 6 --out unit.toml
@@ -43,16 +43,16 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("presses", metavar="PRESSES", help="folder of photographs of one unit, fingertip up")
     verb.add_argument("--out", metavar="FILE", help="new TOML file to write")
-    verb.add_argument("--ball-diameter", type=float, metavar="MM", help="of the ball (with --test: as fitted)")
+    verb.add_argument("--ball-diameter", type=float, metavar="MM", help="diameter of the ball (with --test: as fitted)")
     verb.add_argument("--background", metavar="FILE", help="photograph of the untouched gel (default: estimated)")
-    verb.add_argument("--gel", metavar="SENSOR", help="whose unit it is (default: the one of --start, else digit)")
+    verb.add_argument("--gel", metavar="SENSOR", help="sensor of the unit (default: that of --start, else digit)")
     verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
     verb.add_argument("--unit", metavar="TEXT", help="the unit's name in the file (default: the file's)")
     verb.add_argument("--only", metavar="NAMES", help="photographs to use, file names separated by commas")
     verb.add_argument("--quick", action="store_true", help="fit the fast picture alone: a minute in place of five")
-    verb.add_argument("--test", metavar="FILE", help="try this calibration instead of fitting one")
-    verb.add_argument("--preset", choices=TRIED, help="with --test: what draws the pictures (default: fast)")
-    verb.add_argument("--json", metavar="FILE", help="with --test: write the rows")
+    verb.add_argument("--test", metavar="FILE", help="test this calibration instead of fitting one")
+    verb.add_argument("--preset", choices=TRIED, help="with --test: preset that draws the pictures (default: fast)")
+    verb.add_argument("--json", metavar="FILE", help="with --test: write the errors to this file")
     verb.add_argument("--sheet", metavar="FILE", help="with --test: write photographs, renders, differences as PNG")
     progress_argument(verb)
 

@@ -34,11 +34,11 @@ def prepare_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--kind",
         choices=("raw", "tared", "scaled", "rectified"),
-        help="what the file holds, where the automatic answer is wrong",
+        help="kind of signals in the file, where `tactile info` guesses wrong",
     )
     polarity_argument(verb)
     columns_argument(verb)
-    verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor to counts, for a scaled recording")
+    verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor from a scaled recording to counts")
     verb.add_argument(
         "--smooth", type=int, metavar="N", help="average over N frames, odd (default: 3 if rectified, else 1)"
     )
@@ -51,8 +51,8 @@ def polarity_argument(verb: argparse.ArgumentParser) -> None:
         "--polarity",
         choices=("auto", "falls", "rises"),
         default="auto",
-        help="what counts do where the film over an electrode thins: fall, as raw ones do, or rise, in files that hold"
-        " rest minus reading (default: as the file says, or the recording shows)",
+        help="direction of the counts where the fluid film over an electrode gets thinner: raw counts fall, files that"
+        " hold rest minus reading rise (default: as the file states, else as the recording shows)",
     )
 
 
@@ -61,8 +61,7 @@ def columns_argument(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--columns",
         metavar="MAP.toml",
-        help="which column of a CSV file is what, where its names are of no known layout; `tactile info --columns`"
-        " writes such a map",
+        help="map of the columns of a CSV file in no known layout; `tactile info --columns` writes one",
     )
 
 
@@ -81,8 +80,8 @@ def electrodes_argument(verb: argparse.ArgumentParser) -> None:
         "--electrodes",
         choices=("sheet", "gap"),
         default="sheet",
-        help="how the fluid's film becomes counts: as a conducting sheet, 3 ms a contact, or one over the gap under"
-        " each electrode, at no cost and less like real fingers (default: sheet)",
+        help="law from the fluid film's thickness to counts: sheet, current in a conducting sheet, 3 ms a contact; gap,"
+        " one over the thickness under each electrode, at no cost and less like real fingers (default: sheet)",
     )
 
 
@@ -92,8 +91,8 @@ def answer_arguments(verb: argparse.ArgumentParser) -> None:
         "--answer",
         choices=("likely", "mean"),
         default="likely",
-        help="by the most plausible contact, sharp; or by the mean of all that are plausible, each frame alone, which"
-        " blurs where signals leave two places open (default: likely)",
+        help="estimate of a frame: likely, its most plausible contact; mean, the mean over all its plausible contacts,"
+        " each frame alone, which is blurred where two places fit the signals (default: likely)",
     )
     verb.add_argument(
         "--frames-apart",
@@ -103,22 +102,22 @@ def answer_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--mount-shift",
         metavar="X,Z",
-        help="lay the BioTac elsewhere on the DIGIT: move all contacts by so many mm along and across the gel, so that"
-        " those at the tip come into the picture; +x leads from the tip to the base",
+        help="mount the BioTac elsewhere on the DIGIT: shift all contacts by X mm along the finger (+x is from the tip"
+        " to the base) and Z mm across it, so that those at the tip come into the picture",
     )
     verb.add_argument(
         "--samples",
         type=int,
         default=0,
         metavar="N",
-        help="draw N contacts a frame from its posterior, as sample_center and sample_force in frames.h5",
+        help="also draw N contacts a frame from the posterior, as sample_center and sample_force in frames.h5",
     )
     verb.add_argument(
         "--gel",
         choices=("translated", "solved"),
         default="translated",
-        help="the gel as the networks translate it, or by contact mechanics: a ball of the dent's curvature at"
-        " the found place and force, some 10 ms a frame; needs the extra [fem] (default: translated)",
+        help="displacement of the gel: translated, by the networks; solved, by contact mechanics, a ball of the"
+        " dent's curvature at the estimated place and force, 25 ms a frame, extra [fem] (default: translated)",
     )
 
 
@@ -129,9 +128,24 @@ def target_argument(verb: argparse.ArgumentParser) -> None:
         dest="target",
         default="digit",
         metavar="SENSOR",
-        help="gel to translate to, any with a descriptor; one that no networks lead to is solved by contact mechanics"
-        " (default: %(default)s)",
+        help="gel to translate to: any sensor with a gel (docs/extend.md); where the networks do not lead to it, its"
+        " displacement is solved by contact mechanics (default: %(default)s)",
     )
+
+
+def unit_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add ``--sensor``, ``--to``, ``--weights`` and ``--calibration``: what translates, and between which units."""
+    verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of the unit, from `tactile adapt`")
+    target_argument(verb)
+    weights_argument(verb)
+    verb.add_argument(
+        "--calibration", metavar="FILE", help="gel unit, by `tactile calibrate` (default: the one that ships)"
+    )
+
+
+def weights_argument(verb: argparse.ArgumentParser) -> None:
+    """Add ``--weights``."""
+    verb.add_argument("--weights", metavar="DIR", help="networks from `tactile train` (default: those that ship)")
 
 
 def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
@@ -141,7 +155,9 @@ def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
 
 def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
     """Add ``--seed``; ``same`` : the output that a seed determines, in words."""
-    verb.add_argument("--seed", type=int, default=0, metavar="S", help=f"same seed, same {same} (default: 0)")
+    verb.add_argument(
+        "--seed", type=int, default=0, metavar="S", help=f"random seed; same seed, same {same} (default: 0)"
+    )
 
 
 def check_seed(seed: int) -> None:

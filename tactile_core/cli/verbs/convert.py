@@ -1,4 +1,4 @@
-"""``tactile convert``: recordings to DIGIT pictures."""
+"""``tactile convert``: translate recordings to deformations, forces and DIGIT pictures."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .common import (
     prepare_arguments,
     prepare_words,
     progress_argument,
-    target_argument,
+    unit_arguments,
 )
 
-BRIEF = "recordings to DIGIT pictures"
+BRIEF = "translate recordings to deformations, forces and DIGIT pictures"
 TEXT = """\
-Read, tare, translate and shade recordings. Each gets the folder DIR/<file name without extension> with
-  frames.h5          numbers of every frame: time, electrodes, force, contact_center, confidence, flags; and what
-                     --keep names
+Translate recordings and draw them. Each gets the folder DIR/<file name without extension> with
+  frames.h5          numbers of every frame: time, electrodes, force, contact_center, confidence, flags; and those
+                     that --keep names
   images/%05d.png    DIGIT pictures, 240 x 320, numbered by the frame's index in the recording (from 0)
   contact_sheet.png  a few frames to look at
   note.json          versions, weights, options, warnings
@@ -31,9 +31,10 @@ Read, tare, translate and shade recordings. Each gets the folder DIR/<file name 
 One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all.
 A file of several fingers gives one result a finger, <name>_finger0, <name>_finger1, ...; hand.bag#1 picks one.
 
---error bounds the error that the toolkit adds to that of its networks. In levels of a picture, it picks the cheapest
-preset of `tactile render` that was measured to stay below (without it: fast). In um of heights and displacements, where
-the added error is fixed, a smaller bound is refused. The networks' own error is printed too; the bound excludes it."""
+--error bounds the error that drawing and rounding add to that of the networks. A bound in grey levels of the picture
+picks the cheapest preset of `tactile render` whose measured error is below it (without --error: fast). A bound in um of
+heights and displacements is checked, and refused where the fixed error there is larger. The networks' own error is
+printed beside it and is not part of the bound."""
 # 4 B a number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
 # noisy real one), packed height maps at 200 kB.
 SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
@@ -56,29 +57,24 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "recordings", nargs="+", metavar="RECORDING", help="CSV, HDF5, NPZ, MAT or bag files, in any known layout"
     )
-    verb.add_argument("--out", required=True, metavar="DIR", help="folder of the results; may exist and hold others")
+    verb.add_argument("--out", required=True, metavar="DIR", help="folder for the results; may hold other results")
     verb.add_argument(
         "--frames",
         default=":",
         metavar="A:B:STEP",
-        help="only these frames, counted from 0 as in Python; for a negative A write --frames=-50: ."
-        " Pictures keep their number in the recording, and the tare still sees the whole of it",
+        help="frames to convert, as a Python slice (the last 50: --frames=-50:); pictures keep their number in the"
+        " recording, and the resting reading is still taken from all of it",
     )
     verb.add_argument(
         "--keep",
         default="latent,displacement,image",
         metavar="WORDS",
-        help="what to write beside the numbers that are always there, out of"
-        " latent,displacement,height,image,traction,marker_motion (default: %(default)s)",
+        help="additional outputs, out of latent,displacement,height,image,traction,marker_motion"
+        " (default: %(default)s)",
     )
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
     prepare_arguments(verb)
-    verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
-    target_argument(verb)
-    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
-    verb.add_argument(
-        "--calibration", metavar="FILE", help="unit that is drawn, by `tactile calibrate`, instead of the shipped one"
-    )
+    unit_arguments(verb)
     answer_arguments(verb)
     error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
     progress_argument(verb)
@@ -106,13 +102,7 @@ def run(options: argparse.Namespace) -> int:
     made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(
-        options.weights,
-        options.calibration,
-        preset,
-        answer=answer,
-        gel=options.gel,
-        target=options.target,
-        source=None,
+        options.weights, options.calibration, preset, answer=answer, gel=options.gel, target=options.target, source=None
     )
     if levels is not None:
         why = presets.describe_choice(preset, levels)

@@ -7,7 +7,7 @@ import argparse
 from ..terminal import tell
 from .common import NOTHING
 
-BRIEF = "what works on this machine, and how to get more"
+BRIEF = "check which libraries work here, and how to get more"
 TEXT = """\
 Say which libraries are here, what each is for, and how Mitsuba draws: compiled by LLVM, or one ray at a time without
 it. Each library is tried in a process of its own, so that a broken one breaks nothing; this takes some seconds."""

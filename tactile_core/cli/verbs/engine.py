@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 def place_arguments(verb: argparse.ArgumentParser) -> None:
     """Add ``--workers``, ``--cluster``, ``--restart``, ``--plan``."""
     where = verb.add_mutually_exclusive_group()
-    where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; changes no byte")
+    where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; bytes stay the same")
     where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
     verb.add_argument(
         "--insecure",
         action="store_true",
-        help="of --cluster: do without TLS, in a network that is yours alone; Dask's messages run code",
+        help="with --cluster: no TLS; only in a network that is yours alone, as Dask's messages can run code",
     )
     verb.add_argument("--restart", type=int, metavar="N", help="replace a worker after N tasks (default: 200)")
 
@@ -34,8 +34,8 @@ def parts_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--plan",
         action="store_true",
-        help="write the job into OUT.parts and stop: `tactile batch --out OUT.parts --array I/N`, and --status or"
-        " --verify, work there; the same command without --plan goes on, and makes OUT",
+        help="write the job into OUT.parts and stop, for `tactile batch --out OUT.parts` with --array I/N, --status or"
+        " --verify; the same command without --plan then finishes it and makes OUT",
     )
 
 

@@ -7,7 +7,7 @@ import argparse
 from ..terminal import bar, say, tell
 from .common import NOTHING, progress_argument
 
-BRIEF = "a finished batch job as NPZ, PNG, OpenEXR or LeRobot data set"
+BRIEF = "write a finished batch job as NPZ, PNG, OpenEXR or LeRobot data"
 TEXT = """\
 Write the shards of a finished job (see `tactile batch`) as
   npz      one NPZ file a recording, all arrays

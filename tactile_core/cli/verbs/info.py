@@ -1,4 +1,4 @@
-"""``tactile info``: what a recording holds, and what a sensor is."""
+"""``tactile info``: describe recordings, or a sensor."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from .common import NOTHING, columns_of, polarity_argument
 if TYPE_CHECKING:
     from ...recordings.electrode_gains import SensorFile
 
-BRIEF = "what a recording holds, and what a sensor is"
+BRIEF = "describe recordings, or a sensor"
 TEXT = """\
-Say what recordings hold: sensor, channels, rate, duration, polarity, tare, gaps, bad samples. Of a BioTac SP's CSV,
-which no weights translate: finger, lines, labels and the counts of its 24 electrodes; changes against the unit's rest
-with --sensor, since recordings that begin in contact do not tell it.
+Describe recordings: sensor, channels, rate, duration, polarity, tare, gaps, bad samples. Of a CSV file of a BioTac SP,
+to which no shipped weights apply: finger, lines, labels and the counts of its 24 electrodes; with --sensor also the
+changes against the unit's rest, which recordings that begin in contact do not show.
 
 A CSV file whose column names are of no known layout needs a map: --columns map.toml writes one, guessed from the
 names of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch.
 
-Without a recording, --sensor takes the name of a sensor, one that ships or one of $TACTILE_SENSORS, and tells of it."""
+Without a recording, --sensor NAME describes a sensor: one that ships, or one in the folder $TACTILE_SENSORS."""
 EPILOG = """\
 examples:
   tactile info results/*.csv
@@ -34,13 +34,13 @@ LEAVES = NOTHING
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("recordings", nargs="*", metavar="FILE")
+    verb.add_argument("recordings", nargs="*", metavar="FILE", help="recordings, in any known layout")
     polarity_argument(verb)
     verb.add_argument(
-        "--sensor", metavar="FILE|NAME", help="rest and gains of the unit, as `tactile adapt` writes them; or a sensor"
+        "--sensor", metavar="FILE|NAME", help="rest and gains of a unit, from `tactile adapt`; or a sensor's name"
     )
     verb.add_argument(
-        "--columns", metavar="MAP.toml", help="which column is what; where there is no such file, it is written"
+        "--columns", metavar="MAP.toml", help="map of the columns of a CSV file; it is written where there is none yet"
     )
 
 

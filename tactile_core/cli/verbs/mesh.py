@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ...geometry.indenters import Indenter
     from ...mechanics.solve import Solution
 
-BRIEF = "meshes for other tools"
+BRIEF = "write the mesh of a sensor for other tools"
 TEXT = """\
 Write the mesh of a sensor in metres, x along the finger, -y out of the pad. The ending of --out chooses the format:
   .ply  surface with normals, read by MeshLab, Blender and trimesh; numbers of each vertex beside its place

@@ -9,8 +9,8 @@ from ..terminal import bar, tell
 from . import engine
 from .common import RESUMES, check_seed, electrodes_argument, progress_argument, seed_argument
 
-BRIEF = "simulate paired contacts"
-TEXT = "Simulate contacts of a scene's indenters with both sensors: same force, angle and place."
+BRIEF = "simulate the same contacts on two sensors, to train on"
+TEXT = "Simulate random contacts of a scene's indenters on two sensors, at the same force, angle and place on both."
 EPILOG = """\
 example:
   tactile pairs scenes/press_sphere/scene.toml --count 2000 --seed 1 --out pairs.h5 --workers 4
@@ -26,21 +26,25 @@ LEAVES = RESUMES
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("scene", metavar="SCENE", help="scene.toml: indenters and their range of places, angles, depths")
+    verb.add_argument("scene", metavar="SCENE", help="scene.toml: indenters, ranges of places, angles, depths")
     verb.add_argument("--count", type=int, required=True, metavar="N", help="number of paired contacts")
     seed_argument(verb, "file")
     verb.add_argument(
-        "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json, what is in it, goes beside"
+        "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json beside it describes it"
     )
     verb.add_argument(
-        "--from", dest="source", default="biotac", metavar="SENSOR", help="sensor that feels (default: %(default)s)"
+        "--from",
+        dest="source",
+        default="biotac",
+        metavar="SENSOR",
+        help="sensor translated from (default: %(default)s)",
     )
     verb.add_argument(
         "--to",
         dest="target",
         default="digit",
         metavar="SENSOR",
-        help="gel that is looked at (default: %(default)s); your own is a folder in $TACTILE_SENSORS",
+        help="gel to translate to (default: %(default)s); your own is a folder in $TACTILE_SENSORS",
     )
     verb.add_argument(
         "--keep", metavar="WORDS", help="traction: the force field on both surfaces, too, Pa on each node, float32"

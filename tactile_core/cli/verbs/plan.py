@@ -1,4 +1,4 @@
-"""``tactile plan``: what a scene or a recording will build, and what it will cost."""
+"""``tactile plan``: estimate what a scene's or a recording's outputs build and cost."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import argparse
 from ..terminal import tell
 from .common import NOTHING, error_argument
 
-BRIEF = "what will be built, and what it will cost"
+BRIEF = "estimate time, memory and disk of a command, without running it"
 TEXT = """\
-Say, before anything is run, what a scene's `tactile simulate` (and `convert` and `render` after it), or a recording's
-`tactile convert`, will build for the outputs asked for: sensors and their nodes, matrices (cached, or to be built),
-contacts and their tiers, networks, lights; and what time, memory and disk to expect, from measured tables that ship.
+List what the outputs of a scene (by `tactile simulate`, then `convert` and `render`) or of a recording (by `tactile
+convert`) build: sensors and their nodes, matrices (cached, or to be built), contacts and their tiers, networks, lights;
+and estimate time, memory and disk from measured tables that ship.
 Nothing is written. Where a scene's matrices are cached, contacts on its motion are solved to know their depth."""
 EPILOG = """\
 examples:
@@ -28,10 +28,10 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--keep",
         metavar="WORDS",
-        help="outputs; of a scene out of electrodes,displacement_biotac,displacement_digit,translation,image;"
-        " of a recording latent,displacement,height,image (default: all of a scene, those of `convert`)",
+        help="outputs; for a scene out of electrodes,displacement_biotac,displacement_digit,translation,image (default:"
+        " all); for a recording out of latent,displacement,height,image (default: those of `convert`)",
     )
-    verb.add_argument("--preset", metavar="NAME", help="of the pictures (default: as `render` and `convert` have it)")
+    verb.add_argument("--preset", metavar="NAME", help="preset of the pictures (default: as of `render`, `convert`)")
     error_argument(verb, "um of surfaces, levels of pictures, or both: 50um,0.6levels")
     verb.add_argument("--json", action="store_true", help="print JSON")
 

@@ -14,7 +14,7 @@ from .common import NOTHING, PRESETS, error_argument, progress_argument
 if TYPE_CHECKING:
     from ...jobs.render import Options
 
-BRIEF = "pictures of deformed gels, physically based"
+BRIEF = "draw pictures of deformed gels, by their optics"
 TEXT = """\
 Draw what the camera of a DIGIT, or of another --gel, sees of its deformed gel. INPUT is one of
   frames.h5          of `tactile convert`, with displacement kept
@@ -53,18 +53,22 @@ LEAVES = NOTHING
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("input", metavar="INPUT")
+    verb.add_argument("input", metavar="INPUT", help="frames, heights or a scene, see above")
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
-    verb.add_argument("--preset", choices=PRESETS, help="how exactly (default: standard)")
+    verb.add_argument("--preset", choices=PRESETS, help="method, see above (default: standard)")
     error_argument(verb, "levels of the picture (picks the preset), um of the gel (picks a scene's tier), or both")
-    verb.add_argument("--calibration", metavar="UNIT.toml", help="of your sensor (default: the one that ships)")
-    verb.add_argument("--gel", metavar="SENSOR", help="whose gel it is (default: the calibration's, else digit)")
-    verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="only these, counted from 0 as in Python")
-    verb.add_argument("--size", metavar="WxH", help="pixels, such as 480x640 (default: the calibration's)")
+    verb.add_argument(
+        "--calibration", metavar="UNIT.toml", help="unit, by `tactile calibrate` (default: the one that ships)"
+    )
+    verb.add_argument("--gel", metavar="SENSOR", help="sensor of the gel (default: the calibration's, else digit)")
+    verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="frames to draw, as a Python slice")
+    verb.add_argument("--size", metavar="WxH", help="size in pixels, such as 480x640 (default: the calibration's)")
     verb.add_argument("--exr", action="store_true", help="write OpenEXR beside PNG")
     verb.add_argument("--scene-out", metavar="FILE.xml", help="write the first frame as a scene of Mitsuba's, too")
     verb.add_argument("--noise", action="store_true", help="add the unit's camera noise to PNG pictures")
-    verb.add_argument("--variant", choices=("llvm", "scalar"), help="of Mitsuba (default: the faster one that works)")
+    verb.add_argument(
+        "--variant", choices=("llvm", "scalar"), help="Mitsuba's variant (default: the faster that works)"
+    )
     verb.add_argument("--overwrite", action="store_true", help="replace an older result")
     engine.parts_arguments(verb)
     progress_argument(verb)

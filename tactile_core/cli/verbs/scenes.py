@@ -7,7 +7,7 @@ import argparse
 from ..terminal import tell
 from .common import NOTHING
 
-BRIEF = "example scenes, to list and to copy"
+BRIEF = "list or copy the example scenes"
 TEXT = """\
 List the example scenes that ship, or copy them (all, or those named) into the folder scenes, where the examples of
 every page look for them. One that is there already is refused, not written over."""

@@ -10,7 +10,7 @@ from ..terminal import agree, bar, duration, say, tell
 from . import engine
 from .common import NOTHING, check_seed, electrodes_argument, error_argument, progress_argument, seed_argument
 
-BRIEF = "simulate a recording"
+BRIEF = "simulate the recording that a scene describes"
 TEXT = """\
 Simulate the recording that a scene describes. The file is marked as simulated and holds the true meshes. Only sensors
 that --keep needs are solved: electrodes, displacement_biotac and traction_biotac need the BioTac, the others the DIGIT.

@@ -9,7 +9,7 @@ from ...training.options import DEVICES
 from ..terminal import bar, say, tell
 from .common import RESUMES, check_seed, progress_argument, seed_argument
 
-BRIEF = "train the networks on pairs"
+BRIEF = "train the networks on pairs, or fine-tune one"
 TEXT = """\
 Train the networks and the force estimate on simulated pairs; or, with the word s2mpn in place of the pairs, fine-tune
 that one network on a real sensor's recording that says where and how hard it was touched (HDF5 with
@@ -28,14 +28,14 @@ MAX_EFFORT = 1000.0
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("pairs", metavar="PAIRS", help="HDF5 file of `tactile pairs`, or the word s2mpn")
-    verb.add_argument("--real", metavar="FILE", help="of s2mpn: the labelled recording")
-    verb.add_argument("--weights", metavar="DIR", help="of s2mpn: where it starts (default: the shipped weights)")
+    verb.add_argument("--real", metavar="FILE", help="with s2mpn: the labelled recording")
+    verb.add_argument("--weights", metavar="DIR", help="with s2mpn: weights to start from (default: those that ship)")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder to write")
     seed_argument(verb, "weights")
-    verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="factor on the epochs (default: 1)")
-    verb.add_argument("--without", action="append", default=[], metavar="NAME", help="leave this indenter out")
-    verb.add_argument("--without-below-x", type=float, metavar="MM", help="leave contacts below x on the pad out")
-    what = "auto (default): a GPU when torch sees one; cpu; cuda. Bytes repeat on the same device only"
+    verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="factor on all epochs (default: 1)")
+    verb.add_argument("--without", action="append", default=[], metavar="NAME", help="indenter to leave out")
+    verb.add_argument("--without-below-x", type=float, metavar="MM", help="leave out contacts at smaller x")
+    what = "auto (default) is a GPU where torch sees one; weights repeat to the byte on the same device only"
     verb.add_argument("--device", choices=DEVICES, default="auto", help=what)
     verb.add_argument("--overwrite", action="store_true", help="train again over older weights in DIR")
     progress_argument(verb)

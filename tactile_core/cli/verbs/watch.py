@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import say, tell
-from .common import NOTHING, columns_argument, columns_of, polarity_argument, target_argument
+from .common import NOTHING, columns_argument, columns_of, polarity_argument, unit_arguments
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Rows = Iterator[tuple[Recording | None, float]]  # new rows and when they came; None now and then without any
     Output = Callable[[Shown, dict[str, np.ndarray]], bool]  # takes a frame and its pictures; false: it has ended
 
-BRIEF = "live view of a recording that is being written"
+BRIEF = "show a recording live while it is being written"
 TEXT = """\
 Follow a CSV recording while another program writes it, and show the newest frame's DIGIT picture: in a window, or in
 a PNG file that is replaced with each picture. --serve publishes the frames for other programs of this machine
@@ -55,22 +55,22 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         "--speed",
         type=float,
         metavar="X",
-        help="of playing: times the recording's own pace; 0: every frame, as fast as pictures come (default: 1)",
+        help="with --play: multiple of the recording's own pace; 0: every frame, as fast as it is drawn (default: 1)",
     )
     verb.add_argument("--out", metavar="FILE", help="write each picture to this PNG file instead of a window")
     verb.add_argument(
         "--serve",
         type=int,
         metavar="PORT",
-        help="publish each frame at this port of this machine alone, by ZeroMQ (0: any free port), instead of a window",
+        help="publish each frame by ZeroMQ at this port, for programs of this machine (0: any free port); no window",
     )
     verb.add_argument(
         "--camera",
         metavar="N|FILE",
         help="show a real DIGIT's camera, by number (0: /dev/video0) or from a video file, beside the simulated one",
     )
-    verb.add_argument("--idle", type=float, metavar="S", help="end when no frame came for S seconds (default: never)")
-    verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="of the recording (default: 100)")
+    verb.add_argument("--idle", type=float, metavar="S", help="end after S s without a new frame (default: never)")
+    verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="rate of the recording (default: 100)")
     polarity_argument(verb)
     columns_argument(verb)
     verb.add_argument(
@@ -79,12 +79,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         metavar="auto|none|A:B",
         help="frames without contact, of the first 10 s, that give the resting reading (default: found automatically)",
     )
-    verb.add_argument("--sensor", metavar="FILE", help="rest, gains and offsets of this sensor, from `tactile adapt`")
-    target_argument(verb)
-    verb.add_argument(
-        "--calibration", metavar="FILE", help="unit that is drawn, by `tactile calibrate`, instead of the shipped one"
-    )
-    verb.add_argument("--weights", metavar="DIR", help="networks of your own training instead of the shipped ones")
+    unit_arguments(verb)
 
 
 def run(options: argparse.Namespace) -> int:
