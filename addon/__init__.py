@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from types import ModuleType
+from typing import Any
+
+import bpy
+
 from .operators import (
     calibration_objects,
     check_llvm,
@@ -49,15 +55,47 @@ def register() -> None:
     done = []
     try:
         for part in PARTS:
-            part.register()
             done.append(part)
+            _register(part)
     except Exception:  # whatever it was, it goes on to Blender
-        for part in reversed(done):
-            part.unregister()
+        for part in reversed(done[:-1]):
+            _unregister(part)
         raise
 
 
 def unregister() -> None:
     """Called by Blender when the extension is switched off."""
     for part in reversed(PARTS):
+        _unregister(part)
+
+
+def _register(part: ModuleType) -> None:
+    """Register what a part declares, then call its own `register`, if it has one.
+
+    CLASSES : of Blender's kinds; MENUS : (menu, function that draws the entry); HANDLERS : (list of
+    ``bpy.app.handlers``, function); POINTERS : (kind of data-block, name of its property, group of properties)
+    """
+    for kind in _declared(part, "CLASSES"):
+        bpy.utils.register_class(kind)
+    for holder, name, group in _declared(part, "POINTERS"):
+        setattr(holder, name, bpy.props.PointerProperty(type=group, name=name.replace("_", " ").capitalize()))
+    for listed, function in (*_declared(part, "MENUS"), *_declared(part, "HANDLERS")):
+        listed.append(function)
+    if hasattr(part, "register"):
+        part.register()
+
+
+def _unregister(part: ModuleType) -> None:
+    """Take back what `_register` did."""
+    if hasattr(part, "unregister"):
         part.unregister()
+    for listed, function in (*_declared(part, "MENUS"), *_declared(part, "HANDLERS")):
+        listed.remove(function)
+    for holder, name, _ in _declared(part, "POINTERS"):
+        delattr(holder, name)
+    for kind in reversed(_declared(part, "CLASSES")):
+        bpy.utils.unregister_class(kind)
+
+
+def _declared(part: ModuleType, what: str) -> Sequence[Any]:
+    return getattr(part, what, ())

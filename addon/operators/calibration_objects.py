@@ -59,4 +59,3 @@ class TACTILE_OT_save_as_calibration(_OnGel, TactileOperator, ExportHelper):
 
 
 CLASSES = (TACTILE_OT_reset_to_calibration, TACTILE_OT_save_as_calibration)
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -35,4 +35,4 @@ class TACTILE_OT_check_llvm(TactileOperator):
         self.report({"INFO"}, verdict)
 
 
-register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_check_llvm,))
+CLASSES = (TACTILE_OT_check_llvm,)

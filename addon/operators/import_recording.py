@@ -144,17 +144,4 @@ def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 CLASSES = (TACTILE_OT_import_recording, TACTILE_FH_recording)
-
-
-def register() -> None:
-    """Register what this file declares; the package calls it."""
-    for kind in CLASSES:
-        bpy.utils.register_class(kind)
-    bpy.types.TOPBAR_MT_file_import.append(_menu)
-
-
-def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
-    bpy.types.TOPBAR_MT_file_import.remove(_menu)
-    for kind in reversed(CLASSES):
-        bpy.utils.unregister_class(kind)
+MENUS = ((bpy.types.TOPBAR_MT_file_import, _menu),)

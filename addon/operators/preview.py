@@ -104,14 +104,10 @@ class TACTILE_OT_live_picture(TactileOperator):
         view.show_picture(context, image)
 
 
-def register() -> None:
-    """Register what this file declares; the package calls it."""
-    bpy.utils.register_class(TACTILE_OT_live_picture)
-    bpy.app.handlers.save_pre.append(_keep_images)
-
-
 def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
+    """Stop drawing; the package calls it."""
     switch_off()
-    bpy.app.handlers.save_pre.remove(_keep_images)
-    bpy.utils.unregister_class(TACTILE_OT_live_picture)
+
+
+CLASSES = (TACTILE_OT_live_picture,)
+HANDLERS = ((bpy.app.handlers.save_pre, _keep_images),)

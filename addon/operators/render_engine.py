@@ -100,19 +100,19 @@ def _end_idle_workers() -> float:
 
 
 def register() -> None:
-    """Register what this file declares; the package calls it."""
-    bpy.utils.register_class(TactileRenderEngine)
-    bpy.app.handlers.load_pre.append(_end_workers)
+    """Let idle workers end, and show Blender's own panels for this engine too."""
     bpy.app.timers.register(_end_idle_workers, first_interval=_LOOK, persistent=True)
     for panel in _panels():
         panel.COMPAT_ENGINES.add(ID)
 
 
 def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
+    """Take back what `register` did, and end all workers."""
     for panel in _panels():
         panel.COMPAT_ENGINES.discard(ID)
     bpy.app.timers.unregister(_end_idle_workers)
-    bpy.app.handlers.load_pre.remove(_end_workers)
     tracer_process.close_all()
-    bpy.utils.unregister_class(TactileRenderEngine)
+
+
+CLASSES = (TactileRenderEngine,)
+HANDLERS = ((bpy.app.handlers.load_pre, _end_workers),)

@@ -102,4 +102,3 @@ def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 CLASSES = (TACTILE_OT_set_up_render, TACTILE_PT_render)
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -132,19 +132,4 @@ def _menu_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 CLASSES = (TACTILE_OT_import_scene, TACTILE_OT_export_scene)
-
-
-def register() -> None:
-    """Register what this file declares; the package calls it."""
-    for kind in CLASSES:
-        bpy.utils.register_class(kind)
-    bpy.types.TOPBAR_MT_file_import.append(_menu_import)
-    bpy.types.TOPBAR_MT_file_export.append(_menu_export)
-
-
-def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
-    bpy.types.TOPBAR_MT_file_export.remove(_menu_export)
-    bpy.types.TOPBAR_MT_file_import.remove(_menu_import)
-    for kind in reversed(CLASSES):
-        bpy.utils.unregister_class(kind)
+MENUS = ((bpy.types.TOPBAR_MT_file_import, _menu_import), (bpy.types.TOPBAR_MT_file_export, _menu_export))

@@ -122,4 +122,4 @@ class TACTILE_OT_force_arrow(TactileOperator):
             styles.add_arrow(thing, self.length * thing.tactile.per_metre * 1e-3)
 
 
-register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_set_style, TACTILE_OT_force_arrow))
+CLASSES = (TACTILE_OT_set_style, TACTILE_OT_force_arrow)

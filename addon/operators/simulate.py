@@ -83,4 +83,4 @@ class TACTILE_OT_simulate(JobOperator):
         skin.tactile.samples = SAMPLE_RATE / _rate(context.scene)
 
 
-register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_simulate,))
+CLASSES = (TACTILE_OT_simulate,)

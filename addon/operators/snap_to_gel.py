@@ -104,4 +104,4 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
             return msgspec.structs.replace(spec, file=str(path)).build()
 
 
-register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_snap_to_gel,))
+CLASSES = (TACTILE_OT_snap_to_gel,)

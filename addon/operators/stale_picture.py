@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import bpy
 import numpy as np
@@ -118,21 +117,8 @@ def _take_up(*_: object) -> None:
             return
 
 
-def _handlers() -> list[tuple[list, Callable]]:
-    known = bpy.app.handlers
-    found = [(known.save_pre, _note), (known.load_post, _take_up)]
-    if not bpy.app.background:  # where nobody sees it
-        found += [(known.frame_change_post, _frame_changed), (known.depsgraph_update_post, _changed)]
-    return found
-
-
-def register() -> None:
-    """Called by the package."""
-    for handlers, function in _handlers():
-        handlers.append(function)
-
-
-def unregister() -> None:
-    """Called by the package."""
-    for handlers, function in _handlers():
-        handlers.remove(function)
+HANDLERS = [(bpy.app.handlers.save_pre, _note), (bpy.app.handlers.load_post, _take_up)]
+if not bpy.app.background:  # where nobody sees it
+    HANDLERS += [
+        (bpy.app.handlers.frame_change_post, _frame_changed), (bpy.app.handlers.depsgraph_update_post, _changed),
+    ]  # fmt: skip

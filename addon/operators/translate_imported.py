@@ -105,4 +105,4 @@ def _gel_beside(skin: bpy.types.Object, sensor: str) -> bpy.types.Object:
     return same or digit_objects.add_gel(group, skin.tactile.per_metre, skin, sensor)
 
 
-register, unregister = bpy.utils.register_classes_factory((TACTILE_OT_translate,))
+CLASSES = (TACTILE_OT_translate,)

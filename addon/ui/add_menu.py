@@ -155,17 +155,4 @@ def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 CLASSES = (TACTILE_OT_add_sensor, TACTILE_OT_add_indenter, TACTILE_OT_use_as_indenter, TACTILE_MT_add)
-
-
-def register() -> None:
-    """Register what this file declares; the package calls it."""
-    for kind in CLASSES:
-        bpy.utils.register_class(kind)
-    bpy.types.VIEW3D_MT_add.append(_menu)
-
-
-def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
-    bpy.types.VIEW3D_MT_add.remove(_menu)
-    for kind in reversed(CLASSES):
-        bpy.utils.unregister_class(kind)
+MENUS = ((bpy.types.VIEW3D_MT_add, _menu),)

@@ -79,17 +79,18 @@ class TACTILE_OT_install_styles(TactileOperator):
 
 
 def register() -> None:
-    """Called by the package; while that runs, the open file cannot be reached."""
-    bpy.utils.register_class(TACTILE_OT_install_styles)
+    """Write and list the library a moment later: while extensions register, the open file cannot be reached."""
     if not bpy.app.background:
         bpy.app.timers.register(install)
 
 
 def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
+    """Take the library off the list."""
     if bpy.app.timers.is_registered(install):
         bpy.app.timers.unregister(install)
     listed = entry()
     if listed is not None:
         bpy.context.preferences.filepaths.asset_libraries.remove(listed)
-    bpy.utils.unregister_class(TACTILE_OT_install_styles)
+
+
+CLASSES = (TACTILE_OT_install_styles,)

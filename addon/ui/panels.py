@@ -190,4 +190,3 @@ def _depth(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.ty
 
 
 CLASSES = (TACTILE_PT_recording, TACTILE_PT_picture, TACTILE_PT_parts, TACTILE_PT_author)
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

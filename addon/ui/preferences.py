@@ -114,15 +114,7 @@ CLASSES = (TACTILE_OT_clear_cache, TactilePreferences)
 
 
 def register() -> None:
-    """Register what this file declares; the package calls it."""
-    for kind in CLASSES:
-        bpy.utils.register_class(kind)
+    """Take up the LLVM that the user chose before."""
     stored = bpy.context.preferences.addons.get(ID)
     if stored is not None and stored.preferences is not None:
         _tell(stored.preferences)
-
-
-def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
-    for kind in reversed(CLASSES):
-        bpy.utils.unregister_class(kind)

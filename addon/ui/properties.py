@@ -182,17 +182,4 @@ def check_own(*things: bpy.types.Object | None) -> None:
 
 
 CLASSES = (TactileObject,)
-
-
-def register() -> None:
-    """Register what this file declares; the package calls it."""
-    for kind in CLASSES:
-        bpy.utils.register_class(kind)
-    bpy.types.Object.tactile = bpy.props.PointerProperty(type=TactileObject, name="Tactile")
-
-
-def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
-    del bpy.types.Object.tactile
-    for kind in reversed(CLASSES):
-        bpy.utils.unregister_class(kind)
+POINTERS = ((bpy.types.Object, "tactile", TactileObject),)

@@ -101,13 +101,5 @@ def _prepare(settings: TactileRender, context: bpy.types.Context) -> None:
         pictures.prepare(context.scene, context.evaluated_depsgraph_get())
 
 
-def register() -> None:
-    """Register what this file declares; the package calls it."""
-    bpy.utils.register_class(TactileRender)
-    bpy.types.Scene.tactile_render = bpy.props.PointerProperty(type=TactileRender, name="Tactile render")
-
-
-def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
-    del bpy.types.Scene.tactile_render
-    bpy.utils.unregister_class(TactileRender)
+CLASSES = (TactileRender,)
+POINTERS = ((bpy.types.Scene, "tactile_render", TactileRender),)

@@ -96,13 +96,5 @@ def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.operator(TACTILE_OT_open_workspace.bl_idname, icon="WORKSPACE")
 
 
-def register() -> None:
-    """Register what this file declares; the package calls it."""
-    bpy.utils.register_class(TACTILE_OT_open_workspace)
-    bpy.types.TOPBAR_MT_window.append(_menu)
-
-
-def unregister() -> None:
-    """Take back what `register` did; the package calls it."""
-    bpy.types.TOPBAR_MT_window.remove(_menu)
-    bpy.utils.unregister_class(TACTILE_OT_open_workspace)
+CLASSES = (TACTILE_OT_open_workspace,)
+MENUS = ((bpy.types.TOPBAR_MT_window, _menu),)

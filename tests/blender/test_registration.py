@@ -1,0 +1,33 @@
+"""Switched off the extension leaves nothing in Blender, and switched on again it is whole."""
+
+import bpy
+
+LISTS = "save_pre", "load_pre", "load_post", "frame_change_post", "depsgraph_update_post"
+MENUS = "TOPBAR_MT_file_import", "TOPBAR_MT_file_export", "VIEW3D_MT_add", "TOPBAR_MT_window"
+
+
+def left(extension):
+    """What of the extension Blender knows: classes, properties, handlers and functions that draw menu entries."""
+    own = extension.__name__ + "."
+    functions = [f for name in LISTS for f in getattr(bpy.app.handlers, name)]
+    functions += [f for name in MENUS for f in getattr(getattr(bpy.types, name).draw, "_draw_funcs", ())]
+    properties = [name for kind in (bpy.types.Object, bpy.types.Scene) for name in dir(kind) if "tactile" in name]
+    classes = [name for name in dir(bpy.types) if name.startswith("TACTILE_")]
+    return (
+        sorted({f"{f.__module__}.{f.__name__}" for f in functions if f.__module__.startswith(own)}),
+        properties,
+        classes,
+    )
+
+
+def test_off_leaves_nothing_and_on_again_is_whole(extension):
+    before = left(extension)
+    functions, properties, classes = before
+    assert {name.rpartition(".")[2] for name in functions} >= {"_menu", "_menu_import", "_menu_export", "_note"}
+    assert properties == ["tactile", "tactile_render"] and "TACTILE_PT_recording" in classes
+    extension.unregister()
+    try:
+        assert left(extension) == ([], [], [])
+    finally:
+        extension.register()
+    assert left(extension) == before
