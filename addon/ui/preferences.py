@@ -114,7 +114,7 @@ CLASSES = (TACTILE_OT_clear_cache, TactilePreferences)
 
 
 def register() -> None:
-    """Take up the LLVM that the user chose before."""
+    """Take up what the user set before: the library of LLVM, the folder of sensors."""
     stored = bpy.context.preferences.addons.get(ID)
     if stored is not None and stored.preferences is not None:
         _tell(stored.preferences)
