@@ -166,7 +166,7 @@ def run_tools(folder: Path, extra: str) -> int:
 
 
 def run_in_bpy(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
-    """The extension's tests in the bpy wheel of one version; returns pytest's status."""
+    """Run the extension's tests in the bpy wheel of one version; returns pytest's status."""
     folder = options.venv or ROOT / (".venv-bpy-" + options.bpy)
     old = tuple(int(part) for part in options.bpy.split(".")[:2]) < (5, 1)
     needed = (3, 11) if old else (3, 13)
@@ -188,7 +188,7 @@ def run_in_bpy(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
 
 
 def run_in_binary(binary: Path, pytest_arguments: list[str]) -> int:
-    """The same tests inside a real Blender, on the zip with the wheels of its Python; returns pytest's status."""
+    """Run the extension's tests inside a real Blender, on the zip with the wheels of its Python; returns the status."""
     code = "import sys; print('PYTHON %d.%d' % sys.version_info[:2])"
     try:
         command = [str(binary), "--background", "--factory-startup", "--python-expr", code]

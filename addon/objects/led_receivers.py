@@ -1,4 +1,4 @@
-"""What a DIGIT's LEDs light: its gel and body alone, by Blender's light linking.
+"""Restrict a DIGIT's LEDs to its own gel and body, by Blender's light linking.
 
 The gel throws no shadow (``digit_body``), so that without it their light would fall on what stands around.
 """

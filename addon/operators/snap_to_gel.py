@@ -1,4 +1,4 @@
-"""How deep an indenter is in the resting gel, and the button that puts it there."""
+"""Measure an indenter's depth in the resting gel, and move it to a depth: the button Snap to Gel."""
 
 from __future__ import annotations
 

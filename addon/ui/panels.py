@@ -85,11 +85,11 @@ def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str,
 
     No words for sensors that were simulated.
     """
-    told = gel if gel is not None and "expected_error_um" in gel else skin
-    if "expected_error_um" not in told:
+    shown = gel if gel is not None and "expected_error_um" in gel else skin
+    if "expected_error_um" not in shown:
         return "", False
-    trust = told["confidence"], int(told.get("flags", 0))
-    words = trust_words.in_words(*trust, 1e-6 * told["expected_error_um"], skin["force"])
+    trust = shown["confidence"], int(shown.get("flags", 0))
+    words = trust_words.in_words(*trust, 1e-6 * shown["expected_error_um"], skin["force"])
     return words, trust_words.is_guess(*trust)
 
 

@@ -6,7 +6,7 @@
 On photographs: three fits without a third of PRESSES each, tried on that third; three numbers a press are fitted
 (right, down, depth), by the fast picture; with --deeper, on further photographs of the same unit and ball, too, whose
 drift of the light is taken off. Fits end on the fast picture, with --finish on Mitsuba's; they start from round
-numbers that know nothing of the unit. Nulls: the background alone, and the nearest fitted photograph shifted to the
+numbers that know nothing of the unit. Baselines: the background alone, and the nearest fitted photograph shifted to the
 place. `through` allows light through the coating where the ball touches it, three more numbers a photograph; `known`
 takes the mean of what the other photographs of the same day show. With --every, by `reference`, too (20 s of CPU a
 photograph), and by the presets without LLVM.
@@ -36,7 +36,7 @@ from tactile_core.accuracy import Row, row
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures, working_factor
 from tactile_core.pictures.calibrate.contact_light import contact_disc, contact_radius, fitted_light
 from tactile_core.pictures.calibrate.fit import calibrate
-from tactile_core.pictures.calibrate.kept_apart import FOLDS
+from tactile_core.pictures.calibrate.held_out import FOLDS
 from tactile_core.pictures.calibrate.photo_metrics import metrics
 from tactile_core.pictures.calibrate.photographs import Photographs, Press, chosen, press_of, read_photographs
 from tactile_core.pictures.calibrate.press_fit import MODEL_ERROR, Ball, Sight, fit_ball

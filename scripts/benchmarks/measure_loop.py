@@ -166,7 +166,7 @@ def pictures(contacts: list[FastContact]):  # noqa: ANN201
 
 
 def gel_steps(count: int) -> tuple[str, dict[str, Times], dict[str, str]]:
-    """The same of whole steps of a ``Gel`` along paths, with their pictures."""
+    """Time whole steps of a ``Gel`` along paths, with their pictures: name, times by way, error by way in words."""
     times: dict[str, Times] = {how: [] for how in HOW}
     levels = []
     for number, contact in enumerate(random_contacts(-(-count // STEPS) + WARM, SEED)):

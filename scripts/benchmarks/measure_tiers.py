@@ -145,7 +145,7 @@ def validated(sensor: Sensor) -> Iterator[Miss]:
 
 
 def share_of(full: dict) -> dict:
-    """The reference tier's row out of the full tier's."""
+    """Return the reference tier's entry: the full tier's with its errors times REFERENCE_SHARE."""
     errors = ("shape_um", "shape_95_um", "force", "force_95")
     return full | {name: float(f"{REFERENCE_SHARE * full[name]:.4g}") for name in errors} | {"assumed": True}
 

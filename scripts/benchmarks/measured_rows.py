@@ -1,4 +1,4 @@
-"""What a measuring script does with its rows: print them as they come, write them as JSON, name those that miss."""
+"""Print the rows of a measuring script as they come, write them as JSON, and name those that miss their target."""
 
 from __future__ import annotations
 

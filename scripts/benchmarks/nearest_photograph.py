@@ -2,7 +2,7 @@
 
     python scripts/benchmarks/nearest_photograph.py FITTED APART --background untouched.png
 
-FITTED, APART : folders of photographs, those that a unit was fitted to and those kept apart. Of the fitted ones each is
+FITTED, APART : folders of photographs, those that a unit was fitted to and held-out ones. Of the fitted ones each is
 moved by whole pixels to where it correlates best, and the one that leaves least is taken: the answer is known to it.
 """
 
@@ -23,7 +23,7 @@ from tactile_core.pictures.calibrate.photographs import Press, read_photographs 
 
 
 def main() -> int:
-    """Compare each photograph kept apart, and report means."""
+    """Compare each held-out photograph, and report means."""
     parser = parser_of(__doc__)
     parser.add_argument("fitted", metavar="FITTED")
     parser.add_argument("apart", metavar="APART")

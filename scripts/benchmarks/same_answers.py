@@ -1,4 +1,4 @@
-"""Whether a change of structure leaves answers as they were: every byte that a fixed set of commands writes.
+"""Compare all bytes that a fixed set of commands writes before and after a refactoring.
 
     python scripts/benchmarks/same_answers.py before.json                       on the commit before
     python scripts/benchmarks/same_answers.py after.json --than before.json     on the one after, on the same machine

@@ -31,9 +31,9 @@ def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def awaited(file: Path) -> Iterator[None]:
-    """Wait for the lock on ``file``, which stays afterwards, and hold it: what several want is then made once.
+    """Wait for the lock on ``file`` and hold it, so that what several processes need is made once; the file stays.
 
-    Where the file system keeps no locks it is held at once, by each that asks.
+    On a file system without locks every process gets it at once.
     """
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:

@@ -27,7 +27,7 @@ def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarr
 def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str, np.ndarray]:
     """Return the last contact as arrays: force (3,) N, motion of markers (rows, columns, 2) m along x, z, and picture.
 
-    markers : from ``marker_nodes``; picture : whether to take one, the dearest part
+    markers : from ``marker_nodes``; picture : whether to draw one, the slowest part
     """
     moved = gel.contact.displacement[markers.ravel()][:, [0, 2]].reshape(*markers.shape, 2)
     seen = {"force": gel.contact.force.astype(np.float32), "markers": moved.astype(np.float32)}

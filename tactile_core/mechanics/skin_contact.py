@@ -1,8 +1,8 @@
 """Find the body that a deformed skin shows to be pressed into it, so that a gel can be solved under the same contact.
 
 By mechanics alone, with nothing learned: the node that is displaced most was touched first and sticks, so it has moved
-as the body has, which tells depth and lean. Each body that it may be is pressed into the skin in the same way, moved
-until its load is centred where the skin's is, and the one whose dent is likest is taken with its force. So it holds on
+as the body has, which tells depth and lean. Each candidate body is pressed into the skin in the same way, moved until
+its load is centred where the skin's is, and the one whose dent is most similar is taken with its force. So it holds on
 parts of the pad that no network was trained on.
 """
 
@@ -60,7 +60,7 @@ class _Trial:
 
 
 def skin_contact(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> BodyContact:
-    """Find the contact of a BioTac's skin: the likeliest of `likely_contacts`.
+    """Find the contact of a BioTac's skin: the most likely of `likely_contacts`.
 
     >>> contact = skin_contact(displacement, [tactile.indenters.Sphere(2e-3)])
     >>> gel = contact.on_gel().displacement
@@ -69,7 +69,7 @@ def skin_contact(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> B
 
 
 def likely_contacts(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> list[BodyContact]:
-    """Find how each of the bodies would be pressed into a BioTac's skin, by the fast tier; the likeliest first.
+    """Find how each of the bodies would be pressed into a BioTac's skin, by the fast tier; the most likely first.
 
     displacement : (3650, 3) m of the skin
     bodies : what may be pressed into it beside a ball, whose radius is found; each takes 20 to 30 ms of CPU, and one

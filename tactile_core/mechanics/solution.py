@@ -1,4 +1,4 @@
-"""What is asked of contact mechanics (``Step``) and what it answers (``Solution``), the same in every tier."""
+"""Input (``Step``) and result (``Solution``) of contact mechanics, the same in every tier."""
 
 from __future__ import annotations
 

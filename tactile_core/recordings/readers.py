@@ -167,7 +167,7 @@ def list_fingers(paths: Iterable[str | os.PathLike[str]]) -> list[str]:
 
 
 def _fingers_of_table(header: tuple[str, ...]) -> tuple[int, ...]:
-    """Fingers of a file whose layout holds hands; none of others, also of those whose columns a map names."""
+    """Return the fingers of a file whose layout holds hands; () for any other layout and for mapped columns."""
     known = [layout for layout in layouts() if _holds_hands(layout) and layout.score(header) >= RECOGNISED]
     return known[0].fingers(header) if known else ()
 

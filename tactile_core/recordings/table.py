@@ -60,7 +60,7 @@ class Table:
         return found
 
     def counts(self, names: list[str]) -> np.ndarray:
-        """Return `columns`; of a table that leaves others out to be small, in single precision where that is exact."""
+        """Return `columns` (T, n), as float32 where the table is kept small and that is exact, else as float64."""
         exact = any(self.header.index(name) in self.exact for name in names if name in self.header)
         return self.columns(names, np.float32 if self.left_out and not exact else np.float64)
 

@@ -91,7 +91,7 @@ def sensor_surface(sensor: str) -> Lattice:
 
 
 def is_gel(sensor: str) -> bool:
-    """Return true for a sensor whose descriptor tells of a gel, false for one of skin and fluid.
+    """Return true for a sensor with a gel, false for one of skin and fluid, by its descriptor.
 
     Raises TactileError for a name that is none.
     """

@@ -1,4 +1,4 @@
-"""What the descriptor of a finger of skin, fluid and core says, as the BioTac's: ``Fluid`` and its tables."""
+"""Descriptor of a finger of skin, fluid and core, such as the BioTac: ``Fluid`` and its tables."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Electrodes:
 class Readout:
     """Origin of the counts: each electrode in a voltage divider with a load, read by a converter.
 
-    polarity : what counts do where a film thins; pressure : Pa a count of the fluid's pressure
+    polarity : falls or rises, what counts do where a film gets thinner; pressure : Pa a count
     """
 
     bits: int = number(above=0, below=32)

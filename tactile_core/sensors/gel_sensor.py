@@ -1,4 +1,4 @@
-"""What the descriptor of a gel on a window says, as the DIGIT's: ``Gel`` and its tables."""
+"""Descriptor of a gel on a window, such as the DIGIT's: ``Gel`` and its tables."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ class Options:
     astray : weight of a translated place's distance on the DIGIT from the true one, in cells, against the same loss
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (docs/sources.md)
     unit : share of training samples that keep their sign and are read as a real unit is known, its rest found from
-        recordings that never touch nothing: unit_gain, standard deviation of the logarithm of a channel's gain,
+        recordings that are in contact throughout: unit_gain, standard deviation of the logarithm of a channel's gain,
         unit_offset, counts, of its rest (10 to 60 counts between two halves of a unit's recordings; docs/convert.md)
     misfit : of samples read as a real unit is known and of rectified ones, share of the whole signal's size that each
         channel is off by besides. The simulated contacts nearest to real slides leave .3 of it, .07 a channel

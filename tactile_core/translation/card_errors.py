@@ -1,4 +1,4 @@
-"""Read the error of a set of weights on presses kept apart from their training, and the baseline, from their card."""
+"""Read the error of a set of weights on held-out presses from their training, and the baseline, from their card."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ WORSE = 0.8  # of the baseline, the error of no displacement at all: above it we
 
 
 def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Return error and baseline, um, of the translation on presses kept apart; None where the card has no such row."""
+    """Return error and baseline, um, of the translation on held-out presses; None where the card has no such row."""
     rows = card.get("errors")
     for row in rows if isinstance(rows, list) else []:
         if isinstance(row, dict) and (row.get("name"), row.get("set")) == (ROW, SET):
@@ -27,6 +27,6 @@ def doubt(card: Mapping[str, Any]) -> str:
         return ""
     judged = "worse" if found[0] > found[1] else "hardly better"
     return (
-        f"these weights are {judged} than none: off by {found[0]:.3g} um (rms of the gel) on presses kept apart from"
+        f"these weights are {judged} than none: off by {found[0]:.3g} um (rms of the gel) on held-out presses from"
         f" their training, where no displacement at all is off by {found[1]:.3g} um: train on more pairs, or longer"
     )

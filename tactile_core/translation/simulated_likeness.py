@@ -6,7 +6,7 @@ strengths. Two always fit better; what counts is that they leave little where on
 the simulated one are fitted badly by both, and not marked. A second contact near the first, or much lighter, looks like
 one.
 
-A signal that even the likest simulated contact hardly resembles comes from a wrong rest, polarity or order of channels.
+A signal unlike even the most similar simulated contact comes from a wrong rest, polarity or order of channels.
 Rectified signals are not judged: without signs, two contacts look like one (5 % of pairs were found).
 """
 
@@ -23,13 +23,13 @@ from ..sensors import SOURCE
 # Shares of the signal's length: what two contacts leave at most, and how much more one leaves. Chosen on 4,000 contacts
 # of training pairs and sums of two: 1 % of the contacts are marked, and a third of the sums.
 LEFT_BY_TWO, MORE_BY_ONE = 0.25, 0.17
-# Share of its length that the likest simulated contact leaves of a signal at least, to be unlike all. Of test contacts
+# Least share of a signal's length that the most similar simulated contact leaves, to be unlike all. Of test contacts
 # with noise and gains 10 % apart, one in a thousand leaves more than .53; of real grips of hard objects, those whose
 # rest is known leave .22 to .43, those whose rest was taken under load .73 and more. Chosen with both in sight.
 UNLIKE = 0.6
 # Cosine of two patterns, above which they are the same contact, a little moved or pressed (assumed).
 ALIKE = 0.6
-FIRST = 64  # patterns, the likest to the signal, that one of the two is looked for among: an eighth of the work
+FIRST = 64  # patterns, the most similar to the signal, that one of the two is looked for among: an eighth of the work
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from .weights import ADVICE
 # Frames that differ from training in kind, not in degree, are worth little.
 UNTRAINED_CONFIDENCE = 0.2  # assumed
 # Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
-# (scripts/evaluate_translation.py --kept-apart) it flags half of that part's frames, and most of those it should.
+# (scripts/evaluate_translation.py --held-out) it flags half of that part's frames, and most of those it should.
 # The largest change is another matter: signals of deep contacts at the tip are three times those that 99 % of the
 # contacts stay below, and training knows them. What exceeds all but one in a thousand is out of its range.
 IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}

@@ -1,4 +1,4 @@
-"""How far a frame's translation is to be trusted, in one line of plain words, for contact sheets and panels alike."""
+"""Describe in one line how far a frame's translation can be trusted, for contact sheets and panels alike."""
 
 from __future__ import annotations
 

@@ -41,9 +41,7 @@ def test_shipped_calibration_beats_a_table_fitted_on_the_same_presses(
         for label, values in (("fast", ours), ("taxim_like", theirs)):
             print(
                 line(
-                    row(
-                        f"{label}_{name}", values[name], units[name], baseline=baseline[name], of="5 presses kept apart"
-                    )
+                    row(f"{label}_{name}", values[name], units[name], baseline=baseline[name], of="5 held-out presses")
                 )
             )
     assert baseline["roi_psnr"] < theirs["roi_psnr"] < ours["roi_psnr"]

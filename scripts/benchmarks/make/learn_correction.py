@@ -132,7 +132,7 @@ def _triangulation(sensor: str):  # noqa: ANN202
 
 
 def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Correction, list[Row]]:
-    """The correction of one sensor, and rows of its errors on presses kept apart (five folds by press)."""
+    """The correction of one sensor, and rows of its errors on held-out presses (five folds by press)."""
     samples = list(samples)
     known = Known(
         np.array([s.features for s in samples]), np.log([s.ratio for s in samples]),
@@ -170,7 +170,7 @@ def _guessed_apart(known: Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.ndarray) -> np.ndarray:
-    """See ``Learned``: the share of what was predicted for presses kept apart that leaves the least squares."""
+    """See ``Learned``: the share of what was predicted for held-out presses that leaves the least squares."""
     rows, depth, log_ratio = [], known.x[which, 0], np.clip(known.log_ratio[which], -MOST, MOST)
     for _, _, here in _bins(depth):
         pairs = (log_guess[which][here], log_ratio[here]), (guess[which][here], known.fields[which][here])
@@ -206,7 +206,7 @@ def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -
         for what, after, before, scale, unit in measures:
             value, baseline = (float(np.median(np.abs(errors[here, k])) * scale) for k in (after, before))
             name = f"{sensor}_friction_{friction:g}_corrected_{low:g}_to_{high:g}_{what}"
-            of = f"{here.sum()} contacts of presses kept apart, median; baseline: uncorrected"
+            of = f"{here.sum()} contacts of held-out presses, median; baseline: uncorrected"
             yield row(name, value, unit, baseline=baseline, of=of)
 
 

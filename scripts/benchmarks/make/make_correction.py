@@ -3,8 +3,8 @@
     python scripts/benchmarks/make/make_correction.py --work DIR [--presses 155] [--rubbing 49] [--seed 0] [--workers 2]
 
 Stop it at any time: presses that are solved stay in DIR and are not solved again. Writes
-tactile_core/data/mechanics_correction.npz and prints how far the corrected fast tier is from the full tier on presses
-kept apart. All presses are solved without friction, the first ones with friction too. Two hours on two cores.
+tactile_core/data/mechanics_correction.npz and prints how far the corrected fast tier is from the full tier on held-out
+presses. All presses are solved without friction, the first ones with friction too. Two hours on two cores.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Pictures beside photographs: the DIGIT's pictures, ours beside others', on presses that were not fitted.
 
-Photographs are of a 6 mm ball pressed into a DIGIT; those that the calibration was not fitted on are the truth. Null is
-the background alone; a table after Taxim is fitted on the photographs the calibration was fitted on
+Photographs are of a 6 mm ball pressed into a DIGIT; those that the calibration was not fitted on are the truth. The
+baseline is the background alone; a table after Taxim is fitted on the photographs the calibration was fitted on
 (scripts/benchmarks/competitors/taxim_like.py); each preset of `tactile render`. Where and how deep the ball was pressed
 is three numbers a photograph, found once by the fast picture; the table finds its own.
 """
@@ -39,7 +39,7 @@ def measure(name: str, quick: bool, presses: str) -> Method:
     fitted = [press.name for press in photographs.presses if press.name in unit.fit.photographs]
     test = chosen(photographs, [press.name for press in photographs.presses if press.name not in fitted])
     tried = evaluate_unit(unit, test, BALL, search_radius=False)
-    baseline, of = mean_metrics(tried)[1], f"{len(test.presses)} photographs kept apart"
+    baseline, of = mean_metrics(tried)[1], f"{len(test.presses)} held-out photographs"
     label = name
     if name == TABLE:
         table = fit_table(unit, chosen(photographs, fitted), BALL)

@@ -1,4 +1,4 @@
-"""An error that was promised beside the one that was found, over many contacts or frames."""
+"""A stated bound beside the measured error, over many contacts or frames."""
 
 from __future__ import annotations
 
@@ -47,4 +47,4 @@ class Promise:
             yield f"| {self.name} | {name} | {here.sum()} | {bound} | {found} | {self.covered(here):.1%} |"
 
 
-TABLE = "| what | among | contacts | bound, median | found, median | found below the bound |\n|---|---|---|---|---|---|"
+TABLE = "| what | among | contacts | bound, median | measured, median | below the bound |\n|---|---|---|---|---|---|"

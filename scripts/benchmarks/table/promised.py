@@ -1,4 +1,4 @@
-"""Promised against found: bounds of mechanics and translation on held-out contacts, pictures, scenes, photographs."""
+"""Stated bounds against measured errors: mechanics, translation, pictures, scenes, photographs, all held out."""
 
 from __future__ import annotations
 
@@ -36,34 +36,34 @@ FOLDS = 5
 EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/benchmarks/measure_tiers.py has them
 SCENES = "press", "press_roll_slide", "edge", "ring", "roll", "slide", "user_mesh"
 TEXT = """\
-## Promised against found
+## Stated bounds against measured errors
 
 A bound holds for 95 of 100 contacts. Mechanics: the fast tier against the full tier on the test contacts; the bounds
 are those of a table made, as `mechanics_tiers.json` is, from the other four fifths of the presses. Translation: largest
 node error from signals, bounds as `tactile convert` writes them, found on the training's validation presses for each
-place along the finger. Right is a share between 90 and 98 %.
+place along the finger. The share below the bound should be 90 to 98 %.
 
-![promised against found](promised.png)
+![measured errors over stated bounds](promised.png)
 
 """
 PICTURES = """
 Pictures: grey levels rms, as `tactile render` states them, against the reference preset on contact fields that the
 table was not made from.
 
-| preset | promised | found, each field |
+| preset | stated | measured, each field |
 |---|---|---|
 """
 SCENES_TEXT = """
 Scenes, simulated (fast tier) and translated: largest node error of the frames in contact, um.
 
-| scene | frames | BioTac, expected | found | below the bound | DIGIT, expected | found | below the bound |
+| scene | frames | BioTac, expected | measured | below the bound | DIGIT, expected | measured | below the bound |
 |---|---|---|---|---|---|---|---|
 """
 PHOTOGRAPHS = """
-Photographs that the calibration was not fitted on; promised is what it states of those it was fitted on, mean error in
-the region, grey levels.
+Photographs that the calibration was not fitted on, mean error in the region, grey levels; stated is the error on those
+that it was fitted on.
 
-| photograph | promised | found | baseline |
+| photograph | stated | measured | baseline |
 |---|---|---|---|
 """
 
@@ -184,7 +184,7 @@ def scene_rows(translator: Translator, name: str) -> tuple[list[Row], str]:
 
 
 def plot(promises: Sequence[Promise]) -> bytes:
-    """Draw a PNG: found over promised, both logarithmic, one panel a promise; on the line they are equal."""
+    """Draw a PNG: measured errors over stated bounds, both logarithmic, a panel each; on the line they are equal."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator

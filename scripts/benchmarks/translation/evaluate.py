@@ -1,7 +1,7 @@
 """Judge the translation against the simulated truth and on recordings of a real BioTac, beside doing nothing.
 
     python scripts/evaluate_translation.py --json FILE              on the test contacts that ship
-    python scripts/evaluate_translation.py --kept-apart FOLDER      and networks kept from some of it (again for more)
+    python scripts/evaluate_translation.py --held-out FOLDER      and networks kept from some of it (again for more)
     python scripts/evaluate_translation.py --recordings DIR         on real recordings: slides (but sample 7 of each
                                                                     material) or grips; --quick: six slides
 
@@ -49,7 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = parser_of(__doc__)
     parser.add_argument("--test-set", default=TEST_SET, metavar="FILE", help="pairs of the full tier (%(default)s)")
     parser.add_argument(
-        "--kept-apart",
+        "--held-out",
         action="append",
         default=[],
         metavar="FOLDER",
@@ -101,7 +101,7 @@ def on_test_set(network: translate.Translator, options: argparse.Namespace) -> l
     found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
     found += sequence_rows.full_rows(network, pairs)
     found += [*two_contact_rows.rows(pairs), *test_set.speed_rows(network, pairs)]
-    apart = [translate.load_translator(folder) for folder in options.kept_apart]
+    apart = [translate.load_translator(folder) for folder in options.held_out]
     for unaware in apart:
         found += test_set.unseen_rows(unaware, pairs, bodies)
     if options.card:

@@ -1,6 +1,6 @@
-"""From the BioTac's mesh to the DIGIT's by mechanics alone, beside M2MPN: also where networks never were trained.
+"""Measure the way from the BioTac's mesh to the DIGIT's by mechanics alone beside M2MPN, also at untrained places.
 
-No network's number is in it, so the region that `evaluate_translation.py --kept-apart` keeps from networks is like any
+No network's number is in it, so the region that `evaluate_translation.py --held-out` keeps from networks is like any
 other. ``mechanics-known``: the contact is looked for among the training's bodies, the one pressed among them;
 ``mechanics-unknown``: that one is left out; ``mechanics-ball``: a ball alone, of any radius.
 """

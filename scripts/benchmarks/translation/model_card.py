@@ -25,6 +25,14 @@ The networks take changes of a BioTac's 19 electrodes to the contact that they m
 deformation of the skin and of a DIGIT's gel; `tactile convert` and `tactile.translate` run them, [limits](#limits) end
 this page. Made by `scripts/evaluate_translation.py --card`; the numbers are of the weights that ship.
 """
+NAMES = """\
+Names: MVB and MVD are the autoencoders of the BioTac's and the DIGIT's mesh, SVB is that of the signals. S2MPN takes
+signals to the BioTac's mesh, M2MPN that mesh to the DIGIT's (D2B the other way), chain is both in turn; B2S and D2S
+take a mesh back to signals. likely is the posterior's most plausible contact, mean its mean, solved the contact solved
+on the gel; followed and sequence are recordings whose contact is tracked through time. peak is the depth of the dent,
+core the nodes deeper than 30 % of it, iou the overlap of the touched patches (intersection over union), place the
+contact's centre.
+"""
 SWEEP = """\
 ## Sweep
 
@@ -66,6 +74,7 @@ def write_model_card(
         _training(card),
         "## Errors",
         "",
+        NAMES,
         f"Test set: {len(pairs.press)} contacts of {len(np.unique(pairs.press))} presses, solved by the full tier of"
         " mechanics on both sensors; signals read with 1.5 counts of noise and gains 10 % off. Depth bins (0.1-0.3,"
         " 0.3-0.6, 0.6-0.9, 0.9-1.2 mm on the BioTac) and indenters count alike, no slides; baseline: no deformation.",

@@ -103,14 +103,14 @@ def _sheet_beside(out: str) -> Path:
 
 def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     from ...pictures.calibrate.fit import calibrate
-    from ...pictures.calibrate.kept_apart import check_orientation, check_worth, tried_apart
+    from ...pictures.calibrate.held_out import check_orientation, check_worth, cross_validated
     from ...pictures.calibrate.report import rows_of, write_sheet
     from ...sensors.calibration_file import load_calibration, write_calibration
 
     start, diameter = load_calibration(options.start, options.gel), 1e-3 * options.ball_diameter
     check_orientation(photographs, diameter, start)
-    with bar("trial on presses kept apart", "third", options.progress) as progress:
-        apart = tried_apart(photographs, diameter, start, quick=options.quick, progress=progress)
+    with bar("trial on held-out presses", "third", options.progress) as progress:
+        apart = cross_validated(photographs, diameter, start, quick=options.quick, progress=progress)
     with bar("calibrate", "step", options.progress) as progress:
         name = options.unit or Path(options.out).stem
         done = calibrate(photographs, diameter, start, unit=name, quick=options.quick, progress=progress)
@@ -125,7 +125,7 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     say(f"these photographs tell too little of: {', '.join(done.calibration.fit.not_identified)}")
     write_calibration(options.out, done.calibration)
     write_sheet(_sheet_beside(options.out), done.tried)
-    _tell_rows(rows_of(done.tried, "presses it was fitted on") + rows_of(apart, "presses kept apart, by thirds"))
+    _tell_rows(rows_of(done.tried, "presses it was fitted on") + rows_of(apart, "held-out presses, by thirds"))
     tell(options.out)
     return 0
 

@@ -72,12 +72,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _say_error(card: dict) -> None:
-    """Print the error of the weights on presses kept apart, and a warning where it is hardly below the baseline."""
+    """Print the error of the weights on held-out presses, and a warning where it is hardly below the baseline."""
     from ...translation.card_errors import chain_error, doubt
 
     found = chain_error(card)
     if found is not None:
-        say(f"presses kept apart: the gel is off by {found[0]:.3g} um rms; no displacement at all: {found[1]:.3g} um")
+        say(f"held-out presses: the gel is off by {found[0]:.3g} um rms; no displacement at all: {found[1]:.3g} um")
     if doubt(card):
         say(f"warning: {doubt(card)}")
 

@@ -134,7 +134,7 @@ class _Work:
         return [Task(index) for index in own + others]
 
     def take(self, task: Task, reply: Reply) -> list[Task]:
-        """Note a reply; returns what can be done now."""
+        """Record a worker's reply; returns the tasks that can be started now."""
         self.finished += 1
         if reply.stop:
             raise TactileError(*_parts_of(reply.error))

@@ -120,7 +120,7 @@ class ContactProblem:
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """The nodes among them."""
+        """Sorted touchable indices (n,) of the followed points that are nodes: here all of ``near``."""
         return self.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:

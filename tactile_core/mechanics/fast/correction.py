@@ -28,8 +28,8 @@ _SMALLEST_RADIUS = 0.3e-3  # m, added to a patch's: one touching node has a size
 # Nodal forces across the normals, over the whole force: 0.0001 without friction (0.04 at most); 0.027 at
 # least with 0.78, of 1,187 contacts of nine indenters.
 _SIDEWAYS, _STILL, _RUBS = 19, 0.005, 0.025
-_ALIKE = 1.0  # on presses kept apart 0.5 and 3 did as well; with 0 forces with friction were a fifth farther off
-# Features that a force is estimated from, twice: the mean of both was nearer on presses kept apart than either.
+_ALIKE = 1.0  # on held-out presses 0.5 and 3 did as well; with 0 forces with friction were a fifth farther off
+# Features that a force is estimated from, twice: the mean of both was nearer on held-out presses than either.
 ALL, ESSENTIAL = slice(None), np.array([0, 2, 4, 15, 16, 18, 19])  # depth, force, radius, core, ..., friction
 FILE = "mechanics_correction.npz"
 

@@ -46,5 +46,5 @@ def test_what_is_no_ball_makes_no_file(tmp_path, start, capsys):
         picture[row : row + 60, column - 40 : column] += random.integers(-60, 60, 3)
         Image.fromarray(picture.clip(0, 255).astype(np.uint8)).save(folder / f"bar_{number}.png")
     assert fit(folder, tmp_path, start) == 2
-    assert "tried on presses kept apart" in capsys.readouterr().err
+    assert "tried on held-out presses" in capsys.readouterr().err
     assert not (tmp_path / "unit.toml").exists()

@@ -49,7 +49,7 @@ def _median_unexplained(presses: list[Press], bench: BallPictures, radius: float
     return float(np.median([unexplained_share(sight, fit_ball(bench, sight, radius)[1]) for sight in sights]))
 
 
-def tried_apart(
+def cross_validated(
     photographs: Photographs,
     ball_diameter: float,
     start: Calibration,
@@ -78,4 +78,4 @@ def check_worth(tried: list[Evaluation]) -> None:
             f"{ours['roi_l1']:.1f} levels off in the region of the press, the background alone {baseline['roi_l1']:.1f}"
         )
         advice = "Check --ball-diameter, --background, the light, and that the pictures lie fingertip up"
-        raise TactileError("calibration, tried on presses kept apart", found, f"at most {WORTH:g} of that", advice)
+        raise TactileError("calibration, tried on held-out presses", found, f"at most {WORTH:g} of that", advice)
