@@ -49,12 +49,22 @@ def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -
     if count == wanted:
         return
     found, advice = f"{count} electrodes", "Check which sensor made this recording"
-    others = (other for each in known_sensors() if isinstance(other := describe(each), Fluid))
-    like = next((other.title for other in others if other.electrodes.count == count), "")
+    others = ((each, other) for each in known_sensors() if isinstance(other := describe(each), Fluid))
+    like = next((name for name, other in others if other.electrodes.count == count), "")
     if like:
-        found += f": a {like}"
-        advice = f"Translate it with weights of a {like} (docs/extend.md)"
+        found, advice = f"{found}: a {title(like)}", _advice(like)
     raise TactileError(f"{path}, {source}", found, f"the {wanted} electrodes of a {title(sensor)}", advice)
+
+
+def _advice(sensor: str) -> str:
+    """Say how recordings of a sensor are translated: by the weights that ship, or by what commands make."""
+    ships = title(SOURCE)
+    own = f"Translate it with weights of a {title(sensor)}. Those that ship are a {ships}'s; half an hour makes others"
+    return (
+        f"{own}: `tactile pairs scenes/training --count 12000 --seed 3 --from {sensor} --out pairs.h5`, `tactile train "
+        "pairs.h5 --out trained`, `tactile adapt RECORDINGS --out rest.toml`, `tactile convert RECORDING --out results "
+        "--weights trained/weights --sensor rest.toml` (docs/extend.md: what they need, and how right they are)"
+    )
 
 
 def assemble(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import sensor_surface, shape_of, skin_of
-from .descriptor import describe
+from . import electrodes, sensor_surface, shape_of, skin_of
+from .calibration_file import load_calibration
+from .descriptor import describe, passed_over
+from .electrodes import table_of
 from .fluid_sensor import Fluid
 from .gel_sensor import Gel
 
@@ -13,7 +15,7 @@ from .gel_sensor import Gel
 def about(name: str) -> str:
     """Describe a sensor in a few lines: kind, size, material, nodes of its surface, folder, sources.
 
-    Raises TactileError for an unknown name and a descriptor that is not sound.
+    Raises TactileError for an unknown name, and for a descriptor, a table or a calibration of it that is not sound.
     """
     found, surface = describe(name), sensor_surface(name)
     size = " x ".join(f"{1e3 * each:.2f}" for each in np.ptp(surface.rest, axis=0)[[0, 2]])
@@ -25,13 +27,19 @@ def about(name: str) -> str:
         f"surface: {len(surface.rest)} nodes, {len(surface.faces)} triangles",
         f"descriptor: {found.folder}",
         *(f"source: {source}" for source in found.sources),
+        *(
+            f"not read: {folder}, since a sensor that ships has its name; rename the folder"
+            for folder in passed_over(name)
+        ),
     ]
     return "\n".join(lines)
 
 
 def _of_gel(name: str, gel: Gel) -> list[str]:
     form = "flat" if gel.dome is None else "domed"
-    picture = f"calibration {gel.camera.calibration}" if gel.camera.calibration else "no calibration"
+    picture = "no calibration"
+    if gel.camera.calibration:
+        picture = f"calibration {gel.camera.calibration}, {load_calibration(None, name).unit}"
     return [f"kind: gel, {form}, {1e3 * shape_of(name).thickness:g} mm thick at its apex; {picture}"]
 
 
@@ -39,4 +47,8 @@ def _of_skin(name: str, skin: Fluid) -> list[str]:
     words = (
         f"{1e3 * skin_of(name).thickness:g} mm thick over fluid; {skin.readout.bits} bits at {skin.readout.rate:g} Hz"
     )
-    return [f"kind: fluid, a skin {words}"]
+    count, table = skin.electrodes.count, table_of(name)
+    there = f"in {table.name}, all inside the body" if table.is_file() else f"whose table {table.name} is not there"
+    if table.is_file():
+        electrodes(name)  # raises for one that is not
+    return [f"kind: fluid, a skin {words}", f"electrodes: {count}, {there}"]

@@ -74,7 +74,7 @@ def calibration_path(sensor: str) -> Path:
 @functools.cache
 def _shipped(sensor: str) -> Calibration:
     file = calibration_path(sensor)
-    return load_calibration(file)
+    return load_calibration(file, sensor)
 
 
 def _read(file: Path) -> Calibration:

@@ -32,6 +32,23 @@ def _folders() -> dict[str, Path]:
     return {path.parent.name: path.parent for place in places for path in sorted(place.glob(f"*/{FILE}"))}
 
 
+def passed_over(name: str) -> tuple[Path, ...]:
+    """Return the user's own folder of this name that is not read, since a sensor that ships has the name."""
+    own, ships = os.environ.get(OWN), FOLDER / name
+    folder = Path(own or FOLDER) / name
+    return (folder,) if (folder / FILE).is_file() and (ships / FILE).is_file() and not folder.samefile(ships) else ()
+
+
+def _advice() -> str:
+    """Say how a sensor becomes known, and what is odd about the folder that is to hold the user's own."""
+    own = os.environ.get(OWN)
+    if own and (Path(own) / FILE).is_file():
+        return f"${OWN} is {own}, a sensor's own folder: name the folder that holds it"
+    if own and not Path(own).is_dir():
+        return f"${OWN} is {own}, which is no folder: name the one that holds the sensor's"
+    return f"Name a known one, or put its folder into ${OWN}"
+
+
 def names() -> tuple[str, ...]:
     """List the known sensors: those that ship, and the user's own folders in ``$TACTILE_SENSORS``."""
     return tuple(sorted(_folders()))
@@ -42,7 +59,7 @@ def describe(name: str) -> Fluid | Gel:
     """Read the descriptor of a known sensor. Raises TactileError for an unknown name."""
     folder = _folders().get(name)
     if folder is None:
-        raise TactileError("sensor", repr(name), ", ".join(names()), f"Name a known one, or put its folder into ${OWN}")
+        raise TactileError("sensor", repr(name), ", ".join(names()), _advice())
     return read(folder)
 
 

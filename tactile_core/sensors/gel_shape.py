@@ -72,7 +72,12 @@ class GelShape:
         if holes.any():
             at = 1e3 * x[holes][0], 1e3 * z[holes][0]
             raise TactileError(f"{path}, x_mm {at[0]:g}, z_mm {at[1]:g}", "an open profile: no height", "a closed dome")
-        return np.linalg.lstsq(self._dome_basis(dome, x[within], z[within]), height[within], rcond=1e-10)[0]
+        basis = self._dome_basis(dome, x[within], z[within])
+        found, _, rank, _ = np.linalg.lstsq(basis, height[within], rcond=1e-10)
+        if rank < basis.shape[1]:
+            few = f"{within.sum()} heights inside margin_mm, which determine {rank} of {basis.shape[1]} coefficients"
+            raise TactileError(path, few, "more of them", "Give more heights, or lower degree_along or degree_across")
+        return found
 
     def dome_point(self, x: float, z: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the place (3,) m of the resting surface at (x, z) m and its outward unit normal (3,)."""

@@ -1,6 +1,7 @@
 """Recordings of a BioTac SP: read and described, never taken for those of a BioTac, nor the reverse."""
 
 import dataclasses
+import re
 from pathlib import Path
 
 import fake_tools
@@ -95,15 +96,19 @@ def test_nineteen_of_its_columns_are_no_biotac(stem, counts, write):
     names = [f"{stem}{number}" for number in range(1, 25)]
     path = written(write, names, counts)
     columns = ColumnMap(electrodes=tuple(names[:19]))
-    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19"):
+    with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19") as refused:
         recordings.read(path, columns)
+    for command in ("pairs scenes/training .* --from biotac_sp", "train", "adapt", "convert .* --weights .* --sensor"):
+        assert re.search(f"`tactile {command} ", str(refused.value))
     with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19"):
         info.describe(path, PrepareOptions(columns=columns))
 
 
 def test_a_biotac_is_no_biotac_sp(press, in_layout):
     for layout in ("csv_slide", "npz_electrodes"):
-        with pytest.raises(TactileError, match="19 electrodes: a BioTac; expected the 24 electrodes of a BioTac SP"):
+        with pytest.raises(
+            TactileError, match=r"a BioTac; expected the 24 electrodes of a BioTac SP.*Those that ship are a BioTac's"
+        ):
             read_sp(in_layout(layout, press))
     with pytest.raises(TactileError, match="sensor 'digit': of kind gel; expected a sensor of kind fluid"):
         recordings.read(in_layout("npz_electrodes", press), sensor="digit")

@@ -9,6 +9,7 @@ import pytest
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.sensors import biotac, descriptor
+from tactile_core.sensors.about import about
 from tactile_core.sensors.electrodes import read_places
 from tactile_core.sensors.gel_shape import GelShape
 from tactile_core.sensors.profiles import read_radii
@@ -109,6 +110,32 @@ def test_a_gel_with_a_hole_in_its_table_is_refused(tmp_path):
     file.write_text("\n".join(lines))
     with pytest.raises(TactileError, match=r"x_mm -8, z_mm -7.93: an open profile"):
         GelShape(descriptor.read(folder)).dome_height(np.zeros(1), np.zeros(1))
+
+
+def test_a_table_of_too_few_heights_is_refused(tmp_path):
+    folder = tmp_path / "few"
+    shutil.copytree(descriptor.FOLDER / "gelsight_mini", folder)
+    lines = (folder / "profile.csv").read_text().splitlines()
+    (folder / "profile.csv").write_text("\n".join([line for line in lines if not line.startswith("-8,")][:5]))
+    with pytest.raises(TactileError, match=r"profile\.csv: 4 heights .*determine \d of 6 coefficients"):
+        GelShape(descriptor.read(folder)).dome_height(np.zeros(1), np.zeros(1))
+
+
+def test_where_own_sensors_lie_is_said_where_it_is_odd(tmp_path, monkeypatch):
+    mine = changed(tmp_path, "poisson = 0.48", "poisson = 0.4", "digit")
+    for own, words in ((tmp_path / "none", "which is no folder"), (mine, "a sensor's own folder")):
+        monkeypatch.setenv(descriptor.OWN, str(own))
+        with pytest.raises(TactileError, match=words):
+            descriptor.describe("my_gel")
+    monkeypatch.setenv(descriptor.OWN, str(tmp_path))
+    assert f"not read: {mine}" in about("digit") and "not read" not in about("gelsight_mini")
+
+
+def test_a_descriptor_whose_calibration_is_another_gel_s_is_refused(tmp_path, monkeypatch):
+    changed(tmp_path, "poisson = 0.48", "poisson = 0.4", "gelsight_mini").rename(tmp_path / "my_mini")
+    monkeypatch.setenv(descriptor.OWN, str(tmp_path))
+    with pytest.raises(TactileError, match=r"default\.toml, sensor: 'gelsight_mini'; expected 'my_mini'"):
+        about("my_mini")
 
 
 def test_electrodes_outside_the_body_are_refused(tmp_path):
