@@ -18,7 +18,7 @@ from .electrode_faults import dead, saturated
 from .flags import Flag
 from .polarity import AUTO, BLOCK, Polarity, choose, polarity_of, spread_out, touching
 from .recording import Recording
-from .repair import fill, find_glitches, is_time_series
+from .repair import fill, find_glitches, is_time_series, smooth
 from .rest_level import (
     TARED_PDC,
     Quiet,
@@ -31,8 +31,10 @@ from .rest_level import (
     window_frames,
 )
 from .signal_kind import KINDS, detect
-from .smoothing import LONGEST, RECTIFIED, SIGNED, smooth
 
+LONGEST = 101  # frames, a second, to smooth over: beyond, touch itself is smoothed away (assumed)
+# Frames where the user gives none. Rectified signals need it: folded noise does not average out in the networks.
+RECTIFIED, SIGNED = 3, 1
 # Counts that the 95th percentile of a scaled recording's largest changes is stretched to (docs/sources.md, Networks).
 SCALED_PEAK = 150.0
 FRAMEWISE = ("change", "electrodes", "quiet", "flags", "pdc")  # arrays of `Signals` with a row for each frame
@@ -215,7 +217,10 @@ def doubt_law(signals: Signals) -> Signals:
         rows = slice(start, start + BLOCK)
         contact[rows] &= touching(signals.typical_of(rows))
     frames = np.flatnonzero(contact)
-    words = contact_law.doubt(signals.typical_of(frames[spread_out(len(frames), contact_law.MOST)]), signals.sensor)
+    seen = frames[spread_out(len(frames), contact_law.MOST)]
+    guessed = bool(signals.flags[0] & np.uint16(Flag.NO_QUIET_PART))  # then so is what pressure rose from
+    pressure = None if guessed else of_kind(signals.sensor, Fluid).readout.pressure * signals.pdc[seen]
+    words = contact_law.doubt(signals.typical_of(seen), pressure, signals.sensor)
     flags = signals.flags & ~np.uint16(Flag.LAW_DOUBTED)
     if words:
         flags[contact] |= np.uint16(Flag.LAW_DOUBTED)

@@ -13,7 +13,7 @@ from ..geometry.lattice import Lattice
 from . import biotac, digit
 from .descriptor import describe, of_kind
 from .descriptor_fields import Material
-from .electrodes import Places, contacts_of, places_of, typical_rest
+from .electrodes import Places, contact_pressures_of, contacts_of, places_of, typical_rest
 from .fluid_sensor import FALLS, Fluid
 from .gel_sensor import Gel
 from .gel_shape import shape_of
@@ -21,9 +21,10 @@ from .skin_shape import skin_of
 
 __all__ = [
     "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PAIR", "PRESSURE_PER_COUNT", "REST_COUNTS",
-    "SAMPLE_RATE", "SOURCE", "TARGET", "Lattice", "Material", "biotac_surface", "contacts_of", "describe",
-    "digit_surface", "electrode_count", "electrodes", "excitation_electrodes", "from_maker", "from_syntouch", "is_gel",
-    "places_of", "sensor_surface", "shape_of", "skin_of", "thickness", "title", "typical_rest",
+    "SAMPLE_RATE", "SOURCE", "TARGET", "Lattice", "Material", "biotac_surface", "contact_pressures_of", "contacts_of",
+    "describe", "digit_surface", "electrode_count", "electrodes", "excitation_electrodes", "from_maker",
+    "from_syntouch", "is_gel", "places_of", "sensor_surface", "shape_of", "skin_of", "thickness", "title",
+    "typical_rest",
 ]  # fmt: skip
 
 PAIR = SOURCE, TARGET = "biotac", "digit"  # of the weights that ship, and where no other sensors are named

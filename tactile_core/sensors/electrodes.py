@@ -79,9 +79,20 @@ def contacts_of(name: str) -> np.ndarray | None:
     Raises TactileError for a sensor without electrodes.
     """
     found = of_kind(name, Fluid)
-    if not found.electrodes.contacts:
-        return None
-    return np.load(found.folder / found.electrodes.contacts, allow_pickle=False).astype(np.float64)
+    return _table(found, found.electrodes.contacts)
+
+
+def contact_pressures_of(name: str) -> np.ndarray | None:
+    """Load the rise (P,) float64 Pa of the fluid's pressure in the contacts of `contacts_of`; None without a table.
+
+    Raises TactileError for a sensor without electrodes.
+    """
+    found = of_kind(name, Fluid)
+    return _table(found, found.electrodes.contact_pressures)
+
+
+def _table(sensor: Fluid, file: str) -> np.ndarray | None:
+    return np.load(sensor.folder / file, allow_pickle=False).astype(np.float64) if file else None
 
 
 def read_places(path: Path) -> Places:

@@ -91,12 +91,14 @@ class Electrodes:
     count : of those that are read, which signals are as wide as
     contacts : counts that simulated contacts change by, which show a recording's polarity and faults; empty where the
         networks alone bring such
+    contact_pressures : Pa that the fluid's pressure rises by in the same contacts; empty where that is not known
     """
 
     places: str = file_beside()
     count: int = number(above=0, below=MOST_ELECTRODES)
     radius: float = number("mm", above=0)
     contacts: str = file_beside(or_none=True)
+    contact_pressures: str = file_beside(or_none=True)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,10 +16,10 @@ from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_faults import named_electrodes
 from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit
 from ..recordings.fingers import split
+from ..recordings.gain_matching import PRIOR, Match, match
 from ..recordings.readers import each_finger, sensor_of
 from ..sensors import typical_rest
 from . import reference_signals
-from .gain_matching import PRIOR, Match, match
 from .reference_signals import ReferenceSignals
 from .unit_rest import UnitRest, find_rest, find_rest_sp
 

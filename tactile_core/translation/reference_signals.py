@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
+from ..recordings.gain_matching import match
 from ..sensors import electrode_count
 from ..sensors.readout import NOISE
 from . import weights
 from .card_sensors import pair_of
-from .gain_matching import match
 from .networks import compress, expand
 
 FILE = "signals.safetensors"

@@ -14,7 +14,7 @@ _UNLIKE, _SILENT = "signals unlike training", "no contact"
 # What makes a frame a guess, the gravest first; then what is only worth saying.
 _DOUBTS = {
     Flag.UNEXPLAINED: "rest perhaps under load",
-    Flag.LAW_DOUBTED: "gains or order doubted",
+    Flag.LAW_DOUBTED: "gains, order or skin doubted",
     Flag.POLARITY_DOUBTED: "polarity doubted",
     Flag.OUT_OF_RANGE: _UNLIKE,
     Flag.NO_QUIET_PART: "rest not found",

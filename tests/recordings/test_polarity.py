@@ -12,20 +12,26 @@ from tactile_core import recordings
 from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, polarity
 from tactile_core.recordings.flags import Flag
+from tactile_core.sensors import PRESSURE_PER_COUNT, contact_pressures_of
 
 
-def pressed(sign: float, *, pdc: bool, frames: int = 400, seed: int = 0, swing: float = 100.0) -> recordings.Recording:
-    """Rest, simulated contacts one after another, rest; whole counts of rest 3,300 plus or minus the change."""
+def pressed(sign: float, *, pdc: bool, frames: int = 400, seed: int = 0, share: float = 1.0) -> recordings.Recording:
+    """Rest, simulated contacts one after another, rest; whole counts of rest 3,300 plus or minus the change.
+
+    share : of the fluid's pressure as simulated
+    """
     random = np.random.default_rng(seed)
     contacts = polarity.contact_signals()
-    chosen = contacts[random.choice(len(contacts), 8, replace=False)]
+    which = random.choice(len(contacts), 8, replace=False)
+    chosen, fluid = contacts[which], share * contact_pressures_of("biotac")[which] / PRESSURE_PER_COUNT
     strength = np.clip(np.sin(np.linspace(0, 8 * np.pi, frames - 120)), 0, 1)
     change = np.zeros((frames, 19))
-    change[60:-60] = strength[:, None] * chosen[np.arange(frames - 120) * 8 // (frames - 120)]
+    order = np.arange(frames - 120) * 8 // (frames - 120)
+    change[60:-60] = strength[:, None] * chosen[order]
     electrodes = np.rint(3300 + sign * change * np.exp(0.1 * random.standard_normal(19)))
     electrodes += np.rint(random.normal(0, 1, electrodes.shape))
     pressure = np.zeros(frames)
-    pressure[60:-60] = swing * strength
+    pressure[60:-60] = strength * fluid[order]
     return recordings.Recording(
         name="made", path="made", layout="made", time=np.arange(frames) / 100, start_time=0.0, electrodes=electrodes,
         rows=np.arange(frames), flags=np.zeros(frames, np.uint16), pdc=1000 + np.rint(pressure) if pdc else None,
@@ -43,7 +49,7 @@ def test_it_is_found_and_the_change_is_that_of_a_raw_reading(pdc, sign, name, se
 
 
 def test_what_shows_nothing_is_taken_to_fall_and_flagged():
-    still = pressed(1.0, pdc=True, swing=5.0)
+    still = pressed(1.0, pdc=True, share=0.05)
     for recording in (still, dataclasses.replace(still, electrodes=np.full((400, 19), 3300.0), pdc=None)):
         found = recordings.prepare(recording)
         assert found.report["polarity"] == "falls"

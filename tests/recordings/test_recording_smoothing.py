@@ -7,7 +7,7 @@ import pytest
 
 from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, prepare, read
-from tactile_core.recordings.smoothing import smooth
+from tactile_core.recordings.repair import smooth
 
 
 def test_a_mean_round_each_frame():

@@ -1,9 +1,10 @@
-"""Make the BioTac's contact_patterns.npy: the electrodes' response to simulated contacts, which shows polarities.
+"""Make the BioTac's contact_patterns.npy and contact_pressures.npy: the response to simulated contacts.
 
     python scripts/benchmarks/make/make_contact_patterns.py [WEIGHTS]     of the weights that ship, or of others
 
 The reference signals of the weights, in counts against rest, with the sign of a raw reading (``sensors.COUNT_SIGN``).
-Run it again when the weights were trained again.
+With the fluid's pressure that the same weights give for them. They show a recording's polarity and whether it can be
+of a sensor as simulated. Run it again when the weights were trained again.
 """
 
 from __future__ import annotations
@@ -16,15 +17,21 @@ import numpy as np
 from tactile_core.files import atomic
 from tactile_core.sensors import SOURCE, describe
 from tactile_core.translation import networks, reference_signals
+from tactile_core.translation.translate import load_translator
 
 
 def main(arguments: list[str]) -> int:
-    """Write the table; returns the exit status."""
+    """Write the tables; returns the exit status."""
     folder = arguments[0] if arguments else networks.WEIGHTS_FOLDER
-    content = io.BytesIO()
-    np.save(content, reference_signals.read(folder).typical.astype(np.float16))
+    signals = reference_signals.read(folder).typical.astype(np.float16)
+    pressures = load_translator(folder).nets.pressure(signals.astype(np.float64)).astype(np.float32)
     found = describe(SOURCE)
-    atomic.write_bytes(found.folder / found.electrodes.contacts, content.getvalue())
+    for file, values in (
+        (found.electrodes.contacts, signals), (found.electrodes.contact_pressures, pressures),
+    ):  # fmt: skip
+        content = io.BytesIO()
+        np.save(content, values)
+        atomic.write_bytes(found.folder / file, content.getvalue())
     return 0
 
 

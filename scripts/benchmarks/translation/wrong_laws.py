@@ -1,7 +1,7 @@
 """Measure whether recordings of a wrong law are doubted, and how often right ones are.
 
     python scripts/benchmarks/translation/wrong_laws.py --json FILE     the table of docs/accuracy.md
-    python scripts/benchmarks/translation/wrong_laws.py --fit           the limit's two numbers, from the other presses
+    python scripts/benchmarks/translation/wrong_laws.py --fit           the limits' numbers, from the other presses
 
 A recording is so many simulated contacts of one unit, out of ``scenes/training/test_contacts.h5``, whose gains are 10 %
 apart, with 1.5 counts of noise. Even presses are for choosing the limit, odd ones are reported. A doubted recording is
@@ -24,16 +24,22 @@ import numpy as np  # noqa: E402
 from tactile_core.accuracy import HEADER, Row, line, row  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
 from tactile_core.recordings import contact_law  # noqa: E402
+from tactile_core.sensors import PRESSURE_PER_COUNT  # noqa: E402
 from tactile_core.translation.simulated_likeness import residual_shares, unlike  # noqa: E402
 
 CONTACTS = 5, 10, 20, 40, 100
 FRAMES = 20  # of each recording whose frames are judged one by one
 UNITS = 400  # recordings a law and number of contacts
 GAIN, NOISE = 0.1, 1.5  # of a channel; counts (docs/sources.md, BioTac read-out)
-TARGET, ALARMS, FROM = 0.9, 0.05, 100  # shares of recordings; contacts from which on they are asked for
-CHOSEN = 0.01  # share of right recordings beyond the limit where it is chosen, so that others stay below ALARMS
+TARGET, ALARMS, FROM = 0.9, 0.05, 20  # shares of recordings; contacts from which on they are asked for
+# Share of right recordings beyond each limit where it is chosen, so that others stay below ALARMS.
+CHOSEN = {"LEFT, MORE": 0.005, "GAINED, MORE_GAINED": 0.01}
 OFFSET, CHANNELS, FACTOR = 40.0, 4, 2.0  # counts of rest; channels whose gain is so many times as large
-Law = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+PRESSES = 0.5  # share of the presses that a recording's contacts are of, where the limits are chosen
+PDC = 1.5  # counts of noise of the fluid's pressure (assumed, as the electrodes')
+SOFTER = 0.5  # of the skin's modulus: the same dents at so much of the pressure, in linear elasticity
+Touches = tuple[np.ndarray, np.ndarray]  # changes (n, 19) counts, and the fluid's pressure (n,) Pa
+Law = Callable[[np.ndarray, np.ndarray, np.random.Generator], Touches]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -43,8 +49,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
     if options.fit:
-        left, more = fit()
-        print(f"LEFT, MORE = {left:.4f}, {more:.4f}")
+        for name, (base, more) in fit().items():
+            print(f"{name} = {base:.4f}, {more:.4f}")
         return 0
     rows = measured()
     print("\n".join([HEADER, *map(line, rows)]))
@@ -53,92 +59,107 @@ def main(arguments: list[str] | None = None) -> int:
     return int(any(not each["ok"] for each in rows))
 
 
-def inverted(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def inverted(change: np.ndarray, pressure: np.ndarray, random: np.random.Generator) -> Touches:
     """Counts that rise where they should fall."""
-    return -change
+    return -change, pressure
 
 
-def doubled(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def doubled(change: np.ndarray, pressure: np.ndarray, random: np.random.Generator) -> Touches:
     """Double the gains of some channels."""
     gain = np.ones(change.shape[1])
     gain[random.choice(len(gain), CHANNELS, replace=False)] = FACTOR
-    return change * gain
+    return change * gain, pressure
 
 
-def swapped(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def swapped(change: np.ndarray, pressure: np.ndarray, random: np.random.Generator) -> Touches:
     """Swap two channels."""
     order = np.arange(change.shape[1])
     first, second = random.choice(len(order), 2, replace=False)
     order[[first, second]] = order[[second, first]]
-    return change[:, order]
+    return change[:, order], pressure
 
 
-def moved(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def moved(change: np.ndarray, pressure: np.ndarray, random: np.random.Generator) -> Touches:
     """Rest taken too high or too low in all channels."""
-    return change + OFFSET * random.choice([-1.0, 1.0])
+    return change + OFFSET * random.choice([-1.0, 1.0]), pressure
 
 
-def right(change: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def softer(change: np.ndarray, pressure: np.ndarray, random: np.random.Generator) -> Touches:
+    """A skin of half the stiffness."""
+    return change, SOFTER * pressure
+
+
+def right(change: np.ndarray, pressure: np.ndarray, random: np.random.Generator) -> Touches:
     """The law as simulated."""
-    return change
+    return change, pressure
 
 
-WRONG: dict[str, Law] = {"inverted": inverted, "gains_doubled": doubled, "channels_swapped": swapped, "rest_off": moved}
+WRONG: dict[str, Law] = {
+    "inverted": inverted, "gains_doubled": doubled, "channels_swapped": swapped, "rest_off": moved,
+    "skin_softer": softer,
+}  # fmt: skip
 
 
-def signals(odd: bool) -> np.ndarray:
-    """Changes (n, 19) counts of the test set's contacts, of odd or of even presses."""
+def touches(odd: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Changes (n, 19) counts, pressures (n,) Pa and presses (n,) of the test set's contacts, of odd or even presses."""
     with h5py.File(ROOT / "scenes" / "training" / "test_contacts.h5", "r") as file:
-        return file["signal"][:].astype(float)[file["press"][:] % 2 == int(odd)]
+        press = file["press"][:]
+        chosen = press % 2 == int(odd)
+        change, pressure = (file[name][:].astype(float)[chosen] for name in ("signal", "pressure"))
+        return change, pressure, press[chosen]
 
 
-def recordings(change: np.ndarray, contacts: int, law: Law, seed: int) -> list[np.ndarray]:
-    """Contacts (n, 19) counts of UNITS recordings, each of a unit with gains of its own."""
+def recordings(odd: bool, contacts: int, law: Law, seed: int, presses: float = 1.0) -> list[Touches]:
+    """Contacts of UNITS recordings, each of a unit with gains of its own; presses : share of them that each is of."""
     random, found = np.random.default_rng([seed, contacts]), []
+    change, pressure, press = touches(odd)
+    known = np.unique(press)
     for _ in range(UNITS):
+        of = np.arange(len(change))
+        if presses < 1:
+            of = np.flatnonzero(np.isin(press, random.choice(known, int(presses * len(known)), replace=False)))
         gain = 1 + GAIN * random.standard_normal(change.shape[1])
-        chosen = change[random.choice(len(change), min(contacts, len(change)), replace=False)] * gain
-        seen = law(chosen, random) + NOISE * random.standard_normal(chosen.shape)
-        found.append(seen[contact_law.touching(seen)])
+        chosen = of[random.choice(len(of), min(contacts, len(of)), replace=False)]
+        seen, fluid = law(change[chosen] * gain, pressure[chosen], random)
+        seen = seen + NOISE * random.standard_normal(seen.shape)
+        fluid = fluid + PRESSURE_PER_COUNT * PDC * random.standard_normal(len(fluid))
+        contact = contact_law.touching(seen)
+        found.append((seen[contact], fluid[contact]))
     return found
 
 
-def fit() -> tuple[float, float]:
-    """The limit's numbers, by least squares over contacts of what all but CHOSEN of right recordings stay below."""
-    counts, levels = [], []
+def fit() -> dict[str, tuple[float, float]]:
+    """The limits' numbers, by least squares over contacts of what all but CHOSEN of right recordings stay below."""
+    counts: list[float] = []
+    levels: dict[str, list[float]] = {name: [] for name in CHOSEN}
     for contacts in CONTACTS:
-        left = [contact_law.unexplained_share(each) for each in recordings(signals(odd=False), contacts, right, seed=1)]
-        levels.append(np.quantile([share for share, _ in left], 1 - CHOSEN))
-        counts.append(np.mean([different for _, different in left]))
-    more, base = np.polyfit(1 / np.sqrt(counts), levels, 1)
-    return float(base), float(more)
+        left = [contact_law.unexplained_share(each) for each, _ in recordings(False, contacts, right, seed=1)]
+        few = recordings(False, contacts, right, seed=1, presses=PRESSES)
+        gained = [contact_law.gained_share(each) for each, _ in few if len(each)]
+        for (name, beyond), values in zip(CHOSEN.items(), ([share for share, _ in left], gained), strict=True):
+            levels[name].append(float(np.quantile(values, 1 - beyond)))
+        counts.append(float(np.mean([different for _, different in left])))
+    fitted = {name: np.polyfit(1 / np.sqrt(counts), level, 1) for name, level in levels.items()}
+    return {name: (float(base), float(more)) for name, (more, base) in fitted.items()}
 
 
 def measured() -> list[Row]:
     """Shares of frames that are unexplained, by law, and of recordings that are doubted, by number of contacts too."""
     rows = []
     for name, law in ({"right": right} | WRONG).items():
-        seen = np.concatenate(recordings(signals(odd=True), FRAMES, law, seed=3))
+        seen = np.concatenate([each for each, _ in recordings(True, FRAMES, law, seed=3)])
         share = unlike(residual_shares(seen, np.zeros(len(seen), bool))).mean()
         of = f"{len(seen)} frames, each judged alone"
         rows.append(row(f"unexplained_{name}", 100 * float(share), "%", of=of))
     for contacts in CONTACTS:
         asked, of = contacts >= FROM, f"{UNITS} recordings of {contacts} contacts"
         for name, law in ({"right": right} | WRONG).items():
-            doubted = [bool(contact_law.doubt(each)) for each in recordings(signals(odd=True), contacts, law, seed=2)]
-            wrong = law is not right
-            target = (TARGET if wrong else ALARMS) if asked else None
-            key = f"doubted_{name}_{contacts}"
-            rows.append(
-                row(
-                    key,
-                    100 * float(np.mean(doubted)),
-                    "%",
-                    None if target is None else 100 * target,
-                    of=of,
-                    at_least=wrong,
-                )
+            doubted = 100 * float(
+                np.mean([bool(contact_law.doubt(*each)) for each in recordings(True, contacts, law, seed=2)])
             )
+            wrong = law is not right
+            target = 100 * (TARGET if wrong else ALARMS) if asked else None
+            rows.append(row(f"doubted_{name}_{contacts}", doubted, "%", target, of=of, at_least=wrong))
     return rows
 
 

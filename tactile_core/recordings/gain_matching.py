@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .networks import compress
+from .polarity import SCALE
 
 ROUNDS = 30  # most turns; 10 to 20 are usual
 SETTLED = 0.01  # largest change of a log gain in a turn that counts as none
@@ -45,11 +45,11 @@ def match(change: np.ndarray, typical: np.ndarray, rectified: bool, prior: float
     Rectified signals give no offset: it is folded away with the sign.
     """
     typical = np.abs(typical) if rectified else np.asarray(typical, np.float64)
-    compressed = compress(typical).astype(np.float64)
+    compressed = np.arcsinh(typical / SCALE)
     log_gain, offset = np.zeros(change.shape[1]), np.zeros(change.shape[1])
     settled = False
     for _ in range(ROUNDS):
-        near = _nearest(compress((change - offset) / np.exp(log_gain)).astype(np.float64), compressed)
+        near = _nearest(np.arcsinh((change - offset) / np.exp(log_gain) / SCALE), compressed)
         before = log_gain
         log_gain, contacts = _log_gain(change - offset, typical, near, before, rectified, prior)
         if not rectified:
