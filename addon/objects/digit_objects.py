@@ -12,7 +12,7 @@ from . import axes, mesh_cache, styles, surfaces
 from .style_nodes import DISPLACEMENT
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
-_BEHIND = 50e-3  # m between the gels of one skin along the finger: more than a housing is long
+_BEHIND = 60e-3  # m between the gels of one skin along the finger: a housing, and the legend at its base
 BESIDE = 7.1e-3 + 23e-3 + 5e-3  # m: half widths of BioTac (docs/sources.md) and of a housing round the LEDs, a gap
 
 
@@ -34,7 +34,7 @@ def add_gel(
     if beside is not None:
         gel.location = beside.location
         gel.location.y += BESIDE * per_metre
-    gel.location.x += others * _BEHIND * per_metre
+    gel.location.x -= others * _BEHIND * per_metre
     return gel
 
 

@@ -68,6 +68,13 @@ def _give(thing: bpy.types.Object, style: str, largest: float, exaggeration: flo
         style_legend.remove_legend(thing)
 
 
+def take_over(thing: bpy.types.Object, other: bpy.types.Object) -> None:
+    """Give a new sensor the style of another one, over its own range."""
+    style = styles.style_of(other)
+    if style != "NONE" and styles.can_show(thing, style):
+        _give(thing, style, 0.0, 1.0)
+
+
 def follow(thing: bpy.types.Object, before: float) -> None:
     """Fit a sensor's style to a new animation: its range, unless it was set by hand, and what it colours by.
 

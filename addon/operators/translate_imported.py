@@ -74,11 +74,13 @@ class TACTILE_OT_translate(JobOperator):
         if skin is None:
             raise TactileError(self._skin, "no longer in the scene", "the skin that was translated")
         frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
-        gel = _gel_beside(skin, self._target)
+        gel, new = _gel_beside(skin, self._target)
         digit_body.add_body(gel, render_settings.calibration_of(context.scene, self._target))
         summary = self._animate(gel, frames, skin.tactile.motion)
+        if new:
+            set_style.take_over(gel, skin)
         low = timeline.mark_low_confidence(context.scene, self._found.translation.confidence, frames)
-        view.show(context, [skin, gel])
+        view.show(context, [gel, skin])
         view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))
         self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
@@ -97,12 +99,15 @@ class TACTILE_OT_translate(JobOperator):
         return summary
 
 
-def _gel_beside(skin: bpy.types.Object, sensor: str) -> bpy.types.Object:
-    """Return the skin's gel of a sensor; one that is there keeps its LEDs, coating and camera as the user set them."""
+def _gel_beside(skin: bpy.types.Object, sensor: str) -> tuple[bpy.types.Object, bool]:
+    """Return the skin's gel of a sensor, and whether it is new.
+
+    One that is there keeps its LEDs, coating and camera as the user set them.
+    """
     group = properties.home_of(skin)
     there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")
     same = next((thing for thing in there if properties.sensor_name(thing) == sensor), None)
-    return same or digit_objects.add_gel(group, skin.tactile.per_metre, skin, sensor)
+    return same or digit_objects.add_gel(group, skin.tactile.per_metre, skin, sensor), same is None
 
 
 CLASSES = (TACTILE_OT_translate,)

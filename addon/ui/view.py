@@ -130,13 +130,14 @@ def fit_timeline(context: bpy.types.Context) -> None:
 def show(context: bpy.types.Context, things: list[bpy.types.Object], beside: Sequence[bpy.types.Object] = ()) -> None:
     """Select the things, colour solid views by object, and look at them, what is beside them, and their parts.
 
-    Without a window, select only.
+    Views that show a style's colours go on. Without a window, select only.
     """
     for thing in context.view_layer.objects:
         thing.select_set(thing in things)
     context.view_layer.objects.active = things[0]
     for area, _ in _main_regions(context, "VIEW_3D"):
-        area.spaces.active.shading.color_type = "OBJECT"
+        if area.spaces.active.shading.color_type != "VERTEX":
+            area.spaces.active.shading.color_type = "OBJECT"
     look_at(context, [*things, *beside])
 
 

@@ -44,6 +44,7 @@ def on_both(imported, needs):
     needs("scipy")
     imported(frames="55:85:6")
     bpy.ops.tactile.translate()
+    bpy.ops.tactile.set_style(style="DISPLACEMENT")
     bpy.ops.tactile.translate(to=GEL.upper())
     return [next(t for t in bpy.context.scene.objects if t.tactile.role == "DIGIT" and t.tactile.sensor == sensor)
             for sensor in ("digit", GEL)]  # fmt: skip
@@ -72,6 +73,7 @@ def test_another_gel_is_solved_under_the_contact_that_the_networks_find(on_both,
     np.testing.assert_allclose(nodes_of(mini), to_blender(rest + wanted[4], 1000), atol=1e-3)
     assert np.linalg.norm(wanted[4], axis=1).max() > 100e-6
     assert abs(mini.location.x - digit.location.x) > 40  # it stands beside the first
+    assert part("addon.objects.styles").style_of(mini) == "DISPLACEMENT"  # as its skin
     words, _ = part("addon.ui.panels").trust_of(scene.objects["BioTac skin"], mini)
     assert "error not known" in words
 
