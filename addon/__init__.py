@@ -14,6 +14,7 @@ from .operators import (
     import_recording,
     preview,
     render_engine,
+    render_properties,
     render_setup,
     scene_files,
     set_style,
@@ -23,12 +24,12 @@ from .operators import (
     translate_imported,
 )
 from .process import command_line
-from .ui import add_menu, asset_library, panels, preferences, properties, render_settings, workspace
+from .ui import add_menu, asset_library, panels, preferences, properties, workspace
 
 # In the order of registration: properties before what uses them.
 PARTS = (
     properties,
-    render_settings,
+    render_properties,
     preferences,
     asset_library,
     check_llvm,

@@ -66,6 +66,7 @@ def _keep_images(*_: object) -> None:
 
 def switch_off() -> None:
     """Remove the handlers, and end the worker."""
+    stale_picture.leave_to_live_picture(False)
     for handlers, function in _handlers():
         if function in handlers:
             handlers.remove(function)
@@ -101,6 +102,7 @@ class TACTILE_OT_live_picture(TactileOperator):
         image = pictures.update(gel, context.evaluated_depsgraph_get())
         for handlers, function in _handlers():
             handlers.append(function)
+        stale_picture.leave_to_live_picture(True)
         view.show_picture(context, image)
 
 

@@ -22,12 +22,13 @@ _SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material
 class _Known:
     """What the picture was drawn of: gel, its displacement (n, 3) m and unit, None where unknown.
 
-    bright : its pixels while it is dim
+    bright : its pixels while it is dim; live : whether each change draws it again
     """
 
     gel: str = ""
     drawn: tuple[np.ndarray, str] | None = None
     bright: np.ndarray | None = None
+    live: bool = False
 
 
 _known = _Known()
@@ -36,6 +37,11 @@ _known = _Known()
 def remember(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     """Remember what the picture has just been drawn of."""
     _known.gel, _known.drawn, _known.bright = gel.name, _state(gel, depsgraph), None
+
+
+def leave_to_live_picture(live: bool) -> None:
+    """Dim nothing while the live picture is on, which draws each change."""
+    _known.live = live
 
 
 def shown_gel(scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -82,9 +88,7 @@ def _state(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[np.nd
 @persistent
 def _frame_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     """Called by Blender at each change of the frame."""
-    from . import preview
-
-    if depsgraph is not None and not preview.is_on() and not bpy.app.is_job_running("RENDER"):
+    if depsgraph is not None and not _known.live and not bpy.app.is_job_running("RENDER"):
         check(scene, depsgraph)
 
 

@@ -1,6 +1,4 @@
-"""Settings of a scene's pictures: preset, unit, largest error."""
-
-import importlib.util
+"""Read the settings of a scene's pictures: preset, unit, largest error."""
 
 import bpy
 
@@ -9,37 +7,7 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.jobs.error_budget import Budget, parse_budget
 from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.calibration import Calibration
-from ..objects import digit_body
 from . import preferences, properties
-
-_FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
-_MITSUBA = (
-    ("standard", "Standard", "Direct light, traced by Mitsuba"),
-    ("quality", "Quality", "And the light that bounces once"),
-    ("reference", "Reference", "Everything, seconds a frame"),
-)
-_PACKAGE = __package__.rsplit(".", 2)[0]
-TRACED = importlib.util.find_spec(f"{_PACKAGE}.tactile_core.pictures.mitsuba") is not None
-PRESETS = (_FAST, *(_MITSUBA if TRACED else ()))
-_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
-
-
-class TactileRender(bpy.types.PropertyGroup):
-    """Render settings of each scene."""
-
-    preset: bpy.props.EnumProperty(
-        name="Preset", description="How exactly the picture is made", items=PRESETS,
-        update=lambda settings, context: _prepare(settings, context),
-    )  # fmt: skip
-    calibration: bpy.props.StringProperty(
-        name="Calibration", description="File of one unit (tactile calibrate); empty: that of the sensor, or of the"
-        " preferences for a DIGIT", subtype="FILE_PATH", options=_RELATIVE,
-        update=lambda settings, context: _take_calibration(settings, context),
-    )  # fmt: skip
-    error: bpy.props.StringProperty(
-        name="Largest Error", description="Largest error that the toolkit itself may add: 50um of a simulated surface,"
-        " 0.6levels of a picture, or both with a comma. Picks tier and preset; empty: the fast tier, the preset above",
-    )  # fmt: skip
 
 
 def budget_of(scene: bpy.types.Scene) -> Budget:
@@ -80,26 +48,3 @@ def calibration_of(scene: bpy.types.Scene, sensor: str, size: tuple[int, int] | 
         expected = f"a calibration file of a {sensors.title(sensor)}"
         raise TactileError(error.where, error.found, expected, advice) from error
     return unit if size is None else unit.at_size(*size)
-
-
-def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> None:
-    """Put LEDs, coating and camera to those of the file that was chosen; one that is none is reported by a render."""
-    scene = settings.id_data
-    for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
-        if digit_body.leds_of(gel) and gel.library is None:
-            try:
-                digit_body.reset(gel, calibration_of(scene, properties.sensor_name(gel)))
-            except TactileError:
-                continue
-
-
-def _prepare(settings: TactileRender, context: bpy.types.Context) -> None:
-    """Let the worker of the preset that was chosen get ready."""
-    from ..operators import pictures
-
-    if settings.id_data == context.scene:
-        pictures.prepare(context.scene, context.evaluated_depsgraph_get())
-
-
-CLASSES = (TactileRender,)
-POINTERS = ((bpy.types.Scene, "tactile_render", TactileRender),)
