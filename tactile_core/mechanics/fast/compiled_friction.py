@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from . import friction_loops as loops
-from . import stick_slip
-from .active_set import UnsolvedError
 from .friction import (
     BEYOND,
     BEYOND_WAVERING,
     FLAT,
     GAP_NOISE,
-    LARGEST_STEP,
     MAX_ITERATIONS,
     NEARLY_CLOSED,
     SLIP_TOLERANCE,
@@ -20,7 +17,7 @@ from .friction import (
     Friction,
 )
 from .frictionless import FORCE_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pace, Try
-from .stick_slip import LEAST_FORCE
+from .stick_slip import LARGEST_TILT, LARGEST_TURN, LEAST_FORCE, solved
 
 
 class CompiledFriction(Friction):
@@ -42,24 +39,15 @@ class CompiledFriction(Friction):
             loops.reduce_to_law(force, core, active, slips, normal, self.friction, lean)
             moved, core_moved = loops.respond(matrix, force, core)
             loops.linearise(moved, place, off, gap, normal, moves, slip, gap_then)
-            at, core_at = np.flatnonzero(active[:k]), np.flatnonzero(active[k:])
-            sliding = slips[at]
-            stuck, slipping = at[~sliding], at[sliding]
-            curved, bend = self._bend_at(slipping, force, place, there) if calm else FLAT
-            system, right, carry, across, pressing = loops.assemble(
-                matrix, k, stuck, core_at, slipping, normal, lean, force, slip, gap_then, self.core_gap + core_moved,
-                moves, curved, bend, direction, self.friction, stick_slip.RIDGE, LEAST_FORCE,
+            at = np.flatnonzero(slips & active[:k])
+            curved, bend = self._bend_at(at, force, place, there) if calm else FLAT
+            force, core, step = self._newton(
+                force, core, active, at, normal, lean, slip, gap_then, self.core_gap + core_moved, moves, curved, bend,
+                axial_force,
             )  # fmt: skip
-            answer = stick_slip.solved(system, right, symmetric=not len(slipping))
-            step = 0.0
             if axial_force is not None:
-                step = _step_for(axial_force - float(force.sum(axis=0) @ direction), carry, answer)
                 shift += step
                 there = self.pose.moved(shift)
-            force, core = loops.advance(
-                force, core, np.ascontiguousarray(answer), step, stuck, core_at, slipping, normal, lean, across,
-                pressing, curved, bend, self.friction, LEAST_FORCE, stick_slip.LARGEST_TURN, stick_slip.LARGEST_TILT,
-            )  # fmt: skip
             displacement, core_moved = loops.respond(matrix, force, core)
             points = self.rest + displacement
             (gap, turned), off = there.distance(self.indenter, points), self._off(points, there)
@@ -84,13 +72,34 @@ class CompiledFriction(Friction):
             (gap, normal), off = there.distance(self.indenter, points), self._off(points, there)
         return state
 
-
-def _step_for(missing: float, carry: np.ndarray, answer: np.ndarray) -> float:
-    """Distance, m, that the indenter moves for ``missing`` N more along its motion. Raises UnsolvedError."""
-    carried, per_step = carry @ answer
-    if not per_step > 0:
-        raise UnsolvedError("no node can carry the force")
-    return min(max(float((missing - carried) / per_step), -LARGEST_STEP), LARGEST_STEP)
+    def _newton(  # noqa: ANN202
+        self, force, core, active, at, normal, lean, slip, gap, core_gap, moves, curved, bend, axial_force,  # noqa: ANN001
+    ):  # fmt: skip
+        """See ``stick_slip.Step``: forces (k, 3), (c,) N after the step, and how far the indenter moves, m."""
+        inverse, rows = self.stiffness.among(self.block, active)
+        direction, friction, columns = self.pose.direction, self.friction, 1 if axial_force is None else 2
+        across, pressing, limit, against, turning = loops.slipping_frames(
+            at, normal, lean, force, slip, curved, bend, friction, LEAST_FORCE
+        )
+        motion = loops.known_motion(active, slip, gap, normal, lean, core_gap, at, direction, columns)
+        forces = loops.moving_forces(inverse, rows, motion)
+        bearing, moved = loops.borne(forces, motion, moves, at, curved, turning, direction)
+        turns = np.empty((0, columns))
+        if len(at):
+            system, right = loops.slip_system(
+                inverse, rows, at, normal, lean, across, against, curved, turning, bearing, friction
+            )
+            answer = np.ascontiguousarray(solved(system, right))
+            turns = answer[len(at) :]
+            loops.slide(motion, answer, at, lean, across, against)
+            forces = loops.moving_forces(inverse, rows, motion)
+            bearing, moved = loops.borne(forces, motion, moves, at, curved, turning, direction)
+        step = 0.0 if axial_force is None else self._step_for(forces, force, axial_force)
+        force, core = loops.advance(
+            force, core, forces, step, at, normal, lean, across, pressing, limit, curved, bend, bearing, moved,
+            turns, friction, LARGEST_TURN, LARGEST_TILT,
+        )  # fmt: skip
+        return force, core, step
 
 
 def _bears(force: np.ndarray, direction: np.ndarray, axial_force: float) -> bool:

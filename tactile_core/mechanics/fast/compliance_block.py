@@ -14,6 +14,7 @@ from .mirror_symmetry import axes_of
 # Relative stiffness added to each node: 1e-6 moves a gap by nanometres and keeps single precision definite, also where
 # one node presses two faces of a concave corner.
 _RIDGE = 1e-6
+_INNER = 2**40  # more than a surface has degrees of freedom
 
 
 class ComplianceBlock:
@@ -34,6 +35,7 @@ class ComplianceBlock:
     ) -> None:
         self.nodes, self.inner = nodes, inner
         self.k, self.c = len(nodes), len(inner)
+        self.keys = np.concatenate([axes_of(nodes), _INNER + inner])  # (3 k + c,), sorted: the same in every block
         size = 3 * self.k
         rows = rows or ComplianceRows(compliance, np.unique(nodes))
         surface = rows.block(nodes)

@@ -23,6 +23,7 @@ from .compliance import Compliance
 from .compliance_block import ComplianceBlock
 from .compliance_rows import ComplianceRows
 from .contact_state import Contact, sideways_share
+from .contact_stiffness import ContactStiffness
 from .friction import Friction
 from .frictionless import Frictionless, Try
 from .projection import first_contact, project
@@ -64,6 +65,7 @@ class ContactProblem:
         self.work = work or Work()
         self._rest = self._resting()
         self._block: ComplianceBlock | None = None
+        self._stiffness = ContactStiffness()
         self._rows = ComplianceRows(compliance, np.empty(0, int))
         self._look_near(pose.moved(reach))
 
@@ -212,7 +214,7 @@ class ContactProblem:
             begin.force, begin.slipping = _borne(before, candidates.nodes)
             spots = self._spots(before, moved, pose, candidates.nodes)
             solver = (CompiledFriction if available() else Friction)(
-                block, rest, core_gap, self.indenter, pose, spots, self.friction
+                block, rest, core_gap, self.indenter, pose, spots, self.friction, self._stiffness
             )
         unknowns = len(active) if self.friction == 0 else len(block.matrix)
         try:

@@ -13,7 +13,9 @@ import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
 from ...geometry.indenters.indenter import lengths
+from .active_set import UnsolvedError
 from .compliance_block import ComplianceBlock
+from .contact_stiffness import ContactStiffness
 from .frictionless import FORCE_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pace, Try
 from .node_vectors import dot
 from .stick_slip import LEAST_FORCE, Slipping, Step
@@ -63,13 +65,15 @@ class Friction:
     """Solves for the nodes of one block.
 
     rest : (k, 3) m; core_gap : (c,) m; spots : (k, 3) m, where nodes stick, in the indenter's frame
+    stiffness : that of the solve before, of whichever block, from which this one goes on
     """
 
     def __init__(
         self, block: ComplianceBlock, rest: np.ndarray, core_gap: np.ndarray, indenter: Indenter, pose: Pose,
-        spots: np.ndarray, friction: float,
+        spots: np.ndarray, friction: float, stiffness: ContactStiffness | None = None,
     ) -> None:  # fmt: skip
         self.block, self.rest, self.core_gap = block, rest, core_gap
+        self.stiffness = stiffness or ContactStiffness()
         self.indenter, self.pose, self.spots, self.friction = indenter, pose, spots, friction
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
@@ -162,26 +166,31 @@ class Friction:
 
     def _step(self, guess: _Guess, seen: _Seen, axial_force: float | None) -> _Guess:
         """The forces with which linearised gaps close and sticking nodes stay, among what touches and slips now."""
-        k, direction = self.block.k, self.pose.direction
-        at, core_at = np.flatnonzero(guess.active[:k]), np.flatnonzero(guess.active[k:])
-        number = np.flatnonzero(guess.slips[at])
-        s = at[number]
+        at = np.flatnonzero(guess.slips & guess.active[: self.block.k])
         slipping = Slipping(
-            number, seen.normal[s], seen.lean[s], dot(guess.force[s], seen.normal[s]), seen.slip[s], seen.moves[s],
+            at, seen.normal[at], seen.lean[at], dot(guess.force[at], seen.normal[at]), seen.slip[at], seen.moves[at],
             seen.curved, seen.bend, self.friction,
         )  # fmt: skip
-        away = seen.slip[at] + seen.gap[at, None] * seen.normal[at]
-        solved = Step(self.block.matrix, at, 3 * k + core_at, away, seen.core_gap[core_at], direction, slipping)
-        step = 0.0
-        if axial_force is not None:
-            step = solved.step_for(axial_force - float(guess.force.sum(axis=0) @ direction))
-            step = min(max(step, -LARGEST_STEP), LARGEST_STEP)
-        change, core_change, of_slipping = solved.change(step)
-        force, core = guess.force.copy(), guess.core.copy()
-        force[at[solved.sticks]] += change
-        force[s] = of_slipping
-        core[core_at] += core_change
+        away = seen.slip + seen.gap[:, None] * seen.normal
+        solved = Step(
+            self.stiffness, self.block, guess.active, away, seen.core_gap, self.pose.direction, slipping,
+            deepens=axial_force is not None,
+        )  # fmt: skip
+        step = 0.0 if axial_force is None else self._step_for(solved.forces, guess.force, axial_force)
+        force, core = solved.change(guess.force, guess.core, step)
         return _Guess(force, core, guess.active, guess.slips, guess.shift + step)
+
+    def _step_for(self, change: np.ndarray, force: np.ndarray, axial_force: float) -> float:
+        """Return how far, m, the indenter moves in a step. Raises UnsolvedError.
+
+        change : (3 k + c, 2) N, of forces at rest and for a metre of motion; force : (k, 3) N before it
+        """
+        changed = change[: force.size].reshape(-1, 3, 2).sum(axis=0)
+        carried, per_step = self.pose.direction @ changed
+        if not per_step > 0:
+            raise UnsolvedError("no node can carry the force")
+        step = (axial_force - float(force.sum(axis=0) @ self.pose.direction) - carried) / per_step
+        return min(max(float(step), -LARGEST_STEP), LARGEST_STEP)
 
     def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap, beyond):  # noqa: ANN001, ANN202
         """Update which points (k + c,) touch and which nodes (k,) slip; returns true if either changed."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...files.compiled import Loop
-from .mirror_symmetry import axes_of
 
 
 @Loop
@@ -68,44 +67,60 @@ def linearise(moved, place, off, gap, normal, moves, slip, gap_then):  # noqa: A
         gap_then[a] = gap[a] + onto
 
 
-def assemble(  # noqa: ANN201
-    matrix, k, stuck, core_at, slipping, normal, lean, force, slip, gap, core_gap, moves, curved, bend, direction,  # noqa: ANN001
-    friction, ridge, least,  # noqa: ANN001
-):  # fmt: skip
-    """Assemble the system of a Newton step and its two right sides; see ``stick_slip.Step``.
-
-    stuck, slipping : nodes (t,), (s,) that stick and slip; core_at : (d,) points that press
-    curved : (q,), which of the slipping nodes' normals turn; bend : (q, 3, 3) 1/m
-    Returns system (j, j) float32, right (j, 2), carry (j,), across (s, 3) and pressing (s,) of the slipping nodes.
-    """
-    s, q = len(slipping), len(curved)
-    n = 3 * len(stuck) + len(core_at)
-    base, total = n + 3 * s, n + 2 * s + 3 * q
-    index = np.concatenate([axes_of(stuck), 3 * k + core_at, axes_of(slipping)])
-    across, pressing, turning = np.empty((s, 3)), np.empty(s), np.empty((q, 3, 3))
-    columns, system = np.empty((base, total), np.float32), np.empty((total, total), np.float32)
-    right, carry = np.zeros((total, 2)), np.zeros(total)
-    _slipping_frames(slipping, normal, lean, force, curved, bend, friction, across, pressing, turning)
-    _fill_columns(matrix, index, n, slipping, normal, lean, across, curved, turning, friction, ridge, columns)
-    _fill_rows(columns, n, slipping, normal, across, curved, system)
-    _fill_right(
-        stuck, core_at, slipping, normal, lean, across, pressing, slip, gap, core_gap, moves, curved, turning,
-        direction, friction, least, system, right, carry,
-    )  # fmt: skip
-    return system, right, carry, across, pressing
+@Loop
+def moving_forces(inverse, rows, motion):  # noqa: ANN001, ANN201
+    """Forces (m, r) N that move the points of ``rows`` (j,) by their ``motion`` (m, r) m; inverse : (j, j) float32."""
+    forces, sums = np.zeros(motion.shape), np.empty(len(rows), np.float32)
+    for column in range(motion.shape[1]):
+        sums[:] = 0
+        for i in range(len(rows)):
+            way, line = np.float32(motion[rows[i], column]), inverse[i]
+            if way != 0:
+                for j in range(len(rows)):
+                    sums[j] += way * line[j]
+        for j in range(len(rows)):
+            forces[rows[j], column] = sums[j]
+    return forces
 
 
 @Loop
-def _slipping_frames(slipping, normal, lean, force, curved, bend, friction, across, pressing, turning):  # noqa: ANN001, ANN202
-    """Directions across friction, normal forces, and the turn of curved nodes' forces; see ``stick_slip.Slipping``."""
-    for a in range(len(slipping)):
+def known_motion(active, slip, gap, normal, lean, core_gap, slipping, direction, columns):  # noqa: ANN001, ANN201
+    """Motion (3 k + c, columns) m of what touches, as far as it is known; ``slipping`` nodes may slip besides."""
+    k = len(slip)
+    motion = np.zeros((3 * k + len(core_gap), columns))
+    for a in range(k):
+        for i in range(3 if active[a] else 0):
+            motion[3 * a + i, 0] = -(slip[a, i] + gap[a] * normal[a, i])
+            for column in range(1, columns):
+                motion[3 * a + i, column] = direction[i]
+    for p in range(len(core_gap)):
+        if active[k + p]:
+            motion[3 * k + p, 0] = -core_gap[p]
+    for a in slipping:
+        for column in range(columns):
+            along = 0.0
+            for i in range(3):
+                along += lean[a, i] * motion[3 * a + i, column]
+            for i in range(3):
+                motion[3 * a + i, column] -= lean[a, i] * along
+    return motion
+
+
+@Loop
+def slipping_frames(slipping, normal, lean, force, slip, curved, bend, friction, least):  # noqa: ANN001, ANN201
+    """See ``stick_slip.Slipping``: across (s, 3), pressing, limit and against (s,), and turning (q, 3, 3)."""
+    s = len(slipping)
+    across, pressing, limit, against = np.empty((s, 3)), np.zeros(s), np.empty(s), np.zeros(s)
+    turning = np.empty((len(curved), 3, 3))
+    for a in range(s):
         node = slipping[a]
-        across[a, 0] = normal[node, 1] * lean[node, 2] - normal[node, 2] * lean[node, 1]
-        across[a, 1] = normal[node, 2] * lean[node, 0] - normal[node, 0] * lean[node, 2]
-        across[a, 2] = normal[node, 0] * lean[node, 1] - normal[node, 1] * lean[node, 0]
-        pressing[a] = 0.0
         for i in range(3):
+            j, h = (i + 1) % 3, (i + 2) % 3
+            across[a, i] = normal[node, j] * lean[node, h] - normal[node, h] * lean[node, j]
             pressing[a] += force[node, i] * normal[node, i]
+            against[a] -= slip[node, i] * lean[node, i]
+        limit[a] = friction * max(pressing[a], least)
+        against[a] = max(against[a], 0.0) / limit[a]
     for p in range(len(curved)):
         node = slipping[curved[p]]
         for j in range(3):
@@ -114,120 +129,109 @@ def _slipping_frames(slipping, normal, lean, force, curved, bend, friction, acro
                 onto += lean[node, i] * bend[p, i, j]
             for i in range(3):
                 turning[p, i, j] = pressing[curved[p]] * (bend[p, i, j] - friction * normal[node, i] * onto)
+    return across, pressing, limit, against, turning
 
 
 @Loop
-def _fill_columns(matrix, index, n, slipping, normal, lean, across, curved, turning, friction, ridge, columns):  # noqa: ANN001, ANN202
-    """Rows ``index`` (m,) of the matrix in the unknowns' columns, (m, total)."""
-    s = len(slipping)
-    line = np.empty(matrix.shape[1], np.float32)
-    for r in range(len(index)):
-        for j in range(len(line)):
-            line[j] = matrix[index[r], j]
-        line[index[r]] *= np.float32(1 + ridge)
-        for b in range(n):
-            columns[r, b] = line[index[b]]
-        for a in range(s):
-            pushed, turned = 0.0, 0.0
+def borne(forces, motion, moves, slipping, curved, turning, direction):  # noqa: ANN001, ANN201
+    """See ``stick_slip.Step._borne``: what slipping nodes bear (s, 3, r) N, and curved ones' motion (q, 3, r) m."""
+    columns = forces.shape[1]
+    bearing, moved = np.empty((len(slipping), 3, columns)), np.empty((len(curved), 3, columns))
+    for a in range(len(slipping)):
+        for i in range(3):
+            for column in range(columns):
+                bearing[a, i, column] = forces[3 * slipping[a] + i, column]
+    for p in range(len(curved)):
+        node = slipping[curved[p]]
+        for column in range(columns):
             for i in range(3):
-                entry = line[3 * slipping[a] + i]
-                pushed += entry * (normal[slipping[a], i] + friction * lean[slipping[a], i])
-                turned += entry * across[a, i]
-            columns[r, n + a] = pushed
-            columns[r, n + s + a] = turned
-        for p in range(len(curved)):
-            for j in range(3):
-                felt = 0.0
-                for i in range(3):
-                    felt += line[3 * slipping[curved[p]] + i] * turning[p, i, j]
-                columns[r, n + 2 * s + 3 * p + j] = felt
+                moved[p, i, column] = motion[3 * node + i, column]
+                moved[p, i, column] += moves[node, i] if column == 0 else -direction[i]
+            for i in range(3):
+                for j in range(3):
+                    bearing[curved[p], i, column] -= turning[p, i, j] * moved[p, j, column]
+    return bearing, moved
 
 
 @Loop
-def _fill_rows(columns, n, slipping, normal, across, curved, system):  # noqa: ANN001, ANN202
-    """The system's rows (total, total): those of slipping nodes along their normals and across, and of curved ones."""
-    s, total = len(slipping), system.shape[1]
-    for r in range(n):
-        for b in range(total):
-            system[r, b] = columns[r, b]
-    for a in range(s):
-        node = slipping[a]
-        for b in range(total):
-            x, y, z = columns[n + 3 * a, b], columns[n + 3 * a + 1, b], columns[n + 3 * a + 2, b]
-            system[n + a, b] = x * normal[node, 0] + y * normal[node, 1] + z * normal[node, 2]
-            system[n + s + a, b] = x * across[a, 0] + y * across[a, 1] + z * across[a, 2]
+def slip_system(inverse, rows, slipping, normal, lean, across, against, curved, turning, bearing, friction):  # noqa: ANN001, ANN201
+    """System (2 s, 2 s) float32 and right (2 s, r) of the unknowns of slipping nodes; see ``stick_slip.Step``."""
+    s, columns = len(slipping), bearing.shape[2]
+    system, right = np.empty((2 * s, 2 * s), np.float32), np.zeros((2 * s, columns))
+    bend, at, ways = np.full(s, -1), np.empty(s, np.int64), np.empty((2, 3))
     for p in range(len(curved)):
+        bend[curved[p]] = p
+    place = np.empty(rows.max() + 1, np.int64)
+    for j in range(len(rows)):
+        place[rows[j]] = j
+    for a in range(s):
+        at[a] = place[3 * slipping[a]]
+    mixed = np.empty(inverse.shape[1], np.float32)
+    for a in range(s):
+        node, first, second, third = slipping[a], inverse[at[a]], inverse[at[a] + 1], inverse[at[a] + 2]
         for i in range(3):
-            at = n + 2 * s + 3 * p + i
-            for b in range(total):
-                system[at, b] = -columns[n + 3 * curved[p] + i, b]
-            system[at, at] += np.float32(1)
+            ways[0, i], ways[1, i] = lean[node, i] - friction * normal[node, i], across[a, i]
+        for way in range(2):
+            x, y, z = np.float32(ways[way, 0]), np.float32(ways[way, 1]), np.float32(ways[way, 2])
+            for j in range(len(mixed)):
+                mixed[j] = x * first[j] + y * second[j] + z * third[j]
+            for i in range(3):
+                for j in range(3 if bend[a] >= 0 else 0):
+                    mixed[at[a] + j] -= np.float32(ways[way, i] * turning[bend[a], i, j])
+                for column in range(columns):
+                    right[way * s + a, column] -= ways[way, i] * bearing[a, i, column]
+            line = system[way * s + a]
+            for b in range(s):
+                x, y, z, other = mixed[at[b]], mixed[at[b] + 1], mixed[at[b] + 2], slipping[b]
+                line[b] = x * lean[other, 0] + y * lean[other, 1] + z * lean[other, 2]
+                line[s + b] = -against[b] * (x * across[b, 0] + y * across[b, 1] + z * across[b, 2])
+        system[s + a, s + a] -= np.float32(1)
+    return system, right
 
 
 @Loop
-def _fill_right(  # noqa: ANN202
-    stuck, core_at, slipping, normal, lean, across, pressing, slip, gap, core_gap, moves, curved, turning, direction,  # noqa: ANN001
-    friction, least, system, right, carry,  # noqa: ANN001
-):  # fmt: skip
-    """Right sides (total, 2), what carries force along the motion (total,), and friction's stiffness in the system."""
-    t, d, s = len(stuck), len(core_at), len(slipping)
-    n = 3 * t + d
-    for a in range(t):
-        for i in range(3):
-            right[3 * a + i, 0] = -(slip[stuck[a], i] + gap[stuck[a]] * normal[stuck[a], i])
-            right[3 * a + i, 1] = direction[i]
-            carry[3 * a + i] = direction[i]
-    for p in range(d):
-        right[3 * t + p, 0] = -core_gap[core_at[p]]
+def slide(motion, answer, slipping, lean, across, against):  # noqa: ANN001, ANN201
+    """Add to ``motion`` (3 k + c, r) m what the slipping nodes' unknowns (2 s, r) are."""
+    s = len(slipping)
     for a in range(s):
-        node, against = slipping[a], 0.0
         for i in range(3):
-            away = slip[node, i] + gap[node] * normal[node, i]
-            right[n + a, 0] -= normal[node, i] * away
-            right[n + s + a, 0] -= across[a, i] * away
-            right[n + a, 1] += normal[node, i] * direction[i]
-            right[n + s + a, 1] += across[a, i] * direction[i]
-            carry[n + a] += direction[i] * (normal[node, i] + friction * lean[node, i])
-            carry[n + s + a] += direction[i] * across[a, i]
-            against -= slip[node, i] * lean[node, i]
-        system[n + s + a, n + s + a] += np.float32(max(against, 0.0) / (friction * max(pressing[a], least)))
-    for p in range(len(curved)):
-        for i in range(3):
-            at = n + 2 * s + 3 * p + i
-            right[at, 0] = moves[slipping[curved[p]], i]
-            right[at, 1] = -direction[i]
-            for j in range(3):
-                carry[at] += direction[j] * turning[p, j, i]
+            for column in range(motion.shape[1]):
+                way = lean[slipping[a], i] * answer[a, column] - across[a, i] * against[a] * answer[s + a, column]
+                motion[3 * slipping[a] + i, column] += way
 
 
 @Loop
 def advance(  # noqa: ANN201
-    force, core, answer, step, stuck, core_at, slipping, normal, lean, across, pressing, curved, bend, friction, least,  # noqa: ANN001
-    largest_turn, largest_tilt,  # noqa: ANN001
+    force, core, forces, step, slipping, normal, lean, across, pressing, limit, curved, bend, bearing, moved, turns,  # noqa: ANN001
+    friction, largest_turn, largest_tilt,  # noqa: ANN001
 ):  # fmt: skip
-    """Compute forces (k, 3), (c,) N after a Newton step; answer : (j, 2), for rest and for a metre of ``step``."""
-    t, d, s = len(stuck), len(core_at), len(slipping)
-    n = 3 * t + d
-    new, new_core = force.copy(), core.copy()
-    for a in range(t):
+    """Compute forces (k, 3), (c,) N after a Newton step; forces : (3 k + c, r), for rest and for a metre of ``step``.
+
+    turns : (s, r) N, of friction across itself
+    """
+    k, new, new_core, last = len(force), force.copy(), core.copy(), forces.shape[1] - 1
+    for a in range(k):
         for i in range(3):
-            new[stuck[a], i] += answer[3 * a + i, 0] + step * answer[3 * a + i, 1]
-    for p in range(d):
-        new_core[core_at[p]] += answer[3 * t + p, 0] + step * answer[3 * t + p, 1]
+            new[a, i] += forces[3 * a + i, 0] + (step * forces[3 * a + i, 1] if last else 0.0)
+    for p in range(len(core)):
+        new_core[p] += forces[3 * k + p, 0] + (step * forces[3 * k + p, 1] if last else 0.0)
     place, u, v, tilt = 0, np.empty(3), np.empty(3), np.empty(3)
-    for a in range(s):
-        node = slipping[a]
-        turn = (answer[n + s + a, 0] + step * answer[n + s + a, 1]) / (friction * max(pressing[a], least))
-        turn = min(max(turn, -largest_turn), largest_turn)
+    for a in range(len(slipping)):
+        node, total = slipping[a], pressing[a]
+        for i in range(3):
+            total += normal[node, i] * (bearing[a, i, 0] + (step * bearing[a, i, 1] if last else 0.0))
+        turn = turns[a, 0] + (step * turns[a, 1] if last else 0.0)
+        turn = min(max(turn / limit[a], -largest_turn), largest_turn)
         for i in range(3):
             u[i] = normal[node, i]
             v[i] = np.cos(turn) * lean[node, i] + np.sin(turn) * across[a, i]
         if place < len(curved) and curved[place] == a:
-            at, size = n + 2 * s + 3 * place, 0.0
+            size = 0.0
             for i in range(3):
                 tilt[i] = 0.0
                 for j in range(3):
-                    tilt[i] += bend[place, i, j] * (answer[at + j, 0] + step * answer[at + j, 1])
+                    way = moved[place, j, 0] + (step * moved[place, j, 1] if last else 0.0)
+                    tilt[i] += bend[place, i, j] * way
                 size += tilt[i] ** 2
             share, size = min(1.0, largest_tilt / max(np.sqrt(size), 1e-12)), 0.0
             for i in range(3):
@@ -241,7 +245,6 @@ def advance(  # noqa: ANN201
         for i in range(3):
             v[i] -= onto * u[i]
             size += v[i] ** 2
-        total = pressing[a] + answer[n + a, 0] + step * answer[n + a, 1]
         for i in range(3):
             new[node, i] = total * (u[i] + friction * v[i] / np.sqrt(size))
     return new, new_core

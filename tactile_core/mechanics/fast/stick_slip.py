@@ -1,8 +1,11 @@
 """Newton step of a contact with Coulomb friction, in the forces of all touching points at once.
 
-A sticking node bears any force and may not move. A slipping node has two unknowns: its normal force, on which friction
-leans, and the turn of friction across that; its gap closes, and friction stays opposite to the slip. Where the normal
-turns as a slipping node moves along a curved indenter the force turns with it: its motion is unknown too.
+A sticking node bears any force and may not move. A slipping node closes its gap, and two things are unknown: how far it
+moves along friction, whose size its normal force decides, and the turn of friction across that, which stays opposite to
+the slip. Where the normal turns as a slipping node moves along a curved indenter the force turns with it.
+
+All motions but those of slipping nodes are known, and the stiffness of what touches (``contact_stiffness``) makes
+forces of them: the system to be solved has two unknowns a slipping node, however many stick.
 """
 
 from __future__ import annotations
@@ -14,10 +17,10 @@ import numpy as np
 
 from ...geometry.indenters.indenter import lengths
 from .active_set import UnsolvedError
-from .mirror_symmetry import axes_of
-from .node_vectors import cross, dot, weighted
+from .compliance_block import ComplianceBlock
+from .contact_stiffness import ContactStiffness
+from .node_vectors import cross, dot
 
-RIDGE = 1e-6  # relative, of the compliance: keeps single precision definite
 LARGEST_TURN = 1.0  # rad, of a slipping node's friction in one step
 LARGEST_TILT = 0.3  # rad, of a normal in one step
 LEAST_FORCE = 1e-9  # N: below what single precision of the compliance resolves
@@ -25,7 +28,7 @@ LEAST_FORCE = 1e-9  # N: below what single precision of the compliance resolves
 
 @dataclasses.dataclass(frozen=True)
 class Slipping:
-    """Slipping nodes: numbers ``at`` (s,) among the touching ones, and what they do.
+    """Slipping nodes: numbers ``at`` (s,) among the block's, and what they do.
 
     normal, lean : (s, 3) unit vectors, of the indenter and of friction; pressing : (s,) N, normal forces
     slip : (s, 3) m, from their spots; moves : (s, 3) m, from where the normals were found
@@ -52,6 +55,12 @@ class Slipping:
         """Limit (s,) N of friction."""
         return self.friction * np.maximum(self.pressing, LEAST_FORCE)
 
+    @functools.cached_property
+    def against(self) -> np.ndarray:
+        """Slip (s,) m along friction, against its limit: how far a node moves across it under 1 N, m/N."""
+        return np.maximum(-dot(self.slip, self.lean), 0) / self.limit
+
+    @functools.cached_property
     def turning(self) -> np.ndarray:
         """Return the change (c, 3, 3) N/m of curved nodes' forces with their motion, at the same normal forces."""
         at = self.curved
@@ -73,104 +82,102 @@ class Slipping:
 
 
 class Step:
-    """The solved system of a block's touching points: ``at`` (a,) nodes, and ``core`` (d,) rows of its matrix.
+    """The solved Newton step of a block's ``active`` (k + c,) points.
 
-    compliance : (m, m) float32 m/N, of the block
-    away : (a, 3) m, by which nodes stand off their spots and gaps are open; core_gap : (d,) m
-    direction : (3,), in which the indenter moves
-    sticks : (a,) bool, the nodes that do not slip
-    Unknown are the forces of the t sticking nodes (3 t), those of the core (d), the normal forces of slipping nodes (s)
-    and the turn of their friction (s), and the motion of curved ones. Raises UnsolvedError.
+    stiffness : of what touches, kept from step to step
+    away : (k, 3) m, by which nodes stand off their spots and gaps are open; core_gap : (c,) m
+    direction : (3,), in which the indenter moves; deepens : whether ``change`` may be asked to move it
+    forces : (3 k + c, r) N, change of those on the block's points, and where it deepens that for a metre of motion
+    Raises UnsolvedError.
     """
 
     def __init__(
-        self, compliance: np.ndarray, at: np.ndarray, core: np.ndarray, away: np.ndarray, core_gap: np.ndarray,
-        direction: np.ndarray, slipping: Slipping,
+        self, stiffness: ContactStiffness, block: ComplianceBlock, active: np.ndarray, away: np.ndarray,
+        core_gap: np.ndarray, direction: np.ndarray, slipping: Slipping, *, deepens: bool,
     ) -> None:  # fmt: skip
-        self._slipping, self._direction = slipping, direction
-        self.sticks = np.ones(len(at), bool)
-        self.sticks[slipping.at] = False
-        stuck, slips = at[self.sticks], 3 * at[slipping.at]
-        self._stuck, self._whole, s = 3 * len(stuck), 3 * len(stuck) + len(core), len(slips)
-        index = np.concatenate([axes_of(stuck), core, slips, slips + 1, slips + 2])
-        matrix = compliance.take(index, 0).take(index, 1)
-        matrix.reshape(-1)[:: len(index) + 1] *= 1 + RIDGE
-        right = np.zeros((len(index), 2))
-        right[: self._stuck, 0] = -away[self.sticks].ravel()
-        right[: self._stuck, 1].reshape(-1, 3)[:] = direction
-        right[self._stuck : self._whole, 0] = -core_gap
-        right[self._whole :, 0].reshape(3, s)[:] = -away[slipping.at].T
-        right[self._whole :, 1].reshape(3, s)[:] = direction[:, None]
-        self._carry = right[:, 1]
-        if s:
-            matrix, right, self._carry = self._reduced(matrix, right)
-        self._answer = solved(matrix, right, symmetric=not s)
+        self._block, self._slipping, self._direction = block, slipping, direction
+        self._inverse, self._rows = stiffness.among(block, active)
+        surface = 3 * block.k
+        motion = np.zeros((len(block.matrix), 2 if deepens else 1))
+        motion[:surface, 0] = -away.ravel()
+        motion[surface:, 0] = -core_gap
+        if deepens:
+            motion[:surface, 1].reshape(-1, 3)[:] = direction
+        if len(slipping.at):
+            self._slide(motion)
+        self.forces = self._under(motion)
+        self._bearing = self._borne(motion) if len(slipping.at) else None
 
-    def step_for(self, missing: float) -> float:
-        """Return how far, m, the indenter moves for ``missing`` N more along its motion. Raises UnsolvedError."""
-        carried, per_step = self._carry @ self._answer
-        if not per_step > 0:
-            raise UnsolvedError("no node can carry the force")
-        return float((missing - carried) / per_step)
+    def change(self, force: np.ndarray, core: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return forces (k, 3), (c,) N after the step, from those before it; step : m, of the indenter."""
+        by, slipping, surface = np.array([1.0, step][: self.forces.shape[1]]), self._slipping, 3 * self._block.k
+        found = self.forces @ by
+        force, core = force + found[:surface].reshape(-1, 3), core + found[surface:]
+        if self._bearing is not None:
+            bearing, motion = (each @ by for each in self._bearing)
+            pressing = slipping.pressing + dot(slipping.normal, bearing)
+            force[slipping.at] = slipping.forces(pressing, self._turn @ by / slipping.limit, motion)
+        return force, core
 
-    def change(self, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return force changes of sticking nodes (t, 3) N and core (d,) N, and slipping nodes' new forces (s, 3) N."""
-        found = self._answer[:, 0] + step * self._answer[:, 1]
-        slipping = self._slipping
-        s, unknown = len(slipping.at), found[self._whole :]
-        pressing, turn, motion = unknown[:s], unknown[s : 2 * s], unknown[2 * s :]
-        forces = slipping.forces(slipping.pressing + pressing, turn / slipping.limit, motion.reshape(-1, 3))
-        return found[: self._stuck].reshape(-1, 3), found[self._stuck : self._whole], forces
+    def _under(self, motion: np.ndarray) -> np.ndarray:
+        """Forces (3 k + c, r) N on the active points that move them by ``motion`` (3 k + c, r) m."""
+        forces = np.zeros(motion.shape)
+        forces[self._rows] = self._inverse @ motion[self._rows].astype(np.float32)
+        return forces
 
-    def _reduced(self, matrix: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The system in the unknowns of slipping nodes, and how these carry force along the motion."""
-        slipping, n, s, m = self._slipping, self._whole, len(self._slipping.at), len(matrix)
-        rows, columns = np.empty((2, 3, 2, s))
-        rows[:, 0], columns[:, 0] = slipping.normal.T, (slipping.normal + slipping.friction * slipping.lean).T
-        rows[:, 1] = columns[:, 1] = slipping.across.T
-        q = 3 * len(slipping.curved)
-        total = n + 2 * s + q
-        among = np.empty((m + q, total), np.float32)  # the rows of the motion come to stand after those of the turn
-        among[:m, :n] = matrix[:, :n]
-        on_slips = matrix[:, n:].reshape(m, 3, s).swapaxes(0, 1)
-        among[:m, n : n + 2 * s].reshape(m, 2, s)[:] = weighted(on_slips[:, :, None], columns)
-        carry = np.concatenate([right[:n, 1], self._direction @ columns.reshape(3, -1)])
-        reduced = np.empty((total, 2))
-        if q:
-            self._add_motion(among, on_slips)
-            carry = np.concatenate([carry, (self._direction @ slipping.turning()).ravel()])
-            below = -among[(n + slipping.curved[:, None] + s * np.arange(3)).ravel()]
-            below.reshape(-1)[n + 2 * s :: total + 1] += 1
-            reduced[n + 2 * s :, 0] = slipping.moves[slipping.curved].ravel()
-            reduced[n + 2 * s :, 1].reshape(-1, 3)[:] = -self._direction
-        among[n : n + 2 * s].reshape(2, s, total)[:] = weighted(among[n:m].reshape(3, 1, s, total), rows[..., None])
-        if q:
-            among[n + 2 * s : total] = below
-        against = np.maximum(-dot(slipping.slip, slipping.lean), 0) / slipping.limit
-        among.reshape(-1)[(n + s) * (total + 1) : (n + 2 * s) * (total + 1) : total + 1] += against
-        reduced[:n] = right[:n]
-        reduced[n : n + 2 * s] = (rows[..., None] * right[n:].reshape(3, 1, s, 2)).sum(axis=0).reshape(-1, 2)
-        return among[:total], reduced, carry
+    def _slide(self, motion: np.ndarray) -> None:
+        """Let slipping nodes slip in ``motion`` (3 k + c, r) m as friction asks for."""
+        slipping, count = self._slipping, len(self._slipping.at)
+        of_nodes = motion[: 3 * self._block.k].reshape(self._block.k, 3, -1)
+        lean, across = slipping.lean[:, :, None], slipping.across[:, :, None]
+        held = of_nodes[slipping.at]
+        held -= lean * (lean * held).sum(axis=1, keepdims=True)
+        of_nodes[slipping.at] = held
+        self.forces = self._under(motion)
+        bearing, _ = self._borne(motion)
+        law = slipping.lean - slipping.friction * slipping.normal
+        right = -np.concatenate([np.einsum("ai,aij->aj", each, bearing) for each in (law, slipping.across)])
+        answer = solved(self._system(law), right)
+        along, self._turn = answer[:count, None], answer[count:]
+        of_nodes[slipping.at] += lean * along - across * (slipping.against[:, None, None] * self._turn[:, None])
 
-    def _add_motion(self, among: np.ndarray, on_slips: np.ndarray) -> None:
-        """Add what the motion of curved nodes does by turning their forces, as the last columns of ``among``."""
-        at, turning = self._slipping.curved, self._slipping.turning()
-        felt = weighted(on_slips[:, :, at, None], turning.swapaxes(0, 1)[:, None])
-        among[: on_slips.shape[1], -3 * len(at) :].reshape(-1, len(at), 3)[:] = felt
+    def _borne(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Find what slipping nodes bear, (s, 3, r) N, besides what turns with their normals, and curved ones' motion.
+
+        motion : (3 k + c, r) m; the second (q, 3, r) m is relative to the indenter
+        """
+        slipping, columns = self._slipping, motion.shape[1]
+        bearing = self.forces[: 3 * self._block.k].reshape(-1, 3, columns)[slipping.at]
+        moved = np.zeros((len(slipping.curved), 3, columns))
+        if len(slipping.curved):
+            moved += motion[: 3 * self._block.k].reshape(-1, 3, columns)[slipping.at[slipping.curved]]
+            moved[:, :, 0] += slipping.moves[slipping.curved]
+            moved[:, :, 1:] -= self._direction[:, None]
+            bearing[slipping.curved] -= slipping.turning @ moved
+        return bearing, moved
+
+    def _system(self, law: np.ndarray) -> np.ndarray:
+        """Matrix (2 s, 2 s) float32 of the unknowns of slipping nodes; law : (s, 3), along which forces must vanish."""
+        slipping, place = self._slipping, np.zeros(len(self._block.matrix), np.int64)
+        place[self._rows] = np.arange(len(self._rows))
+        at = place[3 * slipping.at]
+        s, whole = len(at), (at[:, None] + np.arange(3)).ravel()
+        blocks = self._inverse.take(whole, 0).take(whole, 1).reshape(s, 3, s, 3)
+        blocks[slipping.curved, :, slipping.curved] -= slipping.turning
+        rows = np.stack([law, slipping.across]).astype(np.float32)
+        columns = np.stack([slipping.lean, -slipping.against[:, None] * slipping.across]).astype(np.float32)
+        half = (rows[:, :, None] @ blocks.reshape(s, 3, 3 * s)).reshape(2, s, s, 3)
+        system = np.einsum("pabj,rbj->parb", half, columns).reshape(2 * s, 2 * s)
+        system.reshape(-1)[s * (2 * s + 1) :: 2 * s + 1] -= 1
+        return np.ascontiguousarray(system)
 
 
-def solved(matrix: np.ndarray, right: np.ndarray, *, symmetric: bool) -> np.ndarray:
-    """Solve the system (j, j) for ``right`` (j, 2); overwrites the matrix. Raises UnsolvedError."""
+def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve the system (j, j) for ``right`` (j, r); overwrites the matrix. Raises UnsolvedError."""
     from scipy.linalg import lapack
 
-    if not len(matrix):
-        return right
     # LAPACK stores by columns: what it takes for the transposed matrix needs no copy.
-    if symmetric:
-        _, answer, failed = lapack.sposv(matrix.T, right, lower=1, overwrite_a=1)
-    else:
-        factor, pivots, failed = lapack.sgetrf(matrix.T, overwrite_a=1)
-        answer = right if failed else lapack.sgetrs(factor, pivots, right, trans=1)[0]
+    factor, pivots, failed = lapack.sgetrf(matrix.T, overwrite_a=1)
     if failed:
-        raise UnsolvedError("the compliance of the touching nodes is not positive definite")
-    return answer.astype(float)
+        raise UnsolvedError("no motion of the slipping nodes balances their forces")
+    return lapack.sgetrs(factor, pivots, right, trans=1)[0].astype(float)
