@@ -30,6 +30,7 @@ from ..mechanics.force_search import MOST_FORCE
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import FRICTION
+from ..mechanics.pose_path import same_line
 from ..mechanics.thickness import DEPTH_LIMIT, thickness_under
 from ..pictures.height_map import folds_counted, gel_mapper
 from ..pictures.presets import FAST, NAMES
@@ -133,6 +134,7 @@ class Gel:
         self._press: CorrectedPress | None = None
         self._work = Work()
         self._pose: Pose | None = None  # of the step before
+        self._touch: tuple[Pose, float] | None = None  # the first touch found last, and the greatest depth there, m
         self._contact = self._untouched(Pose(np.zeros(3), np.eye(3), PUSH))
 
     def press(self, pose: Any, force: float | None = None) -> GelContact:
@@ -228,6 +230,13 @@ class Gel:
         axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
         return _matrix(self._first_touch(Pose(np.array([x, 0.0, z]), axes, PUSH)).moved(depth))
 
+    def _touch_and_limit(self, pose: Pose) -> tuple[Pose, float]:
+        """See ``_first_touch``, and the greatest depth, m; both as before where the pose differs in depth alone."""
+        if self._touch is None or not same_line(self._touch[0], pose):
+            touch = self._first_touch(pose)
+            self._touch = touch, DEPTH_LIMIT * thickness_under(self.sensor, self.indenter, touch)
+        return self._touch
+
     def _first_touch(self, pose: Pose) -> Pose:
         """Find the first touch of an indenter that comes along +y; raises TactileError where it misses the sensor."""
         in_front = self._foremost - pose.support(self.indenter, PUSH)[1]  # from there the search is short
@@ -278,14 +287,13 @@ class Gel:
     def _moved_to(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
         """The contact at a pose or force; None where nothing touches. Raises UnsolvedError."""
         try:
-            touch = self._first_touch(pose)
+            touch, limit = self._touch_and_limit(pose)
         except TactileError:  # it passes the sensor by
             if force is not None:
                 flags.append("force not reached")
             self._press = None
             return None
         depth = float((pose.apex - touch.apex) @ PUSH)
-        limit = DEPTH_LIMIT * thickness_under(self.sensor, self.indenter, touch)
         if force is None and depth <= 0:
             self._press = None
             return None

@@ -320,3 +320,31 @@ def test_meshes_and_sensors_that_cannot_be_are_refused():
         Gel("digit", BALL, preset="best")
     with pytest.raises(TactileError, match="trimesh"):
         Gel("digit", Sphere)  # the class, not one of it
+
+
+def test_first_touch_is_looked_for_once_a_line(monkeypatch):
+    """It is the same at every depth, and costs as much as a small contact; numbers are those without it."""
+    gel, looked = Gel("digit", indenter=Sphere(3e-3)), []
+    whole = Gel._first_touch
+
+    def first_touch(self, pose):
+        looked.append(pose)
+        return whole(self, pose)
+
+    pose = gel.touching(x=-8e-3, z=0.5e-3)
+    monkeypatch.setattr(Gel, "_first_touch", first_touch)
+    forces = []
+    for depth in (0.1e-3, 0.2e-3, 0.3e-3):
+        there = pose.copy()
+        there[1, 3] += depth
+        forces.append(gel.press(there).force)
+    assert len(looked) == 1
+    there[0, 3] += 0.1e-3  # slid
+    slid = gel.press(there)
+    assert len(looked) == 2 and slid.depth > 0
+    again = Gel("digit", indenter=Sphere(3e-3))
+    for number, depth in enumerate((0.1e-3, 0.2e-3, 0.3e-3)):
+        there = pose.copy()
+        there[1, 3] += depth
+        again._touch = None
+        np.testing.assert_allclose(again.press(there).force, forces[number], rtol=1e-9)
