@@ -13,11 +13,11 @@ import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
 from ...geometry.indenters.indenter import lengths
+from ...geometry.node_vectors import dot
 from .active_set import UnsolvedError
 from .compliance_block import ComplianceBlock
 from .contact_stiffness import ContactStiffness
 from .frictionless import FORCE_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pace, Try
-from .node_vectors import dot
 from .stick_slip import LEAST_FORCE, Slipping, Step
 
 SLIP_TOLERANCE = 0.05e-6  # m, motion of a sticking node that counts as none: a quarter of the gaps' tolerance

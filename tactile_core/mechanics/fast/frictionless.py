@@ -15,10 +15,10 @@ import numpy as np
 from ...files.compiled import available
 from ...geometry.indenters import Indenter, Pose
 from ...geometry.indenters.indenter import lengths
+from ...geometry.node_vectors import weighted
 from .active_set import Pressing, complement
 from .compliance_block import ComplianceBlock
 from .frictionless_loops import tangent_response
-from .node_vectors import weighted
 
 GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that the target allows
 SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up

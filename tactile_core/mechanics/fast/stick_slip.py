@@ -16,10 +16,10 @@ import functools
 import numpy as np
 
 from ...geometry.indenters.indenter import lengths
+from ...geometry.node_vectors import cross, dot
 from .active_set import UnsolvedError
 from .compliance_block import ComplianceBlock
 from .contact_stiffness import ContactStiffness
-from .node_vectors import cross, dot
 
 LARGEST_TURN = 1.0  # rad, of a slipping node's friction in one step
 LARGEST_TILT = 0.3  # rad, of a normal in one step
