@@ -1,10 +1,10 @@
-"""The translation against truth and recordings: the door to `benchmarks/translation/evaluate.py`; `--help` says all."""
+"""The translation against truth and recordings: runs `benchmarks/translation/evaluation.py`, see --help."""
 
 from __future__ import annotations
 
 import sys
 
-from benchmarks.translation.evaluate import main
+from benchmarks.translation.evaluation import main
 
 if __name__ == "__main__":
     sys.exit(main())

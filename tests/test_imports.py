@@ -217,7 +217,7 @@ def test_rooms_stay_small_enough_to_look_around_in():
 def test_a_file_name_stands_once_but_for_a_verbs():
     """The command, the work behind it and the add-on's operator may share the verb's name, one file each."""
     places: dict[str, list[str]] = {}
-    for path in sources("tactile_core", "addon"):
+    for path in sources("tactile_core", "addon", "scripts"):
         places.setdefault(path.stem, []).append(path.parent.relative_to(ROOT).as_posix())
     del places["__init__"]
     twice = {
@@ -226,6 +226,17 @@ def test_a_file_name_stands_once_but_for_a_verbs():
         if len(found) > (1 if VERBS not in found else 2 + ("addon/operators" in found))
     }
     assert twice == {}
+
+
+def test_no_function_bears_a_name_that_says_nothing():
+    banned = {"told", "some", "of", "first", "seen", "within", "left", "fall", "hidden"}
+    found = [
+        f"{path.relative_to(ROOT)}:{node.name}"
+        for path in sources("tactile_core", "addon", "scripts")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef) and node.name.lstrip("_") in banned
+    ]
+    assert found == []
 
 
 def lint(path: str, code: str) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
-from benchmarks.translation.evaluate import TEST_SET
+from benchmarks.translation.evaluation import TEST_SET
 from tactile_core.accuracy import HEADER, Row, line, row
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Indenter

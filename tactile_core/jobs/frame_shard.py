@@ -1,4 +1,4 @@
-"""A shard: some frames of a recording, translated, in a sealed HDF5 file of the layout of ``frames_file``.
+"""A shard: some frames of a recording, translated, in a checksummed HDF5 file of the layout of ``frames_file``.
 
 Its attributes name the recording and its hash, the recipe's hash, and which shard of how many it is; the rows are
 frames `number * shard_frames` to that of the next. Pictures are the dataset ``image``.

@@ -1,4 +1,4 @@
-"""A recording's signals, ready for the networks, in a sealed file that shards read a few rows of.
+"""A recording's signals, ready for the networks, in a checksummed file of which shards read a few rows.
 
 Datasets, T first: ``time`` float64 s; ``change`` float64 and ``electrodes`` float32 (T, e) counts; ``quiet`` bool;
 ``flags`` uint16; ``pdc`` float64 counts. ``part`` (P,) first frame of each part of the recording, ``rest`` (P, e)

@@ -38,24 +38,24 @@ class MarkerField:
             )
         still = np.zeros_like(self._mapper.surface.rest)
         self._dome = self._mapper.follow(still, self._x.ravel(), self._z.ravel())[2]  # of the public mesh
-        self.rest = self._seen(still)[0]
+        self.rest = self._in_picture(still)[0]
 
     def motion(self, displacement: np.ndarray) -> np.ndarray:
         """Return the motion (T, n, 2) float32, px right and down, of the dots on gels displaced by (T, M, 3) m."""
-        moved = [self._seen(frame)[0] - self.rest for frame in displacement]
+        moved = [self._in_picture(frame)[0] - self.rest for frame in displacement]
         return np.stack(moved).astype(np.float32) if moved else np.zeros((0, *self.rest.shape), np.float32)
 
     def marks(self, displacement: np.ndarray) -> np.ndarray:
         """Return the share (H, W) float32 of the coating's light that the dots of a gel displaced by (M, 3) m leave."""
         share = np.ones(self.unit.camera.shape, np.float32)
-        middle, *rim = self._seen(displacement)
+        middle, *rim = self._in_picture(displacement)
         # Columns: half of the dot's image along x and along z, px.
         axes = np.stack([(rim[0] - rim[1]) / 2, (rim[2] - rim[3]) / 2], -1)
         for place, axis in zip(middle, axes, strict=True):
             self._darken(share, place, axis)
         return share
 
-    def _seen(self, displacement: np.ndarray) -> np.ndarray:
+    def _in_picture(self, displacement: np.ndarray) -> np.ndarray:
         """Places (5, n, 2) px, right and down, of the dots' middles and rims."""
         camera, mapper = self.unit.camera, self._mapper
         x, z, height = mapper.follow(displacement, self._x.ravel(), self._z.ravel())

@@ -181,9 +181,9 @@ def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str], law: str) -
     """Extract what is kept of a frame's contacts. The force is the first sensor's, of the BioTac where it is solved."""
     moved, pressed = _field(solved, keep, "displacement"), _field(solved, keep, "traction")
     if not solved:
-        return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(19), np.full(2, np.nan))
+        return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(sensors.ELECTRODES), np.full(2, np.nan))
     first = next(iter(solved.values()))
-    change = signal_of(solved["biotac"], law) if "electrodes" in keep else np.zeros(19)
+    change = signal_of(solved["biotac"], law) if "electrodes" in keep else np.zeros(sensors.ELECTRODES)
     centre = next((each.centre for sensor, each in solved.items() if sensors.is_gel(sensor)), np.full(2, np.nan))
     return _Frame(moved, pressed, first.force, first.pressure, change, centre)
 

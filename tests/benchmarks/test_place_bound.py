@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from benchmarks import place_bound
-from benchmarks.translation.evaluate import TEST_SET
+from benchmarks.translation.evaluation import TEST_SET
 
 from tactile_core.simulation.pairs_file import read_pairs
 

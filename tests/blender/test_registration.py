@@ -6,7 +6,7 @@ LISTS = "save_pre", "load_pre", "load_post", "frame_change_post", "depsgraph_upd
 MENUS = "TOPBAR_MT_file_import", "TOPBAR_MT_file_export", "VIEW3D_MT_add", "TOPBAR_MT_window"
 
 
-def left(extension):
+def known(extension):
     """What of the extension Blender knows: classes, properties, handlers and functions that draw menu entries."""
     own = extension.__name__ + "."
     functions = [f for name in LISTS for f in getattr(bpy.app.handlers, name)]
@@ -21,13 +21,13 @@ def left(extension):
 
 
 def test_off_leaves_nothing_and_on_again_is_whole(extension):
-    before = left(extension)
+    before = known(extension)
     functions, properties, classes = before
     assert {name.rpartition(".")[2] for name in functions} >= {"_menu", "_menu_import", "_menu_export", "_note"}
     assert properties == ["tactile", "tactile_render"] and "TACTILE_PT_recording" in classes
     extension.unregister()
     try:
-        assert left(extension) == ([], [], [])
+        assert known(extension) == ([], [], [])
     finally:
         extension.register()
-    assert left(extension) == before
+    assert known(extension) == before

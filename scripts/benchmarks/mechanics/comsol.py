@@ -69,7 +69,7 @@ class Press:
         """Percent, of the mean error of force."""
         return FORCE if np.arccos(min(abs(self.into[2]), 1.0)) < STEEP else STEEP_FORCE
 
-    def first(self, steps: int) -> Press:
+    def first_steps(self, steps: int) -> Press:
         """The press as far as its first steps."""
         names = ("advances", "force", "electrodes", "skin")
         return dataclasses.replace(self, **{name: getattr(self, name)[:steps] for name in names})
@@ -224,7 +224,7 @@ def _other_mesh(press: Press, steps: list[Pressed]) -> Iterator[Row]:
 def fast_rows(press: Press) -> Iterator[Row]:
     """Yield the rows of one press; the stiffness of the descriptor's skin was fitted on ``FITTED``."""
     steps = fast_steps(press)
-    press = press.first(len(steps))
+    press = press.first_steps(len(steps))
     changes, expected = gap_changes(press, steps)
     off, baseline = changes - expected, resting_gaps_cut(press) - expected
     ratio = force_ratios(press, steps)

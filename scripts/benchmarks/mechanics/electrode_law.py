@@ -101,7 +101,7 @@ def _grid_rows(sheet: BiotacSheet, skin: list[np.ndarray]) -> Iterator[Row]:
 
 def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) -> Iterator[Row]:
     """The sheet on few fields: its time and error a contact, and with films that a contact of the fast tier watches."""
-    reduced, watched = reduced_sheet(), [sensing_films(contact) for contact in touches]
+    reduced, sensed = reduced_sheet(), [sensing_films(contact) for contact in touches]
     films = [sheet.films(moved) for moved in skin]
     started = time.perf_counter()
     exact = np.stack([sheet.resistances(each) for each in films])
@@ -114,7 +114,7 @@ def _reduced_rows(sheet: BiotacSheet, touches: list[Contact], skin: np.ndarray) 
     change = 100 * (exact / rest - 1)
     for name, answer in (
         ("reduced_sheet_error", found),
-        ("reduced_sheet_error_of_watched_films", np.stack([reduced.resistances(each) for each in watched])),
+        ("reduced_sheet_error_of_sensing_films", np.stack([reduced.resistances(each) for each in sensed])),
     ):
         yield row(name, _rms(100 * (answer / rest - 1) - change), "percent of rest", baseline=_rms(change), of=of)
 

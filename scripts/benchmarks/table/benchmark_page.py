@@ -12,7 +12,7 @@ from tactile_core.accuracy import Row
 from tactile_core.files import atomic, provenance
 
 from .method import Method
-from .translation import SAME_PAIRS
+from .translation_methods import SAME_PAIRS
 
 TITLES = {
     "mechanics": "Contact mechanics", "translation": "Translation, signals to the DIGIT's gel",

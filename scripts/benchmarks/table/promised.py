@@ -27,7 +27,7 @@ from tactile_core.training.step_errors import error_columns, joined, our_bodies,
 from tactile_core.translation.network_sizes import SURFACES
 from tactile_core.translation.translate import Translator, load_translator
 
-from .mechanics import EVERY
+from .mechanics_methods import EVERY
 from .method import ROOT, TEST_SET, TRAINING
 from .promise import TABLE, Promise
 

@@ -20,7 +20,7 @@ from tactile_core.training.step_errors import our_bodies, translation_metrics
 from tactile_core.translation.networks import load
 
 from .method import TEST_SET
-from .translation import SAME_PAIRS
+from .translation_methods import SAME_PAIRS
 
 STEPS = "MVB", "MVD", "S2MPN", "M2MPN", "chain"
 

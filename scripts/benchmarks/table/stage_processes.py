@@ -21,7 +21,7 @@ def measured(stage: str, quick: bool, file: str, missing: dict[str, str], only: 
     file : where the first method of pictures and chain leaves the others' truth; the photographs
     only : words that name a stage, or a stage and a method; none for all
     """
-    for name in importlib.import_module(f"benchmarks.table.{stage}").NAMES:
+    for name in importlib.import_module(f"benchmarks.table.{stage}_methods").NAMES:
         if only and stage not in only and f"{stage} {name}" not in only:
             continue
         began = time.perf_counter()
@@ -38,5 +38,5 @@ def measured(stage: str, quick: bool, file: str, missing: dict[str, str], only: 
 
 def one(stage: str, name: str, quick: bool, file: str) -> Method | None:
     """Measure one method; it is run in a process of its own."""
-    measure = importlib.import_module(f"benchmarks.table.{stage}").measure
+    measure = importlib.import_module(f"benchmarks.table.{stage}_methods").measure
     return measure(name, quick, file) if stage in WITH_FILE else measure(name, quick)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-NOISE = 1.5  # counts (the most of 0.7 to 1.5 in real recordings: docs/sources.md, BioTac read-out)
+from tactile_core.sensors.readout import NOISE
+
 GAIN = 0.1  # standard deviation a channel (assumed: docs/sources.md, BioTac read-out)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.table.translation import plain_signals
+from benchmarks.table.translation_methods import plain_signals
 from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.sensors import SAMPLE_RATE

@@ -15,8 +15,8 @@ import numpy as np
 from tactile_core.errors import TactileError
 from tactile_core.recordings import Recording, read
 from tactile_core.recordings.repair import fill
+from tactile_core.sensors import SAMPLE_RATE
 
-RATE = 100.0  # Hz, of the electrodes
 WRENCH_RATE = 150.0  # Hz, nominal; its even grid sets where a recording begins and ends
 CUT = 5.0  # Hz
 HALF_MEDIAN, GLITCH = 5, 30.0  # samples to each side, counts
@@ -119,7 +119,7 @@ def lowpass(values: np.ndarray) -> np.ndarray:
     """Keep what lies below 5 Hz of (T, ...) at 100 Hz, without delay."""
     from scipy.signal import butter, filtfilt
 
-    return filtfilt(*butter(4, CUT / (RATE / 2)), values, axis=0)
+    return filtfilt(*butter(4, CUT / (SAMPLE_RATE / 2)), values, axis=0)
 
 
 def without_pose(values: np.ndarray, arm: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
+from tactile_core.sensors import SAMPLE_RATE
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.error_summary import metric_row, metric_rows, slices
 from tactile_core.training.step_errors import Bodies, error_columns, joined, parts, translation_metrics
@@ -29,7 +30,7 @@ UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter th
 EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
 BASELINE_METRICS = ("baseline_biotac_rms_um", "baseline_digit_rms_um", "baseline_digit_core_height_um")
 FROM_SIGNALS = ("S2MPN_rms_um", "S2MPN_position_mm", "force_percent", "chain_rms_um")
-WINDOW, RATE = 3, 100.0  # frames; Hz, of the electrodes (docs/sources.md, BioTac read-out)
+WINDOW = 3  # frames
 BATCHES = {1: 0.8, 500: 0.25}  # frames a call -> target, ms a frame
 ROUNDS = 7  # calls, of which the fastest counts: what else runs only ever slows
 SEED = 7  # of the readings' noise
@@ -68,7 +69,7 @@ def window_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Ro
     found = metric_rows(
         {metric: columns[metric] for metric in (*FROM_SIGNALS, *BASELINE_METRICS)}, pairs, rows, name, {}
     )
-    return [*found, row("window_delay_ms", 1e3 * (WINDOW - 1) / 2 / RATE, "ms", of=name)]
+    return [*found, row("window_delay_ms", 1e3 * (WINDOW - 1) / 2 / SAMPLE_RATE, "ms", of=name)]
 
 
 def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:

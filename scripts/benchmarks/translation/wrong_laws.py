@@ -21,6 +21,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 import h5py  # noqa: E402
 import numpy as np  # noqa: E402
 
+from benchmarks.translation.noise import GAIN, NOISE  # noqa: E402
 from tactile_core.accuracy import HEADER, Row, line, row  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
 from tactile_core.recordings import contact_law  # noqa: E402
@@ -30,7 +31,6 @@ from tactile_core.translation.simulated_likeness import residual_shares, unlike 
 CONTACTS = 5, 10, 20, 40, 100
 FRAMES = 20  # of each recording whose frames are judged one by one
 UNITS = 400  # recordings a law and number of contacts
-GAIN, NOISE = 0.1, 1.5  # of a channel; counts (docs/sources.md, BioTac read-out)
 TARGET, ALARMS, FROM = 0.9, 0.05, 20  # shares of recordings; contacts from which on they are asked for
 # Share of right recordings beyond each limit where it is chosen, so that others stay below ALARMS.
 CHOSEN = {"LEFT, MORE": 0.005, "GAINED, MORE_GAINED": 0.01}

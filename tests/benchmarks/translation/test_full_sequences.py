@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from benchmarks.make.make_sequences import HOLD, REST, RISE
 from benchmarks.translation import full_sequences
-from benchmarks.translation.evaluate import TEST_SET
+from benchmarks.translation.evaluation import TEST_SET
 
 from tactile_core.simulation.pairs_file import read_pairs
 

@@ -20,7 +20,7 @@ from tactile_core.training.step_errors import true_displacement
 from tactile_core.translation.translate import load_translator
 
 from .method import TEST_SET, Method, best_ms, peak_mb
-from .translation import plain_signals
+from .translation_methods import plain_signals
 
 NAMES = ("truth", FAST, "standard", "quality")
 CONTACTS, QUICK_CONTACTS = 8, 3
