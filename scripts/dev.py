@@ -309,7 +309,8 @@ def run_pip(python: Path, folder: Path, what: list[str], numpy: str | None) -> s
         text = re.sub(r"(?m)^numpy==.*$", f"numpy=={numpy}", constraints.read_text(encoding="utf-8"))
         constraints = folder / "constraints.txt"
         constraints.write_text(text, encoding="utf-8")
-    command = [str(python), "-m", "pip", "install", "--no-input", "--constraint", str(constraints)]
+    # Python compiles what it imports; of all that lies in these packages that is a small part.
+    command = [str(python), "-m", "pip", "install", "--no-input", "--no-compile", "--constraint", str(constraints)]
     log = folder / LOG
     started = subprocess.Popen(
         [*command, *what],
