@@ -9,7 +9,6 @@ contacts that press without sliding; baseline: no displacement. Exits 2 when a f
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,42 +17,36 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
+from benchmarks.measured_rows import finished, parser_of, printed
+from benchmarks.translation.noise import NOISE
 from benchmarks.translation.sequence_rows import plain_signals
 from tactile_core import accuracy
-from tactile_core.accuracy import Row, line, row
+from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
-from tactile_core.files import atomic
 from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.step_errors import digit_columns, our_bodies, parts, true_displacement
 from tactile_core.translation.translate import Translation, Translator, load_translator
 
-NOISE, GAINS, SEED = 1.5, 0.1, 0  # counts; 1, standard deviation of their logarithm
+GAINS, SEED = 0.1, 0  # standard deviation of the gains' logarithm
 DEEP = 0.3e-3  # m, on the BioTac
 UNITS = {"rms_um": "um", "place_mm": "mm", "peak_percent": "%", "iou": "1"}
 
 
 def main() -> int:
     """Run, print, write; the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("pairs", metavar="PAIRS", type=Path)
     parser.add_argument("--weights", metavar="DIR", nargs="*", default=[], help="networks that lead to that gel")
-    parser.add_argument("--json", metavar="FILE", type=Path, help="write the rows here")
     options = parser.parse_args()
-    found = []
     try:
         pairs = read_pairs(options.pairs)
         networks = {"solved": load_translator()} | {path: load_translator(path, None, None) for path in options.weights}
-        for name, network in networks.items():
-            for one in rows(name, gels(network, pairs), pairs):
-                found.append(one)
-                print(line(one), flush=True)
+        found = printed(each for name, one in networks.items() for each in rows(name, gels(one, pairs), pairs))
     except TactileError as error:
         print(error, file=sys.stderr)
         return 2
-    if options.json:
-        atomic.write_json(options.json, found)
-    return 0
+    return finished(found, options.json)
 
 
 def gels(network: Translator, pairs: Pairs) -> np.ndarray:
