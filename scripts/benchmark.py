@@ -1,4 +1,4 @@
-"""Speed against error of every stage: the door to `benchmarks/table/speed_error.py`; `--help` says all."""
+"""Measure speed against error of every stage: runs `benchmarks/table/speed_error.py`, see --help."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The translation against truth and recordings: runs `benchmarks/translation/evaluation.py`, see --help."""
+"""Compare the translation with truth and recordings: runs `benchmarks/translation/evaluation.py`, see --help."""
 
 from __future__ import annotations
 

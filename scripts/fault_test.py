@@ -1,4 +1,4 @@
-"""Batches that are broken in every way we know: the door to `benchmarks/faults.py`; `--help` says all."""
+"""Break batch jobs in every way we know: runs `benchmarks/faults.py`, see --help."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contact mechanics against known answers: the door to `benchmarks/mechanics/validate.py`; `--help` says all."""
+"""Compare contact mechanics with known answers: runs `benchmarks/mechanics/validate.py`, see --help."""
 
 from __future__ import annotations
 

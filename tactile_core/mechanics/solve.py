@@ -1,4 +1,4 @@
-"""Solve contact mechanics through one door: a sensor, an indenter at a place, a depth or a force, and a tier."""
+"""Solve contacts, the entry point of mechanics: a sensor, an indenter at a place, a depth or a force, and a tier."""
 
 from __future__ import annotations
 
