@@ -35,7 +35,7 @@ def write_cache(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndar
         raise TactileError(thing.name, "a mesh cache of an unsaved file", "a saved .blend", "Save it first")
     path = Path(bpy.path.abspath(f"//{FOLDER}")) / f"{bpy.path.clean_name(thing.name)}.pc2"
     first, step = float(frames[0]), float(frames[1] - frames[0]) if len(frames) > 1 else 1.0
-    try:
+    with atomic.writing(path, "room in a writable folder", "Save the .blend elsewhere"):
         path.parent.mkdir(exist_ok=True)
         with atomic.new_file(path) as partial, open(partial, "wb") as file:
             # PC2: "POINTCACHE2", version 1, points, first frame, frames a sample, samples; then float32 x, y, z
@@ -43,9 +43,6 @@ def write_cache(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndar
             for start in range(0, len(frames), _BLOCK):
                 nodes = rest.astype(np.float32) + displacement[start : start + _BLOCK]
                 file.write(nodes.astype("<f4").tobytes())
-    except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise TactileError(path, found, "room in a writable folder", "Save the .blend elsewhere") from error
     modifier = thing.modifiers.get("Tactile") or thing.modifiers.new("Tactile", "MESH_CACHE")
     modifier.cache_format = "PC2"
     modifier.filepath = bpy.path.relpath(os.fspath(path))

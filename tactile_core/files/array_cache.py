@@ -37,23 +37,17 @@ def store(folder: Path, arrays: Mapping[str, np.ndarray], room: str) -> None:
 
     room : what it takes, in words, such as "350 MB". Raises TactileError for a folder that cannot be written.
     """
-    try:
+    with atomic.writing(folder, f"room for {room}", "Make room, or name a folder in TACTILE_CACHE"):
         hashes = {name: _stored(folder / f"{name}.npy", values) for name, values in arrays.items()}
         atomic.write_json(folder / HASHES, hashes)
-    except OSError as error:
-        found, advice = f"cannot be written ({error.strerror})", "Make room, or name a folder in TACTILE_CACHE"
-        raise TactileError(folder, found, f"room for {room}", advice) from error
 
 
 def claim(folder: Path, room: str) -> None:
     """Make the folder before the work, to find out whether its result can be kept. Raises TactileError like `store`."""
-    try:
+    with atomic.writing(folder, f"a folder for {room}", "Name one in TACTILE_CACHE"):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "probe").touch()
         (folder / "probe").unlink(missing_ok=True)  # another process may have been quicker
-    except OSError as error:
-        found = f"cannot be written ({error.strerror})"
-        raise TactileError(folder, found, f"a folder for {room}", "Name one in TACTILE_CACHE") from error
 
 
 def _stored(file: Path, values: np.ndarray) -> str:

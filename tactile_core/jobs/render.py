@@ -108,24 +108,24 @@ def render(
     if isinstance(about, dict):
         by = about["corrects_lights_by"]
         say(f"at rest: {about['photograph']}, {by['mean_levels']:g} levels from the lights' own picture in the mean")
-    try:
-        with atomic.new_folder(out, overwrite=options.overwrite) as folder, progress(preset) as shown:
-            made.begin(folder)
-            made.write_rest(folder)
-            if options.scene_out is not None:
-                made.write_scene(options.scene_out, next(iter(frames.iterate_rows(rows))))
-            for done, (row, values) in enumerate(zip(rows, frames.iterate_rows(rows), strict=True), 1):
-                made.write_frame(folder, int(frames.numbers[row]), values)
-                shown(done, len(rows))
-            note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
-            if bound.um is not None and scene:
-                note["input"]["tier"] = tier
-            atomic.write_json(folder / results.NOTE, note)
-            timings = {**clock.per_frame(len(rows)), "frames": len(rows), "machine": provenance.machine()}
-            atomic.write_json(folder / results.TIMINGS, timings)
-    except OSError as error:
-        found, advice = f"cannot be written ({error.strerror or error})", "Make room, or name another --out folder"
-        raise TactileError(out, found, "a writable folder", advice) from error
+    with (
+        atomic.writing(out),
+        atomic.new_folder(out, overwrite=options.overwrite) as folder,
+        progress(preset) as shown,
+    ):
+        made.begin(folder)
+        made.write_rest(folder)
+        if options.scene_out is not None:
+            made.write_scene(options.scene_out, next(iter(frames.iterate_rows(rows))))
+        for done, (row, values) in enumerate(zip(rows, frames.iterate_rows(rows), strict=True), 1):
+            made.write_frame(folder, int(frames.numbers[row]), values)
+            shown(done, len(rows))
+        note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
+        if bound.um is not None and scene:
+            note["input"]["tier"] = tier
+        atomic.write_json(folder / results.NOTE, note)
+        timings = {**clock.per_frame(len(rows)), "frames": len(rows), "machine": provenance.machine()}
+        atomic.write_json(folder / results.TIMINGS, timings)
     return out
 
 

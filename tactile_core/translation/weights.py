@@ -29,11 +29,8 @@ ADVICE = "Take the file from a fresh copy of the weights, or train again with `t
 
 def write_bytes(path: str | os.PathLike, data: bytes) -> None:
     """Write a whole file or nothing; raises TactileError if the folder cannot be written."""
-    try:
+    with atomic.writing(path, advice="Choose a folder you can write to"):
         atomic.write_bytes(path, data)
-    except OSError as error:
-        advice = "Choose a folder you can write to"
-        raise TactileError(path, f"cannot be written ({error.strerror})", "a writable folder", advice) from error
 
 
 def sha256(data: bytes) -> str:

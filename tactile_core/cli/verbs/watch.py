@@ -253,10 +253,8 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
     def draw(picture: np.ndarray) -> bool:
         out = io.BytesIO()
         write_png(out, picture)
-        try:
+        with atomic.writing(path, "a file in a writable folder", ""):
             atomic.write_bytes(path, out.getvalue())
-        except OSError as error:
-            raise TactileError(path, f"cannot be written ({error.strerror})", "a file in a writable folder") from error
         return True
 
     return draw
