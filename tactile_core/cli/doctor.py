@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
-from ..files.installed import advice
+from ..files.installed import advice, checkout
 from ..files.version import __version__
 from ..pictures.mitsuba.variant import LLVM, OLDEST_LLVM, llvm_trouble
 
@@ -110,4 +110,6 @@ def _advice() -> str:
         return "brew install llvm"
     if sys.platform == "win32":
         return "install LLVM (winget install LLVM.LLVM) and set DRJIT_LIBLLVM_PATH to its LLVM-C.dll"
-    return "apt install libllvm19 (Debian, Ubuntu), or without root: python scripts/fetch_llvm.py DIR"
+    root = checkout()
+    without_root = "" if root is None else f", or without root: python {root / 'scripts' / 'fetch_llvm.py'} DIR"
+    return f"apt install libllvm19 (Debian, Ubuntu){without_root}"

@@ -47,7 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # a path may hold what the terminal cannot show
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if not hasattr(options, "run"):
+        parser.error(f"no verb given; `tactile --help` says what each does: {', '.join(VERBS)}")
     try:
         with stopping():
             _check_out(options)
@@ -90,7 +93,7 @@ def _parser() -> argparse.ArgumentParser:
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(prog="tactile", description=DESCRIPTION, epilog=EPILOG, formatter_class=raw)
     parser.add_argument("--version", action="version", version=f"tactile {__version__}")
-    verbs = parser.add_subparsers(metavar="VERB", required=True, title="verbs")
+    verbs = parser.add_subparsers(metavar="VERB", title="verbs")
     for name, verb in VERBS.items():
         sub = verbs.add_parser(name, help=verb.BRIEF, description=verb.TEXT, epilog=verb.EPILOG, formatter_class=raw)
         verb.arguments(sub)

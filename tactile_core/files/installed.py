@@ -13,12 +13,18 @@ PACKAGE = "tactile-core"
 
 def advice(extra: str) -> str:
     """Return the command that installs the libraries of an extra: from the checkout, or each by its own name."""
-    root = Path(__file__).resolve().parents[2]
+    root = checkout()
     size = " (torch on Linux fetches CUDA's libraries too, some GB)" if extra == "train" else ""
-    if (root / "pyproject.toml").is_file() and (root / "constraints.txt").is_file():
+    if root is not None:
         return f'python -m pip install -c constraints.txt -e ".[{extra}]" in {root}{size}'
     found = libraries(extra)
     return f"python -m pip install {' '.join(found)}{size}" if found else f"the libraries of the extra [{extra}]"
+
+
+def checkout() -> Path | None:
+    """Return the folder of the checkout that this package is run from; None where it was installed from a wheel."""
+    root = Path(__file__).resolve().parents[2]
+    return root if (root / "pyproject.toml").is_file() and (root / "constraints.txt").is_file() else None
 
 
 @contextmanager

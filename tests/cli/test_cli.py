@@ -42,6 +42,13 @@ def only_line(text: str) -> str:
     return line
 
 
+def test_no_verb_is_told_which_there_are(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main([])
+    said = capsys.readouterr().err
+    assert "tactile --help" in said and all(verb in said for verb in VERBS)
+
+
 @pytest.mark.parametrize("verb", ["convert", "info", "render", "simulate", "pairs", "train", "mesh", "adapt"])
 def test_each_verb_teaches_with_an_example(verb, capsys):
     with pytest.raises(SystemExit) as leave:

@@ -40,6 +40,10 @@ def test_without_llvm_it_says_why_and_how_to_get_it(monkeypatch):
     lines = list(doctor._mitsuba(True))
     assert "scalar_rgb" in lines[0] and "LLVM was not found" in lines[0]
     assert "LLVM 18 or newer" in lines[1]
+    monkeypatch.setattr(doctor.sys, "platform", "linux")
+    assert "fetch_llvm.py DIR" in doctor._advice()
+    monkeypatch.setattr(doctor, "checkout", lambda: None)  # a wheel has no scripts
+    assert "libllvm19" in doctor._advice() and "scripts" not in doctor._advice()
     assert "fast alone" in next(doctor._mitsuba(False))
 
 
