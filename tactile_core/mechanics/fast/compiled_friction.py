@@ -87,7 +87,7 @@ class CompiledFriction(Friction):
         turns = np.empty((0, columns))
         if len(at):
             system, right = loops.slip_system(
-                inverse, rows, at, normal, lean, across, against, curved, turning, bearing, friction
+                inverse, rows, len(motion), at, normal, lean, across, against, curved, turning, bearing, friction
             )
             answer = np.ascontiguousarray(solved(system, right))
             turns = answer[len(at) :]

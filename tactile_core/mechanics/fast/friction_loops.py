@@ -154,18 +154,20 @@ def borne(forces, motion, moves, slipping, curved, turning, direction):  # noqa:
 
 
 @Loop
-def slip_system(inverse, rows, slipping, normal, lean, across, against, curved, turning, bearing, friction):  # noqa: ANN001, ANN201
-    """System (2 s, 2 s) float32 and right (2 s, r) of the unknowns of slipping nodes; see ``stick_slip.Step``."""
+def slip_system(inverse, rows, size, slipping, normal, lean, across, against, curved, turning, bearing, friction):  # noqa: ANN001, ANN201
+    """System (2 s, 2 s) float32 and right (2 s, r) of the unknowns of slipping nodes; see ``stick_slip.Step``.
+
+    rows : (j,) of the inverse, among ``size`` degrees of freedom
+    """
     s, columns = len(slipping), bearing.shape[2]
     system, right = np.empty((2 * s, 2 * s), np.float32), np.zeros((2 * s, columns))
-    bend, at, ways = np.full(s, -1), np.empty(s, np.int64), np.empty((2, 3))
-    for p in range(len(curved)):
-        bend[curved[p]] = p
-    place = np.empty(rows.max() + 1, np.int64)
+    bend, at, ways, place = np.empty(s, np.int64), np.empty(s, np.int64), np.empty((2, 3)), np.empty(size, np.int64)
     for j in range(len(rows)):
         place[rows[j]] = j
     for a in range(s):
-        at[a] = place[3 * slipping[a]]
+        at[a], bend[a] = place[3 * slipping[a]], -1
+    for p in range(len(curved)):
+        bend[curved[p]] = p
     mixed = np.empty(inverse.shape[1], np.float32)
     for a in range(s):
         node, first, second, third = slipping[a], inverse[at[a]], inverse[at[a] + 1], inverse[at[a] + 2]
