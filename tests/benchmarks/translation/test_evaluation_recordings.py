@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.translation import evaluate, recordings, slide_metrics, slide_set
+from benchmarks.translation import evaluation, recordings, slide_metrics, slide_set
 from conftest import SLIDE_HEADER
 
 from tactile_core import sensors
@@ -237,11 +237,11 @@ def test_our_rows_are_the_numbers_that_the_tool_prints(judged):
 
 
 def test_the_script_prints_its_rows_and_tells_bad_input(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(evaluate.translate, "load_translator", lambda folder: Answering(load_translator().nets))
+    monkeypatch.setattr(evaluation.translate, "load_translator", lambda folder: Answering(load_translator().nets))
     arguments = ["--recordings", str(tmp_path), "--out", str(tmp_path / "out"), "--json", str(tmp_path / "rows.json")]
-    assert evaluate.main(arguments) == 2 and "no *_bio.csv" in capsys.readouterr().err
+    assert evaluation.main(arguments) == 2 and "no *_bio.csv" in capsys.readouterr().err
     write_slide(tmp_path, "mat1_1")
-    status = evaluate.main(arguments)
+    status = evaluation.main(arguments)
     printed = capsys.readouterr()
     assert "recordings_force_rank_median" in printed.out and (tmp_path / "rows.json").exists()
     assert status == int("MISSED" in printed.err)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from benchmarks.translation import evaluate, test_set
+from benchmarks.translation import evaluation, test_set
 from benchmarks.translation.noise import GAIN, NOISE, as_read
 from small_pairs import bodies, write_pairs
 
@@ -156,8 +156,8 @@ def test_the_patch_of_a_dent_is_where_it_bends_inward():
 
 def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(request, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(request.config.rootpath)
-    monkeypatch.setattr(evaluate, "QUICK_PRESSES", 23)  # prime as well; targets are met on the whole set alone
-    status = evaluate.main(["--quick", "--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")])
+    monkeypatch.setattr(evaluation, "QUICK_PRESSES", 23)  # prime as well; targets are met on the whole set alone
+    status = evaluation.main(["--quick", "--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")])
     rows = json.loads((tmp_path / "rows.json").read_text())
     missed = [row["name"] for row in rows if row["ok"] is False and row["unit"] not in COSTS]
     assert status == int(bool(missed))
@@ -172,7 +172,7 @@ def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(reques
 
 def test_a_file_that_is_no_test_set_is_refused(tmp_path, capsys):
     (tmp_path / "a.h5").write_bytes(b"nothing")
-    assert evaluate.main(["--test-set", str(tmp_path / "a.h5")]) == 2
+    assert evaluation.main(["--test-set", str(tmp_path / "a.h5")]) == 2
     assert "a.h5" in capsys.readouterr().err
 
 
