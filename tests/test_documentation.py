@@ -76,6 +76,7 @@ ELSEWHERE = {
     "python3 scripts/build_extension.py": ("tests/blender/test_extension_zip.py", "build_extension"),
     "blender ": ("tests/blender/test_command_line.py", "tactile"),
     "tactile adapt slips/": ("tests/recordings/test_biotac_sp.py", '["adapt"'),
+    "tactile convert slips/": ("tests/translation/test_shipped_biotac_sp.py", '"convert"'),
     "tactile info slips/": ("tests/recordings/test_biotac_sp.py", '["info"'),
     "sbatch ": ("tests/jobs/engine/test_batch_slurm.py", "sbatch"),
 }
@@ -85,7 +86,6 @@ NOT_RUN = {
     "pip download --no-deps taxim": "needs a package index; 27 MB",
     "tactile calibrate fit8/": "needs photographs of that package, which do not ship",
     "tactile calibrate --test unit.toml apart16/": "needs photographs of that package, which do not ship",
-    "tactile convert slips/": "needs networks of a BioTac SP, half an hour's training on a table that does not ship",
 }
 # The lines of batch.md's TLS recipe: the whole block is run as one below.
 RECIPE = "openssl ", "T=", "DASK_DISTRIBUTED__SCHEDULER", "OMP_NUM_THREADS=1 dask worker", "export DASK"

@@ -57,13 +57,12 @@ def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -
 
 
 def _advice(sensor: str) -> str:
-    """Say how recordings of a sensor are translated: by the weights that ship, or by what commands make."""
-    ships = title(SOURCE)
-    own = f"Translate it with weights of a {title(sensor)}. Those that ship are a {ships}'s; half an hour makes others"
+    """Say how recordings of another sensor than the networks' are translated: by those that ship, or that are made."""
     return (
-        f"{own}: `tactile pairs scenes/training --count 12000 --seed 3 --from {sensor} --out pairs.h5`, `tactile train "
-        "pairs.h5 --out trained`, `tactile adapt RECORDINGS --out rest.toml`, `tactile convert RECORDING --out results "
-        "--weights trained/weights --sensor rest.toml` (docs/extend.md: what they need, and how right they are)"
+        "Translate it by itself: the first recording, or --weights, says whose networks are taken. A sensor for which "
+        f"none ship gets them in half an hour: `tactile pairs scenes/training --count 12000 --from {sensor} --out "
+        "pairs.h5`, `tactile train pairs.h5 --out trained`, `tactile adapt RECORDINGS --out rest.toml`, `tactile "
+        "convert RECORDING --out results --weights trained/weights --sensor rest.toml` (docs/extend.md)"
     )
 
 

@@ -14,7 +14,7 @@ from .signal_kind import detect
 if TYPE_CHECKING:
     from .electrode_gains import ElectrodeGains
 
-TRANSLATED_BY = "`tactile convert --weights DIR --sensor FILE`, with weights of a BioTac SP (docs/extend.md)"
+TRANSLATED_BY = "`tactile convert RECORDING --sensor FILE`, with the unit's rest by `tactile adapt` (docs/extend.md)"
 ADVICE = (
     "not known: a recording that begins in contact does not tell it; `tactile adapt RECORDINGS` finds it in several"
 )

@@ -6,7 +6,7 @@ import io
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import cache, partial
 from types import ModuleType
@@ -112,6 +112,14 @@ def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) ->
         if columns is not None or container != "csv":
             return SOURCE
         return _sensor(layout_of(where, "csv", read_header(where, file)))
+
+
+def sensor_of_first(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | None = None) -> str:
+    """Return the sensor of the first of these recordings that is one; a BioTac where none is, as it is said later."""
+    for path in paths:
+        with suppress(TactileError):
+            return sensor_of(path, columns)
+    return SOURCE
 
 
 def _sensor(layout: ModuleType) -> str:

@@ -25,7 +25,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.shipped import shipped
-from ..sensors import electrode_count
+from ..sensors import SOURCE, electrode_count
 from .card_sensors import pair_of
 from .contact_frame import ContactFrame
 from .layers import Tensors, plain, residual
@@ -325,15 +325,20 @@ class Networks:
         return out
 
 
-def load(folder: str | os.PathLike | None = None) -> Networks:
-    """Read and verify a weights folder; None: the weights that ship with the package.
+def shipped_folder(source: str | None = None) -> Path:
+    """Return the folder of the weights that ship for recordings of a sensor; the BioTac's where it has none."""
+    own = WEIGHTS_FOLDER / (source or SOURCE)
+    return own if (own / CARD_NAME).is_file() else WEIGHTS_FOLDER
+
+
+def load(folder: str | os.PathLike | None = None, source: str | None = None) -> Networks:
+    """Read and verify a weights folder; None: the weights that ship for recordings of a sensor, ``source``.
 
     raises: TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)
     """
-    shipped = folder is None
-    folder = Path(folder or WEIGHTS_FOLDER)
+    shipped, folder = folder is None, Path(folder or shipped_folder(source))
     card, digest = read_card(folder)
-    if shipped and digest != SHIPPED_CARD_SHA256:
+    if shipped and folder == WEIGHTS_FOLDER and digest != SHIPPED_CARD_SHA256:
         raise TactileError(folder / CARD_NAME, f"sha256 {digest}", SHIPPED_CARD_SHA256, ADVICE)
     tensors, electrodes = {}, electrode_count(pair_of(card, folder / CARD_NAME)[0])
     for net in NETS:

@@ -303,12 +303,13 @@ def load_translator(
     """Load the networks of a weights folder, the shipped ones by default, with options of the estimate.
 
     target : the gel that they must translate to; None for whichever they do
-    source : the sensor whose recordings they must translate; None for whichever they do
+    source : the sensor whose recordings they must translate, by which those that ship are chosen; None for whichever
+        they do
     Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces, and for
     a target that is no sensor or not theirs.
     """
-    nets = networks.load(folder)
-    card_file = f"{folder or networks.WEIGHTS_FOLDER}, card.json"
+    nets, place = networks.load(folder, source), folder or networks.shipped_folder(source)
+    card_file = f"{place}, card.json"
     _check_quantiles(nets.card, card_file)
     error_bounds.check(nets.card, card_file)
     _check_pair(nets.card, source, target, card_file)
@@ -320,7 +321,7 @@ def load_translator(
                 f"{here[:12]}..., the surface of this version", "Use weights trained with this version of the sensors",
             )  # fmt: skip
     if sensors.contacts_of(nets.source) is None:
-        known = patterns_of(reference_signals.read(folder or networks.WEIGHTS_FOLDER).typical)
+        known = patterns_of(reference_signals.read(place).typical)
     else:
         known = shipped_patterns(nets.source)
     return Translator(nets, answer, known)

@@ -53,7 +53,8 @@ def translate(
     if not len(chosen) or chosen[0] > chosen[-1]:
         expected = f"a slice forward through {len(recording)} frames that holds at least one"
         raise TactileError("translate, frames", str(frames), expected)
-    translator = _shared_translator(None if weights is None else os.fspath(weights), answer or Answer())
+    chosen_by = (None, recording.sensor) if weights is None else (os.fspath(weights), None)
+    translator = _shared_translator(*chosen_by, answer or Answer())
     signals = _prepared(recording, prepare, sensor)
     tracked = _tracked(translator, recording, signals)
     parts = [
@@ -64,9 +65,9 @@ def translate(
 
 
 @lru_cache(maxsize=2)
-def _shared_translator(weights: str | None, answer: Answer) -> Translator:
+def _shared_translator(weights: str | None, source: str | None, answer: Answer) -> Translator:
     """Load networks once a process: 13 MB, a quarter of a second."""
-    return load_translator(weights, answer, None, None)
+    return load_translator(weights, answer, None, source)
 
 
 def _prepared(recording: Recording, options: PrepareOptions | None, sensor: str | os.PathLike[str] | None) -> Signals:

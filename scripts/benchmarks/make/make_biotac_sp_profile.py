@@ -28,9 +28,9 @@ def main() -> int:
     return 0
 
 
-def table() -> str:
-    """The table as text."""
-    skin = skin_of("biotac_sp")
+def table(name: str = "biotac_sp") -> str:
+    """The table as text, of the thickness in the descriptor of a sensor that is there."""
+    skin = skin_of(name)
     middle, thick = 1e3 * sum(skin.descriptor.skin.outer_poles) / 2, 1e3 * skin.thickness
     outer, core = 1e3 * biotac_sp.RESTING, 1e3 * biotac_sp.CORE
     inner = outer - thick

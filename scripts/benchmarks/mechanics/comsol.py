@@ -31,7 +31,7 @@ DEEP = 0.3e-3  # m, forces count beyond this depth
 FITTED = "001"  # the press that ``biotac_sp.FORCE_SCALE`` was fitted on
 COARSE = (16, 12, 6)  # node intervals of the second mesh
 _RAYS_DOWN = 32  # rays of the skin from rim to pole
-SENSOR, _DEEPEST = "biotac_sp", 3e-3  # in the fast tier; m, deeper than any press goes
+_DEEPEST = 3e-3  # m, deeper than any press goes
 
 
 def published_volume(intervals: tuple[int, int, int] = INTERVALS) -> Row:
@@ -221,14 +221,14 @@ def _other_mesh(press: Press, steps: list[Pressed]) -> Iterator[Row]:
     yield row(f"comsol_{press.name}_coarser_mesh_gap_rms", _rms(moved), "mm", of=of)
 
 
-def fast_rows(press: Press) -> Iterator[Row]:
-    """Yield the rows of one press; the stiffness of the descriptor's skin was fitted on ``FITTED``."""
-    steps = fast_steps(press)
+def fast_rows(press: Press, sensor: str) -> Iterator[Row]:
+    """Yield the rows of one press on a sensor; the stiffness of ``comsol_sensor``'s skin was fitted on ``FITTED``."""
+    steps = fast_steps(press, sensor)
     press = press.first_steps(len(steps))
     changes, expected = gap_changes(press, steps)
     off, baseline = changes - expected, resting_gaps_cut(press) - expected
     ratio = force_ratios(press, steps)
-    of = f"COMSOL press {press.name}, {len(steps)} steps, fast tier of {SENSOR}"
+    of = f"COMSOL press {press.name}, {len(steps)} steps, fast tier of {sensor}"
     name, target = f"comsol_fast_{press.name}", None if press.name == FITTED else press.force_target
     yield row(f"{name}_gap_rms", _rms(off), "mm", GAP, baseline=_rms(baseline), of=of)
     yield row(f"{name}_gap_rms_at_the_end", _rms(off[-1]), "mm", of=of)
@@ -236,24 +236,24 @@ def fast_rows(press: Press) -> Iterator[Row]:
     yield row(f"{name}_force_bias", 100 * float(ratio.mean() - 1), "percent", of=of)
 
 
-def fast_steps(press: Press) -> list[Pressed]:
-    """The steps of a press in the fast tier, frictionless, as far as it follows them."""
+def fast_steps(press: Press, sensor: str) -> list[Pressed]:
+    """The steps of a press on a sensor in the fast tier, frictionless, as far as it follows them."""
     turned = np.array([[-1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]])  # COMSOL's axes in the shared frame, even in z
-    shift = sensors.from_maker(np.zeros((1, 3)), SENSOR)[0]
+    shift = sensors.from_maker(np.zeros((1, 3)), sensor)[0]
     axis = -turned @ press.into
     first = np.cross([0.0, 0.0, 1.0], axis)
     first /= np.linalg.norm(first)
     start = Pose(turned @ press.point + shift, np.column_stack([first, np.cross(axis, first), axis]))
-    surface = sensors.sensor_surface(SENSOR)
+    surface = sensors.sensor_surface(sensor)
     touch = first_touch(surface, Plate(), start)
     clearance = float((touch.apex - start.apex) @ start.direction)
     depths = np.maximum(press.advances - clearance, 0.0)
-    pad = surface.rest[:, 1] < sensors.skin_of(SENSOR).axis_y + 0.2e-3
+    pad = surface.rest[:, 1] < sensors.skin_of(sensor).axis_y + 0.2e-3
     found: list[Pressed] = []
     try:
         for advance, step in zip(
             press.advances,
-            solve_path(SENSOR, Plate(), touch, map(Step, depths), friction=0.0, limit=_DEEPEST),
+            solve_path(sensor, Plate(), touch, map(Step, depths), friction=0.0, limit=_DEEPEST),
             strict=True,
         ):
             skin = ((surface.rest + step.displacement)[pad] - shift) @ turned

@@ -119,7 +119,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     paths = inputs.find(options.inputs, folder)
     with bar("reading", "file", options.progress) as shown:
         found = inputs.hashed(paths, shown)
-    job = jobs.make(found, _recipe(options), options.weights, options.calibration)
+    job = jobs.make(found, _recipe(options, paths), options.weights, options.calibration)
     if there is None:
         jobs.check_empty(folder, "Name another --out")
         jobs.write(folder, job)
@@ -130,14 +130,14 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     return there
 
 
-def _recipe(options: argparse.Namespace) -> Translate:
-    """Return the recipe that the options describe."""
+def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
+    """Return the recipe that the options describe, of these recordings."""
     from ...jobs import convert, results
     from ...jobs.engine.inputs import unit_hash
     from ...jobs.engine.recipes import MAX_SHARD_FRAMES, SHARD_FRAMES, Prepare, Translate
     from ...jobs.frame_pass import describe_gel
     from ...pictures.mitsuba.variant import variant_for
-    from ...recordings import electrode_gains
+    from ...recordings import electrode_gains, readers
     from ...sensors.calibration_file import load_calibration
     from ...translation.answer import parse_answer
 
@@ -145,7 +145,8 @@ def _recipe(options: argparse.Namespace) -> Translate:
     prepare = Prepare(**prepare_words(options))
     prepare.options().check()
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
-    network, solves = convert.load_networks(options.weights, None, options.gel, options.target, None)
+    source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
+    network, solves = convert.load_networks(options.weights, None, options.gel, options.target, source)
     frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
     if frames > MAX_SHARD_FRAMES:
         raise TactileError("--shard-frames", str(frames), f"1 to {MAX_SHARD_FRAMES}")

@@ -86,8 +86,7 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs import convert, frame_range, results
     from ...jobs.error_budget import parse_budget
     from ...pictures import presets
-    from ...recordings import PrepareOptions, electrode_gains
-    from ...recordings.readers import list_fingers
+    from ...recordings import PrepareOptions, electrode_gains, readers
     from ...translation.answer import parse_answer
 
     prepare = PrepareOptions(**prepare_words(options))
@@ -95,14 +94,20 @@ def run(options: argparse.Namespace) -> int:
     budget = None if options.error is None else parse_budget(options.error)
     answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
-    paths, failed = list_fingers(options.recordings), 0
+    paths, failed = readers.list_fingers(options.recordings), 0
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     levels = None if budget is None else budget.levels
     preset = presets.FAST if levels is None else presets.fitting(levels)
     made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(
-        options.weights, options.calibration, preset, answer=answer, gel=options.gel, target=options.target, source=None
+        options.weights,
+        options.calibration,
+        preset,
+        answer=answer,
+        gel=options.gel,
+        target=options.target,
+        source=None if options.weights else readers.sensor_of_first(paths, prepare.columns),
     )
     if levels is not None:
         why = presets.describe_choice(preset, levels)

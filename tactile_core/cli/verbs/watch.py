@@ -88,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs import live
     from ...jobs.convert import load_tools
     from ...recordings.column_map import refuse_other
-    from ...recordings.readers import container_of
+    from ...recordings.readers import container_of, sensor_of_first
 
     _check(options)
     path = options.rosbag_play or options.recording
@@ -101,7 +101,8 @@ def run(options: argparse.Namespace) -> int:
     columns = columns_of(options)
     refuse_other(path, container, columns)
     speed = 1.0 if options.speed is None else options.speed
-    tools = load_tools(options.weights, options.calibration, target=options.target, source=None)
+    sensor = None if options.weights else sensor_of_first([path], columns)
+    tools = load_tools(options.weights, options.calibration, target=options.target, source=sensor)
     source = _played(path, speed, columns, tools.source) if playing else _followed(options, columns, tools.source)
     tare = None if options.tare == "auto" else options.tare
     unit = _unit(options.sensor, path, tools.source)
