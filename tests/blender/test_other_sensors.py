@@ -125,9 +125,9 @@ def test_a_second_fluid_sensor_stands_with_its_core(scene, nodes_of):
 
 
 @pytest.fixture(scope="module")
-def weights(own_sensors, tmp_path_factory):
+def weights(extension, own_sensors, tmp_path_factory):
     folder = tmp_path_factory.mktemp("sp") / "weights"
-    sp_weights.write_weights(folder)
+    sp_weights.write_weights(folder, f"{extension.__name__}.tactile_core")
     return folder
 
 

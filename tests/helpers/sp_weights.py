@@ -6,14 +6,12 @@ The networks are those that ship, deaf to the electrodes beyond the nineteenth; 
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
 import shutil
 from pathlib import Path
 
 import numpy as np
-
-from tactile_core import sensors
-from tactile_core.translation import networks, weights
 
 SP, FEWER, COUNT = "biotac_sp", 19, 24
 
@@ -26,8 +24,13 @@ def write_places(folder: Path) -> None:
     (folder / SP / "locations.csv").write_text(text, encoding="utf-8")
 
 
-def write_weights(folder: Path) -> None:
-    """Write the networks with more inputs; the surfaces of both fingers have equally many nodes."""
+def write_weights(folder: Path, package: str) -> None:
+    """Write the networks with more inputs; the surfaces of both fingers have equally many nodes.
+
+    package : ``tactile_core`` as the extension under test has it, which a real Blender finds nowhere else
+    """
+    names = ("sensors", "translation.networks", "translation.weights")
+    sensors, networks, weights = (importlib.import_module(f"{package}.{name}") for name in names)
     shutil.copytree(networks.WEIGHTS_FOLDER, folder)
     card = json.loads((folder / "card.json").read_text(encoding="utf-8"))
     card[f"{SP}_nodes_sha256"] = sensors.sensor_surface(SP).sha256
