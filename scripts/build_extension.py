@@ -2,7 +2,7 @@
 
     python3 scripts/build_extension.py                               linux-x64, for Blenders with Python 3.11
     python3 scripts/build_extension.py --platform windows-x64 --python 3.13
-    python3 scripts/build_extension.py --no-wheels                   15 MB, any platform: numpy alone, see Preferences
+    python3 scripts/build_extension.py --no-wheels                   24 MB, any platform: numpy alone, see Preferences
 
 What git tracks goes in (no folder of git's own is read twice, nothing untracked slips in), and the wheels of what
 simulating and rendering need: about 115 MB a platform and Python, so each has a zip of its own. Blender 4.2 to 5.0
