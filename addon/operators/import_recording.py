@@ -22,7 +22,7 @@ LONG = 2000  # frames; beyond it a mesh cache loads and saves faster than shape 
 
 
 class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
-    """Import a recording of a BioTac, or of the sensor that weights read, as an animated skin with its electrodes"""
+    """Import a recording of a BioTac or a BioTac SP as an animated skin with its core and electrodes"""
 
     bl_idname = "tactile.import_recording"
     bl_label = "Import BioTac Recording"

@@ -13,7 +13,7 @@ import numpy as np
 from ...tactile_core import recordings
 from ...tactile_core.errors import TactileError
 from ...tactile_core.jobs import frame_range
-from ...tactile_core.recordings import PrepareOptions, Recording, Signals
+from ...tactile_core.recordings import PrepareOptions, Recording, Signals, readers
 from ...tactile_core.recordings.polarity import AUTO
 from ...tactile_core.translation import translate
 from ...tactile_core.translation.contact_track import Evidence, Tracked
@@ -36,26 +36,27 @@ class Translated:
 
 
 @functools.lru_cache(maxsize=2)
-def _translator(weights: str, _changed: int) -> translate.Translator:
-    """Load networks once, the shipped ones for an empty text, whichever sensors they lead between."""
-    return translate.load_translator(weights or None, target=None, source=None)
+def _translator(weights: str, source: str | None, _changed: int) -> translate.Translator:
+    """Load networks once, for an empty text those that ship for a sensor, whichever gel they lead to."""
+    return translate.load_translator(weights or None, target=None, source=source)
 
 
-def translator_of(weights: str) -> translate.Translator:
-    """Return the networks in a folder, or those that ship. Raises TactileError for what are none."""
+def translator_of(weights: str, path: str) -> translate.Translator:
+    """Return the networks in a folder, else those that ship for a recording. Raises TactileError for what are none."""
+    source = None if weights else readers.sensor_of_first([path])
     folder = bpy.path.abspath(weights) if weights else ""
     try:
         changed = os.stat(os.path.join(folder, CARD_NAME)).st_mtime_ns if folder else 0
     except OSError:
         changed = 0  # the loader says what is wrong
-    return _translator(folder, changed)
+    return _translator(folder, source, changed)
 
 
 def load(
     path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str = AUTO, weights: str = ""
 ) -> Translated:
     """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there."""
-    known = translator_of(weights)
+    known = translator_of(weights, path)
     try:
         changed = os.stat(path).st_mtime_ns
     except OSError:

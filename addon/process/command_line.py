@@ -78,7 +78,7 @@ def _parser() -> argparse.ArgumentParser:
             "--weights",
             type=Path,
             metavar="FOLDER",
-            help="networks, which name the sensor of the recordings (default: those that ship)",
+            help="networks, which name the sensor of the recordings (default: those that ship for it)",
         )
         verb.add_argument("--to", choices=gels, help="gel of recordings (default: the weights')")
         verb.add_argument("--frames", default=":", help="of recordings: A:B:STEP")

@@ -41,7 +41,7 @@ MOTIONS = (
 
 
 OF_ROLE = {"BIOTAC": sensors.SOURCE, "DIGIT": sensors.TARGET}  # the sensors of objects that name none
-WEIGHTS_HELP = "Folder of the networks, which name their two sensors; empty: those that ship"
+WEIGHTS_HELP = "Folder of the networks, which name their two sensors; empty: those that ship for the recording's sensor"
 
 POLARITY_HELP = "What the electrodes' counts do where the film over them thins"
 POLARITIES = (

@@ -9,11 +9,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-import sp_weights
 
 ROOT = Path(__file__).resolve().parents[2]
 SENSORS = ROOT / "tactile_core" / "sensors"
-GEL = "coarse_mini"
+GEL, SP = "coarse_mini", "biotac_sp"
+WEIGHTS = ROOT / "tactile_core" / "data" / "weights"
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,9 @@ def own_sensors(tmp_path_factory):
     (own / GEL / "sensor.toml").write_text(text)
     unit = own / GEL / "default.toml"
     unit.write_text(unit.read_text().replace('sensor = "gelsight_mini"', f'sensor = "{GEL}"'))
-    sp_weights.write_places(own)
+    (own / SP).mkdir()
+    rows = [f"E{k + 1},{x:.2f},0,-5,3000" for k, x in enumerate(np.linspace(-6, 6, 24))]  # on a line under the pad
+    (own / SP / "locations.csv").write_text("\n".join(["name,x_mm,y_mm,z_mm,rest_counts", *rows, "X1,0,0,-4,"]) + "\n")
     return own
 
 
@@ -124,13 +126,6 @@ def test_a_second_fluid_sensor_stands_with_its_core(scene, nodes_of):
     assert np.isfinite(core).all() and (core > skin.min(axis=0)).all() and (core < skin.max(axis=0)).all()
 
 
-@pytest.fixture(scope="module")
-def weights(extension, own_sensors, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("sp") / "weights"
-    sp_weights.write_weights(folder, f"{extension.__name__}.tactile_core")
-    return folder
-
-
 @pytest.fixture
 def recording(tmp_path):
     """A BioTac SP's, which is quiet and then squeezed."""
@@ -141,10 +136,10 @@ def recording(tmp_path):
     return tmp_path / "touch.csv"
 
 
-def test_weights_name_the_sensor_that_is_imported(imported, weights, recording, part):
-    skin = imported(filepath=str(recording), frames="100:110", weights=str(weights))
+def test_a_recording_names_the_sensor_that_is_imported(imported, recording, part):
+    skin = imported(filepath=str(recording), frames="100:110")
     scene = bpy.context.scene
-    assert skin.name == "BioTac SP skin" and skin.tactile.sensor == sp_weights.SP
+    assert skin.name == "BioTac SP skin" and skin.tactile.sensor == SP
     assert sum(thing.tactile.role == "ELECTRODE" for thing in scene.objects) == len(skin["electrodes"]) == 24
     assert bpy.ops.tactile.set_style(style="ELECTRODES") == {"FINISHED"}
     assert bpy.ops.tactile.translate() == {"FINISHED"}
@@ -153,9 +148,9 @@ def test_weights_name_the_sensor_that_is_imported(imported, weights, recording, 
     assert part("addon.ui.panels").trust_of(skin, gel)[0]
 
 
-def test_without_a_table_of_places_no_electrodes_are_shown(imported, weights, recording, monkeypatch, tmp_path):
+def test_without_a_table_of_places_no_electrodes_are_shown(imported, recording, monkeypatch, tmp_path):
     monkeypatch.setenv("TACTILE_SENSORS", str(tmp_path))
-    skin = imported(filepath=str(recording), frames="100:104", weights=str(weights))
+    skin = imported(filepath=str(recording), frames="100:104")
     assert len(skin["electrodes"]) == 24
     assert not any(thing.tactile.role == "ELECTRODE" for thing in bpy.context.scene.objects)
 
@@ -168,18 +163,18 @@ def test_what_are_no_weights_is_said(imported, tmp_path):
 
 def test_a_recording_of_another_sensor_than_the_weights_is_refused_in_words(scene, recording):
     with pytest.raises(RuntimeError, match=r"touch\.csv.*24"):
-        bpy.ops.tactile.import_recording(filepath=str(recording))
+        bpy.ops.tactile.import_recording(filepath=str(recording), weights=str(WEIGHTS))
     assert not scene.objects
 
 
-def test_the_command_line_takes_a_gel_and_weights(part, needs, recording, weights, tmp_path):
+def test_the_command_line_takes_a_gel_and_weights(part, needs, recording, tmp_path):
     needs("scipy")
     main = part("addon.process.command_line").main
-    words = ["--to", GEL, "--weights", str(weights), "--frames", "115:117", "--out", str(tmp_path / "out")]
+    words = ["--to", GEL, "--weights", str(WEIGHTS / SP), "--frames", "115:117", "--out", str(tmp_path / "out")]
     assert main(["convert", str(recording), *words]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "touch" / "touch.blend"))
     sensors = {thing.tactile.role: thing.tactile.sensor for thing in bpy.context.scene.objects if thing.tactile.sensor}
-    assert sensors == {"BIOTAC": sp_weights.SP, "DIGIT": GEL}
+    assert sensors == {"BIOTAC": SP, "DIGIT": GEL}
     assert bpy.context.scene.render.resolution_x == 320
 
 
