@@ -15,6 +15,7 @@ from .compliance_block import ComplianceBlock
 
 RIDGE = 1e-6  # relative, of the compliance: keeps single precision definite
 _MOST_UPDATES = 50  # of one inverse, before it is made anew: rounding adds up
+_SMALL = 90  # rows, of inverses that are made anew as soon as they are changed
 _GOES, _COMES, _FEW = 2, 4, 0.8  # operations by the square of the size; up to this share of the whole changes are made
 
 
@@ -57,7 +58,7 @@ class ContactStiffness:
         """The inverse without rows that do not stay (j,), and with ``new`` ones; None where it is better made anew."""
         size, gone = len(left) + len(new), len(stays) - len(left)
         effort = _GOES * gone * len(stays) ** 2 + _COMES * len(new) * size**2
-        if effort > _FEW * size**3 or self._updates > _MOST_UPDATES:
+        if size < _SMALL or effort > _FEW * size**3 or self._updates > _MOST_UPDATES:
             return None
         try:
             inverse = _without(inverse, stays) if gone else inverse
