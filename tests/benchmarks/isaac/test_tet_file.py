@@ -1,8 +1,9 @@
-"""The reader of Isaac Gym's meshes: it reads the public one, and names what it cannot read."""
+"""The reader of user-given meshes: it reads the public one, and says of each bad one what is wrong with it."""
 
 import numpy as np
 import pytest
-from benchmarks.isaac.tet_file import read_tet
+from benchmarks.isaac import tet_file
+from benchmarks.isaac.tet_file import checked, read_tet
 
 from tactile_core.errors import TactileError
 
@@ -36,6 +37,7 @@ def volumes(mesh):
 def test_a_mesh_is_read_and_turned_right_side_out(write):
     mesh = read_tet(write(text(cells=[[0, 2, 1, 3], [1, 2, 3, 4]])))
     np.testing.assert_array_equal(mesh.nodes, NODES)
+    assert mesh.turned == 1
     assert (volumes(mesh) > 0).all()
 
 
@@ -56,11 +58,25 @@ def test_the_surface_is_closed_and_faces_outward(write):
 
 
 BAD = {
-    "cut in a line": (text(head=False)[:-2], "line 7"),
+    "empty": ("", "no vertices"),
+    "vertices alone": (text(cells=[], head=False), "no tetrahedra"),
+    "cut in a line": (text(head=False)[:-2], r"line 7.*cut short"),
+    "cut after a line": (text().rsplit("\n", 1)[0], "1 tetrahedra; expected the 2"),
+    "cut in the vertices": ("\n".join(text().split("\n")[:4]), "3 vertices; expected the 5"),
     "a stranger": ("solid cube\nfacet normal 0 0 1\n", "line 1"),
     "words for numbers": (text().replace("0.01", "wide"), "line 3"),
+    "not a number": (text().replace("v 0.01 0 0 ", "v nan 0 0 "), "vertex 1 is nan"),
+    "infinite": (text().replace("v 0.01 0 0 ", "v inf 0 0 "), "vertex 1 is nan or infinite"),
+    "a number out of range": (text(cells=[[0, 1, 2, 3], [1, 2, 3, 5]]), r"names the vertices \[1, 2, 3, 5\]"),
+    "a negative number": (text(cells=[[0, 1, 2, 3], [1, 2, 3, -1]]), "expected numbers 0 to 4"),
     "a fraction": (text().replace("t 0 1 2 3", "t 0 1 2 3.5"), "line 8"),
+    "millimetres": (text(nodes=(np.array(NODES) * 1e3).tolist()), "looks like millimetres"),
+    "micrometres": (text(nodes=(np.array(NODES) * 1e-3).tolist()), "Scale it to metres"),
     "flat": (text(nodes=[*NODES[:4], [0.005, 0.005, 0]], cells=[*CELLS[:1], [0, 1, 2, 4]]), "without volume"),
+    "a corner twice": (text(cells=[[0, 1, 2, 3], [1, 2, 4, 4]]), "names a vertex twice"),
+    "a cell twice": (text(cells=[*CELLS, [3, 2, 1, 0]]), "there twice"),
+    "two vertices at one place": (text(nodes=[*NODES, NODES[0]]), "vertices 0 and 5 are at one place"),
+    "a loose vertex": (text(nodes=[*NODES, [0.02, 0, 0]]), "belong to no tetrahedron"),
     "binary": (b"\x89HDF\r\n\xff\xfe", "cannot be read"),
 }
 
@@ -70,6 +86,37 @@ def test_a_bad_file_is_refused_in_words(case, write):
     content, said = BAD[case]
     with pytest.raises(TactileError, match=said):
         read_tet(write(content))
+
+
+def test_a_file_that_is_not_there_or_too_large_is_refused(tmp_path, write, monkeypatch):
+    with pytest.raises(TactileError, match="cannot be read"):
+        read_tet(tmp_path / "absent.tet")
+    with pytest.raises(TactileError, match="cannot be read"):
+        read_tet(tmp_path)
+    monkeypatch.setattr(tet_file, "MAX_CELLS", 1)
+    with pytest.raises(TactileError, match="more than 1 vertices"):
+        read_tet(write(text()))
+    monkeypatch.setattr(tet_file, "MAX_BYTES", 10)
+    with pytest.raises(TactileError, match="more than 10 bytes"):
+        read_tet(write(text()))
+
+
+def test_each_cut_of_a_file_is_read_whole_or_refused(write):
+    """A cut can only pass where nothing but the end of the last line is missing."""
+    whole = text()
+    for end in range(len(whole)):
+        try:
+            mesh = read_tet(write(whole[:end]))
+        except TactileError:
+            continue
+        np.testing.assert_array_equal(mesh.nodes, NODES)
+        assert len(mesh.cells) == 2
+
+
+def test_arrays_are_checked_like_files():
+    assert checked(np.array(NODES), np.array(CELLS)).turned == 0
+    with pytest.raises(TactileError, match="millimetres"):
+        checked(np.array(NODES) * 1e3, np.array(CELLS))
 
 
 def test_the_public_mesh_is_read(outside_data):
