@@ -18,7 +18,7 @@ from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, Se
 from ..recordings.fingers import split
 from ..recordings.gain_matching import PRIOR, Match, match
 from ..recordings.readers import each_finger, sensor_of
-from ..sensors import typical_rest
+from ..sensors import title, typical_rest
 from . import reference_signals
 from .reference_signals import ReferenceSignals
 from .unit_rest import UnitRest, find_rest, find_rest_sp
@@ -96,7 +96,9 @@ def adapt_hand(
     units = _units(paths)
     sensor = found.pop()
     if typical_rest(sensor) is None:
-        return _rests_alone(units, sensor), ("no gains: networks of this sensor, which they need, do not ship",)
+        return _rests_alone(units, sensor), (
+            f"no gains are fitted to a {title(sensor)}: its recordings give its rest alone",
+        )
     sections: dict[str, Any] = {}
     warnings: list[str] = []
     for finger, files in sorted(units.items(), key=lambda unit: unit[0] or 0):
