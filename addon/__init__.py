@@ -24,7 +24,7 @@ from .operators import (
     translate_imported,
 )
 from .process import command_line
-from .ui import add_menu, asset_library, panels, preferences, properties, workspace
+from .ui import add_menu, asset_library, panels, preferences, properties, view, workspace
 
 # In the order of registration: properties before what uses them.
 PARTS = (
@@ -47,6 +47,7 @@ PARTS = (
     scene_files,
     workspace,
     panels,
+    view,
     command_line,
 )
 

@@ -117,7 +117,20 @@ def _stand_first() -> None:
     """Let the tab be the first until the sidebar is drawn."""
     if not TACTILE_PT_first.is_registered:
         bpy.utils.register_class(TACTILE_PT_first)
-        bpy.app.timers.register(lambda: bpy.utils.unregister_class(TACTILE_PT_first), first_interval=_FIRST)
+        bpy.app.timers.register(_stand_back, first_interval=_FIRST, persistent=True)
+
+
+def _stand_back() -> None:
+    """Let the tab stand behind Blender's own again."""
+    if TACTILE_PT_first.is_registered:
+        bpy.utils.unregister_class(TACTILE_PT_first)
+
+
+def unregister() -> None:
+    """Take back what `open_tab` did; the package calls it."""
+    if bpy.app.timers.is_registered(_stand_back):
+        bpy.app.timers.unregister(_stand_back)
+    _stand_back()
 
 
 def fit_timeline(context: bpy.types.Context) -> None:

@@ -20,14 +20,18 @@ def known(extension):
     )
 
 
-def test_off_leaves_nothing_and_on_again_is_whole(extension):
+def test_off_leaves_nothing_and_on_again_is_whole(extension, part):
+    view = part("addon.ui.view")
+    view.unregister()  # what a test before may have opened
     before = known(extension)
     functions, properties, classes = before
     assert {name.rpartition(".")[2] for name in functions} >= {"_menu", "_menu_import", "_menu_export", "_note"}
     assert properties == ["tactile", "tactile_render"] and "TACTILE_PT_recording" in classes
+    view._stand_first()  # for two seconds a class more, as where the tab is opened in an older Blender
     extension.unregister()
     try:
         assert known(extension) == ([], [], [])
+        assert not bpy.app.timers.is_registered(view._stand_back)
     finally:
         extension.register()
     assert known(extension) == before
