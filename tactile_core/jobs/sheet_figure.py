@@ -25,8 +25,8 @@ DPI = 100
 WIDTH, LEFT, RIGHT, GAP = 16.0, 0.95, 1.05, 0.12
 TITLE, WARNING_LINE, NUMBERS, ELECTRODES, TIME_AXIS, HEADING, Z_AXIS = 0.62, 0.21, 0.16, 1.4, 0.45, 0.26, 0.36
 PRESSURE = 0.75
-CAPTION_LINE, CAPTION_LETTERS, FOOT = 0.19, 31, 0.25  # a column is 31 letters of the caption wide
-MOST_CAPTION_LINES = 5  # force, two reasons of which one is too long for a line, expected error
+# Room for five lines: force, two reasons of which one is too long for a line, expected error; of 31 letters at most.
+CAPTION, CAPTION_LETTERS, FOOT = 1.045, 31, 0.25
 
 UNROLLED_X, UNROLLED_Z = (-24e-3, 8e-3), (-11.2e-3, 11.2e-3)  # m, what the unrolled rows show
 BESIDE_GEL = 0.5e-3, 0.4e-3  # m along and across the finger, of what the gel's row shows beside it
@@ -57,7 +57,7 @@ class SheetFigure:
         rows += self.column_width * camera.height / camera.width + (2 if truth else 1) * GAP + Z_AXIS
         head = TITLE + WARNING_LINE * len(warnings) + NUMBERS + ELECTRODES + TIME_AXIS + HEADING
         head += (PRESSURE + TIME_AXIS) * pressure
-        self.height = head + rows + CAPTION_LINE * (MOST_CAPTION_LINES + 0.5) + FOOT
+        self.height = head + rows + CAPTION + FOOT
         self.figure: Figure = Figure(figsize=(WIDTH, self.height), dpi=DPI, facecolor="white")
         self.top = 0.0  # inches from the upper edge to what is still free
 
@@ -223,7 +223,7 @@ class SheetFigure:
             text = "\n".join(textwrap.fill(line, CAPTION_LETTERS) for line in lines)
             color = MARK if is_guess(confidence[k], flags[k]) else "black"
             self._text(self._middle(k), 0.08, text, size=10, ha="center", va="top", color=color)
-        self.top += CAPTION_LINE * (MOST_CAPTION_LINES + 0.5)
+        self.top += CAPTION
         along = "left" if self.camera.right_z < 0 else "right"
         gel = sensors.title(self.camera.sensor)
         foot = (

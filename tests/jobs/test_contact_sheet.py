@@ -6,7 +6,7 @@ import pytest
 
 from tactile_core import sensors
 from tactile_core.jobs.contact_sheet import Contents, choose_frames, contact_sheet
-from tactile_core.jobs.sheet_figure import CAPTION_LINE, FOOT, MOST_CAPTION_LINES, SheetFigure
+from tactile_core.jobs.sheet_figure import CAPTION, FOOT, SheetFigure
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration_file import load_calibration
 
@@ -112,7 +112,7 @@ def test_captions_touch_neither_each_other_nor_the_line_below_them() -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure = SheetFigure(6, load_calibration().camera, [], False, pressure=False)
-    figure.top = figure.height - CAPTION_LINE * (MOST_CAPTION_LINES + 0.5) - FOOT
+    figure.top = figure.height - CAPTION - FOOT
     pairs = [Flag.UNEXPLAINED | Flag.OUT_OF_RANGE, Flag.BEYOND_PICTURE | Flag.POLARITY_ASSUMED, Flag.RECTIFIED]
     flags = np.array([int(flag) for flag in (*pairs, *pairs)], np.uint16)
     figure.captions(np.full((6, 3), 9.0), np.linspace(0, 1, 6), flags, np.full(6, 1e-3))
