@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from .mechanics.solve import solve as solve
     from .pictures.renderer import Renderer as Renderer
     from .recordings.readers import read as read
+    from .sensors.calibration_file import load_calibration as load_calibration
     from .translation.translate_recording import translate as translate
 
 _HOME = {  # of each public name: its module, and its name there; none for the module itself
@@ -47,11 +48,14 @@ _HOME = {  # of each public name: its module, and its name there; none for the m
     "Renderer": (".pictures.renderer", "Renderer"),
     "TactileError": (".errors", "TactileError"),
     "indenters": (".geometry.indenters", None),
+    "load_calibration": (".sensors.calibration_file", "load_calibration"),
     "read": (".recordings.readers", "read"),
     "solve": (".mechanics.solve", "solve"),
     "translate": (".translation.translate_recording", "translate"),
 }
-__all__ = ["Gel", "Placement", "Renderer", "TactileError", "indenters", "read", "solve", "translate"]
+__all__ = [
+    "Gel", "Placement", "Renderer", "TactileError", "indenters", "load_calibration", "read", "solve", "translate",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

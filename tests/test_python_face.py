@@ -27,7 +27,7 @@ def test_dir_lists_the_public_names_alone():
 def test_every_public_name_is_there_and_teaches():
     for name in tactile.__all__:
         assert getattr(tactile, name).__doc__, name
-    for name in ("read", "translate", "Renderer", "solve", "Placement", "Gel"):
+    for name in ("read", "translate", "load_calibration", "Renderer", "solve", "Placement", "Gel"):
         text = pydoc.render_doc(getattr(tactile, name))
         assert ">>>" in text and " m" in text, f"help(tactile.{name}) needs an example and units"
 
@@ -106,6 +106,13 @@ def test_an_unknown_preset_is_refused_before_mitsuba_is_looked_for(monkeypatch):
     monkeypatch.setitem(sys.modules, "mitsuba", None)
     with pytest.raises(tactile.TactileError, match="'best'; expected one of fast, standard"):
         tactile.Renderer(preset="best")
+
+
+def test_a_file_of_a_calibration_is_loaded_first_and_then_drawn_by():
+    file = ROOT / "scenes" / "calibrations" / "gelsight_mini_dots.toml"
+    assert tactile.Renderer(tactile.load_calibration(file), "fast").calibration.markers is not None
+    with pytest.raises(tactile.TactileError, match=r"expected a Calibration.*tactile\.load_calibration"):
+        tactile.Renderer(str(file), "fast")
 
 
 def test_five_lines_from_a_csv_to_pictures(slide_csv):

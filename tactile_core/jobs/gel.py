@@ -100,7 +100,8 @@ class Gel:
     sensor : name of a sensor, such as "digit" or "biotac"
     indenter : one of ``geometry.indenters``, or a closed ``trimesh.Trimesh`` in metres
     friction : Coulomb's coefficient; 0 for none
-    calibration : of the camera and its lights, None for the one that ships; preset : of the pictures
+    calibration : the camera and its lights, of ``load_calibration``; None for the one that ships
+    preset : of the pictures
     Raises TactileError for another sensor, and for meshes and values that no indenter can have; ModuleNotFoundError
     without the extra [fem], and without [render] for presets other than ``fast``.
     """

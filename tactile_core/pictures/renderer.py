@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from typing import Protocol
 
@@ -46,7 +45,7 @@ class Light(Protocol):
 class Renderer:
     """Camera pictures of one DIGIT by one preset; the scene and the picture at rest are made once.
 
-    calibration : the unit's camera and lights, or the file of `tactile calibrate`; None for the unit that ships
+    calibration : the unit's camera and lights, of ``load_calibration``; None for the unit that ships
     preset : ``fast`` (numpy alone, 8 ms a picture), ``standard``, ``quality`` or ``reference`` (Mitsuba)
     variant : Mitsuba's, "llvm_ad_rgb" or "scalar_rgb"; None for the faster one that works here; unused by ``fast``
     background : (H, W, 3) picture of the undeformed gel, levels 0 to 255; None for the calibration's
@@ -61,7 +60,7 @@ class Renderer:
 
     def __init__(
         self,
-        calibration: Calibration | str | os.PathLike[str] | None = None,
+        calibration: Calibration | None = None,
         preset: str = DEFAULT,
         variant: str | None = None,
         background: np.ndarray | None = None,
@@ -69,8 +68,10 @@ class Renderer:
         seed: int = 0,
         surroundings: Surroundings = NOTHING,
     ) -> None:
+        calibration = load_calibration() if calibration is None else calibration
         if not isinstance(calibration, Calibration):
-            calibration = load_calibration(calibration)
+            advice = "Read a file with tactile.load_calibration(path)"
+            raise TactileError("Renderer, calibration", f"{calibration!r:.80}", "a Calibration", advice)
         self.calibration = calibration
         self.camera = calibration.camera
         self._domed = rest is None and calibration.dome_scale != 1

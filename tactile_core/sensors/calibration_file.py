@@ -49,8 +49,12 @@ _TABLES = {
 def load_calibration(path: str | os.PathLike | None = None, sensor: str | None = None) -> Calibration:
     """Load the calibration in a TOML file; None for the one that ships with a sensor's descriptor, None the DIGIT's.
 
+    path : written by ``tactile calibrate``, or by hand; its lengths are in mm, those of the result in m
+    sensor : name of the sensor whose calibration it must be; None for any
     A background's photograph is looked for beside the file. Raises TactileError naming file and field for what cannot
     be read, is unknown, missing or out of its range, and for a file of another sensor.
+
+    >>> renderer = tactile.Renderer(tactile.load_calibration("unit.toml"))
     """
     if path is None:
         return _shipped(sensor or Camera.sensor)
