@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import pydoc
@@ -12,12 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import tactile_core as tactile
 from tactile_core.files.installed import advice
+from tactile_core.recordings.recording import Truth
 from tactile_core.sensors import digit_surface
 
 ROOT = Path(__file__).parent.parent
+NO_PLACE = np.full((2, 2), np.nan)
 
 
 def test_dir_lists_the_public_names_alone():
@@ -30,6 +34,47 @@ def test_every_public_name_is_there_and_teaches():
     for name in ("read", "translate", "load_calibration", "Renderer", "solve", "Placement", "Gel"):
         text = pydoc.render_doc(getattr(tactile, name))
         assert ">>>" in text and " m" in text, f"help(tactile.{name}) needs an example and units"
+
+
+def test_results_print_a_line_for_each_field(slide_csv):
+    recording = tactile.read(slide_csv())
+    ball = tactile.indenters.Sphere(radius=3e-3)
+    contact = tactile.solve("digit", ball, tactile.Placement(x=-6e-3, z=0.0), force=2.0)
+    lines = repr(contact).splitlines()
+    assert lines[0] == "Solution" and "  tier           'fast'" in lines and "  depth          0.000969762" in lines
+    touching, place = np.count_nonzero(contact.contact_patch), f"{contact.displacement.min():.4g} to "
+    assert f"  contact_patch  (2867,) bool, {touching} true" in lines
+    assert any(line.startswith(f"  displacement   (2867, 3) float64, {place}") for line in lines)
+    assert not any("on_demand" in line or "between" in line for line in lines)  # hidden; None
+    for result in (recording, tactile.translate(recording)):
+        assert all(len(line) < 200 for line in repr(result).splitlines()), repr(result)
+    assert "electrodes  (150, 19) float64, " in repr(recording) and "  about       {}" in repr(recording)
+    assert repr(tactile.Renderer(preset="fast")) == "<Renderer of a digit, preset fast, pictures (320, 240, 3)>"
+    assert "under Sphere(radius=0.003)>" in repr(tactile.Gel("digit", ball))
+
+
+def test_missing_numbers_are_counted():
+    truth = Truth(displacement_biotac=None, displacement_digit=None, force=np.zeros(3), contact_center=NO_PLACE)
+    assert repr(truth).splitlines()[1:3] == [
+        "  force           [0. 0. 0.]",
+        "  contact_center  (2, 2) float64, all NaN",
+    ]
+    half = dataclasses.replace(truth, contact_center=np.array([[1.0, np.nan]]), force=np.zeros((0, 3)))
+    assert repr(half).splitlines()[1:3] == [
+        "  force           (0, 3) float64",
+        "  contact_center  (1, 2) float64, 1 to 1, 1 NaN",
+    ]
+
+
+def test_solve_presses_a_trimesh_and_refuses_what_is_no_body():
+    ball = trimesh.creation.icosphere(2, 1e-3)  # m
+    place = tactile.Placement(x=-6e-3, z=0.0)
+    force = tactile.solve("digit", ball, place, depth=0.3e-3).force
+    assert force[1] > 0.01  # N
+    body = tactile.indenters.MeshIndenter.from_trimesh(ball)
+    np.testing.assert_array_equal(force, tactile.solve("digit", body, place, depth=0.3e-3).force)
+    with pytest.raises(tactile.TactileError, match=r"a int; expected .* trimesh\.Trimesh in metres"):
+        tactile.solve("digit", 3, place, force=1.0)
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones():

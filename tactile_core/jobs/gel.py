@@ -20,7 +20,8 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files.installed import require
-from ..geometry.indenters import Indenter, MeshIndenter, Pose
+from ..files.short_text import Summary
+from ..geometry.indenters import Indenter, Pose, as_indenter
 from ..geometry.indenters.rigid_pose import rigid_pose
 from ..mechanics.fast.active_set import UnsolvedError, Work
 from ..mechanics.fast.compliance import Compliance, compliance_of
@@ -63,8 +64,8 @@ _ENDED: Any = object()  # stands for poses or forces that are used up
 _BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (assumed: 20 mm/s at 100 Hz)
 
 
-@dataclasses.dataclass(frozen=True)
-class GelContact:
+@dataclasses.dataclass(frozen=True, repr=False)
+class GelContact(Summary):
     """A contact of a ``Gel``, SI units, in the sensor's frame; n surface nodes.
 
     force : (3,) N, exerted by the indenter; displacement : (n, 3) m of the surface
@@ -122,13 +123,16 @@ class Gel:
             require("render", "mitsuba")
         self.sensor, self.preset = sensor, preset
         self.friction = _not_negative(friction, "Gel, friction", "a coefficient of zero or more")
-        self.indenter: Indenter = indenter if _presses(indenter) else MeshIndenter.from_trimesh(indenter)
+        self.indenter: Indenter = as_indenter(indenter)
         self.surface = sensors.sensor_surface(sensor)
         if calibration is not None and calibration.camera.sensor != sensor:
             found = f"of a {sensors.title(calibration.camera.sensor)}"
             raise TactileError("Gel, calibration", found, f"one of a {sensors.title(sensor)}")
         self._calibration = calibration
         self.reset()
+
+    def __repr__(self) -> str:
+        return f"<Gel of a {self.sensor}, friction {self.friction:g}, preset {self.preset}, under {self.indenter!r}>"
 
     def reset(self) -> None:
         """Take the indenter away: the next contact depends on nothing before."""
@@ -363,11 +367,6 @@ class Gel:
         none = np.zeros_like(self.surface.rest)
         patch = np.zeros(len(none), bool)
         return GelContact(np.zeros(3), none, none.copy(), patch, 0.0, 0.0, 0.0, _matrix(pose))
-
-
-def _presses(indenter: Any) -> bool:
-    """Return true for one of ``geometry.indenters``; a class of them is none."""
-    return hasattr(indenter, "curvature") and not isinstance(indenter, type)
 
 
 def _given(pose: Any, force: float | None) -> tuple[Pose, float | None]:

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..files.short_text import Summary
 from .solids.finite_strain import FiniteStrainSolid, State
 
 Sensor = str  # name of a sensor, such as "biotac"
@@ -38,8 +39,8 @@ class OnDemand:
     errors: Callable[[], tuple[float, float]]
 
 
-@dataclasses.dataclass(frozen=True)
-class Solution:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Solution(Summary):
     """A solved contact, SI units, whatever the tier.
 
     tier : which solver made it; converged : whether it may be used; iterations : of its last step

@@ -10,7 +10,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files.installed import needing
-from ..geometry.indenters import Indenter, Pose
+from ..geometry.indenters import Indenter, Pose, as_indenter
 from . import error_estimate
 from .electrodes.biotac_sheet import sensing_films
 from .fast.compliance import compliance_of
@@ -40,7 +40,8 @@ def solve(
 ) -> Solution:
     """Press ``indenter`` into ``sensor`` at ``place`` to a depth, m, or a force along the motion, N.
 
-    sensor : name of a sensor, such as ``"digit"``; indenter : of ``tactile.indenters``, in m
+    sensor : name of a sensor, such as ``"digit"``
+    indenter : of ``tactile.indenters``, or a closed ``trimesh.Trimesh``, in m
     place : a ``tactile.Placement``, or the indenter's pose at first touch
     depth, force : one of the two: m beyond first touch, or N, found to a thousandth
     tier : ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round
@@ -80,6 +81,7 @@ def solve_path(
         raise TactileError("solve, tier", repr(tier), "fast, full or reference")
     if not (np.isfinite(friction) and friction >= 0):
         raise TactileError("solve, friction", repr(friction), "a coefficient of zero or more")
+    indenter = as_indenter(indenter)
     pose = place if isinstance(place, Pose) else _first_touch(sensor, indenter, place)
     thick = thickness_under(sensor, indenter, pose)
     limit = DEPTH_LIMIT * thick if limit is None else limit

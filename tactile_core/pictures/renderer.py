@@ -72,7 +72,7 @@ class Renderer:
         if not isinstance(calibration, Calibration):
             advice = "Read a file with tactile.load_calibration(path)"
             raise TactileError("Renderer, calibration", f"{calibration!r:.80}", "a Calibration", advice)
-        self.calibration = calibration
+        self.calibration, self.preset = calibration, preset
         self.camera = calibration.camera
         self._domed = rest is None and calibration.dome_scale != 1
         own = rest_height_map(self.camera) if rest is None else rest
@@ -100,6 +100,9 @@ class Renderer:
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
+
+    def __repr__(self) -> str:
+        return f"<Renderer of a {self.camera.sensor}, preset {self.preset}, pictures {(*self.camera.shape, 3)}>"
 
     def __call__(self, height_map: np.ndarray, marks: np.ndarray | None = None) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..files.short_text import Summary
 from ..sensors import SAMPLE_RATE, SOURCE
 
 LEAST_STEP = 1e-6  # s between stamps; less is no time (assumed), and its inverse no number
 
 
-@dataclass(frozen=True, eq=False)
-class Truth:
+@dataclass(frozen=True, eq=False, repr=False)
+class Truth(Summary):
     """True values of a simulated recording; real ones have none. None marks arrays that its file was made without.
 
     displacement_biotac : (T, N, 3) float32, m, of the outer skin's nodes
@@ -48,8 +49,8 @@ class Truth:
         return {sensor: values for sensor, values in held.items() if values is not None}
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Summary):
     """Content of a recording's file, unchanged: one frame a data row, in file order, nothing resampled or dropped.
 
     name : file name without its extension

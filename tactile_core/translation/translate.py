@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import accuracy, sensors
 from ..errors import TactileError
+from ..files.short_text import Summary
 from ..recordings import Signals
 from ..recordings.flags import Flag
 from ..sensors import SOURCE, TARGET
@@ -41,8 +42,8 @@ IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
 UNDECIDED, APART = 0.3, 3e-3  # assumed
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Translation:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Translation(Summary):
     """Result of a translation; T frames first, float32, SI units.
 
     latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents, before a mount's shift

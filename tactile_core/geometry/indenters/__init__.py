@@ -9,7 +9,7 @@ from .cylinder import Cylinder
 from .edge import Edge
 from .indenter import Indenter
 from .lying_cylinder import LyingCylinder
-from .mesh_indenter import MeshIndenter
+from .mesh_indenter import MeshIndenter, as_indenter
 from .pose import Pose, pose_on
 from .ring import Ring
 from .several import Several
@@ -27,5 +27,6 @@ __all__ = [
     "Ring",
     "Several",
     "Sphere",
+    "as_indenter",
     "pose_on",
 ]

@@ -18,6 +18,7 @@ from ...errors import TactileError
 from ...files import array_cache
 from ...files.cache import cache_folder
 from ...files.installed import needing
+from ...files.short_text import Summary
 from . import mesh_file, mesh_grid
 from .indenter import Indenter
 from .spline_grid import SplineGrid
@@ -31,8 +32,17 @@ _FLATTEST = 0.5  # flatter than at any edge: deep inside, where opposite faces a
 _LEVEL = 1e-7  # m, hull vertices this near to the farthest one lie equally far
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class MeshIndenter(Indenter):
+def as_indenter(body: Any) -> Indenter:
+    """Return ``body`` if it is an indenter, the indenter of it if it is a ``trimesh.Trimesh`` in metres.
+
+    Raises what ``MeshIndenter.from_trimesh`` does, for anything else too.
+    """
+    presses = hasattr(body, "curvature") and not isinstance(body, type)
+    return body if presses else MeshIndenter.from_trimesh(body)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MeshIndenter(Summary, Indenter):
     """A rigid body bounded by a triangle mesh.
 
     Its surface is where a tricubic spline of the mesh's signed distance is zero: smooth, with sharp edges rounded over

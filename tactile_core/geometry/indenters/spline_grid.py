@@ -8,11 +8,12 @@ import itertools
 import numpy as np
 
 from ...files.compiled import Loop, available
+from ...files.short_text import Summary
 from ..cubic_spline import bspline_slopes, bspline_weights
 
 
-@dataclasses.dataclass(frozen=True)
-class SplineGrid:
+@dataclasses.dataclass(frozen=True, repr=False)
+class SplineGrid(Summary):
     """The spline sum_ijk c_ijk B(x - i) B(y - j) B(z - k), in units of ``spacing`` m from ``origin`` (3,) m.
 
     coefficients : (nx, ny, nz), 4 or more each way, in the unit of the values
