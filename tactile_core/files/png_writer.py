@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+import io
 import os
 import struct
 import zlib
@@ -24,16 +25,22 @@ UP = 2  # PNG's filter of each row: less the row above, modulo 256
 
 def write_png(file: str | os.PathLike | BinaryIO, picture: np.ndarray) -> None:
     """Write a picture (H, W, 3) uint8 to a path or an open file. Raises OSError where the disk refuses."""
-    if not _has_libdeflate():
-        from PIL import Image
-
-        Image.fromarray(picture).save(file, "PNG", **PACKING)
-        return
-    content = _packed(picture)
+    content = pack_png(picture)
     if isinstance(file, str | os.PathLike):
         Path(file).write_bytes(content)
     else:
         file.write(content)
+
+
+def pack_png(picture: np.ndarray) -> bytes:
+    """Pack a picture (H, W, 3) uint8 as a PNG."""
+    if _has_libdeflate():
+        return _packed(picture)
+    from PIL import Image
+
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, "PNG", **PACKING)
+    return content.getvalue()
 
 
 @functools.cache

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import TactileError
-from ..files.png_writer import write_png
+from ..files.png_writer import pack_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import folds_counted
 from ..recordings import flags
@@ -168,6 +168,7 @@ class FramePass:
         self._pressure: list[np.ndarray] = []
         self._forces: list[np.ndarray] = []  # that the traction adds up to, and the networks'
         self.folded = 0  # height maps of a gel that folds over itself
+        self._packed: tuple[np.ndarray, bytes] | None = None  # the last picture, and its file
         self.share = 0.0  # the deepest move of a node so far, over the gel's thickness
         parts = [frames[start : start + BLOCK] for start in range(0, len(frames), BLOCK)]
         chosen = choose_frames(np.concatenate([np.abs(signals.change[part]).mean(axis=1) for part in parts]))
@@ -276,8 +277,14 @@ class FramePass:
                     shown["pictures"] = picture
                 if "image" in self.keep:
                     with self.clock.stage("png"):
-                        write_png(folder / results.IMAGES / results.IMAGE_NAME.format(frame), picture)
+                        self._write_picture(folder / results.IMAGES / results.IMAGE_NAME.format(frame), picture)
         return {"height_map": heights} if "height" in self.keep else {}
+
+    def _write_picture(self, path: Path, picture: np.ndarray) -> None:
+        """Write a picture; one that equals the one before, as while nothing touches, is not packed again."""
+        if self._packed is None or not np.array_equal(picture, self._packed[0]):
+            self._packed = picture, pack_png(picture)
+        path.write_bytes(self._packed[1])
 
     def _count_flags(self, bits: np.ndarray) -> None:
         for name, bit in flags.names().items():

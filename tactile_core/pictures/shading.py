@@ -46,8 +46,8 @@ class Shader:
         self.calibration = calibration = calibration or load_calibration()
         camera = self.camera = calibration.camera
         self._dome = rest is None  # heights have the public mesh's dome, which the unit's own takes the place of
-        rest = of_unit(rest_height_map(camera), calibration) if rest is None else rest
-        rest = camera_array(rest, camera.shape, "rest height map")
+        self._resting = rest_height_map(camera) if rest is None else camera_array(rest, camera.shape, "rest height map")
+        rest = of_unit(self._resting, calibration) if self._dome else self._resting
         self._view = Perspective(camera, rest)
         check_reach(rest, calibration, "rest height map")
         self.rest = self._view(rest)
@@ -59,13 +59,19 @@ class Shader:
         self.background = camera_array(background, (*camera.shape, 3), "background")
         self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
+        self._rest_picture = self._drawn(self._rest_radiance)
 
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
-        change = self._radiance(height_map)
+        if np.array_equal(height_map, self._resting):
+            return self._rest_picture.copy()
+        return self._drawn(self._radiance(height_map))
+
+    def _drawn(self, radiance: np.ndarray) -> np.ndarray:
+        """Picture (H, W, 3) uint8 of the radiance (3, H, W) of the LEDs."""
         if available():
-            return in_picture(change, self._rest_radiance, self._response, self.background, np.float32(LARGEST_LEVEL))
-        change -= self._rest_radiance
+            return in_picture(radiance, self._rest_radiance, self._response, self.background, np.float32(LARGEST_LEVEL))
+        change = radiance - self._rest_radiance
         picture = np.empty((*self.camera.shape, 3), np.uint8)
         for channel in range(len(COLOURS)):
             level = self._levels[channel].copy()

@@ -220,7 +220,7 @@ def test_a_disk_that_fills_up_ends_in_one_message_and_no_folder(slide_csv, tmp_p
     def full(*arguments, **more):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("tactile_core.jobs.frame_pass.write_png", full)
+    monkeypatch.setattr("tactile_core.jobs.frame_pass.pack_png", full)
     out = tmp_path / "out"
     (folder,) = results.result_folders([tmp_path / "touch.csv"], out, False)
     with pytest.raises(TactileError, match="No space left on device"):
