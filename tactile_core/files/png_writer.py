@@ -8,6 +8,7 @@ import io
 import os
 import struct
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -32,14 +33,14 @@ def write_png(file: str | os.PathLike | BinaryIO, picture: np.ndarray) -> None:
         file.write(content)
 
 
-def pack_png(picture: np.ndarray) -> bytes:
-    """Pack a picture (H, W, 3) uint8 as a PNG."""
+def pack_png(picture: np.ndarray, packing: Mapping[str, int] = PACKING) -> bytes:
+    """Pack a picture (H, W, 3) uint8 as a PNG; packing : of Pillow, which is used without libdeflate."""
     if _has_libdeflate():
         return _packed(picture)
     from PIL import Image
 
     content = io.BytesIO()
-    Image.fromarray(picture).save(content, "PNG", **PACKING)
+    Image.fromarray(picture).save(content, "PNG", **packing)
     return content.getvalue()
 
 
