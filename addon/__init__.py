@@ -22,9 +22,11 @@ from .operators import (
     snap_to_gel,
     stale_picture,
     translate_imported,
+    view,
 )
 from .process import command_line
-from .ui import add_menu, asset_library, panels, preferences, properties, view, workspace
+from .settings import preferences, properties
+from .ui import add_menu, asset_library, panels, workspace
 
 # In the order of registration: properties before what uses them.
 PARTS = (

@@ -110,6 +110,14 @@ EDGES = {
 }  # fmt: skip
 # addon/process/command_line.py is `tactile` inside Blender.
 EXCEPTIONS = {("addon/process/command_line.py", "cli")}
+# Of the extension's own rooms, which the add-on's __init__ registers.
+ADDON_EDGES = {
+    "settings": "",
+    "process": "settings",
+    "objects": "settings",
+    "operators": "objects process settings",
+    "ui": "operators objects process settings",
+}
 VERBS = "tactile_core/cli/verbs"
 MOST_NAMES, MOST_FILES = 16, 25  # at the top of tactile_core, and in any folder
 
@@ -120,17 +128,19 @@ def room_of(path: Path) -> str:
     return parts[1] if parts[0] == PACKAGE.name else parts[0]
 
 
-def rooms_imported(path: Path) -> set[str]:
-    """Rooms of tactile_core that a file imports from, anywhere in it, its own left out."""
+def rooms_imported(path: Path, package: str = PACKAGE.name) -> set[str]:
+    """Rooms of tactile_core, or of another package, that a file imports from, anywhere in it, its own left out."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             above = path.relative_to(ROOT).parts[: -node.level] if node.level else ()
             names = [*above, *(node.module or "").split(".")] if node.module else [*above]
-            if names[:1] == [PACKAGE.name]:
+            if names[:1] == [package]:
                 found |= {names[1]} if len(names) > 1 else {alias.name for alias in node.names}
-    rooms = {path.stem for path in PACKAGE.glob("*.py")} | {path.name for path in PACKAGE.iterdir() if path.is_dir()}
-    return (found & rooms) - {room_of(path), "__init__"}
+    folder = ROOT / package
+    rooms = {path.stem for path in folder.glob("*.py")} | {path.name for path in folder.iterdir() if path.is_dir()}
+    own = path.relative_to(folder).parts[0] if path.is_relative_to(folder) else room_of(path)
+    return (found & rooms) - {own.removesuffix(".py"), "__init__"}
 
 
 def sources(*folders: str) -> list[Path]:
@@ -173,6 +183,17 @@ def test_each_room_imports_only_what_lies_below_it():
         if path != PACKAGE / "__init__.py"
         for room in sorted(rooms_imported(path) - set(EDGES[room_of(path)].split()))
         if (path.relative_to(ROOT).as_posix(), room) not in EXCEPTIONS
+    ]
+    assert offenders == []
+
+
+def test_each_room_of_the_extension_imports_only_what_lies_below_it():
+    assert {path.parent.name for path in sources("addon")} - {"addon"} == set(ADDON_EDGES)
+    offenders = [
+        f"{path.relative_to(ROOT)} imports {room}"
+        for name, below in ADDON_EDGES.items()
+        for path in sources(f"addon/{name}")
+        for room in sorted(rooms_imported(path, "addon") - set(below.split()))
     ]
     assert offenders == []
 

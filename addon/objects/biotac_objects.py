@@ -7,7 +7,7 @@ import numpy as np
 
 from ...tactile_core import sensors
 from ...tactile_core.geometry.lattice import grid_faces
-from ..ui import properties
+from ..settings import properties
 from . import axes, styles, surfaces
 
 SKIN_COLOUR = (0.25, 0.55, 0.45, 0.35)  # see-through, so that core and electrodes show

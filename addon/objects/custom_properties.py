@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..operators.recording_data import Translated
 from . import curves
 
 UNKNOWN = -1e-6  # m, of an expected error: a keyed property holds no NaN
@@ -20,23 +19,8 @@ ABOUT = {
 }
 
 
-def columns(found: Translated) -> dict[str, np.ndarray]:
-    """Name -> (T,) or (T, k) of each property; the force in Blender's axes."""
-    translation = found.translation
-    values = {
-        "electrodes": found.signals.change,
-        "force": translation.force[:, [0, 2, 1]] * np.array([1, 1, -1]),
-        "confidence": translation.confidence,
-        "expected_error_um": 1e6 * translation.expected_error_biotac,
-        "flags": translation.flags,
-    }
-    if found.recording.pdc is not None:
-        values["pdc"] = found.recording.pdc[found.chosen]
-    return values
-
-
 def write(thing: bpy.types.Object, values: dict[str, np.ndarray], frames: np.ndarray) -> None:
-    """Set and keyframe custom properties."""
+    """Set and keyframe custom properties: values (T,) or (T, k) by the names of ``ABOUT``, at frames (T,)."""
     for name, numbers in values.items():
         bits = name == "flags"  # which mean nothing between two frames
         numbers = np.nan_to_num(np.asarray(numbers, int if bits else np.float64))

@@ -11,7 +11,7 @@ from ...tactile_core import sensors
 from ...tactile_core.pictures.mitsuba.window import ACRYLIC
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from ...tactile_core.sensors.camera import Camera, Led
-from ..ui import properties
+from ..settings import properties
 from . import digit_materials, held_light, image_frame, led_receivers, surfaces
 
 _CHIP = np.array([1.6e-3, 0.8e-3, 0.6e-3])  # m, sides of an LED package (0603)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
-from ..ui import properties
+from ..settings import properties
 from . import axes, mesh_cache, styles, surfaces
 from .style_nodes import DISPLACEMENT
 

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core import sensors
-from ..ui import properties
+from ..settings import properties
 from . import axes, curves, frame_attribute, surfaces
 
 NEAREST, DISTANCE = "electrode", "electrode_distance"  # of the skin's nodes: which, from 0, and how far, m

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core import sensors
-from ..ui import properties
+from ..settings import properties
 
 _PICTURE, _HEIGHTS = "{} picture", "{} height map"  # of a sensor
 

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ..ui import properties
+from ..settings import properties
 from . import axes, surfaces
 
 COLOUR = (0.85, 0.55, 0.2, 1.0)

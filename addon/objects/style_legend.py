@@ -7,7 +7,7 @@ import math
 import bpy
 import numpy as np
 
-from ..ui import properties
+from ..settings import properties
 from . import style_nodes, styles, surfaces
 
 _BEFORE = 8.0  # mm from the sensor's base, or its housing's

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..ui import properties
+from ..settings import properties
 from . import style_nodes, surfaces
 
 MODIFIER = "Tactile style"

@@ -7,8 +7,8 @@ from bpy_extras.io_utils import ExportHelper
 
 from ...tactile_core.sensors import calibration_file
 from ..objects import digit_body, digit_unit
-from ..ui import properties, render_settings
-from ..ui.reports import TactileOperator
+from ..settings import properties, render_settings
+from ..settings.reports import TactileOperator
 
 
 class _OnGel:

@@ -4,8 +4,8 @@ import bpy
 
 from ..process.jobs import Job, JobFolder
 from ..process.tracer_process import close_all
-from ..ui import preferences
-from ..ui.reports import TactileOperator, require
+from ..settings import preferences
+from ..settings.reports import TactileOperator, require
 
 _LOOK = 0.1  # s between two looks at the worker
 

@@ -10,11 +10,11 @@ from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors.electrodes import table_of
 from ..objects import axes, biotac_objects, custom_properties, electrode_markers, motion
-from ..ui import properties, timeline, view
-from ..ui.progress import shown
-from ..ui.properties import MOTIONS, POLARITIES, POLARITY_HELP, WEIGHTS_HELP
-from ..ui.reports import TactileOperator
-from . import recording_data
+from ..settings import properties
+from ..settings.properties import MOTIONS, POLARITIES, POLARITY_HELP, WEIGHTS_HELP
+from ..settings.reports import TactileOperator
+from . import recording_data, timeline, view
+from .progress import shown
 
 SUFFIXES = "*.csv;*.h5;*.hdf5;*.npz"
 _APART = 85e-3  # m between the recordings of a scene: a BioTac, a DIGIT's housing and a gap
@@ -121,7 +121,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         if placed:
             electrode_markers.add_markers(skin, group, found.signals.change, frames)
             electrode_markers.add_counts(skin, found.signals.change, frames)
-        custom_properties.write(skin, custom_properties.columns(found), frames)
+        custom_properties.write(skin, found.columns(), frames)
         return skin
 
 

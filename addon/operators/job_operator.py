@@ -7,7 +7,7 @@ from typing import ClassVar
 import bpy
 
 from ..process.jobs import Job, JobFolder
-from ..ui.reports import Refused, TactileOperator, reported
+from ..settings.reports import Refused, TactileOperator, reported
 
 _STEP = 0.1  # s between two looks at the worker
 

@@ -12,7 +12,7 @@ from ...tactile_core.pictures import height_map, shading
 from ...tactile_core.sensors.calibration import Calibration
 from ..objects import digit_objects, digit_unit, images
 from ..process import tracer_process
-from ..ui import properties, render_settings, reports
+from ..settings import properties, render_settings, reports
 from . import stale_picture
 
 FAST = "fast"

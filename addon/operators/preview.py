@@ -8,9 +8,9 @@ from bpy.app.handlers import persistent
 from ...tactile_core.errors import TactileError
 from ..objects import images
 from ..process import tracer_process
-from ..ui import properties, render_settings, view
-from ..ui.reports import TactileOperator
-from . import pictures, stale_picture
+from ..settings import properties, render_settings
+from ..settings.reports import TactileOperator
+from . import pictures, stale_picture, view
 
 _SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material, bpy.types.ShaderNodeTree)
 _drawing = False  # a picture's own update must not draw another

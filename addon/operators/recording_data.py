@@ -34,6 +34,20 @@ class Translated:
     signals: Signals
     translation: Translation
 
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return the values (T,) or (T, k) of the skin's custom properties by name; the force in Blender's axes."""
+        translation = self.translation
+        values = {
+            "electrodes": self.signals.change,
+            "force": translation.force[:, [0, 2, 1]] * np.array([1, 1, -1]),
+            "confidence": translation.confidence,
+            "expected_error_um": 1e6 * translation.expected_error_biotac,
+            "flags": translation.flags,
+        }
+        if self.recording.pdc is not None:
+            values["pdc"] = self.recording.pdc[self.chosen]
+        return values
+
 
 @functools.lru_cache(maxsize=2)
 def _translator(weights: str, source: str | None, _changed: int) -> translate.Translator:

@@ -8,7 +8,7 @@ from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
 from ..process import tracer_process
-from ..ui import properties, render_settings, reports
+from ..settings import properties, render_settings, reports
 from . import pictures
 
 ID = "TACTILE_DIGIT"

@@ -6,8 +6,8 @@ import bpy
 
 from ...tactile_core.errors import TactileError
 from ..objects import digit_body
-from ..ui import properties
-from ..ui.render_settings import calibration_of
+from ..settings import properties
+from ..settings.render_settings import calibration_of
 from . import pictures
 
 _FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")

@@ -5,8 +5,8 @@ import bpy
 from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors.camera import COLOURS
 from ..objects import digit_body, digit_materials, digit_unit
-from ..ui import properties, render_settings, reports
-from ..ui.reports import TactileOperator
+from ..settings import properties, render_settings, reports
+from ..settings.reports import TactileOperator
 from . import pictures
 from .render_engine import ID
 

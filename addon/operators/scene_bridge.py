@@ -12,7 +12,7 @@ import numpy as np
 
 from ...tactile_core.errors import TactileError
 from ..objects import curves, indenter_objects
-from ..ui import properties
+from ..settings import properties
 
 DEFAULTS = {"format": "tactile-scene-1", "name": "scene", "description": "Made in Blender."}
 DIGITS_S, DIGITS_MM, DIGITS_N = 6, 5, 7  # decimals kept of float32 keyframes

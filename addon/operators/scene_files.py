@@ -11,9 +11,9 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ..objects import axes, biotac_objects, curves, digit_body, digit_objects, indenter_objects
-from ..ui import properties, render_settings, timeline, view
-from ..ui.reports import TactileOperator, require
-from . import scene_bridge
+from ..settings import properties, render_settings
+from ..settings.reports import TactileOperator, require
+from . import scene_bridge, timeline, view
 
 _HOVER = 12e-3  # m above the sensors' frame: an indenter that presses by force is shown clear of the gel
 

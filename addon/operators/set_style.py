@@ -7,8 +7,9 @@ import numpy as np
 
 from ...tactile_core.errors import TactileError
 from ..objects import curves, frame_attribute, style_legend, style_nodes, styles
-from ..ui import properties, view
-from ..ui.reports import TactileOperator
+from ..settings import properties
+from ..settings.reports import TactileOperator
+from . import view
 
 _ROLES = ("BIOTAC", "DIGIT")
 

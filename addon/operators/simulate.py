@@ -9,8 +9,8 @@ import numpy as np
 from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors import SAMPLE_RATE
 from ..process.jobs import Job, JobFolder
-from ..ui import properties, render_settings
-from ..ui.reports import require
+from ..settings import properties, render_settings
+from ..settings.reports import require
 from . import scene_bridge, simulation_result
 from .job_operator import JobOperator
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...tactile_core.translation import contact_patch
 from ..objects import axes, curves, custom_properties, frame_attribute, motion
-from ..ui import properties, view
-from . import pictures, set_style
+from ..settings import properties
+from . import pictures, set_style, view
 
 STANDING = "{} simulated"
 MOVED = "moved "  # before a sensor's name, in a worker's result

@@ -14,8 +14,8 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.mechanics.placement import Placement, pose_at
 from ..objects import axes, indenter_objects
 from ..process.jobs import JobFolder
-from ..ui import properties
-from ..ui.reports import TactileOperator, require
+from ..settings import properties
+from ..settings.reports import TactileOperator, require
 from .scene_bridge import indenter_of, sensor_of
 
 

@@ -10,7 +10,7 @@ from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
 from ..objects import digit_objects, digit_unit, images
-from ..ui import properties, render_settings
+from ..settings import properties, render_settings
 
 DIM = 0.3  # of a stale picture's brightness
 _STALE = "tactile_stale"  # property of the picture's datablock in a saved file

@@ -7,11 +7,11 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import contact_patch, gel_place
 from ..objects import custom_properties, digit_body, digit_objects, frame_attribute, motion
 from ..process.jobs import Job, JobFolder
-from ..ui import properties, render_settings, timeline, view
-from ..ui.progress import shown
-from ..ui.reports import require
-from . import pictures, recording_data, set_style
+from ..settings import properties, render_settings
+from ..settings.reports import require
+from . import pictures, recording_data, set_style, timeline, view
 from .job_operator import JobOperator
+from .progress import shown
 
 _READ = ("displacement_digit", "contact_center", "force", "flags")  # of a translation, to solve its contacts
 
@@ -92,7 +92,7 @@ class TACTILE_OT_translate(JobOperator):
         patch = contact_patch.contact_patch(self._moved, surface)
         frame_attribute.add(gel, frame_attribute.PATCH, patch, frames[0], step)
         set_style.follow(gel, before)
-        values = custom_properties.columns(self._found)
+        values = self._found.columns()
         told = {name: values[name] for name in ("force", "confidence")}
         told |= {"expected_error_um": 1e6 * self._error, "flags": self._flags}
         custom_properties.write(gel, told, frames)

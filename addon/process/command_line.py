@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...tactile_core.errors import TactileError
-from ..ui import properties
+from ..settings import properties
 
 DESCRIPTION = """\
 Convert recordings, simulate scenes and render pictures inside Blender, unattended. Each input gets the folder

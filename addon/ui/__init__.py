@@ -1,1 +1,1 @@
-"""Panels, menus, properties and preferences."""
+"""Panels, menus, the workspace and the asset library."""

@@ -5,9 +5,10 @@ import bpy
 from ...tactile_core.errors import TactileError
 from ...tactile_core.geometry.indenters.scene_form import forms
 from ..objects import axes, biotac_objects, digit_body, digit_objects, indenter_objects
+from ..operators import view
 from ..operators.scene_bridge import sensor_of
-from . import properties, render_settings, view
-from .reports import TactileOperator, require
+from ..settings import properties, render_settings
+from ..settings.reports import TactileOperator, require
 
 # Each shape's own file says how the menu shows it, and which of the sizes below sets which of its fields.
 FORMS = {kind: form for kind, form in forms().items() if form.label}

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ..objects import style_nodes
-from .reports import TactileOperator
+from ..settings.reports import TactileOperator
 
 NAME = "Tactile"
 _PACKAGE = __package__.rsplit(".", 2)[0]

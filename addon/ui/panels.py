@@ -7,16 +7,16 @@ import bpy
 
 from ...tactile_core.translation import trust_words
 from ..objects import style_nodes, styles
-from ..operators import preview, render_setup, snap_to_gel, stale_picture
+from ..operators import preview, render_setup, snap_to_gel, stale_picture, view
 from ..operators.import_recording import TACTILE_OT_import_recording
 from ..operators.preview import TACTILE_OT_live_picture
 from ..operators.render_setup import draw_parts, draw_settings
 from ..operators.scene_files import TACTILE_OT_export_scene, TACTILE_OT_import_scene
 from ..operators.simulate import TACTILE_OT_simulate
 from ..operators.translate_imported import TACTILE_OT_translate
-from . import properties, view
+from ..settings import properties
+from ..settings.reports import missing
 from .add_menu import TACTILE_MT_add
-from .reports import missing
 from .workspace import TACTILE_OT_open_workspace
 
 

@@ -7,8 +7,9 @@ import functools
 import bpy
 
 from ..objects import images
-from . import properties, view
-from .reports import TactileOperator
+from ..operators import view
+from ..settings import properties
+from ..settings.reports import TactileOperator
 
 NAME = "Tactile"
 # Shares of the timeline at the bottom, of what is left of the picture, and of what is below it.

@@ -39,7 +39,7 @@ def shown(part, gel):
 
     def read():
         bpy.context.view_layer.update()
-        unit = part("addon.ui.render_settings").calibration_of(bpy.context.scene, "digit")
+        unit = part("addon.settings.render_settings").calibration_of(bpy.context.scene, "digit")
         return part("addon.objects.digit_unit").shown_unit(gel, bpy.context.evaluated_depsgraph_get(), unit)
 
     return read

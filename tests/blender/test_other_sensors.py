@@ -53,7 +53,7 @@ def on_both(imported, needs):
 
 
 def test_the_menus_list_the_sensors_that_are_there_the_usual_pair_first(part):
-    items = part("addon.ui.properties").sensor_items
+    items = part("addon.settings.properties").sensor_items
     assert [name for name, _, _ in items()][:2] == ["BIOTAC", "DIGIT"]
     assert {"BIOTAC_SP", "GELSIGHT_MINI", GEL.upper()} <= {name for name, _, _ in items()}
     gels = [name for name, _, _ in items(gels_only=True)]
@@ -88,7 +88,7 @@ def test_each_gel_has_its_own_picture_camera_and_lights(on_both, part):
         bpy.context.view_layer.objects.active = gel
         bpy.ops.tactile.set_up_render()
         assert (scene.render.resolution_x, scene.render.resolution_y) == size and scene.camera.parent == gel
-        assert part("addon.ui.properties").gel_of(scene) == gel  # what F12 draws
+        assert part("addon.settings.properties").gel_of(scene) == gel  # what F12 draws
     unit = part("tactile_core.sensors.calibration_file").load_calibration(None, GEL)
     shown = part("addon.objects.digit_unit").shown_unit(mini, bpy.context.evaluated_depsgraph_get(), unit)
     assert shown.unit == unit and not shown.around
@@ -97,7 +97,7 @@ def test_each_gel_has_its_own_picture_camera_and_lights(on_both, part):
 def test_a_calibration_of_one_gel_leaves_the_other_its_own(on_both, part, tmp_path):
     scene, (digit, mini) = bpy.context.scene, on_both
     shutil.copy(SENSORS / "digit" / "default.toml", tmp_path / "unit.toml")
-    of = part("addon.ui.render_settings").calibration_of
+    of = part("addon.settings.render_settings").calibration_of
     scene.tactile_render.calibration = str(tmp_path / "unit.toml")
     assert (of(scene, "digit").camera.sensor, of(scene, GEL).camera.sensor) == ("digit", GEL)
     bpy.data.objects.remove(digit)
@@ -189,7 +189,7 @@ def test_a_file_of_a_former_version_holds_the_usual_pair(imported, part):
 
 
 def test_the_preferences_name_a_folder_of_sensors(part, monkeypatch, tmp_path):
-    preferences = bpy.context.preferences.addons[part("addon.ui.preferences").ID].preferences
+    preferences = bpy.context.preferences.addons[part("addon.settings.preferences").ID].preferences
     monkeypatch.setenv("TACTILE_SENSORS", "")
     preferences.sensors = str(tmp_path)
     try:

@@ -21,13 +21,15 @@ def test_clearing_the_cache_removes_our_arrays_alone(monkeypatch, tmp_path, part
         (tmp_path / name).mkdir()
         (tmp_path / name / "array.npy").write_bytes(b"1234")
     (tmp_path / "compliance-digit-1" / "sha256.json").write_text("{}")
-    assert [part("addon.ui.preferences").size_of(each) for each in part("tactile_core.files.cache").entries()] == [6]
+    assert [
+        part("addon.settings.preferences").size_of(each) for each in part("tactile_core.files.cache").entries()
+    ] == [6]
     assert bpy.ops.tactile.clear_cache() == {"FINISHED"}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
 
 
 def test_a_scene_without_calibration_takes_the_preferences(preferences, scene, part, tmp_path):
-    settings = part("addon.ui.render_settings")
+    settings = part("addon.settings.render_settings")
     own = tmp_path / "unit.toml"
     bpy.ops.tactile.add_sensor(sensor="DIGIT")
     bpy.data.lights["LED red"].energy *= 2

@@ -21,7 +21,7 @@ def known(extension):
 
 
 def test_off_leaves_nothing_and_on_again_is_whole(extension, part):
-    view = part("addon.ui.view")
+    view = part("addon.operators.view")
     view.unregister()  # what a test before may have opened
     before = known(extension)
     functions, properties, classes = before

@@ -241,7 +241,7 @@ def test_a_worker_that_aborts_leaves_blender_alive(traced, part):
 
 
 def test_a_bound_on_pictures_picks_the_preset(ready, part):
-    settings, scene = part("addon.ui.render_settings"), bpy.context.scene
+    settings, scene = part("addon.settings.render_settings"), bpy.context.scene
     table = part("tactile_core.pictures.presets").measured()["presets"]
     scene.tactile_render.preset = "standard"
     assert settings.preset_of(scene) == "standard"

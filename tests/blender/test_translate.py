@@ -106,11 +106,11 @@ def test_the_picture_and_height_map_are_those_of_the_library(gel, part):
 
 def test_low_confidence_is_marked_on_the_timeline(scene, part):
     confidence = np.array([1, 0.2, 0.3, 1, 1, 0.1])
-    assert part("addon.ui.timeline").mark_low_confidence(scene, confidence, np.arange(10, 16)) == 2
+    assert part("addon.operators.timeline").mark_low_confidence(scene, confidence, np.arange(10, 16)) == 2
     assert [(m.frame, m.name) for m in scene.timeline_markers] == [
         (11, "low confidence to 12"), (15, "low confidence to 15"),
     ]  # fmt: skip
-    part("addon.ui.timeline").mark_low_confidence(scene, np.ones(6), np.arange(6))
+    part("addon.operators.timeline").mark_low_confidence(scene, np.ones(6), np.arange(6))
     assert not scene.timeline_markers
 
 

@@ -24,7 +24,7 @@ folder.mkdir(parents=True, exist_ok=True)
 name = "bl_ext.user_default.tactile"
 try:
     assert addon_utils.enable(name, default_set=True)
-    lacking = sys.modules[name + ".addon.ui.reports"].missing("h5py", "scipy", "mitsuba", "msgspec")
+    lacking = sys.modules[name + ".addon.settings.reports"].missing("h5py", "scipy", "mitsuba", "msgspec")
     assert lacking == ["h5py", "scipy", "mitsuba", "msgspec"], lacking
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     bpy.ops.tactile.import_recording(filepath=os.environ["CSV"])

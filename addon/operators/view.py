@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from . import properties
+from ..settings import properties
 
 # Of a new file of Blender's (File > New > General): name, type and place.
 _UNTOUCHED = (

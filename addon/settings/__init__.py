@@ -1,0 +1,1 @@
+"""What is set in a .blend and in the preferences, and how errors are reported."""
