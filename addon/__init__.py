@@ -55,7 +55,7 @@ PARTS = (
 
 
 def register() -> None:
-    """Called by Blender when the extension is switched on; what was registered is taken back if a part fails."""
+    """Register all parts when Blender switches the extension on; unregister them again if one fails."""
     done = []
     try:
         for part in PARTS:
@@ -68,7 +68,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Called by Blender when the extension is switched off."""
+    """Unregister all parts when Blender switches the extension off."""
     for part in reversed(PARTS):
         _unregister(part)
 

@@ -260,6 +260,32 @@ def test_no_function_bears_a_name_that_says_nothing():
     assert found == []
 
 
+def undocumented(node: ast.AST, where: str) -> list[str]:
+    """Names of public classes, functions and methods below a node that have no docstring."""
+    found = []
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If | ast.Try | ast.With):
+            found += undocumented(child, where)
+        if isinstance(child, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and not child.name.startswith("_"):
+            found += [] if ast.get_docstring(child) else [where + child.name]
+            found += undocumented(child, f"{where}{child.name}.") if isinstance(child, ast.ClassDef) else []
+    return found
+
+
+def test_all_that_is_public_has_a_docstring():
+    found = [
+        name
+        for path in sources("tactile_core", "addon", "scenes")
+        for name in undocumented(ast.parse(path.read_text(encoding="utf-8")), f"{path.relative_to(ROOT)}:")
+    ]
+    assert found == []
+
+
+def test_a_docstring_that_is_missing_is_found():
+    code = "class Shown:\n    'A class.'\n    def bare(self): pass\nif True:\n    def also(): pass\ndef _own(): pass"
+    assert undocumented(ast.parse(code), "m:") == ["m:Shown.bare", "m:also"]
+
+
 def lint(path: str, code: str) -> str:
     """What ruff says of this code, were it in that file of the project."""
     command = [sys.executable, "-m", "ruff", "check", "--output-format=concise", "--stdin-filename", path, "-"]

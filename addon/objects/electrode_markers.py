@@ -40,7 +40,7 @@ def add_markers(
 
 
 def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> None:
-    """Let the skin's nodes know the change (T, e), counts, of the electrode that is nearest to each."""
+    """Give each node of the skin the change (T, e), counts, of the electrode nearest to it, as an attribute."""
     rest, places = properties.surface_of(skin).rest, sensors.electrodes(properties.sensor_name(skin))
     # An electrode shows where the skin is nearest to it.
     over = rest[np.linalg.norm(rest[:, None] - places, axis=-1).argmin(0)]

@@ -29,7 +29,7 @@ class JobOperator(TactileOperator):
         raise NotImplementedError
 
     def work(self, context: bpy.types.Context) -> None:
-        """Do it without a window, or from a script: waits for the end."""
+        """Run the job and wait for its end: without a window, or from a script."""
         try:
             self.begin(context)
             while self._job is not None and not self._job.poll(_STEP):
@@ -39,7 +39,7 @@ class JobOperator(TactileOperator):
             self._close(context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """Do it from the window: goes on while Blender stays usable."""
+        """Start the job from the window; Blender stays usable while it runs."""
         try:
             with reported(self):
                 self.begin(context)
@@ -56,7 +56,7 @@ class JobOperator(TactileOperator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Called by Blender for each event."""
+        """Handle an event: Esc stops the job, timers poll it; Blender calls it."""
         if event.type == "ESC":
             self._close(context)
             self.report({"WARNING"}, self.stopped)

@@ -27,7 +27,7 @@ class TactileRenderEngine(bpy.types.RenderEngine):
     bl_use_eevee_viewport = True  # the 3D view's Rendered shading shows the meshes, not the camera inside the gel
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Called by Blender for each frame."""
+        """Render a frame; Blender calls it."""
         try:
             self._show(self._picture(depsgraph))
         except (TactileError, OSError, ModuleNotFoundError) as error:

@@ -53,7 +53,7 @@ class TACTILE_PT_render(bpy.types.Panel):
         return context.engine == ID
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Called by Blender."""
+        """Draw the panel; Blender calls it."""
         draw_settings(self.layout, context)
         draw_parts(self.layout, context)
 

@@ -87,14 +87,14 @@ def _state(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[np.nd
 
 @persistent
 def _frame_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    """Called by Blender at each change of the frame."""
+    """Check the picture at each change of the frame; Blender calls it."""
     if depsgraph is not None and not _known.live and not bpy.app.is_job_running("RENDER"):
         check(scene, depsgraph)
 
 
 @persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Called by Blender at each change of the scene."""
+    """Check the picture at each change of the scene; Blender calls it."""
     if any(isinstance(update.id, _SEEN) for update in depsgraph.updates):
         _frame_changed(scene, depsgraph)
 

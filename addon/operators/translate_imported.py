@@ -85,7 +85,7 @@ class TACTILE_OT_translate(JobOperator):
         self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
     def _animate(self, gel: bpy.types.Object, frames: np.ndarray, how: str) -> str:
-        """Let the gel move, with its contact patch and what is told of each frame; returns a sentence."""
+        """Animate the gel, its contact patch and the properties of each frame; returns a sentence for the user."""
         surface, before = properties.surface_of(gel), gel.tactile.largest
         summary = motion.animate(gel, surface.rest, self._moved, frames, how)
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0

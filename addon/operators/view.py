@@ -110,7 +110,7 @@ class TACTILE_PT_first(bpy.types.Panel):
     bl_options = {"HIDE_HEADER"}  # noqa: RUF012 (Blender reads plain class attributes)
 
     def draw(self, _context: bpy.types.Context) -> None:
-        """Called by Blender."""
+        """Draw nothing; Blender calls it."""
 
 
 def _stand_first() -> None:
@@ -161,7 +161,7 @@ def _main_regions(context: bpy.types.Context, kind: str) -> list[tuple[bpy.types
 
 
 def look_at(context: bpy.types.Context, things: Sequence[bpy.types.Object]) -> None:
-    """Turn no view, but let each show the things and their parts in what toolbar and sidebar, drawn over it, leave."""
+    """Centre each 3D view on the objects and their parts, in the area beside toolbar and sidebar; turns no view."""
     context.view_layer.update()
     shown = {part for thing in things for part in (thing, *thing.children) if part.type == "MESH"}
     corners = np.array([part.matrix_world @ Vector(corner) for part in shown for corner in part.bound_box])

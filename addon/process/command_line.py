@@ -25,7 +25,7 @@ examples:
 
 
 def main(arguments: list[str]) -> int:
-    """Called by Blender with what follows ``--command tactile``; returns the exit status."""
+    """Run the command whose words follow ``--command tactile``; returns the exit status. Blender calls it."""
     options = _parser().parse_args(arguments)
     inputs = [Path(name) for name in options.inputs]
     if options.verb == "batch":

@@ -29,7 +29,7 @@ class Job:
     """
 
     def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:
-        """Start it. folder : where its input lies and its output goes; listening : whether it waits for ``tell``."""
+        """Start the worker. folder : of its input and output; listening : whether it waits for ``tell``."""
         self.folder, self.done, self.total, self.finished, self.stage = folder, 0, 1, False, ""
         self.drawn = 0
         (folder / "job.json").write_text(json.dumps({"kind": kind} | options), encoding="utf-8")
@@ -123,7 +123,7 @@ class JobFolder:
         self.close()
 
     def close(self) -> None:
-        """Remove it."""
+        """Remove the folder."""
         shutil.rmtree(self.path, ignore_errors=True)
 
 

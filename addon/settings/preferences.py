@@ -83,7 +83,7 @@ class TactilePreferences(bpy.types.AddonPreferences):
     verdict: bpy.props.StringProperty(name="Verdict", description="What the last check of LLVM has found")
 
     def draw(self, _context: bpy.types.Context) -> None:
-        """Called by Blender."""
+        """Draw the preferences; Blender calls it."""
         column = self.layout.column(align=True)
         column.label(text="Import from CSV and NPZ, translation and the fast picture work", icon="CHECKMARK")
         lacking = set(missing(*MODULES))

@@ -64,7 +64,7 @@ class TactileOperator(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads plain class attributes)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Called by Blender."""
+        """Do the work and report its errors; Blender calls it."""
         try:
             with reported(self):
                 return self.work(context) or {"FINISHED"}

@@ -142,7 +142,7 @@ class TACTILE_MT_add(bpy.types.Menu):
     bl_label = "Tactile"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        """Called by Blender."""
+        """Draw the menu; Blender calls it."""
         for name, label, _ in properties.sensor_items():
             self.layout.operator(TACTILE_OT_add_sensor.bl_idname, text=label, icon="OUTLINER_OB_META").sensor = name
         self.layout.separator()

@@ -198,7 +198,7 @@ def _sync_folder(path: Path) -> None:
 
 
 def claim(path: str | os.PathLike) -> None:
-    """Refuse, before a long job, a `path` that exists or cannot be written, and make its folder.
+    """Check before a long job that `path` is free and can be written; make its folder.
 
     Raises TactileError for an empty name, an existing file, or a folder that cannot be made or written.
     """

@@ -75,7 +75,7 @@ LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk 
 
 
 def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
-    """Return words of KEPT for words of results.KEEPABLE: drawn contacts are kept as well."""
+    """Return the words of KEPT: `keep`, and the posterior's samples where the options ask for some."""
     return (*keep, SAMPLES) if answer.samples else tuple(keep)
 
 

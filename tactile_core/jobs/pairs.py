@@ -103,13 +103,13 @@ def plan(
 
 
 def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
-    """Count what is there, and say how many blocks that asks for."""
+    """Return the number of blocks that the job needs, by the contacts made so far; nothing is prepared (False)."""
     _scene(job.inputs[index], tuple(job.recipe.files))
     return wanted(_counts(folder, job, index), job.recipe.count, job.inputs[index].path), False
 
 
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
-    """Solve the contacts of some presses."""
+    """Solve the contacts of one block of presses and write them; returns false if the block was there already."""
     from ..simulation.pair_sampling import press_rows
 
     one = job.inputs[index]

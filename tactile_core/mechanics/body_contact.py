@@ -1,4 +1,4 @@
-"""A rigid body pressed into a sensor: its place, its lean and its roundness, read off the surface that it deforms."""
+"""A rigid body pressed into a sensor: place, lean and curvature, estimated from the displacement of the surface."""
 
 from __future__ import annotations
 

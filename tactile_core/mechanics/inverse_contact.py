@@ -1,4 +1,4 @@
-"""Traction that a deformed surface tells of: what must press a patch of it for the patch to lie where it lies.
+"""Compute the traction on a touched patch of a surface from the displacement of the patch.
 
 In contact the displacement is given and the traction unknown; beside it the traction is zero. The sensor's linear
 compliance among the patch's nodes is inverted, with a soft layer on it that keeps noise of single nodes out; a patch

@@ -73,7 +73,7 @@ def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> 
 def write_vtu(
     path: str | os.PathLike, mesh: HexMesh, solid: FiniteStrainSolid | None = None, state: State | None = None
 ) -> None:
-    """Write a volume of triquadratic hexahedra at rest; with a solved ``state`` of its ``solid``, what that says.
+    """Write a volume of triquadratic hexahedra, at rest or with a solved ``state`` of its ``solid``.
 
     At points ``displacement`` m (in ParaView: Warp By Vector), ``force`` N that the outside exerts on each node
     (contact, fluid, support), ``stress`` Pa (Cauchy, xx yy zz xy yz xz) and ``von_mises`` Pa of it, see

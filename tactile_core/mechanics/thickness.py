@@ -47,7 +47,7 @@ def _to_core(sensor: str, point: np.ndarray, outward: np.ndarray) -> float:
 
 
 def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
-    """The thickness, m, at the node of the resting surface nearest to an indenter at first touch."""
+    """Return the thickness, m, at the node of the resting surface nearest to an indenter at first touch."""
     surface, reach = sensors.sensor_surface(sensor), _TOUCHES
     nodes, gap = surface.blocks.near(indenter, pose, reach)
     while not len(nodes):
@@ -60,7 +60,7 @@ def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
 
 
 def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:
-    """A share of the thickness under an indenter at first touch, m, and at most 2.4 mm."""
+    """Return the depth, m, of a share of the thickness under an indenter at first touch; at most 2.4 mm."""
     return min(share * thickness_under(sensor, indenter, pose), _DEEPEST)
 
 

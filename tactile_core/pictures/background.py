@@ -28,8 +28,8 @@ MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 
 def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
     """Picture (H, W, 3) float32, grey levels, of the untouched gel, whose coating shows radiance (H, W, 3).
 
-    Of the calibration's photograph where it has one; where LEDs or albedo are others than when it was taken, as much
-    brighter or darker as they make the untouched gel. Raises TactileError for a photograph that cannot be read or has
+    The calibration's photograph where it has one; it is scaled by the model where LEDs or albedo have changed since it
+    was taken. Raises TactileError for a photograph that cannot be read or has
     another size than the camera's pictures.
     """
     if not unit.photograph:
@@ -44,7 +44,7 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 
 
 def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> dict[str, float]:
-    """Levels by which a picture at rest (H, W, 3) differs from the lights' own: mean and largest, absolute."""
+    """Absolute difference, grey levels, between a picture at rest (H, W, 3) and the lights' own: mean and largest."""
     off = np.abs(picture - by_led(unit, radiance).sum(-1))
     return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
 
@@ -82,7 +82,7 @@ def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 
 
 def fit_ambient(picture: np.ndarray, unit: Calibration, radiance: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """Ambient light (3, 21) with which the unit's picture at rest is nearest one (H, W, 3), least squares.
+    """Fit the ambient light (3, 21) by least squares, so that the unit's picture at rest is nearest to one (H, W, 3).
 
     radiance : (H, W, 3) of the coating at rest
     """

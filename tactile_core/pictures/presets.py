@@ -82,7 +82,7 @@ def measured() -> dict[str, Any]:
 
 
 def cheapest(error: float, variant: str) -> str:
-    """The fastest preset whose measured error, grey levels rms from the full model, is at most that.
+    """Return the fastest preset whose measured error, grey levels rms from the full model, is at most ``error``.
 
     Raises TactileError where none is.
     """
@@ -92,7 +92,7 @@ def cheapest(error: float, variant: str) -> str:
 
 
 def fitting(error: float, variant: str | None = None) -> str:
-    """Return the `cheapest` preset for a variant, or the one that works here; without Mitsuba as without LLVM."""
+    """Return the `cheapest` preset for a variant, else for the one that works here; without Mitsuba as without LLVM."""
     if measured()["presets"][FAST]["error"] <= error:
         return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
     try:

@@ -219,7 +219,7 @@ class MitsubaLight:
         return total / np.float32(self.preset.passes), first
 
     def completed(self, height: np.ndarray, direct: np.ndarray, hits: Hits) -> np.ndarray:
-        """Return the direct light with what else the preset has: the gel's own light, and the window."""
+        """Return the direct light with the preset's other effects: interreflection, and the window's refraction."""
         radiance, preset = direct, self.preset
         if preset.gather and any(self.unit.coating.albedo):
             radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)

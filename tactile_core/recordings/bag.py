@@ -121,7 +121,7 @@ def _bound_unpacking() -> None:
 def read_bag(
     bag: Bag, layout: ModuleType, frames: int = MAX_FRAMES + 1, context: int = 0
 ) -> Iterator[tuple[Recording, int]]:
-    """Yield recordings of `frames` frames, and how many of these, `context` or none, the one before ended with.
+    """Yield recordings of `frames` frames, each with the number of first frames that it repeats from the one before.
 
     Reads the requested finger, or the first that is not all zeros; a warning names the others.
     """

@@ -1,4 +1,4 @@
-"""Describe recordings of a sensor of which no unit has been seen at rest, as the BioTac SP, 24 electrodes a finger."""
+"""Describe recordings of a sensor whose counts at rest are not known, such as the BioTac SP with its 24 electrodes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Doubt a recording whose contacts, taken together, resemble no simulated ones.
+"""Check whether the contacts of a recording, taken together, resemble simulated ones.
 
 A wrong polarity, gains, order of channels or rest turns each contact into a signal that a contact may well have: one
 frame hardly shows it. What a few neighbouring simulated contacts leave unexplained, averaged over different contacts of
@@ -57,7 +57,7 @@ def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, 
 
 
 def gained_share(change: np.ndarray, sensor: str = SOURCE) -> float:
-    """Return how much less of changes in contact (n, 19) counts is left over with gains of the electrodes fitted."""
+    """Return by how much fitted gains reduce the unexplained share of changes in contact (n, 19) counts."""
     change = change[spread_out(len(change), MOST_MATCHED)]
     gains = np.exp(match(change, contact_signals(sensor), rectified=False, prior=PRIOR).log_gain)
     even = change / gains

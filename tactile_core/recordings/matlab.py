@@ -28,7 +28,7 @@ HEADER, PACKED, STEP = 128, 15, 2**20  # bytes; type of a packed element (MAT-fi
 
 @contextmanager
 def open_matlab(path: str, file: BinaryIO) -> Iterator[Store]:
-    """Read a file opened at its start.
+    """Read an open MATLAB 5 file as named arrays.
 
     Raises TactileError for MATLAB 7.3, for objects, for damage, and where scipy is missing.
     """

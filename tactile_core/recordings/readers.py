@@ -115,7 +115,7 @@ def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) ->
 
 
 def sensor_of_first(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | None = None) -> str:
-    """Return the sensor of the first of these recordings that is one; a BioTac where none is, as it is said later."""
+    """Return the sensor of the first readable recording; the BioTac where none is, as `read` then refuses them."""
     for path in paths:
         with suppress(TactileError):
             return sensor_of(path, columns)
@@ -164,7 +164,7 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
 
 
 def list_fingers(paths: Iterable[str | os.PathLike[str]]) -> list[str]:
-    """List the recordings of each file as `each_finger` does; what is none stands for itself, to be refused."""
+    """List the recordings of each file as `each_finger` does; unreadable files are listed too, for `read` to refuse."""
     found = []
     for path in paths:
         try:
@@ -255,7 +255,7 @@ def _container(start: bytes) -> str:
 def table_reader(
     path: str, header: Collection[str], columns: ColumnMap | None, sensor: str = SOURCE, finger: int | None = None
 ) -> Callable[[Table], Recording]:
-    """Return what makes a sensor's recording of a CSV file's table: the map, or the layout that knows its header.
+    """Return the function that makes a Recording of a CSV file's table: by the map, or by the layout of its header.
 
     Raises TactileError for another sensor's file, and for a finger of a file of one.
     """

@@ -115,7 +115,7 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 
 
 def level(samples: np.ndarray) -> np.ndarray:
-    """Return the mean (19,) of the middle half of (n, 19) samples: robust as a median, but no whole counts."""
+    """Return the mean (19,) of the middle half of (n, 19) samples: robust like the median, but not whole counts."""
     cut = len(samples) // 4
     return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0, dtype=float)
 

@@ -52,7 +52,7 @@ class Rest:
     pdc: float | None = None
 
     def agrees(self, level: np.ndarray, pdc: float) -> bool:
-        """Return true if a calm level (19,) counts with this PDC, counts, is a rest of this unit, by its PDC at rest.
+        """Return true if a quiet level (19,) counts is this unit at rest, judged by its PDC, counts.
 
         Where either has no PDC, or PDC of another zero, the level must be near the unit's counts at rest.
         """

@@ -33,7 +33,7 @@ def _folders() -> dict[str, Path]:
 
 
 def passed_over(name: str) -> tuple[Path, ...]:
-    """Return the user's own folder of this name that is not read, since a sensor that ships has the name."""
+    """Return the user's folder that is ignored because a shipped sensor has the same name; None where there is none."""
     own, ships = os.environ.get(OWN), FOLDER / name
     folder = Path(own or FOLDER) / name
     return (folder,) if (folder / FILE).is_file() and (ships / FILE).is_file() and not folder.samefile(ships) else ()

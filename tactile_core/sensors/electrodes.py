@@ -57,7 +57,7 @@ def places_of(name: str) -> Places:
 
 
 def table_of(name: str) -> Path:
-    """Return the path of a sensor's table of electrodes, in whose place there may be nothing."""
+    """Return the path of a sensor's table of electrodes, whether or not the file exists."""
     found, own = of_kind(name, Fluid), os.environ.get(OWN)
     path = found.folder / found.electrodes.places
     return path if path.is_file() or not own else Path(own) / name / found.electrodes.places

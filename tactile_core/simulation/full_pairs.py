@@ -99,9 +99,9 @@ def _turn(scene: Scene, number: int) -> int:
 
 
 def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Return the rows of a press as in the file, see ``pairs_file.units``, and what was wanted and lost.
+    """Solve a press; return its rows as in the file, see ``pairs_file.units``, and a record of the solving.
 
-    Of the latter: wanted () contacts; lost () str, why the last are missing, else empty; seconds () of this process.
+    The record: wanted () contacts; lost () str, why the last are missing, else empty; seconds () of this process.
     """
     began, rows = time.process_time(), []
     steps = [(share * press.depth, np.zeros(2)) for share in SHARES]

@@ -82,7 +82,7 @@ def train(
 
 
 def quiet(share: float, text: str) -> None:
-    """Log progress; used where no callback is given."""
+    """Log progress: the default callback."""
     log.info("%3.0f %% %s", 100 * share, text)
 
 

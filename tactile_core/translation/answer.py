@@ -51,7 +51,7 @@ class Answer:
         return 1e-3 * np.array(self.mount_shift_mm)
 
     def describe_shift(self) -> tuple[str, ...]:
-        """Return sentences for the user of a result about these options."""
+        """Describe a mount's shift in sentences for the user; none without a shift."""
         if not any(self.mount_shift_mm):
             return ()
         x, z = self.mount_shift_mm

@@ -1,4 +1,4 @@
-"""Recover the signs of rectified changes where one simulated contact plainly gives such changes.
+"""Recover the signs of rectified changes where they match one simulated contact closely.
 
 Which electrodes rise and which fall goes with the pattern of their sizes: on test contacts of a unit with gains 10 %
 off the nearest simulated signal has the right sign in 89 of 100 electrodes, with 98 % of the changes' sum. S2MPN then
@@ -23,7 +23,7 @@ LEFT = 0.25
 def recovered(
     change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Give changes (T, 19) counts their signs where they are plain; returns them and which (T,) are left rectified.
+    """Restore the signs of changes (T, 19) counts where they are certain; also return the frames (T,) left rectified.
 
     rectified : (T,) bool, those that have lost their signs; patterns : of the sensor, None for a BioTac's
     """

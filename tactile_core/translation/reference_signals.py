@@ -1,4 +1,4 @@
-"""Store a few hundred simulated signals that represent all contacts of the training, for `tactile adapt` to match.
+"""Store a few hundred simulated signals that represent the training's contacts, for `tactile adapt` to match.
 
 They ship with the weights as ``signals.safetensors``, whose hash is in the card under "signals".
 """

@@ -42,21 +42,21 @@ class Patterns:
 
 
 def patterns_of(signals: np.ndarray) -> Patterns:
-    """Return what signals are compared with, from signals (P, e) counts of simulated contacts."""
+    """Return the patterns of simulated contacts whose signals are (P, e) counts."""
     units = signals / np.linalg.norm(signals, axis=1, keepdims=True)
     return Patterns(signals, units, units @ units.T)
 
 
 @functools.cache
 def shipped_patterns(sensor: str = SOURCE) -> Patterns:
-    """Return those of a sensor that lie beside its descriptor."""
+    """Return the patterns of the simulated contacts that lie beside a sensor's descriptor."""
     return patterns_of(contact_signals(sensor))
 
 
 def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None) -> np.ndarray:
-    """Return the shares (T, 2) of a typical unit's changes (T, 19) counts that one and two simulated contacts leave.
+    """Return the shares (T, 2) of changes (T, 19) counts that the best one and the best two patterns do not explain.
 
-    patterns : of the sensor; None for a BioTac's
+    change : of a typical unit; patterns : of the sensor, None for a BioTac's
     rectified : (T,) bool; these frames and those that hardly change are not judged: NaN
     """
     found = np.full((len(change), 2), np.nan)
@@ -67,20 +67,20 @@ def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Pattern
 
 
 def two_contacts(shares: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames that two contacts explain and one does not, from their shares (T, 2) left over."""
+    """Mark (T,) bool the frames that two contacts explain and one does not, by their ``residual_shares`` (T, 2)."""
     one, two = shares.T
     return (two < LEFT_BY_TWO) & (one - two > MORE_BY_ONE)
 
 
 def unlike(shares: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames that resemble no simulated contact, from their shares (T, 2) left over."""
+    """Mark (T,) bool the frames that resemble no simulated contact, by their ``residual_shares`` (T, 2)."""
     return shares[:, 0] > UNLIKE
 
 
 def residual_lengths(signals: np.ndarray, patterns: Patterns | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the length (T,) of what the best single pattern, and the best two, leave of signals (T, 19) of length one.
+    """Return the residual lengths (T,) of unit signals (T, 19) after fitting the best pattern, and the best two.
 
-    Two are sought where one leaves enough for them to matter; elsewhere they count as leaving as much.
+    Two are fitted only where one leaves more than ``MORE_BY_ONE``; elsewhere both lengths are equal.
     """
     patterns = patterns or shipped_patterns()
     alike, near = patterns.alike, signals @ patterns.units.T

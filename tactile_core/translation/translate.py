@@ -189,7 +189,7 @@ class Translator:
         )  # fmt: skip
 
     def silent(self, quantity: str) -> float:
-        """Apply `silent_level` to the card."""
+        """Return the `silent_level` of a quantity in this card."""
         return silent_level(self.card["silence"], quantity)
 
     def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:

@@ -58,7 +58,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit and write, or evaluate and report."""
+    """Fit a calibration and write it, or evaluate one on photographs; returns the exit status."""
     from ...pictures.calibrate.photographs import chosen, read_photographs
 
     _check_options(options)

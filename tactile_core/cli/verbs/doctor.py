@@ -22,7 +22,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Check this machine and report."""
+    """Print what works on this machine; returns the exit status."""
     from .. import doctor
 
     for line in doctor.report():

@@ -69,14 +69,14 @@ def place(folder: Path, options: argparse.Namespace) -> Place:
 
 
 def place_or_none(options: argparse.Namespace) -> Callable[[Path], Place] | None:
-    """Return what opens the workers that the options ask for, given the job's folder; None for this process alone."""
+    """Return a function from the job's folder to its executor; None where this process does the work alone."""
     if options.cluster is None and (options.workers or 1) == 1:
         return None
     return lambda folder: place(folder, options)
 
 
 def report_failures(done: Done) -> int:
-    """Print what was set aside as errors; returns the exit status."""
+    """Print an error for each task that could not be done; returns the exit status."""
     for name, why in done.aside.items():
         complain(f"{name}: {why}")
     return 2 if done.aside else 0

@@ -65,7 +65,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the mesh."""
+    """Write the mesh that the options name; returns the exit status."""
     _check(options)
     from ...files import atomic
     from ...mechanics import sensor_meshes

@@ -55,7 +55,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Make the pairs."""
+    """Simulate the paired contacts of a scene; returns the exit status."""
     one_thread()  # before numpy is imported
     engine.check_counts(options, "workers", "restart")
     check_seed(options.seed)

@@ -37,7 +37,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Plan and report."""
+    """Print what a scene or a recording will build, and its cost; returns the exit status."""
     import json
 
     from ...jobs import plan

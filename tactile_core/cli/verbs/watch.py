@@ -83,7 +83,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show until the recording ends, the window is closed, or Ctrl-C."""
+    """Show the newest frames until the recording ends, the window is closed, or Ctrl-C."""
     one_thread()  # before numpy is imported
     from ...jobs import live
     from ...jobs.convert import load_tools

@@ -57,7 +57,7 @@ def make(inputs: list[Input], recipe: Recipe, weights: str | None, calibration: 
 
 
 def write(folder: Path, job: Job) -> None:
-    """Make the job folder, its job file first: all else is made again. Raises TactileError where it cannot be."""
+    """Make the job folder and write its job file. Raises TactileError where that is not possible."""
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
         atomic.write_json(folder / FILE, msgspec.to_builtins(job))

@@ -22,7 +22,7 @@ def folder_of(out: Path) -> Path:
 
 @contextmanager
 def begun(out: Path, job: Job) -> Iterator[Path]:
-    """Hold the folder of a job that is new or the one that was begun there; removed once `finished` says so.
+    """Lock the folder of a new job, or of the same one begun before; at the end remove it, if `finished` was called.
 
     Raises TactileError where it holds another job, and what ``run.opened`` raises.
     """
@@ -49,7 +49,7 @@ DONE = ".done"
 
 
 def finished(folder: Path) -> None:
-    """Let the folder be removed at the end of `begun`."""
+    """Mark the folder as no longer needed: `begun` removes it at its end."""
     (folder / DONE).touch()
 
 

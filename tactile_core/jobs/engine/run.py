@@ -44,7 +44,7 @@ class Done:
 
 @contextlib.contextmanager
 def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
-    """Hold the job's folder, made if need be, and clear what killed runs left in it.
+    """Lock the job's folder inside the block, making it if needed; remove what killed runs left in it.
 
     Raises TactileError where another job runs in it, or where it cannot be written.
     """
@@ -83,7 +83,7 @@ def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
 
 
 def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:
-    """Do all that the job still lacks, or a part (i, n) of it; call inside `opened`.
+    """Do the tasks of a job that are not done yet, or part i of n of them; call inside `opened`.
 
     progress : called with (tasks done, tasks known so far)
     Raises TactileError when the disk cannot be written.

@@ -53,7 +53,7 @@ class BiotacSheet:
         return np.maximum(self.film + moved, self.fluid.thinnest)
 
     def films_of(self, change: np.ndarray) -> np.ndarray:
-        """Thickness (k,) m where the gaps of ``sensing_points.sensing_nodes`` (f,) have changed by so much, m."""
+        """Thickness (k,) m after changes (f,) m of the gaps at ``sensing_points.sensing_nodes``."""
         return np.maximum(self.film + change[self.sensing], self.fluid.thinnest)
 
     def near(self, films: np.ndarray) -> np.ndarray:
@@ -66,7 +66,7 @@ class BiotacSheet:
         return resistances(potentials + np.diag(self.near(films)), len(potentials) - FED)
 
     def growth(self, resistance: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
-        """Factors (e,) by which impedances have grown where the film's resistances (e,) ohm are those, not at_rest."""
+        """Factors (e,) by which impedances have grown as resistances (e,) ohm grew from those ``at_rest``."""
         return (resistance + self.fluid.interface) / (at_rest + self.fluid.interface)
 
 
@@ -102,7 +102,7 @@ def biotac_sheet(sensor: str = "biotac", *, core_of_mesh: bool = False) -> Biota
 
 
 def sensing_films(contact: Contact) -> np.ndarray:
-    """Films (k,) m of the sheet in a contact of the fast tier, from the inner nodes that it watches."""
+    """Film thickness (k,) m of the sheet in a contact of the fast tier, from the gaps of its sensing points."""
     skin = contact.compliance
     return biotac_sheet(skin.name).films_of((contact.sensing_gaps - skin.watch_gap)[skin.feet :])
 

@@ -1,4 +1,4 @@
-"""Surface compliance of a sensor: what every surface node does under a unit force on each node that can be touched.
+"""Surface compliance of a sensor: displacement of every surface node by a unit force on each touchable node.
 
 Linear elasticity of the whole solid, condensed to its surface once and cached on disk; a contact then needs
 only dense sub-blocks. The BioTac's incompressible fluid enters exactly, as a rank-one change.
@@ -72,7 +72,7 @@ class Compliance:
 
     @functools.cached_property
     def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Row of ``move`` (m,) for each touchable node, whether it is the image's (m,) bool, and all images (n,)."""
+        """Row (m,) of ``move`` for each touchable node; (m,) bool, if it is the image's; all mirror images (n,)."""
         image = mirror_nodes(self.surface.rest)
         answered = answered_nodes(self.surface, self.touchable, image)
         mirrored = self.surface.rest[self.touchable, 2] < -ON_PLANE
@@ -225,7 +225,7 @@ def build(solid: Solid) -> dict[str, np.ndarray]:
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """Surface nodes (r,) with z >= 0 whose answers also serve their mirror images: of every touchable node one."""
+    """Surface nodes (r,) with z >= 0 whose responses also serve their mirror images: one for every touchable node."""
     return np.unique(np.where(lattice.rest[touchable, 2] >= -ON_PLANE, touchable, image[touchable]))
 
 

@@ -125,19 +125,19 @@ def squares(features: np.ndarray) -> np.ndarray:
 
 
 def kernel(a: np.ndarray, b: np.ndarray, b_squares: np.ndarray, width: float) -> np.ndarray:
-    """Inverse multiquadric and linear kernel (n, m) of scaled features (n, f) and (m, f): smooth, and tame far out."""
+    """Inverse multiquadric plus linear kernel (n, m) of scaled features (n, f) and (m, f)."""
     products = a @ b.T
     apart = squares(a)[:, None] + b_squares - 2 * products
     return 1 / np.sqrt(1 + np.maximum(apart, 0) / width**2) + 0.1 * (products / a.shape[1] + 1)
 
 
 def rubs(features: np.ndarray) -> np.ndarray:
-    """Share of friction in contacts of features (..., f): 0 without it, 1 with as much as was learned from."""
+    """Amount of friction in contacts of features (..., f): 0 without friction, 1 with the largest one learned from."""
     return np.clip((features[..., _SIDEWAYS] - _STILL) / (_RUBS - _STILL), 0.0, 1.0)
 
 
 def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Factor of the kernel between contacts that ``rubs`` so: contacts with friction tell most about each other."""
+    """Factor of the kernel between contacts of ``rubs`` a and b: largest where both have friction, or neither has."""
     return 1 + _ALIKE * (a * b + (1 - a) * (1 - b))
 
 

@@ -85,7 +85,7 @@ def moving_forces(inverse, rows, motion):  # noqa: ANN001, ANN201
 
 @Loop
 def known_motion(active, slip, gap, normal, lean, core_gap, slipping, direction, columns):  # noqa: ANN001, ANN201
-    """Motion (3 k + c, columns) m of what touches, as far as it is known; ``slipping`` nodes may slip besides."""
+    """Prescribed motion (3 k + c, columns) m of touching points; ``slipping`` nodes may slip in addition."""
     k = len(slip)
     motion = np.zeros((3 * k + len(core_gap), columns))
     for a in range(k):
@@ -193,7 +193,7 @@ def slip_system(inverse, rows, size, slipping, normal, lean, across, against, cu
 
 @Loop
 def slide(motion, answer, slipping, lean, across, against):  # noqa: ANN001, ANN201
-    """Add to ``motion`` (3 k + c, r) m what the slipping nodes' unknowns (2 s, r) are."""
+    """Add the slip that belongs to the slipping nodes' unknowns (2 s, r) to ``motion`` (3 k + c, r) m."""
     s = len(slipping)
     for a in range(s):
         for i in range(3):

@@ -89,7 +89,7 @@ class Pace:
         return self.after_wrong(max(-gap.min(), np.abs(gap[active]).max(initial=0.0)))
 
     def after_wrong(self, wrong: float) -> float:
-        """Return the share of the next step from the largest of these gaps, or the deepest place in the indenter, m."""
+        """Return the share of the next step to take, for the largest gap or penetration ``wrong``, m."""
         self._calls += 1
         if wrong > max(_PROGRESS * self._last, GAP_TOLERANCE) and self._calls > _FREE_ITERATIONS:
             self._trust = max(_SHRINK * self._trust, _LEAST_TRUST)

@@ -41,7 +41,7 @@ class BallPictures(abc.ABC):
 
     @abc.abstractmethod
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the change (3, H, W) by a press of each LED's light, in what it gives on a coating that faces it.
+        """Return the change (3, H, W) of each LED's light by a press, relative to its light on a coating that faces it.
 
         ball : right, down, depth, radius, m
         """

@@ -29,5 +29,5 @@ def contact_disc(bench: BallPictures, ball: tuple[float, float, float, float]) -
 
 
 def fitted_light(left: np.ndarray, disc: np.ndarray, model_error: float) -> np.ndarray:
-    """Return the light (3,), grey levels, that leaves least of what a picture lacks, left (n, 3), under a disc (n,)."""
+    """Fit a disc's (n,) light (3,), grey levels, to the residual ``left`` (n, 3) of a picture, by least squares."""
     return disc @ left / (disc @ disc + (model_error / LIKELY) ** 2)

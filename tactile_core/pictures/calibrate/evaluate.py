@@ -1,4 +1,4 @@
-"""A calibration tried on photographs: three numbers a press are fitted, and the picture is held against the photograph.
+"""Evaluate a calibration on photographs: fit place and depth of each press, compare the picture with the photograph.
 
 The baseline stands beside each metric: the background alone, as if nothing had touched the gel.
 """

@@ -27,7 +27,7 @@ CLEARLY = 0.8  # of what is unexplained as they are given, that another way may 
 
 
 def check_orientation(photographs: Photographs, ball_diameter: float, start: Calibration) -> None:
-    """Raise TactileError for photographs that another way of laying them explains clearly better; ball_diameter : m.
+    """Raise TactileError for photographs that are explained clearly better when turned or mirrored; ball_diameter : m.
 
     The other four of the eight ways change the pictures' shape, by which they are recognised.
     """

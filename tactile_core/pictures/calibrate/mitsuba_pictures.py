@@ -14,7 +14,7 @@ from .ball_pictures import BallPictures
 
 
 class MitsubaPictures:
-    """Makes the pictures of one unit after another by a preset that has LLVM compile one scene for all of them."""
+    """Render units one after the other by one scene, which LLVM compiles once."""
 
     def __init__(self, preset: Preset) -> None:
         self.preset = preset

@@ -63,7 +63,7 @@ class GelLight:
         self._look(mi)
 
     def change_unit(self, unit: Calibration) -> None:
-        """Take the numbers of another unit with as many pixels: a hundredth of a second, where a new scene compiles.
+        """Change to another unit with as many pixels: takes 10 ms, as the scene is not compiled again.
 
         Its LEDs, camera, coating and index may differ in numbers, not in kind (a material's name; a sphere so small
         that it is a point). Not for a preset of paths, nor with more lamps. Raises TactileError where it must not.
@@ -125,7 +125,7 @@ class GelLight:
         return found
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the radiance of ``radiance``; of paths first the noisier means of each pass and those before."""
+        """Yield the same as ``radiance``; where paths are traced, first the noisier mean after each pass."""
         height = np.asarray(height_map, np.float32)
         vertices = self._mesh.vertices(height)
         check_mesh(vertices, self._mesh.faces, self._mesh.count)
