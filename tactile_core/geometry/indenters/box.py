@@ -8,7 +8,9 @@ import functools
 import numpy as np
 
 from ...errors import TactileError
-from .indenter import NEAREST, Indenter, check_length, lengths, sign_of
+from ...files.compiled import available
+from .distance_loops import from_box
+from .indenter import NEAREST, Indenter, check_length, contiguous, lengths, sign_of
 from .scene_form import SceneForm, Size
 
 
@@ -30,6 +32,8 @@ class Box(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact (a smaller box inflated by the edge radius), inside to the nearest face."""
+        if available():
+            return from_box(contiguous(points), self._middle, self._inner, self.edge)
         arm = points - self._middle
         out = np.abs(arm) - self._inner
         beyond = np.maximum(out, 0)

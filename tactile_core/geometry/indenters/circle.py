@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .indenter import NEAREST
+from ...files.compiled import available
+from .distance_loops import from_circle
+from .indenter import NEAREST, contiguous
 
 
 def circle_distance(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance (n,) m of points (n, 3) m from a circle of ``radius`` m, and its gradient (n, 3)."""
+    if available():
+        return from_circle(contiguous(points), radius, NEAREST)
     _, radial, arm, length = _arms(points, radius)
     gradient = np.empty((len(points), 3))
     gradient[:, :2], gradient[:, 2] = arm[:, :1] * radial, arm[:, 1]

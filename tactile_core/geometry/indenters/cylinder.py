@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 
 from ...errors import TactileError
+from ...files.compiled import available
 from . import extrusion
-from .indenter import SQUARE, Indenter, check_length, sign_of
+from .distance_loops import from_cylinder
+from .indenter import NEAREST, SQUARE, Indenter, check_length, contiguous, sign_of
 from .scene_form import SceneForm, Size
 
 
@@ -28,6 +31,9 @@ class Cylinder(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
+        if available():
+            inner, half = self.radius - self.edge, self.length / 2
+            return from_cylinder(contiguous(points), 2, self._middle, inner, half - self.edge, self.edge, NEAREST)
         return extrusion.distance(*self._prism(points), self.edge)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
@@ -41,6 +47,10 @@ class Cylinder(Indenter):
         upward = np.array([0.0, 0.0, sign_of(direction[2])])
         inner = (self.radius - self.edge) * radial + (self.length / 2 - self.edge) * upward
         return np.array([0.0, 0.0, self.length / 2]) + inner + self.edge * direction
+
+    @functools.cached_property
+    def _middle(self) -> np.ndarray:
+        return np.array([0.0, 0.0, self.length / 2])
 
     def _prism(self, points: np.ndarray) -> tuple[extrusion.Outline, np.ndarray, float]:
         outline = extrusion.disc(points[:, :2], self.radius - self.edge)

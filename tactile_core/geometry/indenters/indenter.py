@@ -54,6 +54,11 @@ class Indenter(Protocol):
         return float((upper - lower).min())
 
 
+def contiguous(points: np.ndarray) -> np.ndarray:
+    """Return points (n, 3) m as compiled loops take them."""
+    return np.ascontiguousarray(points, float)
+
+
 def lengths(vectors: np.ndarray) -> np.ndarray:
     """Return the lengths (n,) of vectors (n, 3), in half of ``np.linalg.norm``'s time where they are few."""
     return np.sqrt(np.einsum("ai,ai->a", vectors, vectors))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 
 from ...errors import TactileError
+from ...files.compiled import available
 from . import extrusion
-from .indenter import Indenter, check_length, sign_of
+from .distance_loops import from_cylinder
+from .indenter import NEAREST, Indenter, check_length, contiguous, sign_of
 from .scene_form import SceneForm, Size
 
 _OWN = np.array([2, 0, 1])  # extrusions answer in the order y, z, x
@@ -34,6 +37,9 @@ class LyingCylinder(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
+        if available():
+            inner, half = self.radius - self.edge, self.length / 2
+            return from_cylinder(contiguous(points), 0, self._middle, inner, half - self.edge, self.edge, NEAREST)
         distance, gradient = extrusion.distance(*self._prism(points), self.edge)
         return distance, gradient.take(_OWN, axis=1)
 
@@ -48,6 +54,10 @@ class LyingCylinder(Indenter):
         inner = (self.radius - self.edge) * radial
         inner[0] = (self.length / 2 - self.edge) * sign_of(direction[0])
         return np.array([0.0, 0.0, self.radius]) + inner + self.edge * direction
+
+    @functools.cached_property
+    def _middle(self) -> np.ndarray:
+        return np.array([0.0, 0.0, self.radius])
 
     def _prism(self, points: np.ndarray) -> tuple[extrusion.Outline, np.ndarray, float]:
         across = points[:, 1:].copy()

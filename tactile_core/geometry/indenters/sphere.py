@@ -6,7 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from .indenter import NEAREST, Indenter, check_length, lengths
+from ...files.compiled import available
+from .distance_loops import from_ball
+from .indenter import NEAREST, Indenter, check_length, contiguous, lengths
 from .scene_form import SceneForm, Size
 
 
@@ -21,6 +23,8 @@ class Sphere(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
+        if available():
+            return from_ball(contiguous(points), self.radius, NEAREST)
         length, normal = self._polar(points)
         return length - self.radius, normal
 
