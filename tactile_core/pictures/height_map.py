@@ -214,8 +214,17 @@ def check_covered(surface: Lattice, camera: Camera) -> None:
             raise TactileError(
                 f"camera, {name}", f"picture {low * 1e3:.2f}..{high * 1e3:.2f} mm",
                 f"inside the surface's even window {nodes[0] * 1e3:.2f}..{nodes[-1] * 1e3:.2f} mm",
-                "Raise its px/mm",
+                _nearer(name, seen, nodes),
             )  # fmt: skip
+
+
+def _nearer(name: str, seen: np.ndarray, nodes: np.ndarray) -> str:
+    """Say which scale lets a picture whose pixels see (p,) m along an axis lie inside the nodes (n,) m."""
+    room = 2e3 * min(seen.mean() - nodes[0], nodes[-1] - seen.mean())
+    if room <= 0:
+        return f"Its centre_{name}_mm lies outside"
+    axis = "y" if name == "x" else "x"
+    return f"Raise px_per_mm_{axis} to {len(seen) / room:.1f} (the picture's width lies along z, its height along x)"
 
 
 def _short(matrix: np.ndarray) -> np.ndarray:

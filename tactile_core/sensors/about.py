@@ -24,7 +24,7 @@ def about(name: str) -> str:
         *(_of_gel(name, found) if isinstance(found, Gel) else _of_skin(name, found)),
         f"size: {size} mm along and across the finger",
         f"material: Young's modulus {1e-6 * found.material.youngs:g} MPa, Poisson's ratio {found.material.poisson:g}",
-        f"surface: {len(surface.rest)} nodes, {len(surface.faces)} triangles",
+        f"surface: {len(surface.rest)} nodes, {len(surface.faces)} triangles{_apart(name, found)}",
         f"descriptor: {found.folder}",
         *(f"source: {source}" for source in found.sources),
         *(
@@ -33,6 +33,10 @@ def about(name: str) -> str:
         ),
     ]
     return "\n".join(lines)
+
+
+def _apart(name: str, sensor: Fluid | Gel) -> str:
+    return f"; {1e3 * shape_of(name).spacing:.2g} mm apart where the camera looks" if isinstance(sensor, Gel) else ""
 
 
 def _of_gel(name: str, gel: Gel) -> list[str]:

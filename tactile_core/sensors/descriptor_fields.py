@@ -29,6 +29,7 @@ _UNITS = {
     "deg": 0,
 }
 _OTHERS = ("m", "cm", "in", "kpa", "gpa", "bar", "kohm", "khz", "s", "ms", "rad", "n", "v", "mv")  # units often written
+LARGEST_MM, LEAST_MM = 200, 0.05  # of a fingertip: outside, another unit is meant (assumed)
 MOST_NODES = 300  # along a line of a lattice: a compliance of 90,000 nodes fits no memory
 _T = TypeVar("_T")
 
@@ -52,7 +53,7 @@ def one_of(words: tuple[str, ...]) -> Any:
 class Material:
     """An isotropic elastic solid at small strain. youngs : Pa; poisson : below 0.5."""
 
-    youngs: float = number("mpa", above=0)
+    youngs: float = number("mpa", above=1e-4, below=100)  # gels and rubbers; outside, another unit is meant (assumed)
     poisson: float = number(above=0, below=0.5)
 
 
@@ -128,7 +129,8 @@ def _number(kind: type[float] | type[int], value: Any, where: str, meta: Any) ->
     above, below, unit = meta["above"], meta["below"], meta["unit"]
     if not above < float(Decimal(value)) < below:  # also refuses nan
         limits = [f"above {above:g}"] * (above > -math.inf) + [f"below {below:g}"] * (below < math.inf)
-        raise TactileError(where, str(value), " and ".join(limits) or "a finite number")
+        finite = [] if Decimal(value).is_finite() and limits else ["a finite number"]
+        raise TactileError(where, str(value), " ".join([*finite, " and ".join(limits)]).strip())
     if kind is int:
         return int(value)
     return math.radians(value) if unit == "deg" else float(Decimal(value).scaleb(_UNITS.get(unit, 0)))

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import TactileError
-from ..files.text_file import read_small
 from .descriptor import OWN, of_kind
 from .fluid_sensor import Fluid
+from .profiles import table_text
 
 COLUMNS = ("name", "x_mm", "y_mm", "z_mm", "rest_counts")
 
@@ -92,7 +92,11 @@ def contact_pressures_of(name: str) -> np.ndarray | None:
 
 
 def _table(sensor: Fluid, file: str) -> np.ndarray | None:
-    return np.load(sensor.folder / file, allow_pickle=False).astype(np.float64) if file else None
+    try:
+        return np.load(sensor.folder / file, allow_pickle=False).astype(np.float64) if file else None
+    except (OSError, ValueError) as error:
+        found = f"cannot be read ({error})"
+        raise TactileError(sensor.folder / file, found, "the table of numpy that sensor.toml names") from error
 
 
 def read_places(path: Path) -> Places:
@@ -101,7 +105,7 @@ def read_places(path: Path) -> Places:
     Or bsadr/biotac's own table of a BioTac SP, ``SP_COLUMNS``, where those have numbers below zero. Raises TactileError
     naming file and row.
     """
-    rows = list(csv.reader(read_small(path).splitlines()))
+    rows = list(csv.reader(table_text(path).splitlines()))
     if rows and tuple(rows[0]) == SP_COLUMNS:
         return _read_sp(path, rows[1:])
     if not rows or tuple(rows[0]) != COLUMNS:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from pathlib import Path
 
-from .descriptor_fields import MOST_NODES, Material, file_beside, number, one_of
+from ..errors import TactileError
+from .descriptor_fields import LARGEST_MM, LEAST_MM, MOST_NODES, Material, file_beside, number, one_of
 
 MOST_ELECTRODES = 1000  # of a finger (assumed)
 FALLS, RISES = POLARITIES = ("falls", "rises")
@@ -21,6 +23,11 @@ class Frame:
     shift_x: float = number("mm")
     shift_y: float = number("mm")
     lateral_sign: int = number(above=-2, below=2)
+
+    def __post_init__(self) -> None:
+        """Raise TactileError for a side of +z that is none."""
+        if not self.lateral_sign:
+            raise TactileError("frame, lateral_sign", "0", "1 or -1")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +47,16 @@ class Skin:
     outer_poles: tuple[float, float] = number("mm")
     inner_poles: tuple[float, float] = number("mm")
     pad_half_angle: float = number("deg", above=0, below=180)
-    thickness: float = number("mm", above=0)
+    thickness: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
+
+    def __post_init__(self) -> None:
+        """Raise TactileError for stations that do not go from the tip, toward -x, to the base."""
+        (outer_tip, outer_base), (inner_tip, inner_base) = self.outer_poles, self.inner_poles
+        along = outer_tip, inner_tip, self.tip_x, self.base_x, inner_base, outer_base
+        if not all(low < high for low, high in itertools.pairwise(along)):
+            found = ", ".join(f"{1e3 * each:g}" for each in along)
+            expected = "growing: first outer_poles_mm, first inner_poles_mm, tip_x_mm, base_x_mm, then the last of both"
+            raise TactileError("skin, along x", f"{found} mm", expected)
 
 
 @dataclasses.dataclass(frozen=True)

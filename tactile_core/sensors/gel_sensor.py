@@ -7,9 +7,10 @@ import math
 from pathlib import Path
 
 from ..errors import TactileError
-from .descriptor_fields import MOST_NODES, Material, file_beside, number, one_of
+from .descriptor_fields import LARGEST_MM, LEAST_MM, MOST_NODES, Material, file_beside, number, one_of
 
 ROUND, SQUARE = TIPS = ("round", "square")
+ZERO_WITHIN = 0.2e-3  # m: a dome, fitted to a table, may be lower at its apex than the body says (assumed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Outline:
     tip : ``"round"``, a half circle of half_width, or ``"square"``; corner_radius : of the corners of square ends
     """
 
-    half_width: float = number("mm", above=0)
+    half_width: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
     tip_x: float = number("mm")
     base_x: float = number("mm")
     corner_radius: float = number("mm", above=-1e-9)
@@ -34,7 +35,7 @@ class Body:
     """
 
     back_y: float = number("mm")
-    thickness: float = number("mm", above=0)
+    thickness: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
     edge_drop: float = number("mm", above=-1e-9)
     edge_width: float = number("mm", above=0)
 
@@ -101,6 +102,13 @@ class Gel:
     def __post_init__(self) -> None:
         """Raise TactileError for a window that does not lie inside the outline, whose mesh would fold."""
         outline, (low, high) = self.outline, self.lattice.window_z
+        if outline.corner_radius >= outline.half_width:
+            found, expected = (f"{1e3 * each:g}" for each in (outline.corner_radius, outline.half_width))
+            raise TactileError("outline, corner_radius_mm", found, f"below half_width_mm, {expected}")
+        lowest = self.body.back_y - self.body.thickness
+        if abs(self.camera.height_zero_y - lowest) > ZERO_WITHIN:
+            expected = f"{1e3 * lowest:g}, back_y_mm less thickness_mm, within {1e3 * ZERO_WITHIN:g}"
+            raise TactileError("camera, height_zero_y_mm", f"{1e3 * self.camera.height_zero_y:g}", expected)
         if not outline.tip_x < self.lattice.window_x[0] < self.lattice.window_x[1] < outline.base_x:
             expected = f"growing, between {1e3 * outline.tip_x:g} and {1e3 * outline.base_x:g} mm"
             raise TactileError("lattice, window_x_mm", _mm(self.lattice.window_x), expected)

@@ -45,8 +45,16 @@ def read_heights(path: Path) -> np.ndarray:
     return _table(path, _HEIGHTS)
 
 
+def table_text(path: Path) -> str:
+    """Read the text of a table beside a descriptor. Raises TactileError for one that is missing or no text."""
+    try:
+        return read_small(path)
+    except (OSError, UnicodeDecodeError) as error:
+        raise TactileError(path, f"cannot be read ({error})", "the table that sensor.toml names") from error
+
+
 def _table(path: Path, header: str) -> np.ndarray:
-    first, _, rest = read_small(path).partition("\n")
+    first, _, rest = table_text(path).partition("\n")
     if first.strip() != header:
         raise TactileError(f"{path}, row 1", first, header)
     try:

@@ -137,7 +137,7 @@ for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
 def wide() -> Found:
     """120 mm of gel across."""
     camera = dataclasses.replace(UNIT.camera, px_per_mm_x=2.0, px_per_mm_y=2.0)
-    return refusal(lambda: HeightMapper(sensors.digit_surface(), camera), "Raise its px/mm")
+    return refusal(lambda: HeightMapper(sensors.digit_surface(), camera), "Raise px_per_mm_y to 18.4")
 
 
 @case("500_px_per_mm", "extreme px/mm", HEIGHT_MAP, "heights are the gel's cubic surface to 0.05 um, at 2 um a pixel")

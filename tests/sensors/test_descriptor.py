@@ -47,7 +47,16 @@ def test_decimals_are_shifted_before_they_are_rounded():
         ("[skin]", "[skin]\ncolour = 1", "skin: unknown colour"),
         ("[fluid]", "[liquid]", "top level: unknown liquid"),
         ("poisson = 0.48", "poisson = 0.5", "material, poisson: 0.5; expected above 0 and below 0.5"),
-        ("poisson = 0.48", "poisson = nan", "material, poisson: NaN"),
+        ("poisson = 0.48", "poisson = nan", "material, poisson: NaN; expected a finite number above 0 and below 0.5"),
+        ("thickness_mm = 1.58", "thickness_mm = 1580", "skin, thickness_mm: 1580; expected above 0.05 and below 200"),
+        ("youngs_mpa = 4.1", "youngs_mpa = 4.1e6", "material, youngs_mpa: 4.1E+6; expected above 0.0001 and below 100"),
+        ("shift_x_mm = 13.97", "shift_x_mm = inf", "frame, shift_x_mm: Infinity; expected a finite number"),
+        ("lateral_sign = 1", "lateral_sign = 0", "frame, lateral_sign: 0; expected 1 or -1"),
+        (
+            "tip_x_mm = -14.0",
+            "tip_x_mm = 14.0",
+            "skin, along x: -21.3, -19.725, 14, 1.2, 5.08, 6.65 mm; expected",
+        ),
         ("bits = 12", "bits = 12.5", "readout, bits"),
         ("inner_poles_mm = [-19.725, 5.08]", "inner_poles_mm = [5.08]", "a list of 2"),
         ('polarity = "falls"', 'polarity = "down"', "falls or rises"),
@@ -112,6 +121,25 @@ def test_a_gel_with_a_hole_in_its_table_is_refused(tmp_path):
         GelShape(descriptor.read(folder)).dome_height(np.zeros(1), np.zeros(1))
 
 
+@pytest.mark.parametrize(
+    ("name", "table"), [("biotac", "profile.csv"), ("biotac", "electrodes.csv"), ("biotac", "contact_patterns.npy")]
+)
+def test_a_table_that_is_none_is_named(tmp_path, monkeypatch, name, table):
+    mine = f"no_{table.split('.')[0]}"
+    folder = changed(tmp_path, "poisson = 0.48", "poisson = 0.4", name).rename(tmp_path / mine)
+    monkeypatch.setenv(descriptor.OWN, str(tmp_path))
+    (folder / table).write_bytes(b"\xff\x00")
+    with pytest.raises(TactileError, match=table):
+        about(mine)
+        sensors.contacts_of(mine)
+
+
+def test_a_table_that_is_not_there_is_named(tmp_path):
+    folder = changed(tmp_path, 'profile = "profile.csv"', 'profile = "other.csv"', "digit")
+    with pytest.raises(TactileError, match=r"other\.csv: cannot be read .*No such file"):
+        GelShape(descriptor.read(folder)).dome_height(np.zeros(1), np.zeros(1))
+
+
 def test_a_table_of_too_few_heights_is_refused(tmp_path):
     folder = tmp_path / "few"
     shutil.copytree(descriptor.FOLDER / "gelsight_mini", folder)
@@ -167,9 +195,24 @@ def test_a_row_of_electrodes_that_is_none_is_named(tmp_path, row):
         ("window_z_mm = [-6.6, 6.6]", "window_z_mm = [-6.6, 6.5]", "window_z_mm: [-6.6, 6.5]; expected even about 0"),
         ("window_x_mm = [-16.2, 1.2]", "window_x_mm = [-16.2, 5]", "window_x_mm: [-16.2, 5]; expected growing"),
         ("window_x_mm = [-16.2, 1.2]", "window_x_mm = [-19, 1.2]", "corners inside the round tip"),
+        (
+            "corner_radius_mm = 1.15",
+            "corner_radius_mm = 20",
+            "corner_radius_mm: 20; expected below half_width_mm",
+        ),
+        (
+            "height_zero_y_mm = -8.301",
+            "height_zero_y_mm = 0",
+            "camera, height_zero_y_mm: 0; expected -8.2965, back_y_mm less thickness_mm, within 0.2",
+        ),
+        (
+            "half_width_mm = 9.17",
+            "half_width_mm = 0.00917",
+            "half_width_mm: 0.00917; expected above 0.05",
+        ),
     ],
 )
-def test_a_window_outside_the_gel_is_refused(tmp_path, old, new, words):
+def test_a_gel_that_cannot_be_is_refused(tmp_path, old, new, words):
     with pytest.raises(TactileError) as refusal:
         descriptor.read(changed(tmp_path, old, new, "digit"))
     assert words in str(refusal.value)
