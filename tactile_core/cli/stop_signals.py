@@ -33,6 +33,7 @@ def stopping() -> Iterator[None]:
         ours = []
 
     def stop(number: int, frame: FrameType | None) -> None:
+        """Raise Stopped, and ignore all further stop signals, so that the clean-up is not interrupted."""
         for other in ours:
             signal.signal(other, signal.SIG_IGN)
         raise Stopped(number)

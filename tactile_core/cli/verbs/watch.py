@@ -228,6 +228,7 @@ def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStac
         say(f"serving frames at {server.address}, to programs of this machine alone")
 
         def publish(shown: Shown, seen: dict[str, np.ndarray]) -> bool:
+            """Send the frame; returns true: serving never ends the view."""
             server.send(shown, seen)
             return True
 
@@ -252,6 +253,7 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
     from ...files.png_writer import write_png
 
     def draw(picture: np.ndarray) -> bool:
+        """Write the picture (H, W, 3) uint8; returns true: a file never ends the view."""
         out = io.BytesIO()
         write_png(out, picture)
         with atomic.writing(path, "a file in a writable folder", ""):
@@ -272,6 +274,7 @@ def _window(title: str) -> Callable[[np.ndarray], bool]:
     shown = None
 
     def draw(picture: np.ndarray) -> bool:
+        """Show the picture (H, W, 3) uint8; returns false once the window is closed."""
         nonlocal shown
         if shown is None:
             shown = axes.imshow(picture)

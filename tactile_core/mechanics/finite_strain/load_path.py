@@ -97,6 +97,7 @@ class LoadPath:
         """The contact at a force, N, along the motion, near the depth ``guess``, m."""
 
         def move(depth: float, before: ContactState) -> ContactState:
+            """Solve the contact at a depth, m, along the pose's direction, going on from the one before."""
             return self.problem.move(pose.moved(depth), before, self.step)
 
         where, slid_to = f"solve, {self.sensor}, {self.tier} tier", None

@@ -197,6 +197,7 @@ class GelLight:
         right, down = self._per_mm
 
         def to_cell(place: Any) -> Any:
+            """Convert places of the scene, mm, to the cells (column, row) in which the camera sees them."""
             nearer = self._height / (self._height - place.z)
             column = (place.x * nearer * right + 0.5) * (camera.width / cell) - 0.5
             return mi.Point2f(column, (place.y * nearer * down + 0.5) * (camera.height / cell) - 0.5)
