@@ -21,17 +21,32 @@ from .test_set import SEED
 
 PICTURE = "translation_cases.png"
 PURPOSE = """\
-The networks take changes of a BioTac's 19 electrodes to the contact that they most plausibly show, and to the
-deformation of the skin and of a DIGIT's gel; `tactile convert` and `tactile.translate` run them, [limits](#limits) end
-this page. Made by `scripts/evaluate_translation.py --card`; the numbers are of the weights that ship.
+The networks take the changes of a BioTac's 19 electrodes to the contact that most plausibly caused them, and to the
+deformation of the skin and of a DIGIT's gel. `tactile convert` and `tactile.translate` run them; nothing needs to be
+set. This page says how far to trust the result, first in short, then in every number that was measured.
 """
+# Words of an estimate, its row, and what the number is followed by.
+EXPECTED = (
+    ("place of the contact on the gel", "likely_place_mm", " mm"),
+    ("force", "likely_force_size_percent", " %"),
+    ("depth of the gel's dent", "likely_peak_percent", " %"),
+    ("overlap with the true contact patch, best is 1", "likely_iou", ""),
+)
+SHALLOW, DEEP = "0.1 to 0.3 mm deep", "deeper than 0.3 mm"  # in the sets of these rows
 NAMES = """\
-Names: MVB and MVD are the autoencoders of the BioTac's and the DIGIT's mesh, SVB is that of the signals. S2MPN takes
-signals to the BioTac's mesh, M2MPN that mesh to the DIGIT's (D2B the other way), chain is both in turn; B2S and D2S
-take a mesh back to signals. likely is the posterior's most plausible contact, mean its mean, solved the contact solved
-on the gel; followed and sequence are recordings whose contact is tracked through time. peak is the depth of the dent,
-core the nodes deeper than 30 % of it, iou the overlap of the touched patches (intersection over union), place the
-contact's centre.
+| name | meaning |
+|---|---|
+| MVB, MVD, SVB | autoencoders of the BioTac's mesh, the DIGIT's mesh, the signals |
+| S2MPN | network from signals to the BioTac's mesh |
+| M2MPN, D2B | networks from the BioTac's mesh to the DIGIT's, and back |
+| chain | S2MPN, then M2MPN: from signals to the DIGIT's mesh |
+| B2S, D2S | from the BioTac's or the DIGIT's mesh back to signals |
+| likely, mean | the most plausible contact of the posterior, and the posterior's mean |
+| solved | the likely contact, solved on the gel by contact mechanics |
+| followed, sequence | recordings whose contact is tracked through time |
+| peak, core | depth of the dent; nodes deeper than 30 % of it |
+| place, position | centre of the contact |
+| iou | intersection over union of the true and the estimated contact patch |
 """
 SWEEP = """\
 ## Sweep
@@ -49,9 +64,24 @@ LIMITS = """\
 - The size of the electrodes and the BioTac's filling are assumed (see `docs/mechanics.md` and
   `tactile_core/sensors/`). A real unit's gains differ from the simulated ones by half: `tactile adapt` fits them.
 - Rectified recordings are read by networks that know they are; expect larger errors, as their bounds say.
-- Light touches drown in the electrodes' noise: see the places in the rows of shallow contacts.
+- Light touches are lost in the electrodes' noise: see the shallow contacts above.
 - Contacts beyond the DIGIT's gel, deeper than trained, or with shapes far from the nine indenters are not learned.
 """
+
+
+def expected(rows: Sequence[Row]) -> list[str]:
+    """Return the lines of a small table: the errors of shallow and of deeper contacts, each beside its baseline."""
+    by_set = {(row["name"], part): row for row in rows for part in (SHALLOW, DEEP) if part in (row["set"] or "")}
+    lines = [
+        f"| estimate, median error | {SHALLOW} | nearest example | {DEEP} | nearest example |",
+        "|---|---|---|---|---|",
+    ]
+    for words, name, unit in EXPECTED:
+        found = [by_set[name, part] for part in (SHALLOW, DEEP) if (name, part) in by_set]
+        numbers = [number for row in found for number in (row["value"], row["baseline"])]
+        shown = ["" if number is None else f"{number:#.2g}".rstrip(".") + unit for number in numbers]
+        lines += [f"| {words} | {' | '.join(shown)} |"] if len(found) == 2 else []
+    return lines
 
 
 def write_model_card(
@@ -67,23 +97,25 @@ def write_model_card(
     apart : the networks of the unseen rows; sweep : rows of scripts/benchmarks/make/sweep_networks.py
     """
     card = translator.card
+    unseen = [each for each in rows if (each["set"] or "").startswith("unseen")]
     text = [
         "# Model card: the networks that translate touch",
         "",
         PURPOSE,
-        _training(card),
-        "## Errors",
+        "## What to expect",
         "",
-        NAMES,
+        *expected(rows),
+        "",
+        LIMITS,
+        "## Conditions",
+        "",
+        _training(card),
         f"Test set: {len(pairs.press)} contacts of {len(np.unique(pairs.press))} presses, solved by the full tier of"
         " mechanics on both sensors; signals read with 1.5 counts of noise and gains 10 % off. Depth bins (0.1-0.3,"
         " 0.3-0.6, 0.6-0.9, 0.9-1.2 mm on the BioTac) and indenters count alike, no slides; baseline: no deformation.",
         "",
-        *([_apart([each.card["options"] for each in apart]), ""] if apart else []),
-        HEADER,
-        *map(line, rows),
+        "Made by `scripts/evaluate_translation.py --card`; the numbers are of the weights that ship.",
         "",
-        *([SWEEP, HEADER, *map(line, sweep), ""] if sweep else []),
         "## Cases",
         "",
         f"![best, median and worst contact]({PICTURE})",
@@ -91,7 +123,18 @@ def write_model_card(
         "From signals to the DIGIT's gel: the contact with the least, the median and the largest error over the true"
         " deformation's size, among those the gel is moved 0.1 mm by and more.",
         "",
-        LIMITS,
+        "## Names in the tables",
+        "",
+        NAMES,
+        "## Errors",
+        "",
+        HEADER,
+        *(line(each) for each in rows if each not in unseen),
+        "",
+        *(["## Kept apart", "", _apart([each.card["options"] for each in apart]), "", HEADER] if apart else []),
+        *(line(each) for each in unseen),
+        *([""] if apart else []),
+        *([SWEEP, HEADER, *map(line, sweep), ""] if sweep else []),
     ]
     atomic.write_bytes(path, "\n".join(text).encode())
     atomic.write_bytes(path.with_name(PICTURE), _cases(translator, pairs))
