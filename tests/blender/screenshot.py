@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import functools
 import os
+import shutil
 import subprocess
+import tempfile
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +17,9 @@ from pathlib import Path
 import bpy
 
 ROOT = Path(__file__).resolve().parents[2]
-RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+SHIPPED = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+# Where it is imported from: the picture shows the path, which should not be that of a checkout.
+RECORDING = Path(tempfile.gettempdir()) / "recordings" / SHIPPED.name
 # Where the sidebar's tab "Tactile" is drawn in a window of 1280 x 800: alone, beside a picture, in the workspace.
 TABS = {"imported": ("1043", "250"), "authored": ("705", "250")}
 IN_WORKSPACE = ("881", "250")
@@ -27,7 +31,7 @@ def steps(stage: str) -> list[Callable[[], None]]:
     """What a user would have done, each once the window has drawn what came before."""
     if stage == "authored":
         return [install, author, click]
-    done = [install, lambda: bpy.ops.tactile.import_recording(filepath=str(RECORDING))]
+    done = [install, import_recording]
     if stage in ("translated", "rendered"):
         done += [bpy.ops.tactile.translate, bpy.ops.tactile.open_workspace]
         done.append(colour if stage == "translated" else render)
@@ -38,6 +42,13 @@ def install() -> None:
     """The extension, from its zip."""
     bpy.context.preferences.view.show_splash = False
     bpy.ops.extensions.package_install_files(filepath=os.environ["ZIP"], repo="user_default", enable_on_install=True)
+
+
+def import_recording() -> None:
+    """The recording that ships, from the folder of a user."""
+    RECORDING.parent.mkdir(exist_ok=True)
+    shutil.copyfile(SHIPPED, RECORDING)
+    bpy.ops.tactile.import_recording(filepath=str(RECORDING))
 
 
 def author() -> None:

@@ -11,16 +11,41 @@ import numpy as np
 from tactile_core.accuracy import HEADER, Row, line
 from tactile_core.files import atomic
 
+from ..table.summary import short
 from .bonded_layer import GOLDEN_FORCE
 
-_INTRODUCTION = """# Contact mechanics against known answers
+_PURPOSE = """# Contact mechanics against known answers
 
-`tactile.solve` presses an indenter into a fingertip by one of three tiers: `fast` (milliseconds: linear, with friction
-and a learned correction), `full` (seconds: finite strain) and `reference` (a minute: the same on cells half as large).
-This page holds them against formulas, exact solutions, another solver and finer meshes; [accuracy](accuracy.md) has
-their errors in one table. Made by `python scripts/validate_mechanics.py`. *Baseline* is the error of doing nothing
-(`baseline` in the rows of `--json`); shape errors are vector rms over surface nodes that move more than 10 um, and the
-maximum. Times are from one shared 2-core machine.
+`tactile.solve` presses an indenter into a fingertip and returns force and deformation. It has three tiers: `fast`
+(linear, with friction and a learned correction), `full` (finite strain) and `reference` (the same on cells half as
+large). This page shows how far each can be trusted: against formulas, exact solutions, another solver and finer meshes.
+
+## What to expect
+
+A ball of 7 mm diameter pressed 0.6 mm deep, without friction; errors against the reference tier:
+
+"""
+_GUIDANCE = """
+Take `fast` for anything in a loop and for training data; `full` where a sharp edge or a deep press matters. Errors over
+many contacts and all depths: [accuracy](accuracy.md); what each contact states as its own error, and how often that
+holds: [benchmark](benchmark.md).
+
+## Limits
+
+- A contact is refused where the surface has let the indenter through between its nodes: where some carry force on its
+  back, as round a ring's wire pressed deeper than its radius, and in the finite-strain tiers also where the surface
+  lies deeper in it, halfway between nodes, than two fifths of the depth. Less is stated as error.
+- Edges sharper than the spacing of nodes are hardest. Friction holds nodes there; without it springs halfway between
+  nodes keep the indenter out (full tier: `penalty_points.py`; fast tier: `edge_contact.py`), and where that is not
+  enough the full tier tries again with half the spacing.
+- A force at a small depth scatters with the spacing (0.2 % at 0.1 mm), since the contact's edge falls between nodes;
+  the shape does not.
+
+## How to read the tables
+
+`python scripts/validate_mechanics.py` makes this page, and rows with `--json`. *baseline* is the error of doing
+nothing. Shape errors are vector rms over surface nodes that move more than 10 um, and the maximum. Times are from one
+shared 2-core machine.
 
 The golden forces, Hertz and the layers run the reference tier's material and contact (`newton.FiniteStrainContact`) on
 an axisymmetric mesh of the same element (`benchmarks/mechanics/axisymmetric.py`), so that nodes can lie 0.05 mm apart;
@@ -28,27 +53,29 @@ the rows `golden_quarter` run the production cell itself on quarter discs.
 Dimitriadis's formula ends its series early: against the exact small-strain solution (`bonded_layer.exact_layer`, the
 dual integral equations of a bonded layer) it is 0.2 % low at sqrt(R d) / h = 0.1, 0.9 % at 0.19, 4 % at 0.35 and 12 %
 at 0.6 (nu = .5). The solver follows the exact solution, so the formula is asked for 1 % up to 0.15 only.
-The contact's edge falls between nodes: a force at a small depth scatters with the spacing (0.2 % at 0.1 mm), the shape
-does not.
 What each tier is off by on many contacts, by depth, is in `tactile_core/data/mechanics_tiers.json`, made by
-`scripts/benchmarks/measure_tiers.py`; [benchmark](benchmark.md) shows how well its bounds hold.
+`scripts/benchmarks/measure_tiers.py`.
+"""
+_SETTLED = """
+## Random contacts of nine indenters: how many the finite-strain tiers solve
 
-A contact is refused where the surface has let the indenter through between its nodes: where some carry force on its
-back, as round a ring's wire pressed deeper than its radius, and in the finite-strain tiers also where the surface lies
-deeper in it, halfway between nodes, than two fifths of the depth. What is hidden less deep is stated as error. Friction
-holds nodes at edges. Without it they slide off those that are sharper than their spacing: where that lets the indenter
-in, or no contact is found, springs halfway between nodes keep it out (full tier: `penalty_points.py`; fast tier:
-`edge_contact.py`), and where that is not enough the full tier tries again with half the spacing. Of random contacts
-of nine indenters to half of the thickness (`random_contacts(1000, 20)`, full tier) there settled 948 of 954 on the
-DIGIT with a friction of 0.78, all of 562 without and of 40 with friction on the BioTac (these three before there were
-springs, which friction does not use), and 121 of 123 on the DIGIT without, where nodes alone settled 95: all but a ring
-and a bumpy cube, in 11 s on average, 4 in the median, beside other programs. No node of the first three, or of the 95,
-lay more than 1 um in the indenter; of the 121 that was not counted. Of the first of another draw
-(`random_contacts(300, 31)`, DIGIT) 34 of 35 settled without friction, in 6.2 CPU s in the median, 64 s in 95 of 100,
-balls in 1.7 s: all but a bumpy cube at 47 %, which took 4 min to fail; and all of 18 with 0.78, in 10.8 and 34 s. No
-node of these lay more than 1 um in the indenter. In the fast tier there settled, of 10,000 each
-(`scripts/benchmarks/count_contacts.py SENSOR --count 10000 --seed 20`), 9,998 and 9,959 on the DIGIT, without friction
-and with 0.78, and all on the BioTac; no node of these lay more than 1 um in the indenter.
+Contacts to half of the thickness, full tier. No node lay more than 1 um in the indenter where that was counted.
+
+| draw | sensor, friction | solved | CPU time: median, 95 of 100 | not solved |
+|---|---|---|---|---|
+| `random_contacts(1000, 20)` | DIGIT, 0.78 | 948 of 954 (1) | | |
+| | BioTac, none | 562 of 562 (1) | | |
+| | BioTac, 0.78 | 40 of 40 (1) | | |
+| | DIGIT, none | 121 of 123 (2) | 4 s; mean 11 s, beside other programs | a ring, a bumpy cube |
+| the first of `random_contacts(300, 31)` | DIGIT, none | 34 of 35 | 6.2 s, 64 s; balls 1.7 s | a bumpy cube (3) |
+| | DIGIT, 0.78 | 18 of 18 | 10.8 s, 34 s | |
+
+(1) Before there were springs, which friction does not use. (2) Nodes alone settled 95, of which none lay more than 1 um
+in the indenter; of the 121 that was not counted. (3) At 47 % of the thickness; it took 4 min to fail.
+
+In the fast tier there settled, of 10,000 each (`scripts/benchmarks/count_contacts.py SENSOR --count 10000 --seed 20`),
+9,998 and 9,959 on the DIGIT, without friction and with 0.78, and all on the BioTac; no node of these lay more than 1 um
+in the indenter.
 """
 
 
@@ -60,13 +87,41 @@ def write(report: Path, parts: dict[str, list[Row]]) -> None:
         "mechanics_force.png": ("Force against depth", _force),
         "mechanics_speed.png": ("Speed against error", _speed),
     }
-    text = _INTRODUCTION
+    text = _PURPOSE + _tier_table(rows) + _GUIDANCE
     for name, (title, draw) in plots.items():
         _save(report.with_name(name), lambda axes, draw=draw: draw(axes, rows))
         text += f"\n![{title}]({name})\n"
+    text += _SETTLED
     for heading, part in parts.items():
         text += f"\n## {heading}\n\n{HEADER}\n" + "".join(line(row) + "\n" for row in part)
     atomic.write_bytes(report, text.encode())
+
+
+def _tier_table(rows: list[Row]) -> str:
+    """Return the table of the tiers' time and errors at 0.6 mm; a cell is empty where nothing was measured."""
+    found = {row["name"]: row for row in rows}
+
+    def number(name: str, unit: str, scale: float = 1.0, field: str = "value") -> str:
+        value = found[name][field] if name in found else None
+        return "" if value is None else f"{short(abs(scale * value))} {unit}"
+
+    lines = ["| tier | DIGIT: time | shape | force | BioTac: time | shape | force |", "|---|---|---|---|---|---|---|"]
+    for tier in ("fast", "full", "reference"):
+        cells = [tier]
+        for sensor in ("digit", "biotac"):
+            name, quick = f"{sensor}_{tier}_0.6mm", tier == "fast"
+            cells += [
+                number(f"{name}_time", "ms" if quick else "s", 1e-3 if tier == "full" else 1.0),
+                number(f"{name}_shape_rms", "um"),
+                number(f"{name}_force_error", "%"),
+            ]
+        lines.append(f"| {' | '.join(cells)} |")
+    cells = ["nothing computed"]
+    for sensor in ("digit", "biotac"):
+        base = f"{sensor}_fast_0.6mm"
+        cells += ["", number(f"{base}_shape_rms", "um", field="baseline")]
+        cells += [number(f"{base}_force_error", "%", field="baseline")]
+    return "\n".join([*lines, f"| {' | '.join(cells)} |"]) + "\n"
 
 
 def _save(path: Path, draw: Any) -> None:

@@ -16,6 +16,7 @@ from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import mesh_columns, true_displacement
 from tactile_core.translation.translate import Translator
 
+from ..table.summary import short
 from .noise import as_read
 from .test_set import SEED
 
@@ -79,7 +80,7 @@ def expected(rows: Sequence[Row]) -> list[str]:
     for words, name, unit in EXPECTED:
         found = [by_set[name, part] for part in (SHALLOW, DEEP) if (name, part) in by_set]
         numbers = [number for row in found for number in (row["value"], row["baseline"])]
-        shown = ["" if number is None else f"{number:#.2g}".rstrip(".") + unit for number in numbers]
+        shown = [short(number) + unit for number in numbers]
         lines += [f"| {words} | {' | '.join(shown)} |"] if len(found) == 2 else []
     return lines
 
