@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import functools
+import contextlib
 import math
 import os
 import zlib
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import TactileError
 from . import outside
-from .hdf5_free_lists import check_free_lists
+from .hdf5_heaps import Heaps
 
 if TYPE_CHECKING:
     import h5py
@@ -24,7 +24,7 @@ DEFLATE, CHECKSUM, STEP = 1, 3, 2**20
 WIDTHS = {2, 4, 8, 16, 32}  # bytes of an address and of a size; the library opens no file with others
 MAX_DEPTH = 32  # groups within groups, whose names the library looks up again and again (assumed enough; ours have 2)
 MAX_PLAIN_CHUNK = 2**24  # bytes of a chunk in a file of our own; they have 0.2 MB
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
+SIGNATURE, LONGEST = b"\x89HDF\r\n\x1a\n", 256  # LONGEST: bytes of the widest superblock up to the root's address
 
 
 @contextmanager
@@ -38,47 +38,64 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
     """
     import h5py
 
-    check_before_opening(path)
-    with h5py.File(path, "r") as file:
-        beyond = file.id.links.visit(_outside, info=True)
-        if beyond is not None:
-            if beyond.count(b"/") >= MAX_DEPTH:
-                raise _refused(path, beyond[:40], f"groups over {MAX_DEPTH} deep", "a few")
-            raise _refused(path, beyond, "a link to another file", "data inside this file")
+    with open_plain(path) as file:
         file.visititems(lambda name, item: _check(path, name, item) if isinstance(item, h5py.Dataset) else None)
         yield file
 
 
-def check_before_opening(path: str | os.PathLike) -> None:
-    """Raise TactileError for a file on which the HDF5 library would use up all memory, and OSError. Fuzzing found two.
+@contextmanager
+def open_plain(path: str | os.PathLike) -> Iterator[h5py.File]:
+    """Open for reading, with values unchecked. Raises h5py's errors; TactileError for what `open_checked` refuses else.
 
-    The first begins with a driver's information, for which the library takes up to 4 GB whatever the file holds; only
-    files in several parts have it. The second has an endless free list, see ``hdf5_free_lists``.
+    Meant for files of plain numbers, see ``check_plain``. On two kinds of file, found by fuzzing, the HDF5 library
+    would use up all memory: one begins with a driver's information, for which the library takes up to 4 GB whatever
+    the file holds, and only files in several parts have it; the other has an endless free list, see ``hdf5_heaps``.
     """
-    found = outside.check(path, "an HDF5 file")
-    _check_bytes(os.fspath(path), found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
+    import h5py
+
+    with contextlib.ExitStack() as stack:
+        heaps = _heaps(path, stack)
+        file = stack.enter_context(h5py.File(path, "r"))
+        wrong = file.id.links.visit(lambda name, link: _link(path, heaps, name, link), info=True)
+        if wrong is not None:
+            raise wrong
+        yield file
 
 
-@functools.lru_cache(maxsize=256)  # a prepared recording is opened for each shard
-def _check_bytes(path: str, *_identity: int) -> None:
-    with outside.open_file(path) as file:
+def _heaps(path: str | os.PathLike, stack: contextlib.ExitStack) -> Heaps | None:
+    """Return the heaps of a file whose root may be opened, None for a file that the library does not open.
+
+    Raises TactileError, and OSError. Places in the superblock: HDF5 file format, II.A.
+    """
+    block, start = _superblock(path)
+    if not block:
+        return None
+    old = block[8] <= 1
+    width, length = block[13:15] if old else block[9:11]
+    if not {width, length} <= WIDTHS:
+        return None
+    fourth = (24 + 4 * block[8] if old else 12) + 3 * width  # the address of the driver's, in later ones of the root
+    if old and block[fourth : fourth + width].strip(b"\xff"):
+        raise _refused(path, "superblock", "a driver's information: a file in several parts", "one whole file")
+    root = fourth + width + length if old else fourth
+    heaps = stack.enter_context(Heaps(path, start, width, length))
+    wrong = heaps.check_object(int.from_bytes(block[root : root + width], "little"))
+    if wrong is not None:
+        raise wrong
+    return heaps
+
+
+def _superblock(path: str | os.PathLike) -> tuple[bytes, int]:
+    """Read the superblock and what follows it, LONGEST bytes, and where it begins; no bytes where there is none."""
+    with outside.open_file(path, "an HDF5 file") as file:
         size, start = os.fstat(file.fileno()).st_size, 0
         while start < size:
             file.seek(start)
-            block = file.read(64)
+            block = file.read(LONGEST)
             if block.startswith(SIGNATURE):
-                break
+                return block.ljust(LONGEST, b"\xff"), start
             start = 2 * start or 512  # where the library looks, too
-    if start >= size or len(block) < 64:
-        return
-    if block[8] <= 1:  # the fourth address is the driver's (HDF5 file format, II.A); later superblocks have none
-        width, length, addresses = block[13], block[14], 24 + 4 * block[8]
-        if block[addresses + 3 * width : addresses + 4 * width].strip(b"\xff"):
-            raise _refused(path, "superblock", "a driver's information: a file in several parts", "one whole file")
-    else:
-        width, length = block[9], block[10]
-    if {width, length} <= WIDTHS:
-        check_free_lists(path, start, width, length)
+    return b"", 0
 
 
 def declared(data: h5py.Dataset, where: str) -> None:
@@ -103,11 +120,15 @@ def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
         raise _refused(path, name, f"chunks of shape {data.chunks}", f"at most {MAX_PLAIN_CHUNK // 2**20} MB")
 
 
-def _outside(name: bytes, link: h5py.h5l.LinkInfo) -> bytes | None:
-    """Return the name of a link to another file or too deep in groups, which ends the walk; None for other links."""
+def _link(path: str | os.PathLike, heaps: Heaps | None, name: bytes, link: h5py.h5l.LinkInfo) -> TactileError | None:
+    """Return what is wrong with a link, before the library follows it, which ends the walk; None for a good one."""
     import h5py
 
-    return name if link.type == h5py.h5l.TYPE_EXTERNAL or name.count(b"/") >= MAX_DEPTH else None
+    if name.count(b"/") >= MAX_DEPTH:
+        return _refused(path, name[:40], f"groups over {MAX_DEPTH} deep", "a few")
+    if link.type == h5py.h5l.TYPE_EXTERNAL:
+        return _refused(path, name, "a link to another file", "data inside this file")
+    return heaps.check_object(link.u) if heaps and link.type == h5py.h5l.TYPE_HARD else None
 
 
 def _check(path: str | os.PathLike, name: str | bytes, data: h5py.Dataset) -> None:

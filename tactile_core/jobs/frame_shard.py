@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..files import atomic, checksummed
-from ..files.hdf5_checked import check_before_opening
+from ..files.hdf5_checked import open_plain
 from .engine import job as jobs
 from .frame_pass import CHUNK, Tools, translated
 from .frames_file import FramesFile, kept
@@ -66,11 +66,8 @@ def make(folder: Path, job: Job, index: int, number: int, tools: Tools) -> bool:
 
 def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
     """Return true if a whole shard is shard `number` of recording `index`, alone under its name, with these frames."""
-    import h5py
-
     try:
-        check_before_opening(file)
-        with h5py.File(file, "r") as found:
+        with open_plain(file) as found:
             return all(found.attrs[name] == value for name, value in _identity(job, index, number, frames).items())
     except Exception:  # the library raises a dozen types on what is no shard
         return False

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic, checksummed
-from ..files.hdf5_checked import check_before_opening, check_plain, declared
+from ..files.hdf5_checked import check_plain, declared, open_plain
 from ..files.hdf5_writer import Disk
 from ..recordings import PrepareOptions, Recording, Signals, electrode_gains, prepare
 from ..recordings.chunks import read_parts
@@ -256,11 +256,8 @@ class Prepared:
         return self._read(read)
 
     def _read(self, what: Any) -> Any:
-        import h5py
-
         try:
-            check_before_opening(self._path)
-            with h5py.File(self._path, "r") as file:
+            with open_plain(self._path) as file:
                 _check(self._path, file)
                 return what(file)
         except TactileError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import struct
 import zlib
 
@@ -10,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tactile_core.files import array_pack, hdf5_free_lists
+from tactile_core.files import array_pack, hdf5_checked, hdf5_heaps
 from tactile_core.jobs import prepared_signals
 from tactile_core.simulation import pairs_file
 
@@ -85,22 +86,63 @@ def driver_information(path):
         file.write(struct.pack("<Q", end))
 
 
-def endless_list(path):
-    """A group's heap whose first free place names itself as the next."""
-    electrodes(path, data=np.zeros((60, 19)))
+def endless_list(path, which: int = 0):
+    """A heap, the first of the file being its root's, whose first free place names itself as the next."""
+    if not path.exists():
+        electrodes(path, data=np.zeros((60, 19)))
     with open(path, "r+b") as file:
         content = file.read()
-        heap = content.index(b"HEAP")
+        heap = [one.start() for one in re.finditer(b"HEAP", content)][which]
         _, first, address = struct.unpack_from("<3Q", content, heap + 8)
-        assert struct.unpack_from("<Q", content, address + first)[0] == hdf5_free_lists.END
+        address += content.index(b"\x89HDF")
+        if first == hdf5_heaps.END:  # full: its first name is written over
+            file.seek(heap + 16)
+            file.write(struct.pack("<Q", 0))
+            file.seek(address)
+            file.write(struct.pack("<2Q", 8, 8))
+            first = 8
         file.seek(address + first)
-        file.write(struct.pack("<Q", first))
+        file.write(struct.pack("<2Q", first, 8))
+
+
+def endless_list_below(path):
+    endless_list(path, -1)
+
+
+def endless_list_of_names(path):
+    """The names of a dataset's files, which the library loads as it opens the dataset."""
+    external_storage(path)
+    endless_list(path, -1)
+
+
+def endless_list_moved(path):
+    """A group whose header goes on elsewhere."""
+    with h5py.File(path, "w") as file:
+        group = file.create_group("electrode_vals")
+        for index in range(20):
+            group.attrs[f"a{index}"] = np.arange(40)
+        group["data"] = np.zeros((60, 19))
+    endless_list(path, -1)
+
+
+def endless_list_in_new_group(path):
+    """An old group within a group of the newer kind, which has no heap of its own."""
+    with (
+        h5py.File(path, "w", track_order=True) as file,
+        h5py.File("old", "w", driver="core", backing_store=False) as old,
+    ):
+        old["electrode_vals/data"] = np.zeros((60, 19))
+        old.copy("electrode_vals", file)
+    endless_list(path)
 
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (endless_list, "a list of free places without end"),
+        (endless_list, "a list of free places without end"), (endless_list_below, "a list of free places without end"),
+        (endless_list_of_names, "a list of free places without end"),
+        (endless_list_moved, "a list of free places without end"),
+        (endless_list_in_new_group, "a list of free places without end"),
         (driver_information, "a driver's information"),
         (huge_shape, "GB in memory"), (huge_chunk, "chunks of 1450 MB"), (chunk_bomb, "unpacks to more than"),
         (external_storage, "other files"), (external_link, "a link to another file"), (virtual_storage, "other files"),
@@ -120,6 +162,21 @@ def test_hdf5(make, words, load, tmp_path):
     elif make is huge_shape:
         words = "0 stored bytes"
     refused(load, tmp_path / "a.h5", words)
+
+
+def test_heaps_of_a_file_that_begins_with_other_bytes(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w", userblock_size=512) as file:
+        file["electrode_vals/data"] = np.zeros((60, 19))
+    endless_list(tmp_path / "a.h5", -1)
+    refused(pairs_file.read_pairs, tmp_path / "a.h5", "a list of free places without end")
+
+
+def test_what_is_not_reached_is_not_read(tmp_path):
+    """A terabyte of nothing after the data, which no one can look through."""
+    electrodes(tmp_path / "a.h5", data=np.zeros((60, 19)))
+    os.truncate(tmp_path / "a.h5", 2**40)
+    with hdf5_checked.open_checked(tmp_path / "a.h5") as file:
+        assert file["electrode_vals/data"].shape == (60, 19)
 
 
 def test_groups_within_groups(tmp_path):

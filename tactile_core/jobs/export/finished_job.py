@@ -99,11 +99,12 @@ def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
     """Raise TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
     if checksummed.verified_checksum(path) is None:
         raise TactileError(path, "damaged", "a whole shard", ADVICE)
-    if not frame_shard.is_of(path, job, index, number, frames):
-        raise TactileError(path, "another shard under this name", f"shard {number} of {job.inputs[index].name}", ADVICE)
     rows = min(job.recipe.shard_frames, frames - number * job.recipe.shard_frames)
     expected = set(arrays_of(kept(job.recipe.keep, job.recipe.answer), shard=True))
     with damage_reported(str(path), "shard"), open_checked(path) as file:
+        if not frame_shard.is_of(path, job, index, number, frames):
+            expected_shard = f"shard {number} of {job.inputs[index].name}"
+            raise TactileError(path, "another shard under this name", expected_shard, ADVICE)
         if set(file) != expected:
             raise TactileError(path, f"arrays {', '.join(sorted(file))}", ", ".join(sorted(expected)), ADVICE)
         for name, data in file.items():
