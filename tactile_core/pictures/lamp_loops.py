@@ -8,36 +8,56 @@ from ..files.compiled import Loop
 
 
 @Loop
-def lamp_light(  # noqa: ANN201
-    position, strength, tangent, over_picture, near, height, square, tilt, slope_right, slope_down, own, normal,  # noqa: ANN001
-    facing, distance, light,  # noqa: ANN001
+def light_of_lamps(  # noqa: ANN201
+    seen, slope_right, slope_down, right, down, inverse, position, strength, tangent,  # noqa: ANN001
+    near, tilt, normal, mapped, facing, distance, light,  # noqa: ANN001
 ):  # fmt: skip
-    """Fill light (H, W) without shadows, what it is of, and return the box (4,) of pixels that may throw shadows.
+    """Fill in the light (3, H, W) of all LEDs without shadows, and what it is of; return where shadows may begin.
 
-    position : (3,) float32 m of the LED; strength : its squared distance, m2; tangent : m, see ``TANGENT``
-    facing : cosine times distance times the normal's length, m; distance : (H, W), squared, m2
-    box : first and last row and column; the first row beyond the last where there is none
+    seen, slope_right, slope_down, near, tilt, normal, mapped : (H, W), see ``SeenSurface``; right (W,), down (H,) m
+    inverse : 1/m, of the camera's apparent height; position : (3, 3) m of the LEDs; strength : (3,), squared distances
+    from the middle, m2; tangent : (3,) m, see ``TANGENT``
+    facing : (3, H, W) m, cosine times distance times the normal's length; distance : (3, H, W), squared, m2
+    edges : (3, 4), first and last row and column of each LED; the first row beyond the last where there is none
     """
-    rows, columns = near.shape
-    first_row, last_row, first_column, last_column = rows, -1, columns, -1
-    right, down, up = position[0], position[1], position[2]
-    for row in range(rows):
-        for column in range(columns):
-            far = over_picture[row, column] * near[row, column]
-            far += up * height[row, column]
-            far *= np.float32(-2)
-            far += square[row, column]
-            far += strength
-            faces = up * tilt[row, column]
-            faces -= right * slope_right[row, column]
-            faces -= down * slope_down[row, column]
-            faces += own[row, column]
-            if faces < tangent * normal[row, column]:
-                first_row, last_row = min(first_row, row), max(last_row, row)
-                first_column, last_column = min(first_column, column), max(last_column, column)
-            facing[row, column], distance[row, column] = faces, far
-            light[row, column] = max(faces, np.float32(0)) / (far * np.sqrt(far) * normal[row, column]) * strength
-    return first_row, last_row, first_column, last_column
+    rows, columns = seen.shape
+    one, zero, two = np.float32(1), np.float32(0), np.float32(-2)
+    own, square, edges = np.empty(columns, np.float32), np.empty(columns, np.float32), np.empty((3, 4), np.int64)
+    edges[:, 0], edges[:, 1], edges[:, 2], edges[:, 3] = rows, -1, columns, -1
+    for a in range(rows):  # a row stays in the processor's cache; loops without conditions are vectorised
+        for b in range(columns):
+            x, y, height = slope_right[a, b], slope_down[a, b], seen[a, b]
+            nearness = one - height * inverse
+            outward = right[b] * x + down[a] * y
+            tilted = nearness - outward * inverse
+            near[a, b], tilt[a, b] = nearness, tilted
+            own[b] = outward * nearness - tilted * height
+            normal[a, b] = np.sqrt(x * x + y * y + tilted * tilted)
+            square[b] = nearness * nearness * (right[b] * right[b] + down[a] * down[a]) + height * height
+            mapped[a, b] = height / nearness
+        for led in range(3):
+            aside, ahead, up = position[led, 0], position[led, 1], position[led, 2]
+            begins, lower = False, down[a] * ahead
+            for b in range(columns):
+                far = (right[b] * aside + lower) * near[a, b]
+                far += up * seen[a, b]
+                far *= two
+                far += square[b]
+                far += strength[led]
+                faces = up * tilt[a, b]
+                faces -= aside * slope_right[a, b]
+                faces -= ahead * slope_down[a, b]
+                faces += own[b]
+                facing[led, a, b], distance[led, a, b] = faces, far
+                light[led, a, b] = max(faces, zero) / (far * np.sqrt(far) * normal[a, b]) * strength[led]
+            for b in range(columns):
+                begins |= facing[led, a, b] < tangent[led] * normal[a, b]
+            if begins:
+                edges[led, 0], edges[led, 1] = min(edges[led, 0], a), a
+                for b in range(columns):
+                    if facing[led, a, b] < tangent[led] * normal[a, b]:
+                        edges[led, 2], edges[led, 3] = min(edges[led, 2], b), max(edges[led, 3], b)
+    return edges
 
 
 @Loop

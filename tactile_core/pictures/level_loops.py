@@ -15,15 +15,23 @@ def in_picture(radiance, rest, response, background, largest):  # noqa: ANN001, 
     """
     height, width = background.shape[:2]
     picture, lowest = np.empty((height, width, 3), np.uint8), np.float32(0)
-    level = np.empty(width, np.float32)
+    change, level, line = (
+        np.empty((3, width), np.float32),
+        np.empty(width, np.float32),
+        np.empty((width, 3), np.float32),
+    )
     for row in range(height):
+        for led in range(3):
+            for column in range(width):
+                change[led, column] = radiance[led, row, column] - rest[led, row, column]
         for channel in range(3):
             level[:] = 0
             for led in range(3):
                 for column in range(width):
-                    change = radiance[led, row, column] - rest[led, row, column]
-                    level[column] += response[channel, led, row, column] * change
-            for column in range(width):
-                value = np.rint(level[column] + background[row, column, channel])
-                picture[row, column, channel] = np.uint8(min(max(value, lowest), largest))
+                    level[column] += response[channel, led, row, column] * change[led, column]
+            line[:, channel] = level
+        seen, ground, levels = picture[row].ravel(), background[row].ravel(), line.ravel()
+        for k in range(3 * width):
+            value = np.rint(levels[k] + ground[k])
+            seen[k] = np.uint8(np.int32(min(max(value, lowest), largest)))  # by way of 32 bits: vectorised
     return picture

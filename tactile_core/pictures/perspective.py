@@ -75,11 +75,11 @@ class Perspective:
         slope_right, slope_down = slopes(height, self.camera)
         right, down = self.right * self._inverse, self.down * self._inverse
         if available():
-            least = weigh_slopes(slope_right, slope_down, right[0], down[:, 0])
-            return slope_right, float(least)
-        slope_right *= right
-        slope_down *= down
-        slope_right += slope_down
+            weigh_slopes(slope_right, slope_down, right[0], down[:, 0])
+        else:
+            slope_right *= right
+            slope_down *= down
+            slope_right += slope_down
         return slope_right, float(slope_right.min())
 
     def _places(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

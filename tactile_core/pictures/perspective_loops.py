@@ -31,14 +31,10 @@ def slope_maps(height, over_right, over_down):  # noqa: ANN001, ANN201
 
 @Loop
 def weigh_slopes(slope_right, slope_down, right, down):  # noqa: ANN001, ANN201
-    """See ``Perspective._steepness``, into ``slope_right``, and its least; right (W,), down (H,) over the height."""
-    least = np.float32(np.inf)
+    """See ``Perspective._steepness``, into ``slope_right``; right (W,), down (H,) over the camera's height."""
     for a in range(slope_right.shape[0]):
         for b in range(slope_right.shape[1]):
-            steep = slope_right[a, b] * right[b] + slope_down[a, b] * down[a]
-            slope_right[a, b] = steep
-            least = min(least, steep)
-    return least
+            slope_right[a, b] = slope_right[a, b] * right[b] + slope_down[a, b] * down[a]
 
 
 @Loop
@@ -50,6 +46,8 @@ def seen_heights(height, steepness, start, start_near, start_nearest, rows, colu
     one, half, least = np.float32(1), np.float32(0.5), np.float32(0)
     flat_height, flat_steepness, found = height.ravel(), steepness.ravel(), np.empty_like(height)
     turn, there, near, seen, row, column = np.empty((6, width), np.float32)  # by row: half the time of by pixel
+    nearest, first = np.empty(width, np.int32), np.empty(width, np.int32)  # half as long: twice as many at a time
+    wide, most_row, most_column = np.int32(width), np.int32(count - 2), np.int32(width - 2)
     for a in range(count):
         for b in range(width):
             turn[b], there[b] = flat_steepness[start_nearest[a, b]], flat_height[start_nearest[a, b]]
@@ -57,35 +55,18 @@ def seen_heights(height, steepness, start, start_near, start_nearest, rows, colu
             share = turn[b] / start_near[a, b]
             seen[b] = (there[b] + share * start[a, b]) / (one + share)
             near[b] = one - seen[b] * inverse
-            row[b] = min(max(near[b] * rows[a] + middle_row, least), last_row)
-            column[b] = min(max(near[b] * columns[b] + middle_column, least), last_column)
+            lower = min(max(near[b] * rows[a] + middle_row, least), last_row)
+            right = min(max(near[b] * columns[b] + middle_column, least), last_column)
+            nearest[b] = np.int32(lower + half) * wide + np.int32(right + half)
+            i, j = min(np.int32(lower), most_row), min(np.int32(right), most_column)
+            row[b], column[b], first[b] = lower - np.float32(i), right - np.float32(j), i * wide + j
         for b in range(width):
-            turn[b] = flat_steepness[np.intp(row[b] + half) * width + np.intp(column[b] + half)]
-            i, j = min(np.intp(row[b]), count - 2), min(np.intp(column[b]), width - 2)
-            t, s, at = row[b] - np.float32(i), column[b] - np.float32(j), i * width + j
-            upper = flat_height[at] + (flat_height[at + 1] - flat_height[at]) * s
-            lower = flat_height[at + width] + (flat_height[at + width + 1] - flat_height[at + width]) * s
-            there[b] = upper + (lower - upper) * t
+            turn[b], at = flat_steepness[nearest[b]], first[b]
+            upper = flat_height[at] + (flat_height[at + 1] - flat_height[at]) * column[b]
+            at += wide
+            lower = flat_height[at] + (flat_height[at + 1] - flat_height[at]) * column[b]
+            there[b] = upper + (lower - upper) * row[b]
         for b in range(width):
             share = turn[b] / near[b]
             found[a, b] = (there[b] + share * seen[b]) / (one + share)
-    return found
-
-
-@Loop
-def seen_surface(seen, slope_right, slope_down, right, down, inverse):  # noqa: ANN001, ANN201
-    """Compute near, tilt, own, normal, square and mapped, (6, H, W) float32, of ``shading.SeenSurface``."""
-    rows, columns = seen.shape
-    found, one = np.empty((6, rows, columns), np.float32), np.float32(1)
-    for a in range(rows):
-        for b in range(columns):
-            x, y, height = slope_right[a, b], slope_down[a, b], seen[a, b]
-            near = one - height * inverse
-            outward = right[b] * x + down[a] * y
-            tilt = near - outward * inverse
-            found[0, a, b], found[1, a, b] = near, tilt
-            found[2, a, b] = outward * near - tilt * height
-            found[3, a, b] = np.sqrt(x * x + y * y + tilt * tilt)
-            found[4, a, b] = near * near * (right[b] * right[b] + down[a] * down[a]) + height * height
-            found[5, a, b] = height / near
     return found

@@ -12,19 +12,13 @@ from ..errors import TactileError
 from ..files.compiled import available
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
-from ..sensors.camera import COLOURS, Camera, Led
+from ..sensors.camera import COLOURS
 from .background import raised_light, resting_picture
-from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .coating_spread import CoatingSpread
 from .height_map import of_unit, rest_height_map
-from .lamp_loops import lamp_light
+from .lamp_light import Lamps
 from .level_loops import in_picture
-from .perspective import Perspective, slopes
-from .perspective_loops import seen_surface
-
-# A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
-# differences that slopes are made of.
-TANGENT, TANGENT_MARGIN = 1.1, 2  # of the radius, px
+from .perspective import Perspective
 
 
 class Shader:
@@ -52,7 +46,7 @@ class Shader:
         check_reach(rest, calibration, "rest height map")
         self.rest = self._view(rest)
         self._spread = CoatingSpread(camera, calibration.coating.spread)
-        self._lamps = [Lamp(camera, led) for led in calibration.leds]
+        self._lamps = Lamps(camera, calibration.leds)
         self._rest_radiance = self._seen_radiance(self.rest)
         if background is None:
             background = resting_picture(calibration, np.moveaxis(self._rest_radiance, 0, -1))
@@ -93,113 +87,10 @@ class Shader:
 
     def _seen_radiance(self, seen: np.ndarray) -> np.ndarray:
         """Radiance (3, H, W) of heights (H, W) that the pixels see."""
-        surface = SeenSurface(self._view, seen)
-        scale = self.calibration.facing.astype(np.float32)
-        direct = np.stack([lamp.radiance(surface) * level for lamp, level in zip(self._lamps, scale, strict=True)])
-        return self._spread(direct + raised_light(self.calibration, seen))
-
-
-class SeenSurface:
-    """Data of the gel that the pixels see, shared by all LEDs, all (H, W) float32.
-
-    With s = 1 - h / H the seen point is (q s, h), and its normal is along (-dh/dq, tilt), where dh/dq are the slopes of
-    h over the picture and tilt = s - q . dh/dq / H (from h(q) = height(q s)).
-    """
-
-    def __init__(self, view: Perspective, seen: np.ndarray) -> None:
-        camera = view.camera
-        inverse = np.float32(1 / camera.apparent_height)
-        self.height = seen
-        self.slope_right, self.slope_down = slopes(seen, camera)
-        if available():
-            self.near, self.tilt, self.own, self.normal, self.square, self.mapped = seen_surface(
-                seen, self.slope_right, self.slope_down, view.right[0], view.down[:, 0], inverse
-            )
-            return
-        self.near = 1 - seen * inverse
-        outward = view.right * self.slope_right
-        outward += view.down * self.slope_down  # q . dh/dq
-        self.tilt = self.near - outward * inverse
-        # Of the cosine: normal . (LED - point) = tilt LED_up - slopes . LED + own
-        self.own = outward * self.near
-        self.own -= self.tilt * seen
-        self.normal = np.sqrt(self.slope_right**2 + self.slope_down**2 + self.tilt**2)
-        self.square = self.near**2 * (view.right**2 + view.down**2) + seen**2  # of the distance from the origin
-
-        self.mapped = seen / self.near  # the field on which shadows are cast, see ``cast_shadows``
-
-
-class Lamp:
-    """Light of one LED on the gel that the pixels see."""
-
-    def __init__(self, camera: Camera, led: Led) -> None:
-        self.led = led
-        self._caster = ShadowCaster(camera, led)
-        right, down, _ = np.asarray(led.position, np.float32)
-        self._over_picture = camera.right.astype(np.float32) * right + (camera.down.astype(np.float32) * down)[:, None]
-
-    def radiance(self, surface: SeenSurface) -> np.ndarray:
-        """Return the radiance (H, W) float32, relative to a coating that faces the LED in the picture's middle."""
-        if available():
-            return self._compiled_radiance(surface)
-        right, down, up = np.asarray(self.led.position, np.float32)
-        distance = self._over_picture * surface.near
-        distance += up * surface.height
-        distance *= -2
-        distance += surface.square
-        distance += np.float32(np.square(self.led.position).sum())  # squared, so far
-        facing = up * surface.tilt
-        facing -= right * surface.slope_right
-        facing -= down * surface.slope_down
-        facing += surface.own
-        light = np.maximum(facing, 0)
-        edge = bounding_box(facing < np.float32(TANGENT * self.led.radius) * surface.normal, TANGENT_MARGIN)
-        if edge is not None:
-            sight, box = self._caster.sight(surface.mapped, edge)
-            light[box] = self._shadowed(sight, facing[box], distance[box], surface, box)
-        distance *= np.sqrt(distance)
-        distance *= surface.normal
-        light /= distance
-        light *= np.float32(np.square(self.led.position).sum())
-        return light
-
-    def _compiled_radiance(self, surface: SeenSurface) -> np.ndarray:
-        """Compute the same radiance by a compiled loop; shadows are numpy's."""
-        strength = np.float32(np.square(self.led.position).sum())
-        facing, distance, light = np.empty((3, *surface.near.shape), np.float32)
-        first_row, last_row, first_column, last_column = lamp_light(
-            np.asarray(self.led.position, np.float32), strength, np.float32(TANGENT * self.led.radius),
-            self._over_picture, surface.near, surface.height, surface.square, surface.tilt, surface.slope_right,
-            surface.slope_down, surface.own, surface.normal, facing, distance, light,
-        )  # fmt: skip
-        if last_row < 0:
-            return light
-        margin, (rows, columns) = TANGENT_MARGIN, light.shape
-        edge = (
-            slice(max(first_row - margin, 0), min(last_row + 1 + margin, rows)),
-            slice(max(first_column - margin, 0), min(last_column + 1 + margin, columns)),
-        )
-        sight, box = self._caster.sight(surface.mapped, edge)
-        square = distance[box]
-        shadowed = self._shadowed(sight, facing[box], square, surface, box)
-        light[box] = shadowed / (square * np.sqrt(square) * surface.normal[box]) * strength
-        return light
-
-    def _shadowed(
-        self, sight: np.ndarray, facing: np.ndarray, square: np.ndarray, surface: SeenSurface, box: tuple[slice, slice]
-    ) -> np.ndarray:
-        """Cosine times distance of the part of the LED's disc that stands above the horizon, times its share of it.
-
-        With l the vector to the LED and e the unit vector upward across it, that part's centre is l + radius moment /
-        share e; and normal . e = (tilt |l|^2 - above facing) / (|l| plan distance).
-        """
-        share, moment = disc_share(sight)
-        above = self.led.position[2] - surface.height[box]
-        moment *= surface.tilt[box] * square - above * facing
-        moment *= np.float32(self.led.radius) / np.sqrt((square - above**2) * square)
-        share *= facing
-        share += moment
-        return np.maximum(share, 0, out=share)
+        light = self._lamps.light(self._view, seen)
+        light *= self.calibration.facing.astype(np.float32)[:, None, None]
+        light += raised_light(self.calibration, seen)
+        return self._spread(light)
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:

@@ -12,8 +12,8 @@ from ...sensors.gel_shape import shape_of
 from ..background import raised_light
 from ..coating_spread import CoatingSpread
 from ..height_map import check_covered
+from ..lamp_light import Lamps
 from ..perspective import Perspective
-from ..shading import Lamp, SeenSurface
 from .ball_print import deepest, print_on
 
 WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors down to this short side
@@ -68,7 +68,7 @@ class FastPictures(BallPictures):
 
     def __init__(self, calibration: Calibration) -> None:
         super().__init__(calibration)
-        self._lamps = [Lamp(self.camera, led) for led in calibration.leds]
+        self._lamps = Lamps(self.camera, calibration.leds)
         self._resting = self._radiance(self.rest)
 
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
@@ -76,8 +76,8 @@ class FastPictures(BallPictures):
         return self.spread(self._radiance(self.heights(ball)) - self._resting)
 
     def _radiance(self, heights: np.ndarray) -> np.ndarray:
-        surface = SeenSurface(self._view, self._view(heights))
-        return np.stack([lamp.radiance(surface) for lamp in self._lamps]) + self.raised(surface.height)
+        seen = self._view(heights)
+        return self._lamps.light(self._view, seen) + self.raised(seen)
 
 
 def working_factor(width: int, height: int) -> int:
