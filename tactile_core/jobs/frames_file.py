@@ -52,8 +52,11 @@ KEPT = {
     "height": {"height_map": ("m", "(T, 320, 240) of the gel seen by the camera; see pictures.height_map")},
     "image": {},
     "traction": {
-        "traction_digit": ("Pa", "(T, M, 3) of the object on the resting gel, from the translated displacement"),
-        "traction_force": ("N", "(T, 3) what traction_digit adds up to; force is another estimate"),
+        "traction_digit": (
+            "Pa",
+            "(T, M, 3) of the object on the resting gel: pattern from its displacement, size from force",
+        ),
+        "traction_force": ("N", "(T, 3) what traction_digit adds up to: as large as force, along the gel's own shear"),
     },
     "marker_motion": {
         "marker_motion": ("px", "(T, n, 2) right and down, of the gel's dots, row by row; attribute rest: (n, 2) px"),

@@ -113,8 +113,9 @@ def test_a_kept_traction_is_zero_without_contact_and_adds_up(run, slide_csv):
     with h5py.File(folder / "frames.h5") as file:
         assert set(file) == {*ALWAYS, *KEPT["traction"]}
         traction, total = file["traction_digit"][:], file["traction_force"][:]
-        touched = np.isfinite(file["contact_center"][:, 0])
+        touched, force = np.isfinite(file["contact_center"][:, 0]), file["force"][:]
     assert touched.any() and not touched.all()
+    np.testing.assert_allclose(np.linalg.norm(total, axis=1), np.linalg.norm(force, axis=1) * touched, rtol=1e-5)
     assert traction.any(axis=(1, 2)).tolist() == touched.tolist() and (total[touched, 1] > 0).all()
     np.testing.assert_allclose(np.einsum("tnk,n->tk", traction, node_areas("digit")), total, rtol=0, atol=1e-6)
 

@@ -46,7 +46,7 @@ examples:
 
 --keep marker_motion adds the motion, px, of dots printed on the gel, for a --calibration with [markers].
 --keep traction adds the force field on the gel, Pa on each node of its surface, from its translated displacement by the
-gel's own compliance (built once, 18 s and 145 MB), and prints by how much it misses the networks' force.
+gel's own compliance (built once, 18 s and 145 MB), as large in all as the networks' force.
 
 Size of a 700-frame result, measured: {SIZES}."""
 LEAVES = NOTHING
