@@ -17,8 +17,8 @@ from .terminal import complain, say
 from .verbs import VERBS
 
 DESCRIPTION = """\
-Translate touch between robot fingertips: BioTac electrode recordings become the deformation of a BioTac,
-of a DIGIT, and the pictures that the DIGIT's camera would have seen."""
+Translate touch between robot fingertips: the recorded electrodes of a BioTac become the deformation of its skin,
+that of a DIGIT's gel under the same contact, and the pictures that the DIGIT's camera would have taken."""
 
 EPILOG = """\
 examples:

@@ -49,7 +49,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
     verb.add_argument("--unit", metavar="TEXT", help="the unit's name in the file (default: the file's)")
     verb.add_argument("--only", metavar="NAMES", help="photographs to use, file names separated by commas")
-    verb.add_argument("--quick", action="store_true", help="fit the fast picture alone: a minute in place of five")
+    verb.add_argument("--quick", action="store_true", help="fit the fast picture alone, in half the time")
     verb.add_argument("--test", metavar="FILE", help="test this calibration instead of fitting one")
     verb.add_argument("--preset", choices=TRIED, help="with --test: preset that draws the pictures (default: fast)")
     verb.add_argument("--json", metavar="FILE", help="with --test: write the errors to this file")

@@ -34,7 +34,8 @@ def prepare_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--kind",
         choices=("raw", "tared", "scaled", "rectified"),
-        help="kind of signals in the file, where `tactile info` guesses wrong",
+        help="what the electrodes' numbers are, where `tactile info` guesses wrong: raw, readings of 0 to 4095; tared,"
+        " changes against rest; scaled, changes in another unit; rectified, changes without their sign",
     )
     polarity_argument(verb)
     columns_argument(verb)
@@ -117,7 +118,7 @@ def answer_arguments(verb: argparse.ArgumentParser) -> None:
         choices=("translated", "solved"),
         default="translated",
         help="displacement of the gel: translated, by the networks; solved, by contact mechanics, a ball of the"
-        " dent's curvature at the estimated place and force, 25 ms a frame, extra [fem] (default: translated)",
+        " dent's curvature at the estimated place and force, 25 ms a frame, needs scipy (default: translated)",
     )
 
 
@@ -139,7 +140,7 @@ def unit_arguments(verb: argparse.ArgumentParser) -> None:
     target_argument(verb)
     weights_argument(verb)
     verb.add_argument(
-        "--calibration", metavar="FILE", help="gel unit, by `tactile calibrate` (default: the one that ships)"
+        "--calibration", metavar="FILE", help="camera and lights, by `tactile calibrate` (default: those that ship)"
     )
 
 

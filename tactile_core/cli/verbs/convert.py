@@ -44,9 +44,14 @@ examples:
   tactile convert day1/*.csv --out results --keep latent --overwrite
   tactile convert touch.csv --out results --frames 200:300:5 --tare 0:50
 
---keep marker_motion adds the motion, px, of dots printed on the gel, for a --calibration with [markers].
---keep traction adds the force field on the gel, Pa on each node of its surface, from its translated displacement by the
-gel's own compliance (built once, 18 s and 145 MB), as large in all as the networks' force.
+Words of --keep, beside what frames.h5 always holds:
+  latent         the networks' codes of the signals and of both surfaces
+  displacement   of the BioTac's skin and the gel, m at each node of their surfaces
+  height         the gel's height under each pixel of the camera, m
+  image          the camera's pictures, as PNG files
+  traction       force field on the gel, Pa at each node of its surface, by the gel's own compliance (built once, 18 s
+                 and 145 MB), as large in all as the networks' force
+  marker_motion  motion, px, of dots printed on the gel, for a --calibration with [markers]
 
 Size of a 700-frame result, measured: {SIZES}."""
 LEAVES = NOTHING

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 BRIEF = "describe recordings, or a sensor"
 TEXT = """\
-Describe recordings: sensor, channels, rate, duration, polarity, tare, gaps, bad samples. Of a CSV file of a BioTac SP,
-to which no shipped weights apply: finger, lines, labels and the counts of its 24 electrodes; with --sensor also the
-changes against the unit's rest, which recordings that begin in contact do not show.
+Describe recordings: sensor, channels, rate, duration, polarity, resting frames (tare), gaps, bad samples. Of a CSV
+file of a BioTac SP: finger, lines, labels and the counts of its 24 electrodes; with --sensor also the changes against
+the unit's rest, which recordings that begin in contact do not show.
 
 A CSV file whose column names are of no known layout needs a map: --columns map.toml writes one, guessed from the
 names of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch.

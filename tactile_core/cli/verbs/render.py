@@ -14,7 +14,7 @@ from .common import NOTHING, PRESETS, error_argument, progress_argument
 if TYPE_CHECKING:
     from ...jobs.render import Options
 
-BRIEF = "draw pictures of deformed gels, by their optics"
+BRIEF = "draw the camera's pictures of deformed gels"
 TEXT = """\
 Draw what the camera of a DIGIT, or of another --gel, sees of its deformed gel. INPUT is one of
   frames.h5          of `tactile convert`, with displacement kept
