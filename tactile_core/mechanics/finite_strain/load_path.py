@@ -29,6 +29,7 @@ from .solved_contact import ContactState
 _FINER = 0.5
 # Of load steps without friction, on the tier's own mesh and on the finer one, before another way is shorter (assumed).
 _FEW_FAILURES = 4, 2
+_FAILURES = NoEquilibriumError, PenetrationError  # of a way, after which another is tried
 _SPARE = 1.1  # of the depths that the fast tier finds, for which the mesh is made where forces are asked for
 
 
@@ -49,6 +50,7 @@ class LoadPath:
         self.sensor, self.indenter, self.pose, self.tier, self.friction = sensor, indenter, pose, tier, friction
         self.thickness, self.limit = thickness, limit
         self.spacing = 1.0  # of the mesh's nodes, over the tier's own
+        self.fading = False  # true while a step goes by friction that fades
         self.way: list[Pose] = []  # what was solved, which friction remembers
         self.made_for = max(depths, default=0.0)
         self.deeper = 1.0  # how deep the last force was found, over the guess
@@ -67,19 +69,38 @@ class LoadPath:
         """See ``solve_path``. Where the full tier's mesh does not hold the indenter, on a finer one from the start.
 
         guess : m, about where a force is found
+        Without friction, where no mesh holds it, on the tier's own by a way with friction that fades.
         """
+        before = self.last
         try:
             found = self._to(step, guess)
-        except (NoEquilibriumError, PenetrationError):
-            if self.tier != "full" or self.spacing < 1:
-                raise
-            self._refine()
-            found = self._to(step, guess)
+        except _FAILURES as failure:
+            self.last = before
+            found = self._otherwise(step, guess, failure)
         self.way.append(self.last.pose)
         return found
 
-    def _refine(self) -> None:
-        self.spacing = _FINER
+    def _otherwise(self, step: Step, guess: float, failure: TactileError) -> Solution:
+        if self.tier == "full" and self.spacing == 1:
+            self._remake(_FINER)
+            try:
+                return self._to(step, guess)
+            except _FAILURES as finer:
+                failure = finer
+        if self.friction:
+            raise failure
+        if self.spacing < 1:
+            self._remake(1.0)
+        self.fading = True
+        try:
+            return self._to(step, guess)
+        except _FAILURES:
+            raise failure from None
+        finally:
+            self.fading = False
+
+    def _remake(self, spacing: float) -> None:
+        self.spacing = spacing
         self._make()
         for pose in self.way if self.friction else ():
             self.last = self.problem.move(pose, self.last, self.step)
@@ -90,15 +111,20 @@ class LoadPath:
             self.last = self._at_force(pose, step.force, self.deeper * guess)
             self.deeper = self.last.depth / guess
         elif step.depth or self.last.depth:
-            self.last = self.problem.move(pose.moved(step.depth or 0.0), self.last, self.step)
+            self.last = self._move(pose.moved(step.depth or 0.0), self.last)
         return self._solution(self.last)
+
+    def _move(self, pose: Pose, before: ContactState) -> ContactState:
+        if self.fading:
+            return self.problem.move_by_friction(pose, before, FRICTION_STEP)
+        return self.problem.move(pose, before, self.step)
 
     def _at_force(self, pose: Pose, force: float, guess: float) -> ContactState:
         """The contact at a force, N, along the motion, near the depth ``guess``, m."""
 
         def move(depth: float, before: ContactState) -> ContactState:
             """Solve the contact at a depth, m, along the pose's direction, going on from the one before."""
-            return self.problem.move(pose.moved(depth), before, self.step)
+            return self._move(pose.moved(depth), before)
 
         where, slid_to = f"solve, {self.sensor}, {self.tier} tier", None
         if not same_line(self.last.pose, pose):

@@ -8,6 +8,7 @@ by a bordered solve; its core is a second obstacle, for the inner skin.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable
 
@@ -130,6 +131,26 @@ class FiniteStrainContact:
             found = f"no equilibrium beyond {end.part:.0%} of the way"
             raise NoEquilibriumError("finite-strain solver", found, "a shorter way, or less force") from None
         return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
+
+    def move_by_friction(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
+        """Solve a contact without friction at another pose as ``move`` does, by a way with friction that then fades.
+
+        Friction keeps nodes from sliding off the indenter's edges on the way; what is found is in balance without it.
+        """
+        touch = self._rubbed(_FADING[0]).move(pose, start, step)
+        try:
+            for friction in _FADING[1:]:
+                touch = dataclasses.replace(self._rubbed(friction)._solve(pose, touch), depth=touch.depth)
+            return dataclasses.replace(self._stiffened(self._solve(pose, touch)), steps=touch.steps)
+        except _FAILURES:
+            found = "no equilibrium as friction fades"
+            raise NoEquilibriumError("finite-strain solver", found, "friction, or a smaller depth") from None
+
+    def _rubbed(self, friction: float) -> FiniteStrainContact:
+        """Return this contact with friction, which needs no springs between nodes."""
+        rubbed = copy.copy(self)
+        rubbed.friction, rubbed._between = friction, None
+        return rubbed
 
     def _follow(self, along: Callable[[float], Pose], start: ContactState, step: float) -> ContactState:
         """Load steps from ``along(0)``, where ``start`` is solved, to ``along(1)``; a step that fails is halved."""
@@ -284,6 +305,7 @@ class FiniteStrainContact:
         return step, reaction, rise
 
 
+_FADING = 0.78, 0.3, 0.1, 0.03  # friction that fades, after the fast tier's own (assumed: a third each time)
 _GRIP = 30.0  # of a node's own stiffness: springs of friction that yield some micrometres at most
 _SHARES = 1.0, 0.5, 0.25, 0.125  # of a step
 _SAME = 1e-6  # relative, of two steps that swing to and fro (assumed)

@@ -6,8 +6,11 @@ from slab import slab_mesh
 
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Pose, Sphere, pose_on
-from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
+from tactile_core.mechanics.finite_strain import newton
+from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact, NoEquilibriumError
+from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
+from tactile_core.mechanics.solve import solve
 from tactile_core.sensors import Material
 
 BALL, RUBBER = Sphere(4e-3), Material(1e6, 0.45)
@@ -129,3 +132,37 @@ def test_the_answer_does_not_depend_on_the_first_guess(solid):
     one = problem(solid).press(0.5e-3, step=5e-3)
     other = problem(solid, first_share=0.9).press(0.5e-3, step=0.1e-3)
     np.testing.assert_allclose(one.force, other.force, rtol=1e-7, atol=1e-7 * np.abs(one.force).max())
+
+
+def test_friction_that_fades_leads_to_the_contact_without_friction(solid):
+    contact = problem(solid)
+    pose = contact.pose.moved(0.4e-3)
+    direct = contact.move(pose, contact.start(), 0.4e-3)
+    faded = contact.move_by_friction(pose, contact.start(), 0.2e-3)
+    assert not faded.outer.rubbing.any() and faded.depth == direct.depth and contact.friction == 0
+    # The iteration's own tolerance: 1e-8 of the largest nodal force.
+    np.testing.assert_allclose(faded.force, direct.force, atol=1e-6 * direct.force[1])
+    np.testing.assert_allclose(faded.state.displacement, direct.state.displacement, atol=1e-9)
+
+
+def test_a_contact_that_no_mesh_holds_is_found_by_friction(monkeypatch):
+    place, ball = Placement(x=-6e-3, z=0.0), Sphere(3e-3)
+    expected = solve("digit", ball, place, depth=0.1e-3, tier="full", friction=0)
+    tried, move = [], FiniteStrainContact.move
+
+    def slides_off(self, pose, start, step):
+        tried.append((self.friction, len(self.solid.mesh.nodes)))
+        if self.friction:
+            return move(self, pose, start, step)
+        raise NoEquilibriumError("finite-strain solver", "no equilibrium", "a smaller depth")
+
+    monkeypatch.setattr(FiniteStrainContact, "move", slides_off)
+    monkeypatch.setattr(newton, "_FADING", (0.3,))  # shorter, for time alone
+    found = solve("digit", ball, place, depth=0.1e-3, tier="full", friction=0)
+    (without, nodes), (finer, more), (rubs, again) = tried
+    assert without == finer == 0 < rubs and nodes == again < more  # the tier's mesh, a finer one, and that by friction
+    np.testing.assert_allclose(found.force, expected.force, atol=1e-5 * expected.force[1])  # balance of 1e-7, summed
+    with pytest.raises(NoEquilibriumError):  # with friction there is no other way
+        monkeypatch.setattr(FiniteStrainContact, "_solve", lambda *_: (_ for _ in ()).throw(FloatingPointError))
+        monkeypatch.setattr(FiniteStrainContact, "move", move)
+        solve("digit", ball, place, depth=0.1e-3, tier="full", friction=0.5)
