@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import SOURCE, contacts_of
-from ..sensors.fluid_sensor import FALLS, POLARITIES, RISES
+from ..sensors import SOURCE, contacts_of, title
+from ..sensors.descriptor import of_kind
+from ..sensors.fluid_sensor import FALLS, POLARITIES, RISES, Fluid
 from .flags import Flag
 
 AUTO = "auto"
@@ -80,6 +81,13 @@ def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
             doubt = shown.sure and shown.name != stated
             return Polarity(stated, f"{who}; {shown.evidence}" if shown.sure else who, not doubt)
     return shown
+
+
+def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
+    """Return the polarity of a sensor's raw readings, as its descriptor has it; of other kinds assumed."""
+    reading = of_kind(sensor, Fluid).readout.polarity
+    raw = f"raw counts of a {title(sensor)}"
+    return Polarity(reading, raw, True) if kind == "raw" else Polarity(reading, f"assumed: as {raw}", False)
 
 
 def polarity_of(

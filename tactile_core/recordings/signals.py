@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import SOURCE, contacts_of, divider, title, typical_rest
+from ..sensors import SOURCE, contacts_of, divider, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, POLARITIES, Fluid
 from . import contact_law
@@ -16,7 +16,7 @@ from .assemble import check_electrodes
 from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
-from .polarity import AUTO, BLOCK, Polarity, choose, polarity_of, spread_out, touching
+from .polarity import AUTO, BLOCK, Polarity, choose, polarity_of, polarity_of_sensor, spread_out, touching
 from .recording import Recording
 from .repair import fill, find_glitches, is_time_series, smooth
 from .rest_level import (
@@ -277,13 +277,6 @@ def _polarity(
         return choose(polarity_of_sensor(recording.sensor, kind), options.polarity, recording.about.get("polarity", ""))
     shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known, sensor=recording.sensor)
     return choose(shown, options.polarity, recording.about.get("polarity", ""))
-
-
-def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
-    """Return the polarity of a sensor's raw readings, as its descriptor has it; of other kinds assumed."""
-    reading = of_kind(sensor, Fluid).readout.polarity
-    raw = f"raw counts of a {title(sensor)}"
-    return Polarity(reading, raw, True) if kind == "raw" else Polarity(reading, f"assumed: as {raw}", False)
 
 
 def _smoothed_over(options: PrepareOptions, kind: str) -> int:

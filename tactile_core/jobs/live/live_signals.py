@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...recordings.flags import Flag
-from ...recordings.polarity import AUTO, TOUCHING, Polarity, polarity_of
+from ...recordings.polarity import AUTO, TOUCHING, Polarity, polarity_of, polarity_of_sensor
 from ...recordings.rest_level import find_quiet, level, tare_frames, window_frames
 from ...recordings.signal_kind import detect
-from ...recordings.signals import Rest, Signals, polarity_of_sensor
+from ...recordings.signals import Rest, Signals
 from ...sensors import SAMPLE_RATE, SOURCE, contacts_of, electrode_count
 from ...sensors.fluid_sensor import FALLS, POLARITIES
 
