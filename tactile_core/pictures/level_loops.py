@@ -7,31 +7,34 @@ import numpy as np
 from ..files.compiled import Loop
 
 
-@Loop
-def in_picture(radiance, rest, response, background, largest):  # noqa: ANN001, ANN201
+def in_picture(
+    radiance: np.ndarray, rest: np.ndarray, response: np.ndarray, background: np.ndarray, largest: np.float32
+) -> np.ndarray:
     """Compute (H, W, 3) uint8: background (H, W, 3) + response (3, 3, H, W) times radiance less that at rest (3, H, W).
 
-    largest : float32, level
+    All float32; largest : level
     """
-    height, width = background.shape[:2]
-    picture, lowest = np.empty((height, width, 3), np.uint8), np.float32(0)
-    change, level, line = (
-        np.empty((3, width), np.float32),
-        np.empty(width, np.float32),
-        np.empty((width, 3), np.float32),
-    )
-    for row in range(height):
+    picture = np.empty(background.shape, np.uint8)
+    rows = len(picture), -1
+    _fill_levels(radiance, rest, response, background.reshape(rows), largest, picture.reshape(rows))
+    return picture
+
+
+@Loop
+def _fill_levels(radiance, rest, response, background, largest, picture):  # noqa: ANN001, ANN202
+    """Fill in the picture of ``in_picture``; background, picture : (H, 3 W)."""
+    _, height, width = radiance.shape
+    lowest, change, line = np.float32(0), np.empty((3, width), np.float32), np.empty(3 * width, np.float32)
+    for row in range(height):  # a row stays in the processor's cache
         for led in range(3):
             for column in range(width):
                 change[led, column] = radiance[led, row, column] - rest[led, row, column]
         for channel in range(3):
-            level[:] = 0
-            for led in range(3):
-                for column in range(width):
-                    level[column] += response[channel, led, row, column] * change[led, column]
-            line[:, channel] = level
-        seen, ground, levels = picture[row].ravel(), background[row].ravel(), line.ravel()
+            for column in range(width):
+                level = np.float32(0)
+                for led in range(3):
+                    level += response[channel, led, row, column] * change[led, column]
+                line[3 * column + channel] = level
         for k in range(3 * width):
-            value = np.rint(levels[k] + ground[k])
-            seen[k] = np.uint8(np.int32(min(max(value, lowest), largest)))  # by way of 32 bits: vectorised
-    return picture
+            value = np.rint(line[k] + background[row, k])
+            picture[row, k] = np.uint8(np.int32(min(max(value, lowest), largest)))  # by way of 32 bits: vectorised

@@ -140,7 +140,7 @@ def _differences(values: np.ndarray, step: float) -> np.ndarray:
 def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
     """Interpolate values (h, w), 2 x 2 or more, at fractional places within them; float32."""
     if available() and values.dtype == row.dtype == column.dtype == np.float32 and row.ndim == 2:
-        return interpolate(values, row, column)
+        return interpolate(*map(np.ascontiguousarray, (values, row, column)))  # one kind of arrays is compiled
     height, width = values.shape
     # 32 bits turn into floats and back in half the time; all is done in place, as memory is what it waits for.
     i, j = row.astype(np.int32), column.astype(np.int32)

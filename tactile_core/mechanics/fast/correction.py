@@ -275,6 +275,6 @@ def _with_field(sensor: str, contact: Contact, at: Frame, field: np.ndarray) -> 
     if not available():
         return contact.displacement + contact.depth * spread_field(sensor, at, field)
     return add_field(
-        contact.displacement, plane(sensor), _frames_by_axis(sensor), at.centre, at.radius, REACH, LINES, field,
-        contact.depth,
+        contact.displacement, np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor), at.centre, at.radius,
+        REACH, LINES, field, contact.depth,
     )  # fmt: skip
