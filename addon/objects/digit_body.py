@@ -38,7 +38,7 @@ def coating_of(gel: bpy.types.Object) -> bpy.types.Material | None:
 
 
 def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
-    """Add what the gel lacks of a unit's body; what is there stays as the user has made it."""
+    """Add the missing parts of a unit's body to the gel; parts that exist stay as the user has changed them."""
     first = not any(thing.tactile.role == "BODY" for thing in gel.children_recursive)
     if coating_of(gel) is None:
         gel.data.materials.clear()

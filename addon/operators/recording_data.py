@@ -26,7 +26,7 @@ CHUNK = 64  # frames between two steps of the progress: the networks' own block
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Translated:
-    """A recording, which frames of it (T,), their signals and what they become by which networks."""
+    """A recording, the numbers (T,) of its translated frames, their signals and translation, and the networks used."""
 
     translator: translate.Translator
     recording: Recording
@@ -56,7 +56,7 @@ def _translator(weights: str, source: str | None, _changed: int) -> translate.Tr
 
 
 def translator_of(weights: str, path: str) -> translate.Translator:
-    """Return the networks in a folder, else those that ship for a recording. Raises TactileError for what are none."""
+    """Return the networks in a folder, else those that ship for a recording. Raises TactileError without networks."""
     source = None if weights else readers.sensor_of_first([path])
     folder = bpy.path.abspath(weights) if weights else ""
     try:

@@ -41,7 +41,7 @@ class TactileRender(bpy.types.PropertyGroup):
 
 
 def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> None:
-    """Put LEDs, coating and camera to those of the file that was chosen; one that is none is reported by a render."""
+    """Put LEDs, coating and camera to those of the file that was chosen; a bad file is reported by a render."""
     scene = settings.id_data
     for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
         if digit_body.leds_of(gel) and gel.library is None:

@@ -69,7 +69,7 @@ def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:
 
 
 def look_again(context: bpy.types.Context) -> None:
-    """Look at pictures and what is selected once the window is drawn: until then, a view keeps its old size."""
+    """Frame pictures and the selection again once the window is drawn: until then, a view keeps its old size."""
     look = functools.partial(_look_at_selected, context.window_manager, context.window)
     bpy.app.timers.register(look, first_interval=DRAWN)
 
@@ -141,7 +141,7 @@ def fit_timeline(context: bpy.types.Context) -> None:
 
 
 def show(context: bpy.types.Context, things: list[bpy.types.Object], beside: Sequence[bpy.types.Object] = ()) -> None:
-    """Select the things, colour solid views by object, and look at them, what is beside them, and their parts.
+    """Select the objects, colour solid views by object, and frame them with their neighbours and parts.
 
     Views that show a style's colours go on. Without a window, select only.
     """

@@ -116,7 +116,7 @@ def surface_of(thing: bpy.types.Object) -> Lattice:
 
 
 def role_of(sensor: str) -> str:
-    """Return the role of a sensor's surface. Raises TactileError for a name that is none."""
+    """Return the role of a sensor's surface. Raises TactileError for an unknown sensor."""
     return "DIGIT" if sensors.is_gel(sensor) else "BIOTAC"
 
 

@@ -25,7 +25,7 @@ def write_exr(path: str | os.PathLike, channels: Mapping[str, np.ndarray], about
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Read channels (H, W) by name, unchanged, and the text attributes; raises TactileError for what is no EXR file."""
+    """Read channels (H, W) by name, unchanged, and the text attributes; raises TactileError for another file."""
     import OpenEXR
 
     try:

@@ -176,7 +176,7 @@ def convert(
 
 
 def check_order(recording: Recording, answer: Answer) -> None:
-    """Raise TactileError for snapshots through which a contact is to be followed."""
+    """Raise TactileError where a contact is to be tracked through snapshots, which have no order."""
     if answer.follows and np.isnan(recording.time).all():
         found = "snapshots, which do not follow each other"
         raise TactileError(recording.path, found, "frames in order", "Translate each alone: --frames-apart")
@@ -224,7 +224,7 @@ def _unit_entry(calibration: str | os.PathLike | None) -> dict[str, dict[str, st
 
 
 def weights_entry(tools: Tools) -> dict:
-    """Return the weights' hash, which stands for their card, and their error and baseline, um, as the card has them."""
+    """Return the hash of the weights' card, and the error and baseline, um, that the card states."""
     from ..translation.card_errors import chain_error
 
     found = chain_error(tools.card)

@@ -204,7 +204,7 @@ class Gel:
 
     @property
     def areas(self) -> np.ndarray:
-        """Area (n,) m2 that each resting node stands for."""
+        """Area (n,) m2 of the resting surface that belongs to each node."""
         return node_areas(self.sensor)
 
     def height_map(self) -> np.ndarray:
@@ -380,7 +380,7 @@ def _given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
 
 
 def _not_negative(value: Any, where: str, expected: str) -> float:
-    """Return a number; raises TactileError for what is none, negative, or not finite."""
+    """Return the value as a float; raises TactileError unless it is a finite number of zero or more."""
     try:
         number = float(value)
     except (TypeError, ValueError):

@@ -128,7 +128,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
-    """Return the number of blocks needed in all, by the counts in the present ones; None if there are none."""
+    """Return the number of blocks needed in all, by the counts of those made so far; None before the first."""
     counts = _counts(folder, job, index)
     if not counts:
         return None

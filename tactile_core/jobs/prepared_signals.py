@@ -206,7 +206,7 @@ class _Writer:
         self.count = end
 
     def close(self, digest: str) -> None:
-        """Write what is known at the end. digest : of the recording."""
+        """Write the facts that are known only at the end. digest : SHA-256 of the recording."""
         warnings = self._about["warnings"]
         if len(warnings) > MAX_WARNINGS:
             warnings[MAX_WARNINGS:] = [f"{len(warnings) - MAX_WARNINGS} more warnings"]

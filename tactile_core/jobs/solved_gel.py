@@ -84,7 +84,7 @@ def _contacts(moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str)
 
 
 def _on_another(arrays: dict[str, np.ndarray], gel: str) -> dict[str, np.ndarray]:
-    """Leave out of frames solved on another gel what is known of the networks' alone."""
+    """Remove from frames solved on another gel the values that hold for the networks' gel alone."""
     flags, (x, z) = arrays["flags"].copy(), arrays["contact_center"].T
     flags[sensors.shape_of(gel).outline_distance(x, z) <= 0] |= np.uint16(Flag.BEYOND_DIGIT)
     unknown = {name: np.full_like(arrays[name], np.nan) for name in ERRORS if name in arrays}

@@ -1,4 +1,4 @@
-"""Share of a sensor's surface that each of its nodes stands for; a nodal force over it is a traction."""
+"""Area of a sensor's surface that belongs to each of its nodes; a nodal force divided by it is a traction."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def terms() -> Iterator[tuple[int, int]]:
 
 
 def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np.ndarray:
-    """Picture (H, W, 3) uint8 of an image file; raises TactileError for what is no picture or of another size."""
+    """Picture (H, W, 3) uint8 of an image file; raises TactileError for another file, or another size."""
     from PIL import Image
 
     expected = f"an image file ({', '.join(FORMATS)})"

@@ -28,7 +28,7 @@ class CoatingSpread:
             self._right = _blocks(means)
 
     def __call__(self, pictures: np.ndarray) -> np.ndarray:
-        """Pictures (..., H, W) float32, evened out; near an edge, the mean of what is in the picture."""
+        """Smooth pictures (..., H, W) float32; near an edge, over the part inside the picture."""
         if self._none:
             return pictures
         sums = _summed(_summed(pictures.swapaxes(-1, -2), self._step_right).swapaxes(-1, -2), self._step_down)

@@ -38,7 +38,7 @@ class Perspective:
             self._begin_at(self(rest))
 
     def _begin_at(self, seen: np.ndarray) -> None:
-        """Take heights (H, W) m that are about seen as the start of each search."""
+        """Start each search at heights (H, W) m near those that the pixels see."""
         self._start, self._start_near = seen, 1 - seen * self._inverse
         row, column = self._places(self._start_near)
         self._start_nearest = _nearest(row, column, self.camera.width)

@@ -224,7 +224,7 @@ def opened(path: str) -> Iterator[Opened]:
 
 
 def container_of(path: str) -> str:
-    """Detect the container: csv, hdf5, npz, mat or bag. Raises TactileError for what is no file."""
+    """Detect the container: csv, hdf5, npz, mat or bag. Raises TactileError where there is no regular file."""
     with opened(path) as found:
         return found.container
 

@@ -1,4 +1,4 @@
-"""A sensor in words: what its descriptor says, for people."""
+"""Describe a sensor in words, from its descriptor."""
 
 from __future__ import annotations
 

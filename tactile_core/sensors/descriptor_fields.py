@@ -105,7 +105,7 @@ def _without_unit(name: str) -> str:
 
 
 def read_value(kind: Any, value: Any, where: str, meta: Any) -> Any:
-    """Convert a value of the file to a field's type, in SI units. Raises TactileError for one that is none."""
+    """Convert a value of the file to a field's type, in SI units. Raises TactileError for a value of another type."""
     if typing.get_origin(kind) is tuple:
         items = typing.get_args(kind)
         length = None if items[-1] is Ellipsis else len(items)

@@ -64,7 +64,7 @@ def table_of(name: str) -> Path:
 
 
 def typical_rest(name: str) -> np.ndarray | None:
-    """Return the counts (e,) of a sensor's typical unit without contact; None where no unit has been seen at rest.
+    """Return the counts (e,) of a sensor's typical unit without contact; None where they are not known.
 
     Raises TactileError for a sensor without electrodes, and for a table that is bad.
     """

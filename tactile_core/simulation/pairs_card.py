@@ -1,4 +1,4 @@
-"""The card of a file of paired contacts: what is in it, in numbers small enough to keep beside the code."""
+"""The card of a file of paired contacts: its counts, hash and histograms, small enough to keep beside the code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state of a contact, and what the signals say of it: a mixture of Gaussians."""
+"""The state of a contact, and its posterior given the signals: a mixture of Gaussians."""
 
 from __future__ import annotations
 

@@ -174,7 +174,7 @@ def _unit(sensor: str | None, path: str, of: str) -> ElectrodeGains | None:
 
 
 def _followed(options: argparse.Namespace, columns: ColumnMap | None, sensor: str) -> Rows:
-    """Yield new rows of a growing file and their arrival time; None from time to time while there are none."""
+    """Yield new rows of a growing file and their arrival time, s; None now and then while no row comes."""
     from ...jobs.live import Growing
 
     growing, last, bad = Growing(options.recording, columns, sensor), time.perf_counter(), 0
@@ -192,7 +192,7 @@ def _followed(options: argparse.Namespace, columns: ColumnMap | None, sensor: st
 
 
 def _played(path: str, speed: float, columns: ColumnMap | None, sensor: str) -> Rows:
-    """The rows of a finished recording when their time has come, a part of it in memory; speed 0: one after another."""
+    """Yield the rows of a finished recording at their times, one part in memory at a time; speed 0: without waiting."""
     from ...recordings.chunks import read_parts
 
     began = time.perf_counter()

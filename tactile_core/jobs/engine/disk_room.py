@@ -1,4 +1,4 @@
-"""Words on a job whose disk is full: the folder, what is free there, and what is still to come."""
+"""Describe a job whose disk is full: the folder, the space that is free there, and the space still needed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def refused(folder: Path, job: Job, error: OSError) -> TactileError:
 
 
 def _needed(folder: Path, job: Job) -> str:
-    """Say what is still to come: as large as the shards made so far, or as their kind of job expects."""
+    """Say how much space is still needed: by the size of the shards made so far, or as their kind of job expects."""
     state = manifest.status(folder, job)
     sizes = [file.stat().st_size for file in (folder / jobs.SHARDS).glob("*.h5")]
     left, unseen = state.shards - state.there, state.recordings - state.prepared

@@ -35,7 +35,7 @@ def signal_of(contact: Contact | Solution, law: str = SHEET, sensor: str = "biot
 
 @functools.cache
 def rest_counts(sensor: str) -> np.ndarray:
-    """Counts at rest (e,) of a typical unit; of a sensor of which none has been seen at rest, those of its sheet."""
+    """Counts at rest (e,) of a typical unit; of a sensor where they are not known, those of its conducting sheet."""
     known = sensors.places_of(sensor).rest_counts
     if np.isfinite(known).all():
         return known

@@ -231,7 +231,7 @@ class ContactSet:
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:
-        """Release what is pulled, take in what is passed; returns true if nothing was. tolerance : m, of the gaps."""
+        """Release nodes in tension, add nodes that penetrate; returns true if there is none. tolerance : m, of gaps."""
         if not len(self.candidates):
             return True
         distance, normal = self.obstacle.distance(at[self.candidates])

@@ -33,7 +33,7 @@ class DampedFactor:
         self.damping = self.damping / 4 if self.damping > _LEAST else 0.0
 
     def solver(self, blocks: np.ndarray, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """Return a function from forces (n, 3) N to displacements (n, 3) m of what is not ``held`` (n, 3) bool.
+        """Return a function from forces (n, 3) N to displacements (n, 3) m, which are zero where ``held`` (n, 3).
 
         blocks : of the tangent on the solid's pattern; the damping is added to them.
         Raises NotPositiveDefiniteError where even much damping is too little.

@@ -102,7 +102,7 @@ def _dim(facing: np.ndarray, hits: Hits, seen: np.ndarray, cloud: np.ndarray, so
 
 
 def evened(values: np.ndarray) -> np.ndarray:
-    """Return the means of values (h, w) over 3 x 3 pixels; at the border, of what is there twice."""
+    """Return the means of values (h, w) over 3 x 3 pixels; at the border the edge counts twice."""
     for axis in (0, 1):
         total = np.moveaxis(values.copy(), axis, 0)
         along = np.moveaxis(values, axis, 0)

@@ -40,7 +40,7 @@ def mirrored(
     to_cell: Callable[[Any], Any],
     shape: tuple[int, int],
 ) -> np.ndarray:
-    """Radiance (h, w, 3) that cells of the picture show of light mirrored by places of it, summed, not evened out.
+    """Compute the radiance (h, w, 3) of the picture's cells by light that other places mirror onto them, not smoothed.
 
     hit : the places, each DIRECTIONS times, each standing for as much of the picture as a cell of the result
     phase : 0..1 of each, turns its directions; lobe : alpha, and the cosine at its end

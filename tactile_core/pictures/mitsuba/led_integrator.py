@@ -29,7 +29,7 @@ class Lit(NamedTuple):
 def direct(
     mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any, lobe: Any = None
 ) -> list[Lit]:
-    """Light of each emitter at surface interactions, by so many points of it.
+    """Compute the light of each emitter at surface interactions, by a number of points on the emitter.
 
     scene : what stands in the way; phase : 0..1, turns the points, in shares of their distance
     lobe : cosine of the half vector from which on light is left out, near the mirror's direction; None for none
@@ -99,7 +99,7 @@ def register(mi: Any, variant: str) -> None:
             return light, hit.is_valid(), []
 
         def to_string(self) -> str:
-            """Return what Mitsuba prints of it."""
+            """Return the integrator's name, which Mitsuba prints."""
             return f"LedIntegrator[points={self.points}]"
 
     mi.register_integrator(NAME, LedIntegrator)

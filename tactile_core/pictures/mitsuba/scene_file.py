@@ -1,4 +1,4 @@
-"""A unit's scene as a file that any Mitsuba 3 renders: XML, the gel as PLY, and what the camera makes of it.
+"""A unit's scene as a file that any Mitsuba 3 renders: XML, the gel as PLY, and the camera's response as EXR.
 
 NAME.xml        LEDs, coating, housing, camera, Mitsuba's path integrator; `mitsuba NAME.xml` writes the radiance
 NAME.ply        the gel, mm
