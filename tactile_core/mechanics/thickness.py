@@ -53,10 +53,14 @@ def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
     while not len(nodes):
         reach *= 4
         nodes, gap = surface.blocks.near(indenter, pose, reach)
-    node = int(nodes[np.argmin(gap)])
-    if sensors.is_gel(sensor):
-        return thickness(sensor, surface.rest[node])
-    return _to_core(sensor, surface.rest[node], _outward(sensor)[node])
+    return _thickness_at(sensor, int(nodes[np.argmin(gap)]))
+
+
+@functools.cache
+def _thickness_at(sensor: str, node: int) -> float:
+    """The thickness, m, at a node of the resting surface; kept, for a path asks again at each step."""
+    place = sensors.sensor_surface(sensor).rest[node]
+    return thickness(sensor, place) if sensors.is_gel(sensor) else _to_core(sensor, place, _outward(sensor)[node])
 
 
 def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:
