@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import outside
-from ..sensors.calibration import AMBIENT_DEGREE, AMBIENT_UNIT, Calibration
+from ..sensors.calibration import AMBIENT_DEGREE, AMBIENT_TERMS, AMBIENT_UNIT, PHOTOGRAPHED_DEGREE, Calibration
 from ..sensors.camera import Camera
 from .height_map import of_unit, rest_height_map
 from .mitsuba.direct_light import Hits, direct_light
@@ -74,29 +74,33 @@ def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
     """Levels (H, W, 3, 3), channel by LED, of radiance (H, W, 3) at rest and ambient light."""
     right, down = unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT
     ambient = np.zeros((*unit.camera.shape, 3))
-    for (i, j), share in zip(terms(), np.asarray(unit.ambient).T, strict=True):
+    table = np.asarray(unit.ambient)
+    degree = AMBIENT_DEGREE if table.shape[1] == AMBIENT_TERMS else PHOTOGRAPHED_DEGREE
+    for (i, j), share in zip(terms(degree), table.T, strict=True):
         ambient += (down[:, None] ** j * right**i)[..., None] * share
     levels = unit.pixel_response * radiance[..., None, :]
     levels += np.asarray(unit.response.centre) * (ambient * unit.ambient_unit)[..., None, :]
     return levels.astype(np.float32)
 
 
-def fit_ambient(picture: np.ndarray, unit: Calibration, radiance: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """Fit the ambient light (3, 21) by least squares, so that the unit's picture at rest is nearest to one (H, W, 3).
+def fit_ambient(
+    picture: np.ndarray, unit: Calibration, radiance: np.ndarray, degree: int = AMBIENT_DEGREE
+) -> tuple[tuple[float, ...], ...]:
+    """Fit the ambient light (3, n) by least squares, so that the unit's picture at rest is nearest to one (H, W, 3).
 
-    radiance : (H, W, 3) of the coating at rest
+    radiance : (H, W, 3) of the coating at rest; degree : of its polynomial, AMBIENT_DEGREE or PHOTOGRAPHED_DEGREE
     """
     right, down = np.meshgrid(unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT)
-    basis = np.stack([(right**i * down**j).ravel() for i, j in terms()], -1)
+    basis = np.stack([(right**i * down**j).ravel() for i, j in terms(degree)], -1)
     left = picture - np.einsum("hwcl,hwl->hwc", unit.pixel_response, radiance)
     found = np.linalg.lstsq(basis, left.reshape(-1, 3), rcond=None)[0]
     bands = np.linalg.solve(np.asarray(unit.response.centre), found.T) / unit.ambient_unit[:, None]
     return tuple(tuple(row) for row in bands.tolist())
 
 
-def terms() -> Iterator[tuple[int, int]]:
-    """Powers (i, j) of right and down, by i + j, then by j."""
-    for degree in range(AMBIENT_DEGREE + 1):
+def terms(most: int) -> Iterator[tuple[int, int]]:
+    """Powers (i, j) of right and down of a polynomial of degree ``most``, by i + j, then by j."""
+    for degree in range(most + 1):
         for j in range(degree + 1):
             yield degree - j, j
 

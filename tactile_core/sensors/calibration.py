@@ -19,8 +19,13 @@ from .camera import COLOURS, Camera, Led
 from .coating import Coating
 from .markers import Markers
 
-AMBIENT_DEGREE = 5  # of the polynomial of the ambient light over the picture (assumed)
-AMBIENT_TERMS = (AMBIENT_DEGREE + 1) * (AMBIENT_DEGREE + 2) // 2
+# Degrees of the polynomial of the ambient light over the picture, and how many terms they have. The second is for units
+# whose untouched gel is photographed; a background estimated from presses would bend it round their traces. On the
+# GelSight Mini's fitted photographs 5 leaves 5.4 levels beside the press, 7 1.8, 9 1.3, the background's own 1.25.
+AMBIENT_DEGREE, PHOTOGRAPHED_DEGREE = 5, 7
+AMBIENT_TERMS, PHOTOGRAPHED_TERMS = (
+    (degree + 1) * (degree + 2) // 2 for degree in (AMBIENT_DEGREE, PHOTOGRAPHED_DEGREE)
+)
 AMBIENT_UNIT = 10e-3  # m; image coordinates are divided by it in the ambient light's polynomial
 # m: ambient light is counted in what a LED gives on a coating that faces it from there, so that it goes with the LED's
 # power alone, not with its place.
@@ -90,8 +95,9 @@ class Calibration:
     unit : its name, free text
     leds : red, green, blue
     response : the camera's response to each LED's light
-    ambient : (3, 21), a row a LED: its light scattered in gel and acrylic, in units of its radiance on a coating that
-        faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i + j, then by j
+    ambient : (3, 21) or (3, 36), a row a LED: its light scattered in gel and acrylic, in units of its radiance on a
+        coating that faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by
+        i + j, then by j
     ambient_rise : of each LED, share by which the ambient light's unit grows for each metre that gel stands higher
     coating : the paint on the gel
     gel_index : refractive index of gel and acrylic, taken as equal
@@ -127,8 +133,9 @@ class Calibration:
         _check_range("gel, dome_scale", self.dome_scale, 0.0, 5.0)
         _check_range("gel, index", self.gel_index, 1.0, MOST_INDEX)
         table = np.asarray(self.ambient, float)
-        if table.shape != (3, AMBIENT_TERMS) or not np.isfinite(table).all():
-            raise TactileError("ambient", f"shape {table.shape}", f"3 rows of {AMBIENT_TERMS} finite numbers")
+        if table.shape not in ((3, AMBIENT_TERMS), (3, PHOTOGRAPHED_TERMS)) or not np.isfinite(table).all():
+            expected = f"3 rows of {AMBIENT_TERMS} or {PHOTOGRAPHED_TERMS} finite numbers"
+            raise TactileError("ambient", f"shape {table.shape}", expected)
         for share in self.ambient_rise:
             _check_range("ambient, rise_per_mm", 1e-3 * share, -MOST_RISE, MOST_RISE)
         if self.markers is not None and self.photograph:

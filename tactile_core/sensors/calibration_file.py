@@ -15,7 +15,7 @@ from ..errors import TactileError
 from ..files import atomic, outside
 from ..files.text_file import read_toml_text
 from . import digit
-from .calibration import AMBIENT_TERMS, Calibration, Fit, Response
+from .calibration import AMBIENT_TERMS, PHOTOGRAPHED_TERMS, Calibration, Fit, Response
 from .calibration_text import FORMAT, as_text
 from .camera import COLOURS, Camera, Led
 from .coating import Coating
@@ -148,7 +148,7 @@ class _Reader:
             camera=self._camera(),
             leds=leds,
             response=self._response(),
-            ambient=tuple(_numbers(f"ambient, {led}", self._content["ambient"][led], AMBIENT_TERMS) for led in COLOURS),
+            ambient=self._ambient(),
             coating=coating,
             gel_index=_number("gel, index", self._content["gel"]["index"]),
             dome_scale=_number("gel, dome_scale", self._content["gel"]["dome_scale"]),
@@ -159,6 +159,14 @@ class _Reader:
             markers=self._markers() if "markers" in self._content else None,
             ambient_rise=self._ambient_rise(),
         )
+
+    def _ambient(self) -> tuple[tuple[float, ...], ...]:
+        """Rows of one length, that of the first, which may be either."""
+        table = self._content["ambient"]
+        first = table[COLOURS[0]]
+        long = isinstance(first, list) and len(first) == PHOTOGRAPHED_TERMS
+        count = PHOTOGRAPHED_TERMS if long else AMBIENT_TERMS
+        return tuple(_numbers(f"ambient, {led}", table[led], count) for led in COLOURS)
 
     def _ambient_rise(self) -> tuple[float, float, float]:
         red, green, blue = _three("ambient, rise_per_mm", self._content["ambient"]["rise_per_mm"])

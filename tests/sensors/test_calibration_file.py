@@ -132,6 +132,24 @@ def test_picture_at_rest_is_smooth_and_its_ambient_light_is_found_again() -> Non
     np.testing.assert_allclose(found, unit.ambient, atol=1e-3)
 
 
+def test_ambient_light_of_either_degree_is_kept(tmp_path: Path) -> None:
+    unit = load_calibration()
+    shader = Shader(unit)
+    radiance, down = shader.radiance(rest_height_map(unit.camera)), unit.camera.down[:, None, None]
+    picture = shader.background + 20 * (down / 8e-3) ** 7  # which a quintic does not follow
+    left = []
+    for degree, terms in ((5, 21), (7, 36)):
+        fine = dataclasses.replace(unit, ambient=fit_ambient(picture, unit, radiance, degree))
+        write_calibration(tmp_path / "unit.toml", fine)
+        read = load_calibration(tmp_path / "unit.toml")
+        assert np.shape(read.ambient) == (3, terms)
+        left.append(np.abs(Shader(read).background - picture).mean())
+        (tmp_path / "unit.toml").unlink()
+    assert left[1] < 0.05 < 0.1 < left[0]
+    with pytest.raises(TactileError, match=r"ambient: shape \(3, 28\); expected 3 rows of 21 or 36"):
+        dataclasses.replace(unit, ambient=((0.0,) * 28,) * 3)
+
+
 def test_each_led_takes_its_share_of_the_picture_at_rest_along() -> None:
     """Off is black, doubled is twice as bright, ambient light with it; the LEDs' parts add up to the whole."""
     unit = load_calibration()

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...errors import TactileError
-from ...sensors.calibration import Calibration, Fit
+from ...sensors.calibration import AMBIENT_DEGREE, PHOTOGRAPHED_DEGREE, Calibration, Fit
 from ..background import fit_ambient
 from ..height_map import rest_height_map
 from ..mitsuba.variant import llvm_trouble
@@ -98,10 +98,12 @@ def calibrate(
     names = tuple(press.name for press in search.presses)
     light, rest = "Mitsuba" if finish else "fast picture", "estimated" if photographs.estimated else "photographed"
     note = f"{light}; {len(names)} presses; background {rest}"
+    rest_radiance = Shader(fitted).radiance(rest_height_map(fitted.camera))
+    degree = AMBIENT_DEGREE if photographs.estimated else PHOTOGRAPHED_DEGREE
     calibration = dataclasses.replace(
         fitted,
         unit=unit,
-        ambient=fit_ambient(photographs.background, fitted, Shader(fitted).radiance(rest_height_map(fitted.camera))),
+        ambient=fit_ambient(photographs.background, fitted, rest_radiance, degree),
         photograph="",
         noise=photographs.noise,
         fit=Fit(note, names, ball_diameter, metrics, errors, (*unknown, *NEVER_IDENTIFIED)),
