@@ -198,6 +198,32 @@ def test_each_room_of_the_extension_imports_only_what_lies_below_it():
     assert offenders == []
 
 
+def members_imported(folder: Path) -> dict[str, set[str]]:
+    """What each file and folder in a folder imports of the others there, a folder with all that lies below it."""
+    names = {path.stem if path.is_file() else path.name for path in folder.iterdir()} - {"__init__", "__pycache__"}
+    found: dict[str, set[str]] = {name: set() for name in names}
+    for path in folder.rglob("*.py"):
+        own = path.relative_to(folder).with_suffix("").parts[0]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if own in names else ():
+            if isinstance(node, ast.ImportFrom) and node.level:
+                base = path.parents[node.level - 1]
+                ends = [node.module.replace(".", "/")] if node.module else [alias.name for alias in node.names]
+                ways = [base / end for end in ends if base / end != folder and (base / end).is_relative_to(folder)]
+                found[own] |= {way.relative_to(folder).parts[0] for way in ways} & names - {own}
+    return found
+
+
+def test_within_each_folder_imports_run_one_way():
+    """A folder counts as one with all that lies in it, so that a reader meets it on one floor."""
+    circles = {}
+    for folder in {path.parent for path in sources("tactile_core", "addon")}:
+        try:
+            graphlib.TopologicalSorter(members_imported(folder)).prepare()
+        except graphlib.CycleError as error:
+            circles[str(folder.relative_to(ROOT))] = error.args[1]
+    assert circles == {}
+
+
 def test_no_room_looks_up_to_the_public_face():
     """What all rooms need lies below them, so that the face, which opens into all of them, is their roof."""
     homes = {path.stem for path in PACKAGE.iterdir()}

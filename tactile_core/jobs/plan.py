@@ -227,8 +227,8 @@ def _rendered(frames: int, budget: Budget, preset: str | None) -> list[Part]:
 
 
 def _preset(budget: Budget, preset: str) -> str:
+    from ..pictures.mitsuba.variant import fitting
     from ..pictures.presets import NAMES as PRESET_NAMES
-    from ..pictures.presets import fitting
 
     if preset not in PRESET_NAMES:
         raise TactileError("--preset", repr(preset), f"one of {', '.join(PRESET_NAMES)}")

@@ -24,7 +24,8 @@ from ..files.png_writer import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import gel_mapper, of_unit
 from ..pictures.mitsuba.scene_file import camera_planes, write_scene
-from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, fitting, measured
+from ..pictures.mitsuba.variant import fitting
+from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, measured
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import SHIPPED, load_calibration

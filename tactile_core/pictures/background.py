@@ -16,8 +16,8 @@ from ..errors import TactileError
 from ..files import outside
 from ..sensors.calibration import AMBIENT_DEGREE, AMBIENT_TERMS, AMBIENT_UNIT, PHOTOGRAPHED_DEGREE, Calibration
 from ..sensors.camera import Camera
+from .direct_light import Hits, direct_light
 from .height_map import of_unit, rest_height_map
-from .mitsuba.direct_light import Hits, direct_light
 from .perspective import slopes
 
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF")  # of photographs; for others the library may start programs (EPS: Ghostscript)

@@ -11,11 +11,23 @@ from .. import accuracy
 from ..accuracy import Candidate
 from ..errors import TactileError
 from ..files.shipped import shipped
-from .mitsuba.gel_mesh import SPACING
-from .mitsuba.interreflection import Gather
-from .mitsuba.variant import SCALAR, choose_variant
 
 TABLE = shipped("optics_presets.json")
+SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, about 20,000 vertices in the picture
+
+
+@dataclasses.dataclass(frozen=True)
+class Gather:
+    """Resolution at which the gel's own light is gathered.
+
+    step : pixels between places; azimuths : directions round each
+    growth : of the steps outward, each that share of the way, one place at least; bounces : 1 or more
+    """
+
+    step: int
+    azimuths: int
+    growth: float
+    bounces: int
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,17 +101,6 @@ def cheapest(error: float, variant: str) -> str:
     table = measured()["presets"]
     rows = [Candidate(name, table[name]["error"], _ms(table[name]["ms"], variant)) for name in NAMES]
     return accuracy.cheapest(rows, error, "levels").name
-
-
-def fitting(error: float, variant: str | None = None) -> str:
-    """Return the `cheapest` preset for a variant, else for the one that works here; without Mitsuba as without LLVM."""
-    if measured()["presets"][FAST]["error"] <= error:
-        return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
-    try:
-        chosen = choose_variant(variant).name
-    except ModuleNotFoundError:
-        chosen = SCALAR
-    return cheapest(error, chosen)
 
 
 def describe_choice(name: str, error: float) -> str:

@@ -15,10 +15,10 @@ from ..sensors.calibration_file import load_calibration
 from .background import correction, raised_light, resting_picture
 from .camera_noise import camera_noise
 from .coating_spread import CoatingSpread
+from .direct_light import Hits, direct_light
 from .height_map import gel_mapper, of_unit, rest_height_map
 from .level_loops import in_picture
 from .marker_field import MarkerField
-from .mitsuba.direct_light import Hits, direct_light
 from .mitsuba.gel_light import ASIDE, GelLight
 from .mitsuba.gel_mesh import GelMesh
 from .mitsuba.interreflection import interreflection

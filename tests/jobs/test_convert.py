@@ -26,6 +26,7 @@ from tactile_core.jobs.frames_file import ALWAYS, KEPT
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.pictures import presets, renderer
 from tactile_core.pictures.marker_field import MarkerField
+from tactile_core.pictures.mitsuba import variant
 from tactile_core.pictures.mitsuba.variant import SCALAR, Choice
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.markers import Markers
@@ -319,10 +320,10 @@ def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
         return types.SimpleNamespace(dots=None)
 
     monkeypatch.setattr(renderer, "Renderer", draw)
-    monkeypatch.setattr(presets, "choose_variant", lambda wanted: Choice(SCALAR, ""))
-    assert presets.fitting(5) == "fast" and "fast" in presets.describe_choice("fast", 5)
+    monkeypatch.setattr(variant, "choose_variant", lambda wanted: Choice(SCALAR, ""))
+    assert variant.fitting(5) == "fast" and "fast" in presets.describe_choice("fast", 5)
     exact = presets.measured()["presets"]["quality"]["error"]
-    assert (preset := presets.fitting(exact)) == "quality" and "quality" in presets.describe_choice(preset, exact)
+    assert (preset := variant.fitting(exact)) == "quality" and "quality" in presets.describe_choice(preset, exact)
     assert convert.load_tools(preset=preset).preset == "quality" and drawn == ["quality"]
 
 

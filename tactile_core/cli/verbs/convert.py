@@ -91,6 +91,7 @@ def run(options: argparse.Namespace) -> int:
     from ...jobs import convert, frame_range, results
     from ...jobs.error_budget import parse_budget
     from ...pictures import presets
+    from ...pictures.mitsuba import variant
     from ...recordings import PrepareOptions, electrode_gains, readers
     from ...translation.answer import parse_answer
 
@@ -102,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
     paths, failed = readers.list_fingers(options.recordings), 0
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     levels = None if budget is None else budget.levels
-    preset = presets.FAST if levels is None else presets.fitting(levels)
+    preset = presets.FAST if levels is None else variant.fitting(levels)
     made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(

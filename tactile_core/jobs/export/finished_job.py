@@ -70,6 +70,12 @@ class Finished:
         """Number of frames of all recordings."""
         return sum(one.frames for one in self.recordings)
 
+    def check_kept(self, array: str, word: str) -> None:
+        """Raise TactileError where the job did not keep an array, as ``--keep`` word does."""
+        if array not in self.recordings[0].arrays():
+            advice = f"Make the job with --keep {word}"
+            raise TactileError("the job", f"holds no {array}", f"one that kept {word}", advice)
+
 
 def load(folder: Path) -> Finished:
     """Load the job of a folder. Raises TactileError where a shard is missing or not as a job of ours has it."""

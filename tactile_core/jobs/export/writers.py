@@ -36,10 +36,3 @@ def export(
         note = {"layout": layout, "job": source.id, "left_out": source.aside, "versions": provenance.versions()}
         atomic.write_json(partial / NOTE, note)
     return source
-
-
-def needed(source: finished_job.Finished, array: str, word: str) -> None:
-    """Raise TactileError where the job did not keep an array."""
-    if array not in source.recordings[0].arrays():
-        advice = f"Make the job with --keep {word}"
-        raise TactileError("the job", f"holds no {array}", f"one that kept {word}", advice)

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...errors import TactileError
 from ...sensors.calibration import Calibration
+from ..direct_light import evened, lookup
 from ..perspective import slopes
 from ..presets import Preset
 from .camera_rays import camera_rays
-from .direct_light import evened, lookup
 from .gel_mesh import MM, GelMesh, check_mesh
 from .gel_scene import change_numbers, gel_shape, lamps, plugin_names, walls
 from .highlights import mirrored, narrow_lobe

@@ -8,8 +8,8 @@ from ...errors import TactileError
 from ...geometry.lattice import grid_faces
 from ...sensors.camera import Camera
 from ..perspective import slopes
+from ..presets import SPACING
 
-SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, about 20,000 vertices in the picture
 # m of gel round the picture, as high as the picture's edge (13 x 17 mm of 18.4 x 25: docs/sources.md, DIGIT camera).
 MARGIN = 3e-3
 # Mitsuba's ray offsets are made for scenes of about unit size; in metres they would be 0.1 mm.

@@ -7,28 +7,14 @@ random, and Mitsuba is not needed: the tests hold it against Mitsuba's path trac
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from ...sensors.calibration import Calibration
-from .direct_light import Hits, direct_light, lookup, map_lookup
+from ..direct_light import Hits, direct_light, lookup, map_lookup
+from ..presets import Gather
 from .gel_mesh import MARGIN
 
 REACH = 16e-3  # m: across a bowl every distance gives as much, so the whole picture and its rim count
-
-
-@dataclasses.dataclass(frozen=True)
-class Gather:
-    """Resolution of the gathering. step : pixels between places; azimuths : directions round each
-
-    growth : of the steps outward, each that share of the way, one place at least; bounces : 1 or more
-    """
-
-    step: int
-    azimuths: int
-    growth: float
-    bounces: int
 
 
 def interreflection(

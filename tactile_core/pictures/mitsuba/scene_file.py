@@ -29,7 +29,8 @@ from ...sensors.calibration import Calibration
 from ...sensors.camera import COLOURS, Camera
 from ..background import by_led, raised_light
 from ..perspective import Perspective
-from .gel_mesh import MM, SPACING, GelMesh, check_mesh
+from ..presets import SPACING
+from .gel_mesh import MM, GelMesh, check_mesh
 from .gel_scene import lamps, material, walls
 
 VERSION = "3.0.0"  # of the scene format

@@ -12,6 +12,7 @@ import sys
 from typing import Any
 
 from ...errors import TactileError
+from ..presets import FAST, cheapest, measured
 
 LLVM, SCALAR = "llvm_ad_rgb", "scalar_rgb"
 OLDEST_LLVM = 18  # 15 and 16 abort the process on their first kernel on some machines, 14 is refused (blender.md)
@@ -62,6 +63,17 @@ def choose_variant(wanted: str | None = None) -> Choice:
     if wanted == LLVM:
         raise TactileError("variant", f"{LLVM}, but {trouble}", "LLVM 18 or newer", "See `tactile doctor`")
     return Choice(SCALAR, trouble)
+
+
+def fitting(error: float, variant: str | None = None) -> str:
+    """Return the `cheapest` preset for a variant, else for the one that works here; without Mitsuba as without LLVM."""
+    if measured()["presets"][FAST]["error"] <= error:
+        return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
+    try:
+        chosen = choose_variant(variant).name
+    except ModuleNotFoundError:
+        chosen = SCALAR
+    return cheapest(error, chosen)
 
 
 def variant_for(preset: str, wanted: str | None = None) -> str:

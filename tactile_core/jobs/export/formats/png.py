@@ -7,14 +7,13 @@ from pathlib import Path
 
 from ....files.png_writer import write_png
 from ..finished_job import Finished
-from ..writers import needed
 
 BRIEF = "a folder of PNG pictures a recording"
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
     """Write one folder a recording."""
-    needed(source, "image", "image")
+    source.check_kept("image", "image")
     done = 0
     for one in source.recordings:
         (folder / one.name).mkdir()

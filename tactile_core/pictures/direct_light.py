@@ -1,4 +1,4 @@
-"""Lambert's law on what the tracer found: the radiance that each LED gives to each pixel."""
+"""Lambert's law where pixels see the gel: the radiance that each LED gives to each pixel; numpy alone."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...sensors.calibration import Calibration
-from ...sensors.camera import Camera
-from ..cast_shadows import bounding_box
-from ..perspective import bilinear
+from ..sensors.calibration import Calibration
+from ..sensors.camera import Camera
+from .cast_shadows import bounding_box
+from .perspective import bilinear
 
 
 @dataclasses.dataclass(frozen=True)
