@@ -90,11 +90,14 @@ def load_tools(
         solved_gel.prepare(target)
         solve = partial(solved_gel.solved, gel=target, found_on=translator.target)
     asked = translator.answer
-    posterior = translator.posterior if asked.follows else None
-    drawn = translator.plausible if asked.samples else None
-    named, pair = (translator.card, translator.sha256), (translator.source, target, translator.target)
-    drawing = mapper, shade, preset, unit.camera
-    return Tools(translator, *named, *drawing, posterior, drawn, asked, solve, dots, *pair)
+    return Tools(
+        translate=translator, card=translator.card, sha256=translator.sha256,
+        height_map=mapper, shade=shade, preset=preset, camera=unit.camera,
+        posterior=translator.posterior if asked.follows else None,
+        plausible=translator.plausible if asked.samples else None,
+        answer=asked, solve=solve, dots=dots,
+        source=translator.source, target=target, found_on=translator.target,
+    )  # fmt: skip
 
 
 def load_networks(
@@ -110,18 +113,15 @@ def load_networks(
 
 @dataclasses.dataclass(frozen=True)
 class Done:
-    """A finished conversion. folder : the result; warnings : what the user should know of it.
+    """A finished conversion. folder : the result; warnings : what the user should know of it
 
-    added : what the toolkit added to displacements or heights, in words, where a bound was given
-    left : what the translation itself leaves, in words
-    pressed : by how much a kept traction misses the force, in words; empty where it is not kept
+    remarks : sentences on errors: by how much a kept traction misses the force; where a bound was given, what the
+        toolkit added to displacements or heights, and what the translation itself leaves
     """
 
     folder: Path
     warnings: tuple[str, ...]
-    added: str
-    left: str
-    pressed: str = ""
+    remarks: tuple[str, ...]
 
 
 def convert(
@@ -172,7 +172,8 @@ def convert(
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
         found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
-    return Done(Path(folder), made.warnings(), added, made.describe_expected_error(), made.describe_traction())
+    remarks = [made.describe_traction(), added, "" if options.error is None else made.describe_expected_error()]
+    return Done(Path(folder), made.warnings(), tuple(filter(None, remarks)))
 
 
 def check_order(recording: Recording, answer: Answer) -> None:

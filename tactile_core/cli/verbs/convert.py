@@ -128,11 +128,8 @@ def run(options: argparse.Namespace) -> int:
             continue
         for warning in done.warnings:
             say(f"warning: {folder.name}: {warning}")
-        if done.pressed:
-            say(f"{folder.name}: {done.pressed}")
-        if budget is not None:
-            for sentence in filter(None, (done.added, done.left)):
-                say(f"{folder.name}: {sentence}")
+        for remark in done.remarks:
+            say(f"{folder.name}: {remark}")
         tell(str(done.folder))
     if made and failed == len(folders):
         with suppress(OSError):  # it holds something
