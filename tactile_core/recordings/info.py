@@ -12,7 +12,7 @@ from ..sensors import electrode_count, title, typical_rest
 from .biotac_sp import describe_sp
 from .fingers import split
 from .flags import Flag, names
-from .readers import read, sensor_of
+from .readers import pac_columns, read, sensor_of
 from .recording import Recording
 from .signals import PrepareOptions, Signals, prepare
 
@@ -30,18 +30,19 @@ def describe(
     """
     columns = None if options is None else options.columns
     sensor = sensor_of(path, columns)
-    recording = read(path, columns, sensor)
+    recording = read(path, columns, sensor, lean=True)
     finger = split(os.fspath(path))[1]
     gains = None if unit is None else unit.gains_for(path, finger, "--sensor", sensor)
     if typical_rest(sensor) is None:
         return describe_sp(recording, gains)
+    pac = pac_columns(path, columns) if recording.pac is None else recording.pac.shape[1]
     signals = prepare(recording, options)
     if gains is not None:
         from .electrode_gains import prepare_unit
 
         signals = prepare_unit(recording, options, gains)
     lines = [os.fspath(path)]
-    lines += [f"  {label:<11}{text}" for label, text in _rows(recording, signals)]
+    lines += [f"  {label:<11}{text}" for label, text in _rows(recording, signals, pac)]
     lines.append("")
     lines += _electrode_table(signals)
     if signals.warnings:
@@ -49,13 +50,13 @@ def describe(
     return "\n".join(lines)
 
 
-def _rows(recording: Recording, signals: Signals) -> list[tuple[str, str]]:
+def _rows(recording: Recording, signals: Signals, pac: int) -> list[tuple[str, str]]:
     report = signals.report
     origin = "simulated: " + str(recording.about.get("note", "")) if recording.simulated else "not marked as simulated"
     return [
         ("layout", recording.layout),
         ("sensor", f"{title(recording.sensor)}, {electrode_count(recording.sensor)} electrodes; {origin}"),
-        ("channels", _channels(recording)),
+        ("channels", _channels(recording, pac)),
         ("frames", f"{len(recording)} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
         ("rate", f"{recording.rate:.2f} Hz (median)" if len(recording) > 1 else "one frame only"),
         ("duration", f"{recording.duration:.2f} s{_start(recording)}"),
@@ -73,10 +74,10 @@ def _rows(recording: Recording, signals: Signals) -> list[tuple[str, str]]:
     ]
 
 
-def _channels(recording: Recording) -> str:
+def _channels(recording: Recording, pac: int) -> str:
     held = [name for name in ("pdc", "tac", "tdc", "position", "force") if getattr(recording, name) is not None]
-    if recording.pac is not None:
-        held.insert(0, f"pac ({recording.pac.shape[1]} a frame)")
+    if pac:
+        held.insert(0, f"pac ({pac} a frame)")
     if recording.truth is not None:
         nodes = [f"{moved.shape[1]} {title(sensor)}" for sensor, moved in recording.truth.displacements.items()]
         pressed = " and traction" if recording.truth.tractions else ""

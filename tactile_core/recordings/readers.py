@@ -102,6 +102,14 @@ def _unneeded(columns: ColumnMap | None, name: str) -> bool:
     return name not in columns.names() if columns is not None else PAC.fullmatch(name) is not None
 
 
+def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> int:
+    """Count the PAC columns of a CSV file, which a lean reading leaves out; 0 for other files and with a map."""
+    with opened(os.fspath(path)) as (container, where, _, file):
+        if columns is not None or container != "csv":
+            return 0
+        return sum(PAC.fullmatch(name) is not None for name in read_header(where, file))
+
+
 def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> str:
     """Return the sensor of a recording, ``"biotac"`` or ``"biotac_sp"``, from the columns of a CSV file.
 

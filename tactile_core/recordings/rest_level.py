@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,13 +39,31 @@ class Quiet:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Statistics of all windows of n frames, by start frame: mean (W, 19), calm, pdc or None, middle (s) (W,)."""
+    """Statistics of all windows of n frames, by start frame: sums (W, 19), calm, pdc or None, middle (s) (W,).
+
+    The sums are in single precision where that is exact, as it is of counts: in double they are twice the recording.
+    """
 
     n: int
-    mean: np.ndarray
+    sums: np.ndarray
     calm: np.ndarray
     pdc: np.ndarray | None
     middle: np.ndarray
+
+    def mean_of(self, electrode: int) -> np.ndarray:
+        """Return the means (W,) of one electrode."""
+        return self.sums[:, electrode].astype(float) / self.n
+
+    def mean_at(self, window: int) -> np.ndarray:
+        """Return the means (19,) of one window."""
+        return self.sums[window].astype(float) / self.n
+
+    def largest(self, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return the largest (W,) of what the electrodes' means (W,) are changed to."""
+        found = change(self.mean_of(0))
+        for electrode in range(1, self.sums.shape[1]):
+            np.maximum(found, change(self.mean_of(electrode)), out=found)
+        return found
 
 
 def window_frames(rate: float) -> int:
@@ -135,20 +154,23 @@ def _spread(values: np.ndarray, n: int) -> np.ndarray:
 def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
-    mean, calm = np.empty((count, electrodes.shape[1])), np.ones(count, bool)
+    sums, calm = np.empty((count, electrodes.shape[1]), np.float32), np.ones(count, bool)
     for j, column in enumerate(electrodes.T):  # one at a time: sums of all would take seven times the recording
         column = column.astype(float)
         halves = _sums(column, half) / half
         trend = halves[n - half : n - half + count] - halves[:count]
         calm &= (_spread(column, n) <= CALM_STD) & (np.abs(trend) <= CALM_TREND)
-        mean[:, j] = _sums(column, n) / n
+        total = _sums(column, n)
+        if sums.dtype == np.float32 and not np.array_equal(total, total.astype(np.float32)):
+            sums = sums.astype(float)
+        sums[:, j] = total
     pressure = _sums(pdc, n) / n if pdc is not None else None
-    return _Windows(n, mean, calm, pressure, (np.arange(count) + 0.5 * (n - 1)) / rate)
+    return _Windows(n, sums, calm, pressure, (np.arange(count) + 0.5 * (n - 1)) / rate)
 
 
 def _rest_rectified(windows: _Windows) -> np.ndarray:
     """Mark windows (W,) bool at rest. Rectified readings are zero at the tare, so rest is small and calm."""
-    largest = windows.mean.max(axis=1)
+    largest = windows.largest(lambda mean: mean)
     if windows.pdc is None:
         return windows.calm & (largest <= RECTIFIED_LEVEL)
     return windows.calm & (windows.pdc < QUIET_PDC) & (largest <= RECTIFIED_LEVEL_PDC)
@@ -158,7 +180,7 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
     """Mark windows (W,) bool at rest: one calm window is chosen, with all calm ones that agree with it."""
     possible = windows.calm
     if kind != "raw":
-        possible = possible & (np.abs(windows.mean).max(axis=1) <= TARED_LEVEL)
+        possible = possible & (windows.largest(np.abs) <= TARED_LEVEL)
         if windows.pdc is not None and np.median(windows.pdc) < TARED_PDC:
             possible &= windows.pdc < QUIET_PDC
     calm = np.flatnonzero(possible)
@@ -166,33 +188,36 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
         return possible
     anchor = _anchor(windows, calm, kind, duration)
     apart = np.abs(windows.middle - windows.middle[anchor])
-    off = np.zeros(len(windows.mean))
-    for column in windows.mean.T:
-        np.maximum(off, np.abs(column - column[anchor]), out=off)
+    off = windows.largest(lambda mean: np.abs(mean - mean[anchor]))
     if windows.pdc is None:
         agree = possible & (off <= LEVEL + LEVEL_RATE * apart)
-        return agree & _tracked(windows.mean, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
-    pressure = windows.pdc - windows.pdc[anchor]
+        return agree & _tracked(windows.mean_at, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
+    pressure, pressures = windows.pdc - windows.pdc[anchor], windows.pdc[:, None]
     agree = possible & (pressure < QUIET_PDC + PDC_RATE * apart) & (off <= LEVEL_PDC + LEVEL_PDC_RATE * apart)
-    agree &= _tracked(windows.mean, windows.middle, agree, anchor, LEVEL_PDC, LEVEL_PDC_RATE)
-    return agree & _tracked(windows.pdc[:, None], windows.middle, agree, anchor, QUIET_PDC, PDC_RATE)
+    agree &= _tracked(windows.mean_at, windows.middle, agree, anchor, LEVEL_PDC, LEVEL_PDC_RATE)
+    return agree & _tracked(lambda window: pressures[window], windows.middle, agree, anchor, QUIET_PDC, PDC_RATE)
 
 
 def _tracked(
-    values: np.ndarray, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
+    values: Callable[[int], np.ndarray],
+    middle: np.ndarray,
+    possible: np.ndarray,
+    anchor: int,
+    level: float,
+    rate: float,
 ) -> np.ndarray:
-    """Mark windows (W,) bool whose values (W, C) lie near a level that follows them from the anchor on.
+    """Mark windows (W,) bool whose values, (C,) of each, lie near a level that follows them from the anchor on.
 
     The level moves at ``rate`` a second at most: drift over an hour can exceed a press.
     """
-    accepted = np.ones(len(values), bool)
+    accepted = np.ones(len(middle), bool)
     if np.abs(middle - middle[anchor]).max() <= TRACKED:
         return accepted
     candidates = np.flatnonzero(possible)
     for way in (candidates[candidates >= anchor], candidates[candidates < anchor][::-1]):
-        now, last = values[anchor].copy(), middle[anchor]
+        now, last = values(anchor), middle[anchor]
         for k in way:
-            since, off = abs(middle[k] - last), values[k] - now
+            since, off = abs(middle[k] - last), values(k) - now
             accepted[k] = np.abs(off).max() <= level + rate * (since + TRACKED)
             if accepted[k]:
                 now, last = now + np.clip(off, -rate * since, rate * since), middle[k]
@@ -204,7 +229,7 @@ def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> 
         low = windows.pdc[calm]
         calm = calm[low <= low.min() + 0.5 * QUIET_PDC]
     if kind != "raw":
-        return int(calm[np.argmin(np.abs(windows.mean[calm]).max(axis=1))])
+        return int(calm[np.argmin(windows.largest(np.abs)[calm])])
     early = windows.middle[calm] <= NEAR_END + 0.5 * WINDOW
     late = windows.middle[calm] >= duration - NEAR_END - 0.5 * WINDOW
     if early.any():

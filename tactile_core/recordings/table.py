@@ -17,7 +17,8 @@ from .truncated_cell import doubt_last_cell, shown
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
 MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)
 MAX_COLUMNS = 1000  # the widest layout has 50 (assumed enough)
-BLOCK = 8 * 2**20  # bytes of text that are parsed at a time
+WHOLE = 8 * 2**20  # bytes of text up to which a file is parsed at once; of a longer one BLOCK at a time
+BLOCK = 2 * 2**20
 OVERLAP = 200  # rows of the block before by which the last cell of a file is judged
 MAX_BLANK = 8  # blank lines that a message names
 
@@ -61,8 +62,12 @@ class Table:
 
     def counts(self, names: list[str]) -> np.ndarray:
         """Return `columns` (T, n), as float32 where the table is kept small and that is exact, else as float64."""
-        exact = any(self.header.index(name) in self.exact for name in names if name in self.header)
-        return self.columns(names, np.float32 if self.left_out and not exact else np.float64)
+        places = [self.header.index(name) for name in names if name in self.header]
+        if not self.left_out or any(place in self.exact for place in places):
+            return self.columns(names)
+        if places == list(range(places[0], places[0] + len(names))) and self.values.dtype == np.float32:
+            return self.values[:, places[0] : places[0] + len(names)]  # no copy: it may be most of the table
+        return self.columns(names, np.float32)
 
     def column(self, name: str) -> np.ndarray:
         """Return the values (T,) float of a column."""
@@ -109,15 +114,15 @@ def read_header(path: str, file: BinaryIO) -> tuple[str, ...]:
 def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None = None) -> Table:
     """Parse the file, a block at a time. Raises TactileError: not text, empty, no header, no data, twin columns.
 
-    left_out : whether a column of that name is parsed but not held; of a file of more than one block
+    left_out : whether a column of that name is parsed but not held; of a file of more than WHOLE
     """
     size = os.fstat(file.fileno()).st_size
     if size > MAX_BYTES:
         found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split the recording"
         raise TactileError(path, found, "a recording of some hours", advice)
-    blocks = read_tables(path, file, BLOCK, OVERLAP)
+    blocks = read_tables(path, file, WHOLE if size <= WHOLE else BLOCK, OVERLAP)
     first, _ = next(blocks)
-    return first if size <= BLOCK else _joined(first, blocks, size, left_out or (lambda name: False))
+    return first if size <= WHOLE else _joined(first, blocks, size, left_out or (lambda name: False))
 
 
 def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_out: Callable[[str], bool]) -> Table:

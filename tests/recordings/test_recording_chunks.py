@@ -58,13 +58,18 @@ def test_a_text_without_lines_costs_no_memory(tmp_path, monkeypatch):
         list(chunks.read_parts(tmp_path / "a.csv"))
 
 
+def blocks_of_20_kb(monkeypatch):
+    monkeypatch.setattr(table, "WHOLE", 20_000)
+    monkeypatch.setattr(table, "BLOCK", 20_000)
+
+
 def test_a_long_text_is_read_in_blocks_like_a_short_one(slide_lines, write, monkeypatch):
     slide_lines[600] = slide_lines[600].replace("2000", "x", 1)
     slide_lines.insert(400, "")
     slide_lines[-1] = slide_lines[-1].rstrip(",")[:-3]  # cut in its last cell
     path = write(slide_lines, end="")
     whole = recordings.read(path)
-    monkeypatch.setattr(table, "BLOCK", 20_000)
+    blocks_of_20_kb(monkeypatch)
     found = recordings.read(path)
     assert found.warnings == whole.warnings and any("line 602" in text for text in found.warnings)
     for name in ("time", "electrodes", "pdc", "pac", "tdc", "rows", "flags"):
@@ -72,7 +77,7 @@ def test_a_long_text_is_read_in_blocks_like_a_short_one(slide_lines, write, monk
 
 
 def test_a_lean_recording_gives_the_same_signals(slide_lines, write, monkeypatch):
-    monkeypatch.setattr(table, "BLOCK", 20_000)
+    blocks_of_20_kb(monkeypatch)
     slide_lines[600] = slide_lines[600].replace("2000", "x", 1)  # in PAC, which is left out: told all the same
     path = write(slide_lines)
     whole, lean = recordings.read(path), recordings.read(path, lean=True)
@@ -85,14 +90,14 @@ def test_a_lean_recording_gives_the_same_signals(slide_lines, write, monkeypatch
 
 
 def test_what_single_precision_rounds_is_kept_in_double(slide_lines, write, monkeypatch):
-    monkeypatch.setattr(table, "BLOCK", 20_000)
+    blocks_of_20_kb(monkeypatch)
     slide_lines[600] = slide_lines[600][: slide_lines[600].rindex(",", 0, -1) + 1] + "3400.1,"
     path = write(slide_lines)
     np.testing.assert_array_equal(recordings.read(path, lean=True).electrodes, recordings.read(path).electrodes)
 
 
 def test_a_lean_mapped_recording_holds_the_columns_of_its_map(slide_lines, write, monkeypatch):
-    monkeypatch.setattr(table, "BLOCK", 20_000)
+    blocks_of_20_kb(monkeypatch)
     path = write(slide_lines)
     named = ColumnMap(tuple(f"ele{i}" for i in range(1, 20)), "timestamp", pdc="PDC")
     whole, lean = recordings.read(path, named), recordings.read(path, named, lean=True)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
+from tactile_core.recordings import table
 from tactile_core.recordings.info import describe
 
 
@@ -25,6 +26,14 @@ def test_a_good_recording(press, in_layout):
     ):
         assert part in text, part
     assert "warnings" not in text and max(map(len, text.splitlines())) < 200
+
+
+def test_a_long_one_is_described_as_a_short_one(press, in_layout, monkeypatch):
+    path = in_layout("csv_slide", press)
+    whole = describe(path)
+    monkeypatch.setattr(table, "WHOLE", 20_000)
+    monkeypatch.setattr(table, "BLOCK", 20_000)
+    assert describe(path) == whole
 
 
 def test_a_simulated_one_says_so(press, in_layout):
