@@ -1,5 +1,8 @@
 """The networks that ship for a BioTac SP: taken for its recordings, small, and better than the baselines they state."""
 
+import subprocess
+import sys
+
 import h5py
 import numpy as np
 import pytest
@@ -41,3 +44,21 @@ def test_its_recordings_are_converted_by_them_and_a_biotac_s_beside_is_refused(n
         assert file[f"displacement_{NAME}"].shape[0] == len(moved) == 40
     assert not moved[:18].any() and not force[:18].any()
     assert np.abs(moved[22:]).max() > 20e-6 and (force[22:] > 0).all()
+
+
+READS = """
+import sys
+opened = []
+sys.addaudithook(lambda event, args: opened.append(str(args[0])) if event == "open" else None)
+import tactile_core as tactile
+tactile.translate(tactile.read(sys.argv[1]))
+data = [path for path in opened if path.endswith((".safetensors", ".json", ".toml", ".csv", ".npy"))]
+assert any("MVD.safetensors" in path for path in data)
+print([path for path in data if "biotac_sp" in path or "gelsight_mini" in path])
+"""
+
+
+def test_they_cost_a_biotac_s_recordings_nothing(request):
+    recording = request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5"
+    ran = subprocess.run([sys.executable, "-c", READS, recording], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
