@@ -13,7 +13,7 @@ from ..errors import TactileError
 from ..files.installed import advice
 from ..files.version import __version__
 from .stop_signals import Stopped, stopping
-from .terminal import complain, say
+from .terminal import complain, discard_output, flush, say
 from .verbs import VERBS
 
 DESCRIPTION = """\
@@ -44,7 +44,10 @@ PATHS = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit status."""
-    for stream in (sys.stdout, sys.stderr):
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed, as in `tactile convert … >&-`
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - for as long as the process lives
+        stream = getattr(sys, name)
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # a path may hold what the terminal cannot show
     parser = _parser()
@@ -55,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stopping():
             _check_out(options)
             status = options.run(options)
-            sys.stdout.flush()
+            flush()
     except TactileError as error:
         complain(str(error))
         return 2
@@ -67,8 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         return _stopped(stop, options.leaves)
     except BrokenPipeError:
-        # The reader of our output has gone, as in `tactile info … | head`; the exit must not flush into it again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader of our output has gone, as in `tactile info … | head`.
+        discard_output()
         return 0
     return status
 

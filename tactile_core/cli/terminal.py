@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,8 +11,32 @@ from ..errors import TactileError
 
 
 def tell(text: str) -> None:
-    """Print a result on stdout; its line breaks are kept."""
-    sys.stdout.write("\n".join(map(printable, text.split("\n"))) + "\n")
+    """Print a result on stdout; its line breaks are kept. Raises TactileError where it cannot be written."""
+    with _written():
+        sys.stdout.write("\n".join(map(printable, text.split("\n"))) + "\n")
+
+
+def flush() -> None:
+    """Write what was printed on stdout. Raises TactileError where it cannot be."""
+    with _written():
+        sys.stdout.flush()
+
+
+def discard_output() -> None:
+    """Lose what was printed on stdout and not yet written, which the exit would try to write again."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def _written() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        discard_output()
+        found = f"cannot be written ({error.strerror})"
+        raise TactileError("what is printed", found, "a terminal, or a file with room", "Make room") from error
 
 
 def say(text: str) -> None:

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import TactileError
 from . import outside
 from .hdf5_heaps import Heaps
@@ -22,6 +24,7 @@ MAX_RATIO = 1032  # the most that deflate packs (zlib, technical details); lzf a
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}  # that are undone; the numbers are HDF5's
 DEFLATE, CHECKSUM, STEP = 1, 3, 2**20
 WIDTHS = {2, 4, 8, 16, 32}  # bytes of an address and of a size; the library opens no file with others
+MOST_CHUNKS = 20_000  # read at a time: the library takes 4 kB for each while it reads, 80 MB
 MAX_DEPTH = 32  # groups within groups, whose names the library looks up again and again (assumed enough; ours have 2)
 MAX_PLAIN_CHUNK = 2**24  # bytes of a chunk in a file of our own; they have 0.2 MB
 SIGNATURE, LONGEST = b"\x89HDF\r\n\x1a\n", 256  # LONGEST: bytes of the widest superblock up to the root's address
@@ -104,6 +107,23 @@ def declared(data: h5py.Dataset, where: str) -> None:
     if data.size * data.dtype.itemsize > MAX_RATIO * stored + STEP:
         found = f"shape {data.shape} in {stored} stored bytes"
         raise TactileError(where, found, "a dataset whose values are in the file", "Write the file again")
+
+
+def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
+    """Read a dataset, or some rows of it, at most MOST_CHUNKS of its chunks at a time.
+
+    Raises TactileError for a row of more.
+    """
+    if data.chunks is None or not data.ndim:
+        return data[()] if rows is None else data[rows]
+    start, stop, _ = (rows or slice(None)).indices(len(data))
+    in_row = math.prod(-(-size // chunk) for size, chunk in zip(data.shape[1:], data.chunks[1:], strict=True))
+    if in_row > MOST_CHUNKS:
+        raise _refused(data.file.filename, data.name, f"{in_row:,} chunks a row", f"at most {MOST_CHUNKS:,}")
+    step = data.chunks[0] * (MOST_CHUNKS // in_row) if in_row else len(data)
+    if stop - start <= step:
+        return data[start:stop]
+    return np.concatenate([data[first : min(first + step, stop)] for first in range(start, stop, step)])
 
 
 def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import TactileError
-from ..files.hdf5_checked import declared, open_checked
+from ..files.hdf5_checked import declared, open_checked, read_rows
 from .assemble import MAX_FRAMES
 
 # Bytes of one array in memory; a truth of 700 frames and 6,000 nodes takes 50 MB as float32 (assumed enough).
@@ -107,9 +107,9 @@ def open_hdf5(path: str) -> Iterator[Store]:
             with damage_reported(f"{path}, {name}", "attributes"):
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
-        def load(name: str, rows: Any = ()) -> np.ndarray:
+        def load(name: str, rows: slice | None = None) -> np.ndarray:
             declared(file[name], f"{path}, {name}")
-            return file[name][rows]
+            return read_rows(file[name], rows)
 
         yield Store(path, shapes, load, attributes, attributes_of, load)
 

@@ -306,6 +306,12 @@ def _number(cell: str) -> float | None:
     return value if np.isfinite(value) else None
 
 
+def _no_number(cell: str) -> str:
+    """Say what a cell is that is no number: one with a decimal comma is mended by another setting of the export."""
+    comma = cell.count(",") == 1 and _number(cell.replace(",", ".")) is not None
+    return "a number with a decimal comma, where a point is expected" if comma else "not a number"
+
+
 def _row(
     line: str, header: tuple[str, ...], separator: str, frame: int, number: int, problems: list[Problem]
 ) -> list[float]:
@@ -340,7 +346,10 @@ def _bad_row(
         if value is None or not -1e300 < value < 1e300:
             problems.append(
                 Problem(
-                    frame, number, name, f"{shown(cell.strip())} is not a number" if cell.strip() else "an empty cell"
+                    frame,
+                    number,
+                    name,
+                    f"{shown(cell.strip())} is {_no_number(cell.strip())}" if cell.strip() else "an empty cell",
                 )
             )
             value = np.nan

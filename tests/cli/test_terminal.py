@@ -1,5 +1,9 @@
 """What the terminal gets: no control characters, whatever a file is called."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from tactile_core.cli import terminal
@@ -22,3 +26,19 @@ def test_a_file_s_name_reaches_the_terminal_escaped(verb, capsys, tmp_path):
 
 def test_durations_in_the_unit_that_is_read_best():
     assert [terminal.duration(each) for each in (40, 90, 720, 12600)] == ["40 s", "90 s", "12 min", "3.5 h"]
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device stands for a full disk here")
+def test_a_full_disk_under_what_is_printed_is_named():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-m", "tactile_core", "scenes"], stdout=full, stderr=subprocess.PIPE)
+    said = done.stderr.decode()
+    assert done.returncode == 2 and said.startswith("tactile: error: what is printed: cannot be written"), said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell closes it")
+def test_a_closed_output_is_no_error():
+    command = ["sh", "-c", '"$@" >&-', "sh", sys.executable, "-m", "tactile_core", "scenes"]
+    done = subprocess.run(command, stderr=subprocess.PIPE)
+    assert done.returncode == 0 and not done.stderr

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tactile_core import recordings
 from tactile_core.files import array_pack, hdf5_checked, hdf5_heaps
 from tactile_core.jobs import prepared_signals
 from tactile_core.simulation import pairs_file
@@ -177,6 +178,15 @@ def test_what_is_not_reached_is_not_read(tmp_path):
     os.truncate(tmp_path / "a.h5", 2**40)
     with hdf5_checked.open_checked(tmp_path / "a.h5") as file:
         assert file["electrode_vals/data"].shape == (60, 19)
+
+
+def test_a_chunk_for_each_number_takes_bounded_memory(tmp_path):
+    values = np.random.default_rng(0).integers(3000, 3100, (9000, 19))
+    electrodes(tmp_path / "a.h5", data=values, dtype="i2", chunks=(1, 1))
+    assert report_of(recordings.read, tmp_path / "a.h5") == "read"
+    np.testing.assert_array_equal(recordings.read(tmp_path / "a.h5").electrodes, values)
+    electrodes(tmp_path / "b.h5", data=np.zeros((2, 30_000), "u1"), chunks=(1, 1))
+    refused(recordings.read, tmp_path / "b.h5", "")
 
 
 def test_groups_within_groups(tmp_path):

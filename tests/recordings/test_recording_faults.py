@@ -63,6 +63,11 @@ def test_a_bad_cell_is_one_flagged_frame_named_by_line_and_field(cell, press, sl
     assert recordings.prepare(recording).electrodes[39, 2] == pytest.approx(expected)
 
 
+def test_decimal_commas_are_named(slide_lines, write):
+    with pytest.raises(TactileError, match="a number with a decimal comma, where a point is expected"):
+        recordings.read(write([line.replace(",", ";").replace(".", ",") for line in slide_lines]))
+
+
 def test_a_row_with_too_many_cells_is_not_believed(slide_lines, write):
     slide_lines[10] = "7," + slide_lines[10] + "8"
     recording = recordings.read(write(slide_lines))
