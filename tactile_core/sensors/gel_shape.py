@@ -60,7 +60,7 @@ class GelShape:
         t = np.clip((2 * x - self.tip_x - self.base_x) / (self.base_x - self.tip_x), -1, 1)
         chebyshev = np.cos(np.arange(dome.degree_along + 1) * np.arccos(t)[..., None])
         even = ((z / self.half_width) ** 2)[..., None] ** np.arange(dome.degree_across + 1)
-        return (chebyshev[..., :, None] * even[..., None, :]).reshape(*x.shape, -1)
+        return (chebyshev[..., :, None] * even[..., None, :]).reshape(*x.shape, chebyshev.shape[-1] * even.shape[-1])
 
     @functools.cache  # noqa: B019 - shapes are few and kept by ``shape_of`` anyway
     def _dome_coefficients(self, dome: Dome) -> np.ndarray:

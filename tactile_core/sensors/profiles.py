@@ -58,6 +58,9 @@ def _table(path: Path, header: str) -> np.ndarray:
     if first.strip() != header:
         raise TactileError(f"{path}, row 1", first, header)
     try:
-        return np.loadtxt(io.StringIO(rest), delimiter=",", ndmin=2)
+        rows = np.loadtxt(io.StringIO(rest), delimiter=",", ndmin=2)
     except ValueError as error:
         raise TactileError(path, str(error), f"numbers under {header}") from error
+    if rows.shape[1] != header.count(",") + 1:
+        raise TactileError(path, f"rows of {rows.shape[1]} numbers", f"numbers under {header}")
+    return rows

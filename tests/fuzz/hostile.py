@@ -40,7 +40,7 @@ from tactile_core.jobs.engine import job as jobs  # noqa: E402
 from tactile_core.jobs.live import Growing  # noqa: E402
 from tactile_core.pictures import background  # noqa: E402
 from tactile_core.recordings import chunks, electrode_gains  # noqa: E402
-from tactile_core.sensors import calibration_file  # noqa: E402
+from tactile_core.sensors import calibration_file, descriptor, gel_shape  # noqa: E402
 from tactile_core.simulation import pairs_file, scene  # noqa: E402
 from tactile_core.translation import networks, translate, weights  # noqa: E402
 
@@ -167,6 +167,8 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         "weights_card": ((networks.WEIGHTS_FOLDER / weights.CARD_NAME).read_bytes(), read_weights),
         "heights": (heights.getvalue(), read_heights),
         "sensor": ((folder / "sensor.toml").read_bytes(), electrode_gains.read),
+        "gel": ((descriptor.FOLDER / "gelsight_mini" / descriptor.FILE).read_bytes(), read_gel),
+        "dome": ((descriptor.FOLDER / "gelsight_mini" / "profile.csv").read_bytes(), read_dome),
         "tet": (tetrahedra, tet_file.read_tet),
         "obj": (faces, read_mesh(".obj")),
         "stl": (bytes(80) + struct.pack("<I", 4) + triangles(), read_mesh(".stl")),
@@ -186,6 +188,20 @@ PLY = (
     b"0 0 0\n0.01 0 0\n0 0.01 0\n0 0 0.01\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
 )
 OFF = b"OFF\n4 4 6\n0 0 0\n.01 0 0\n0 .01 0\n0 0 .01\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+
+
+def read_gel(path: Path, table: str = "profile.csv") -> None:
+    """Reads the descriptor of a gel, and makes its surface of the table beside it."""
+    with tempfile.TemporaryDirectory() as other:
+        for name in (descriptor.FILE, "profile.csv"):
+            good = descriptor.FOLDER / "gelsight_mini" / name
+            shutil.copyfile(good if name == table else path, Path(other) / name)
+        gel_shape.GelShape(descriptor.read(Path(other))).surface()
+
+
+def read_dome(path: Path) -> None:
+    """Reads the table of a gel's heights, beside a good descriptor."""
+    read_gel(path, descriptor.FILE)
 
 
 def triangles() -> bytes:

@@ -149,6 +149,16 @@ def test_a_table_of_too_few_heights_is_refused(tmp_path):
         GelShape(descriptor.read(folder)).dome_height(np.zeros(1), np.zeros(1))
 
 
+def test_a_table_of_other_columns_or_all_outside_the_margin_is_refused(tmp_path):
+    folder = changed(tmp_path, "margin_mm = 0.4", "margin_mm = 40", "gelsight_mini")
+    with pytest.raises(TactileError, match=r"0 heights inside margin_mm, which determine 0 of 6"):
+        GelShape(descriptor.read(folder)).dome_height(np.zeros(1), np.zeros(1))
+    lines = (folder / "profile.csv").read_text().splitlines()
+    (folder / "profile.csv").write_text("\n".join([lines[0], *(line.rsplit(",", 2)[0] for line in lines[1:])]))
+    with pytest.raises(TactileError, match=r"rows of 2 numbers; expected numbers under x_mm"):
+        GelShape(descriptor.read(folder)).dome_height(np.zeros(1), np.zeros(1))
+
+
 def test_where_own_sensors_lie_is_said_where_it_is_odd(tmp_path, monkeypatch):
     mine = changed(tmp_path, "poisson = 0.48", "poisson = 0.4", "digit")
     for own, words in ((tmp_path / "none", "which is no folder"), (mine, "a sensor's own folder")):
