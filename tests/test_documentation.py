@@ -20,7 +20,7 @@ import pytest
 from conftest import SLIDE_HEADER
 from labelled_recording import labelled_arrays, write_labelled
 from plain_unit import plain_unit
-from pressed_unit import write_photographs
+from pressed_unit import PLACES, write_photographs
 
 from tactile_core.simulation.scene import load_scene
 
@@ -131,8 +131,8 @@ def inputs(tmp_path_factory) -> Path:
     (folder / "locations.csv").touch()
     (folder / "brief").mkdir()
     (folder / "brief" / "scene.toml").write_text(BRIEF)
-    unit = plain_unit()
-    write_photographs(folder / "presses", unit)
+    # A fit takes the time of its pixels and presses, and tests of calibrations find a unit's numbers from larger ones.
+    write_photographs(folder / "presses", plain_unit().at_size(60, 80), PLACES[:3])
     shutil.copytree(folder / "presses", folder / "other_presses")
     if TORCH:
         write_labelled(folder / "labelled.hdf5", labelled_arrays())
