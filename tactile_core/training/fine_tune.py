@@ -30,7 +30,7 @@ from .export_weights import versions
 from .labelled_recording import LabelledRecording, read_labelled
 from .modules import ContactPosterior
 from .stages import FORCE_FLOOR
-from .train import deterministic, prepare_folder
+from .train import deterministic, prepared_folder
 
 EPOCHS, BATCH, RATE = 30, 64, 2e-4  # a few passes at a low rate: the start is a trained network (assumed)
 HOLD = 0.3  # weight of the shape being held, against place and force, each about 1 at first (assumed)
@@ -57,24 +57,24 @@ def fine_tune(
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
     data = read_labelled(path, before.frames["MVD"], seed)
     typical = reference_signals.read(source).typical.astype(np.float32)
-    prepare_folder(Path(out_folder), overwrite)
-    net = "R2MPN" if data.rectified else "S2MPN"
-    with deterministic():
-        state = _train(before, net, data, typical, seed, progress or (lambda share, text: None))
-    after = Networks(before.tensors | {net: state}, before.card)
-    rows = [*_rows(before, data, "before"), *_rows(after, data, "after")]
-    note = {
-        "network": net,
-        "recording": os.path.basename(path),
-        "recording_sha256": _file_sha256(path),
-        "weights_sha256": before.sha256,
-        "contacts": {name: len(rows) for name, rows in vars(data.split).items()},
-        "dropped": list(data.dropped),
-        "seed": seed,
-        "versions": versions(torch.device("cpu")),
-        "errors": rows,
-    }
-    _write(Path(out_folder) / "weights", source, before.card, net, state, note)
+    with prepared_folder(Path(out_folder), overwrite):
+        net = "R2MPN" if data.rectified else "S2MPN"
+        with deterministic():
+            state = _train(before, net, data, typical, seed, progress or (lambda share, text: None))
+        after = Networks(before.tensors | {net: state}, before.card)
+        rows = [*_rows(before, data, "before"), *_rows(after, data, "after")]
+        note = {
+            "network": net,
+            "recording": os.path.basename(path),
+            "recording_sha256": _file_sha256(path),
+            "weights_sha256": before.sha256,
+            "contacts": {name: len(rows) for name, rows in vars(data.split).items()},
+            "dropped": list(data.dropped),
+            "seed": seed,
+            "versions": versions(torch.device("cpu")),
+            "errors": rows,
+        }
+        _write(Path(out_folder) / "weights", source, before.card, net, state, note)
     return rows
 
 

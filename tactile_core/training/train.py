@@ -11,7 +11,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -64,8 +64,7 @@ def train(
     if bodies is None:
         check_surfaces(pairs, pairs_path)
         bodies = our_bodies(*pairs.pair)
-    prepare_folder(out, overwrite)
-    with deterministic():
+    with prepared_folder(out, overwrite), deterministic():
         generator = torch.Generator().manual_seed(seed)
         frames = {
             role: frame(sensor, getattr(options, f"half_{role}"))
@@ -112,15 +111,27 @@ def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
             raise TactileError(f"{os.fspath(path)}, {key}", found, surface.sha256, advice)
 
 
-def prepare_folder(out: Path, overwrite: bool) -> None:
-    """Make the folder; raises TactileError if it cannot be made or already holds weights."""
+@contextmanager
+def prepared_folder(out: Path, overwrite: bool) -> Iterator[None]:
+    """Make the folder; what ends with an error leaves none that is new and empty.
+
+    Raises TactileError if it cannot be made or already holds weights.
+    """
     if (out / "weights" / "card.json").exists() and not overwrite:
         raise TactileError(out, "already holds weights", "a new folder", "Choose another folder, or overwrite")
+    new = [folder for folder in (out / "weights", out) if not folder.exists()]
     try:
         (out / "weights").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         advice = "Choose another folder"
         raise TactileError(out, f"cannot be made ({error.strerror})", "a writable folder", advice) from error
+    try:
+        yield
+    except BaseException:  # Ctrl-C, too; raised again
+        for folder in new:
+            with suppress(OSError):  # it holds a checkpoint
+                folder.rmdir()
+        raise
 
 
 @contextmanager

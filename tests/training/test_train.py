@@ -173,6 +173,17 @@ def test_unusable_output_folder(pairs, tmp_path):
         train(pairs, tmp_path / "file" / "out", 0, QUICK, **SURFACES)
 
 
+def test_a_training_that_saves_nothing_leaves_no_folder(pairs, tmp_path):
+    def stop(share, text):
+        raise KeyboardInterrupt
+
+    (tmp_path / "mine").mkdir()
+    for name in ("new", "mine"):
+        with pytest.raises(KeyboardInterrupt):
+            train(pairs, tmp_path / name, 0, replace(QUICK, checkpoint_seconds=1e9), stop, **SURFACES)
+    assert [folder.name for folder in tmp_path.rglob("*")] == ["mine"]
+
+
 def test_pairs_of_another_surface_are_refused(pairs, tmp_path):
     with pytest.raises(TactileError, match="biotac_nodes_sha256"):
         train(pairs, tmp_path, 0, QUICK)
