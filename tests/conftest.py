@@ -23,6 +23,11 @@ if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_I
     signal.signal(signal.SIGHUP, lambda number, frame: None)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Run the pages' commands first: one page may take a minute, in which other workers do the short tests."""
+    items.sort(key=lambda item: not item.name.startswith("test_commands_work"))
+
+
 @pytest.fixture(scope="session")
 def outside_data() -> Callable[[str], Path]:
     """``outside_data("biotac_recordings")``: that folder of real data, or a skip that says why."""
