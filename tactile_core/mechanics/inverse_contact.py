@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from .. import sensors
-from ..sensors.unrolling import node_normals
 from .fast.compliance import compliance_of
 from .fast.compliance_rows import ComplianceRows
 from .node_areas import node_areas
+from .rest_normals import rest_normals
 
 # Of the sensor's thickness over its modulus: the layer's give under a pressure. On gels solved at finite strain, nine
 # indenters, the sum missed the force by 6.0 % in the median, with 0.01 by 7.5 %, 0.03 by 12.9 %; on translated gels
@@ -28,8 +28,7 @@ def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) 
     BioTac's fluid included, its core left out.
     """
     compliance, areas = compliance_of(sensor), node_areas(sensor)
-    surface = compliance.surface
-    outward = node_normals(surface.rest, surface.faces)
+    outward = rest_normals(sensor)
     nodes = np.flatnonzero(patch[compliance.touchable])
     found, pulling = np.zeros(displacement.shape), True
     while len(nodes) and pulling:

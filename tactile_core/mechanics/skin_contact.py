@@ -16,10 +16,11 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..geometry.indenters import Indenter, Sphere
-from ..sensors.unrolling import node_normals, roll_up, unrolled_nodes
+from ..sensors.unrolling import roll_up, unrolled_nodes
 from .body_contact import BodyContact, leaning, patch_radius
 from .inverse_contact import pressing_traction
 from .node_areas import node_areas
+from .rest_normals import rest_normals
 from .solve import solve
 
 SENSOR = "biotac"
@@ -88,8 +89,7 @@ def likely_contacts(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -
 
 
 def _dent(displacement: np.ndarray) -> _Dent:
-    surface = sensors.sensor_surface(SENSOR)
-    outward = node_normals(surface.rest, surface.faces)
+    outward = rest_normals(SENSOR)
     inward = -np.einsum("ni,ni->n", displacement, outward)
     traction = pressing_traction(SENSOR, displacement, inward > MAYBE * max(inward.max(), 0.0))
     pressure = np.maximum(-np.einsum("ni,ni->n", traction, outward), 0)
@@ -103,7 +103,7 @@ def _dent(displacement: np.ndarray) -> _Dent:
 def _ball(dent: _Dent) -> Sphere:
     """Return the ball that fits the pressed patch."""
     surface = sensors.sensor_surface(SENSOR)
-    outward = node_normals(surface.rest, surface.faces)
+    outward = rest_normals(SENSOR)
     patch = dent.pressure > PRESSED * dent.pressure.max()
     return Sphere(patch_radius(surface.rest[patch] + dent.displacement[patch], outward[patch].mean(axis=0)))
 

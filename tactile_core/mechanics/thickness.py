@@ -8,6 +8,7 @@ import numpy as np
 
 from .. import sensors
 from ..geometry.indenters import Indenter, Pose
+from .rest_normals import rest_normals
 
 DEPTH_LIMIT = 0.6  # of the thickness: the deepest that contacts are asked for
 _DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
@@ -27,7 +28,7 @@ def thickness(sensor: str, point: np.ndarray) -> float:
         on_dome, outward = shape.dome_point(float(point[0]), float(point[2]))
         return float((shape.back_y - on_dome[1]) / -outward[1])
     node = int(np.argmin(((sensors.sensor_surface(sensor).rest - point) ** 2).sum(axis=1)))
-    return _to_core(sensor, point, _outward(sensor)[node])
+    return _to_core(sensor, point, rest_normals(sensor)[node])
 
 
 def _to_core(sensor: str, point: np.ndarray, outward: np.ndarray) -> float:
@@ -60,18 +61,9 @@ def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
 def _thickness_at(sensor: str, node: int) -> float:
     """The thickness, m, at a node of the resting surface; kept, for a path asks again at each step."""
     place = sensors.sensor_surface(sensor).rest[node]
-    return thickness(sensor, place) if sensors.is_gel(sensor) else _to_core(sensor, place, _outward(sensor)[node])
+    return thickness(sensor, place) if sensors.is_gel(sensor) else _to_core(sensor, place, rest_normals(sensor)[node])
 
 
 def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:
     """Return the depth, m, of a share of the thickness under an indenter at first touch; at most 2.4 mm."""
     return min(share * thickness_under(sensor, indenter, pose), _DEEPEST)
-
-
-@functools.cache
-def _outward(sensor: str) -> np.ndarray:
-    """Outward normals (n, 3) of the resting skin."""
-    from ..sensors import unrolling as surface
-
-    lattice = sensors.sensor_surface(sensor)
-    return surface.node_normals(lattice.rest, lattice.faces)
