@@ -16,6 +16,7 @@ from ...errors import TactileError
 from ...files import outside
 from .mesh_self_intersection import first_crossing
 
+FLAT = 1e-9  # of the cube of a mesh's size: a volume that is nothing but rounding (assumed)
 SUFFIXES = (".stl", ".ply", ".obj", ".off")
 UPS = ("x", "y", "z", "-x", "-y", "-z")
 MAX_BYTES, MAX_FACES = 100_000_000, 200_000
@@ -152,7 +153,11 @@ def _check_solid(where: str | os.PathLike, mesh: Any) -> None:
         )
     if not mesh.is_winding_consistent:
         raise TactileError(where, "neighbouring triangles face opposite ways", "one winding", "Recalculate its normals")
-    if not mesh.volume > 0:
+    with np.errstate(invalid="ignore", divide="ignore"):  # the centre of mass of nothing, which is not used
+        volume = mesh.volume
+    if abs(volume) <= FLAT * mesh.scale**3:
+        raise TactileError(where, "flat: it encloses nothing", "a solid body", "Give it a thickness")
+    if not volume > 0:
         raise TactileError(where, "it is inside out: its volume is negative", "outward normals", "Flip its normals")
     crossing = first_crossing(mesh)
     if crossing is not None:

@@ -55,6 +55,12 @@ def shifted_in_plane():
     return both(first, second)
 
 
+def flat():
+    """A pyramid whose tip lies in its base, seen from askew."""
+    body = trimesh.Trimesh([[0, 0, 0], [9, 0, 0], [0, 9, 0], [2, 2, 0]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    return body.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1, 2, 3]))
+
+
 def nan_vertex():
     ball = sphere()
     vertices = ball.vertices.copy()
@@ -77,6 +83,7 @@ def nan_vertex():
         (lambda: sphere(2e3), r"4000 mm across.*in micrometres"),
         (lambda: sphere(0.05), "Scale it|inches|centimetres"),
         (nan_vertex, "nan or infinite"),
+        (flat, "flat: it encloses nothing"),
     ],
 )
 def test_no_solid_is_refused(tmp_path, make, said):
