@@ -33,6 +33,7 @@ from .step_errors import Bodies, our_bodies
 
 log = logging.getLogger(__name__)
 Progress = Callable[[float, str], None]
+CHECKPOINT = "checkpoint.npz"  # in the training's folder, until all else is written
 WARM_UP = 0.02  # share of the steps over which the learning rate rises (assumed)
 VALIDATION_SEED = 2**31  # stands in the place of the epoch; no training has as many
 
@@ -72,11 +73,11 @@ def train(
         }
         contacts = Contacts(pairs, split, options, frames, generator, where)
         model = Model(options, contacts, generator).to(where)
-        history = run_stages(model, contacts, seed, out / "checkpoint.npz", progress or quiet)
+        history = run_stages(model, contacts, seed, out / CHECKPOINT, progress or quiet)
         card = export(model, contacts, bodies, seed, out / "weights")
     write_log(out / "log.csv", history)
     draw_losses(out / "loss.png", history)
-    (out / "checkpoint.npz").unlink()
+    (out / CHECKPOINT).unlink()
     return card
 
 
@@ -115,9 +116,11 @@ def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
 def prepared_folder(out: Path, overwrite: bool) -> Iterator[None]:
     """Make the folder; what ends with an error leaves none that is new and empty.
 
-    Raises TactileError if it cannot be made or already holds weights.
+    Raises TactileError if it cannot be made or already holds weights: a checkpoint beside them is of a training that
+    was killed after it wrote them, and goes on.
     """
-    if (out / "weights" / "card.json").exists() and not overwrite:
+    finished = (out / "weights" / "card.json").exists() and not (out / CHECKPOINT).exists()
+    if finished and not overwrite:
         raise TactileError(out, "already holds weights", "a new folder", "Choose another folder, or overwrite")
     new = [folder for folder in (out / "weights", out) if not folder.exists()]
     try:

@@ -6,6 +6,11 @@ import csv
 import io
 import itertools
 import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -109,6 +114,33 @@ def test_interrupted_anywhere_gives_the_same_bytes(quick, pairs, tmp_path):
             assert not (tmp_path / "weights" / "card.json").exists()
     assert len(seen) > 6
     assert files(tmp_path) == files(quick)
+
+
+HERE = os.path.dirname(__file__)
+KILLED = """
+import os, signal, sys
+sys.path[:0] = sys.argv[3:]
+import test_train as t
+from tactile_core.training import train as module
+def die(*_): os.kill(os.getpid(), signal.SIGKILL)
+midway = sys.argv[2] == "midway"
+if not midway:
+    module.draw_losses = die  # the weights and their card are written, the checkpoint is still there
+module.train(sys.argv[1] + "/pairs.h5", sys.argv[1] + "/out", 3, t.QUICK,
+             progress=lambda share, _: die() if midway and share > 0.5 else None, **t.SURFACES)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_a_killed_training_goes_on_to_the_same_bytes(quick, pairs, tmp_path):
+    shutil.copy(pairs, tmp_path / "pairs.h5")
+    for moment, card in (("midway", False), ("nearly done", True)):
+        command = [sys.executable, "-c", KILLED, str(tmp_path), moment, HERE, *filter(None, sys.path)]
+        assert subprocess.run(command, check=False, stderr=subprocess.DEVNULL).returncode == -signal.SIGKILL
+        assert (tmp_path / "out" / "checkpoint.npz").exists()
+        assert (tmp_path / "out" / "weights" / "card.json").exists() is card
+    train(tmp_path / "pairs.h5", tmp_path / "out", 3, QUICK, **SURFACES)
+    assert files(tmp_path / "out") == files(quick)
 
 
 def test_progress_ends_at_one(pairs, tmp_path):
