@@ -221,6 +221,8 @@ def test_what_is_not_run_here_is_shown_and_run_there():
 # That of Blender's page is run there (tests/blender/test_documented.py).
 @pytest.mark.parametrize("text", [each for each in shown(PAGES, "python") if "import bpy" not in each.values[0]])
 def test_python_of_a_page_runs(text, user):
+    if not TORCH and "tactile_core.training" in text:
+        pytest.skip("torch is not installed: dev.py test --train")
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-c", text], cwd=user, env=environment, capture_output=True, text=True, timeout=SECONDS

@@ -40,7 +40,7 @@ class ShadowCaster:
             expected = f"well below the camera, {camera.apparent_height * 1e3:.1f} mm"
             raise TactileError(f"led {led.colour}, position", found, expected)
         near = 1 - led.position[2] / camera.apparent_height
-        foot = self._foot = tuple(value / near for value in led.position)
+        foot = self.foot = tuple(value / near for value in led.position)
         right, down = np.meshgrid(camera.right, camera.down)
         if abs(foot[0]) <= right.max() and abs(foot[1]) <= down.max():
             found = f"({led.position[0] * 1e3:.1f}, {led.position[1] * 1e3:.1f}) mm, inside the picture"
@@ -52,18 +52,18 @@ class ShadowCaster:
         distance = np.hypot(right, down)
         self._step_angle = GRID_STEP / float(np.hypot(foot[0], foot[1]))
         self._angle_0, self._distance_0 = angle.min(), distance.min()
-        self._row = ((angle - self._angle_0) / self._step_angle).astype(np.float32)
-        self._column = ((distance - self._distance_0) / GRID_STEP).astype(np.float32)
-        rows, columns = int(np.ceil(self._row.max())) + 1, int(np.ceil(self._column.max())) + 1
+        self.row = ((angle - self._angle_0) / self._step_angle).astype(np.float32)
+        self.column = ((distance - self._distance_0) / GRID_STEP).astype(np.float32)
+        rows, columns = int(np.ceil(self.row.max())) + 1, int(np.ceil(self.column.max())) + 1
         ray = (middle + self._angle_0 + self._step_angle * np.arange(rows))[:, None]
         self.distance = (self._distance_0 + GRID_STEP * np.arange(columns)).astype(np.float32)
         across, along = foot[0] + self.distance * np.cos(ray), foot[1] + self.distance * np.sin(ray)
         step_right, step_down = camera.pixel_size
         last_row, last_column = camera.height - 1, camera.width - 1
-        self._pixel_column = ((across - camera.right[0]) / step_right).clip(0, last_column).astype(np.float32)
-        self._pixel_row = ((along - camera.down[0]) / step_down).clip(0, last_row).astype(np.float32)
-        self._radii = self._radii_of_slope(camera, across, along).astype(np.float32)
-        self._shape, self._polar_shape = camera.shape, (rows, columns)
+        self.pixel_column = ((across - camera.right[0]) / step_right).clip(0, last_column).astype(np.float32)
+        self.pixel_row = ((along - camera.down[0]) / step_down).clip(0, last_row).astype(np.float32)
+        self.radii = self._radii_of_slope(camera, across, along).astype(np.float32)
+        self._shape, self.polar_shape = camera.shape, (rows, columns)
 
     def _radii_of_slope(self, camera: Camera, across: np.ndarray, along: np.ndarray) -> np.ndarray:
         """LED radii that a unit of slope of the mapped line of sight is at the LED, across that line, (rows, columns).
@@ -72,7 +72,7 @@ class ShadowCaster:
         the mapped LED's right and down. Points lie at height zero here: that changes the angle by a few degrees.
         """
         led, inverse = np.asarray(self.led.position), 1 / camera.apparent_height
-        rise = (1 - led[2] * inverse) ** 2 * np.array([-self._foot[0] * inverse, -self._foot[1] * inverse, 1.0])
+        rise = (1 - led[2] * inverse) ** 2 * np.array([-self.foot[0] * inverse, -self.foot[1] * inverse, 1.0])
         to_led = np.stack([led[0] - across, led[1] - along, np.full_like(across, led[2])], -1)
         part = (to_led @ rise) ** 2 / (to_led**2).sum(-1)
         return self.distance * np.sqrt(rise @ rise - part) / self.led.radius
@@ -83,11 +83,11 @@ class ShadowCaster:
         height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may throw shadows Returns
             sight (h, w) and the box of pixels it is for; it is 1 everywhere else.
         """
-        reach = self._reach(float(height[box].max()), float(height.min()))
-        rows = _span(self._row[box], self._polar_shape[0] - 1)
-        columns = _span(self._column[box], self._polar_shape[1] - 1, reach)
+        reach = self.reach(float(height[box].max()), float(height.min()))
+        rows = _span(self.row[box], self.polar_shape[0] - 1)
+        columns = _span(self.column[box], self.polar_shape[1] - 1, reach)
         polar = (rows, columns)
-        field = bilinear(height, self._pixel_row[polar], self._pixel_column[polar])
+        field = bilinear(height, self.pixel_row[polar], self.pixel_column[polar])
         sight = self._march(field, polar, reach)
         shadow = bounding_box(sight < FREE, margin=1)
         if shadow is None:
@@ -96,33 +96,33 @@ class ShadowCaster:
         first_row, first_column = rows.start + shadow[0].start, columns.start + shadow[1].start
         polar = slice(first_row, first_row + sight.shape[0]), slice(first_column, first_column + sight.shape[1])
         pixels = (
-            _span(self._pixel_row[polar], self._shape[0] - 1),
-            _span(self._pixel_column[polar], self._shape[1] - 1),
+            _span(self.pixel_row[polar], self._shape[0] - 1),
+            _span(self.pixel_column[polar], self._shape[1] - 1),
         )
-        row = np.clip(self._row[pixels] - np.float32(first_row), 0, sight.shape[0] - 1)
-        column = np.clip(self._column[pixels] - np.float32(first_column), 0, sight.shape[1] - 1)
+        row = np.clip(self.row[pixels] - np.float32(first_row), 0, sight.shape[0] - 1)
+        column = np.clip(self.column[pixels] - np.float32(first_column), 0, sight.shape[1] - 1)
         return bilinear(sight, row, column), pixels
 
-    def _reach(self, highest: float, lowest: float) -> int:
+    def reach(self, highest: float, lowest: float) -> int:
         """Columns that the longest shadow of such heights covers."""
-        rise = self._foot[2] - highest
-        slope = max(rise / float(self.distance[-1]) - 1 / float(self._radii[:, -1].min()), SMALLEST_SLOPE)
+        rise = self.foot[2] - highest
+        slope = max(rise / float(self.distance[-1]) - 1 / float(self.radii[:, -1].min()), SMALLEST_SLOPE)
         return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1
 
     def _march(self, field: np.ndarray, polar: tuple[slice, slice], reach: int) -> np.ndarray:
         if available():
             steps = np.array(march_steps(min(reach, field.shape[1] - 1)), np.int64)
-            foot = np.float32(self._foot[2])
-            return march(field, foot, self.distance[polar[1]], self._radii[polar], steps, GRID_STEP)
+            foot = np.float32(self.foot[2])
+            return march(field, foot, self.distance[polar[1]], self.radii[polar], steps, GRID_STEP)
         horizon = np.full_like(field, -np.inf)
         for k in march_steps(min(reach, field.shape[1] - 1)):
             rise = field[:, :-k] - field[:, k:]
             rise *= np.float32(1 / (k * GRID_STEP))
             np.maximum(horizon[:, k:], rise, out=horizon[:, k:])
-        sight = np.float32(self._foot[2]) - field
+        sight = np.float32(self.foot[2]) - field
         sight /= self.distance[polar[1]]
         sight -= horizon
-        sight *= self._radii[polar]
+        sight *= self.radii[polar]
         return np.clip(sight, -1, FREE, out=sight)
 
 
@@ -155,7 +155,8 @@ def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
 
 
 @functools.cache
-def _disc_tables() -> tuple[np.ndarray, np.ndarray]:
+def disc_tables() -> tuple[np.ndarray, np.ndarray]:
+    """Return ``disc_share`` at even steps of sight from -1 to 1, (257,) float32 each."""
     t = np.linspace(-1, 1, _TABLE_STEPS + 1)
     share = 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
     moment = 2 / (3 * np.pi) * (1 - t**2) ** 1.5
@@ -168,6 +169,6 @@ def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Both over the whole disc's area (circular segment): share 1/2 + (t sqrt(1 - t^2) + asin t) / pi,
     moment 2 (1 - t^2)^(3/2) / (3 pi).
     """
-    share, moment = _disc_tables()
+    share, moment = disc_tables()
     place = ((sight + 1) * (_TABLE_STEPS / 2)).astype(np.intp)
     return share.take(place), moment.take(place)

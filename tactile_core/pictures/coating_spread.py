@@ -19,19 +19,18 @@ class CoatingSpread:
     """Evens out pictures of one camera with a Gaussian of a standard deviation, m; 0 leaves them as they are."""
 
     def __init__(self, camera: Camera, deviation: float) -> None:
-        self._none = deviation == 0
-        if not self._none:
+        self.none = deviation == 0
+        if not self.none:
             right, down = camera.pixel_size
-            self._step_down, means = _means(camera.height, deviation / down)
-            self._down = _blocks(means)
-            self._step_right, means = _means(camera.width, deviation / right)
-            self._right = _blocks(means)
+            # (step, weights): see ``_means``
+            self.down, self.right = _means(camera.height, deviation / down), _means(camera.width, deviation / right)
+            self._down, self._right = _blocks(self.down[1]), _blocks(self.right[1])
 
     def __call__(self, pictures: np.ndarray) -> np.ndarray:
         """Smooth pictures (..., H, W) float32; near an edge, over the part inside the picture."""
-        if self._none:
+        if self.none:
             return pictures
-        sums = _summed(_summed(pictures.swapaxes(-1, -2), self._step_right).swapaxes(-1, -2), self._step_down)
+        sums = _summed(_summed(pictures.swapaxes(-1, -2), self.right[0]).swapaxes(-1, -2), self.down[0])
         across = np.empty((*sums.shape[:-1], pictures.shape[-1]), np.float32)
         for pixels, runs, weights in self._right:
             np.matmul(sums[..., runs], weights.T, out=across[..., pixels])

@@ -60,18 +60,18 @@ class HeightMapper:
         camera = camera or load_calibration().camera
         self.surface, self.camera = surface, camera
         check_covered(surface, camera)
-        self._along, self._across = surface.window_axes
-        self._fine_along, self._fine_across = self._along.refined(REFINEMENT), self._across.refined(REFINEMENT)
+        self.along, self.across = surface.window_axes
+        self._fine_along, self._fine_across = self.along.refined(REFINEMENT), self.across.refined(REFINEMENT)
         fine = self._fine_along.nodes, self._fine_across.nodes
         # [order of the derivative][along x, across z]
-        self._to_fine = [(self._along.matrix(fine[0], k), self._across.matrix(fine[1], k)) for k in (0, 1)]
-        self._to_pixels = [
+        self.to_fine = [(self.along.matrix(fine[0], k), self.across.matrix(fine[1], k)) for k in (0, 1)]
+        self.to_pixels = [
             _short(self._fine_along.matrix(camera.gel_x)), _short(self._fine_across.matrix(camera.gel_z)).T.copy()
         ]  # fmt: skip
-        self._fine_places = np.stack(np.meshgrid(*fine, indexing="ij")).reshape(2, -1)
-        self._rest_y = surface.window_rest[..., 1] - camera.height_zero_y
-        down, right = self._along.matrix(camera.gel_x), self._across.matrix(camera.gel_z)
-        self.rest = (down @ self._rest_y @ right.T).astype(np.float32)
+        self.fine_places = np.stack(np.meshgrid(*fine, indexing="ij")).reshape(2, -1)
+        self.rest_y = surface.window_rest[..., 1] - camera.height_zero_y
+        down, right = self.along.matrix(camera.gel_x), self.across.matrix(camera.gel_z)
+        self.rest = (down @ self.rest_y @ right.T).astype(np.float32)
         self.rest.flags.writeable = False
 
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
@@ -96,7 +96,7 @@ class HeightMapper:
 
     def covers(self, x: np.ndarray, z: np.ndarray) -> bool:
         """Return true if all places x, z m lie on the even part of the resting surface."""
-        ends = ((spline.nodes[0], spline.nodes[-1]) for spline in (self._along, self._across))
+        ends = ((spline.nodes[0], spline.nodes[-1]) for spline in (self.along, self.across))
         return all(low <= place.min() and place.max() <= high for place, (low, high) in zip((x, z), ends, strict=True))
 
     def follow(
@@ -107,8 +107,8 @@ class HeightMapper:
         displacement : (n_nodes, 3) m
         """
         move = self.surface.grid(displacement)[self.surface.window].astype(float)
-        tables = np.stack([move[..., 0], move[..., 2], self._rest_y + move[..., 1]])
-        coefficients = self._along.to_coefficients @ tables @ self._across.to_coefficients.T
+        tables = np.stack([move[..., 0], move[..., 2], self.rest_y + move[..., 1]])
+        coefficients = self.along.to_coefficients @ tables @ self.across.to_coefficients.T
         along_x, along_z, height = self._look_up(coefficients, x, z).astype(float).T
         return x + along_x, z + along_z, height
 
@@ -116,20 +116,20 @@ class HeightMapper:
         move = self.surface.grid(displacement)[self.surface.window].astype(float)
         if not move.any():
             return self.rest.copy()
-        down, right = self._to_pixels
+        down, right = self.to_pixels
         return self.rest + down @ self._raised(move).astype(np.float32) @ right
 
     def _raised(self, move: np.ndarray) -> np.ndarray:
         """Change of height (fine rows, fine columns) m at the nodes of the refined grid, which stay in place."""
-        down, right = self._to_fine[0]
+        down, right = self.to_fine[0]
         if not move[..., [0, 2]].any():
             return down @ move[..., 1] @ right.T
-        tables = np.stack([move[..., 0], move[..., 2], self._rest_y + move[..., 1]])
-        coefficients = self._along.to_coefficients @ tables @ self._across.to_coefficients.T
+        tables = np.stack([move[..., 0], move[..., 2], self.rest_y + move[..., 1]])
+        coefficients = self.along.to_coefficients @ tables @ self.across.to_coefficients.T
         height, lost = self._moved_heights(tables[:2], coefficients)
         if lost:
             _say_folded(lost, len(height))
-        return height.reshape(len(down), len(right)) - down @ self._rest_y @ right.T
+        return height.reshape(len(down), len(right)) - down @ self.rest_y @ right.T
 
     def _moved_heights(self, move: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, int]:
         """Heights (n,) m of the gel points that have moved to the refined grid's nodes, and how many were not found.
@@ -137,15 +137,15 @@ class HeightMapper:
         move : (2, rows, columns) sideways displacement x, z at the window's nodes
         coefficients : (3, rows + 2, columns + 2), of its splines and the height's
         """
-        (down, right), (down_slope, right_slope) = self._to_fine
+        (down, right), (down_slope, right_slope) = self.to_fine
         to_x, to_z = _inverse(down_slope @ move @ right.T, down @ move @ right_slope.T)
         miss = (down @ move @ right.T).reshape(2, -1)
         if not available():
             x, z, lost = self._source(coefficients[:2], to_x, to_z, miss)
             return self._look_up(coefficients[2:], x, z)[:, 0], lost
-        axes = self._along, self._across
+        axes = self.along, self.across
         return heights_above(
-            coefficients, *self._fine_places, to_x, to_z, miss, np.array([axis.start for axis in axes]),
+            coefficients, *self.fine_places, to_x, to_z, miss, np.array([axis.start for axis in axes]),
             np.array([axis.step for axis in axes]), MOVE_TOLERANCE, MOVE_ITERATIONS,
         )  # fmt: skip
 
@@ -159,7 +159,7 @@ class HeightMapper:
         coefficients : (2, rows + 2, columns + 2), of the splines of u; to_x, to_z : (2, n), rows of the Jacobian's
         inverse; miss : (2, n) m, u at the start
         """
-        target = self._fine_places
+        target = self.fine_places
         source = target.copy()
         active, inverse = np.arange(target.shape[1]), np.stack([to_x, to_z])
         for _ in range(MOVE_ITERATIONS):
@@ -179,7 +179,7 @@ class HeightMapper:
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Splines with coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, good to 0.1 nm a mm."""
-        (row, t), (column, s) = self._along.cells(x), self._across.cells(z)
+        (row, t), (column, s) = self.along.cells(x), self.across.cells(z)
         if available():
             return look_up(coefficients, row, t, column, s)
         weights_x, weights_z = bspline_weights(t.astype(np.float32)), bspline_weights(s.astype(np.float32))

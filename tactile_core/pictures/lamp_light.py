@@ -39,10 +39,10 @@ class Lamps:
 
     def __init__(self, camera: Camera, leds: Sequence[Led]) -> None:
         self._camera = camera
-        self._lamps = [_Lamp(camera, led) for led in leds]
-        self._positions = np.stack([lamp.position for lamp in self._lamps])
-        self._strengths = np.array([lamp.strength for lamp in self._lamps])
-        self._tangents = np.array([lamp.tangent for lamp in self._lamps])
+        self.lamps = [Lamp(camera, led) for led in leds]
+        self._positions = np.stack([lamp.position for lamp in self.lamps])
+        self._strengths = np.array([lamp.strength for lamp in self.lamps])
+        self._tangents = np.array([lamp.tangent for lamp in self.lamps])
 
     def light(self, view: Perspective, seen: np.ndarray) -> np.ndarray:
         """Return the radiance (3, H, W) float32 of heights (H, W) m that pixels see, by LED.
@@ -64,9 +64,9 @@ class Lamps:
         square = near**2 * (view.right**2 + view.down**2) + seen**2  # of the distance from the origin
         surface, light = (
             SeenSurface(seen, tilt, normal, seen / near),
-            np.empty((len(self._lamps), *seen.shape), np.float32),
+            np.empty((len(self.lamps), *seen.shape), np.float32),
         )
-        for lamp, lit in zip(self._lamps, light, strict=True):
+        for lamp, lit in zip(self.lamps, light, strict=True):
             right, down, up = lamp.position
             distance = (view.right * right + view.down * down) * near
             distance += up * seen
@@ -87,7 +87,7 @@ class Lamps:
     def _compiled(self, view: Perspective, seen: np.ndarray, slope_right, slope_down, inverse) -> np.ndarray:  # noqa: ANN001
         """Compute the same light by one compiled loop; shadows are numpy's."""
         near, tilt, normal, mapped = np.empty((4, *seen.shape), np.float32)
-        facing, distance, light = np.empty((3, len(self._lamps), *seen.shape), np.float32)
+        facing, distance, light = np.empty((3, len(self.lamps), *seen.shape), np.float32)
         edges = light_of_lamps(
             seen, slope_right, slope_down, view.right[0], view.down[:, 0], inverse, self._positions, self._strengths,
             self._tangents, near, tilt, normal, mapped, facing, distance, light,
@@ -96,7 +96,7 @@ class Lamps:
         for k, (first_row, last_row, first_column, last_column) in enumerate(edges.tolist()):
             if last_row >= 0:
                 edge = _wider(first_row, last_row, seen.shape[0]), _wider(first_column, last_column, seen.shape[1])
-                self._lamps[k].cast_shadow(light[k], surface, edge, facing[k], distance[k])
+                self.lamps[k].cast_shadow(light[k], surface, edge, facing[k], distance[k])
         return light
 
 
@@ -104,11 +104,11 @@ def _wider(first: int, last: int, size: int) -> slice:
     return slice(max(first - TANGENT_MARGIN, 0), min(last + 1 + TANGENT_MARGIN, size))
 
 
-class _Lamp:
+class Lamp:
     """One LED. position : (3,) float32 m; strength : its squared distance, m2; tangent : m, see ``TANGENT``."""
 
     def __init__(self, camera: Camera, led: Led) -> None:
-        self._led, self._caster = led, ShadowCaster(camera, led)
+        self.led, self.caster = led, ShadowCaster(camera, led)
         self.position = np.asarray(led.position, np.float32)
         self.strength = np.float32(np.square(led.position).sum())
         self.tangent = np.float32(TANGENT * led.radius)
@@ -120,7 +120,7 @@ class _Lamp:
 
         facing : (H, W) m, cosine times distance times the normal's length; distance : (H, W), squared, m2
         """
-        sight, box = self._caster.sight(surface.mapped, edge)
+        sight, box = self.caster.sight(surface.mapped, edge)
         square = distance[box]
         shadowed = self._shadowed(sight, facing[box], square, surface, box)
         light[box] = shadowed / (square * np.sqrt(square) * surface.normal[box]) * self.strength
@@ -134,9 +134,9 @@ class _Lamp:
         share e; and normal . e = (tilt |l|^2 - above facing) / (|l| plan distance).
         """
         share, moment = disc_share(sight)
-        above = self._led.position[2] - surface.height[box]
+        above = self.led.position[2] - surface.height[box]
         moment *= surface.tilt[box] * square - above * facing
-        moment *= np.float32(self._led.radius) / np.sqrt((square - above**2) * square)
+        moment *= np.float32(self.led.radius) / np.sqrt((square - above**2) * square)
         share *= facing
         share += moment
         return np.maximum(share, 0, out=share)

@@ -28,20 +28,20 @@ class Perspective:
         self.camera = camera
         self.right = camera.right.astype(np.float32)[None, :]
         self.down = camera.down.astype(np.float32)[:, None]
-        self._middle = np.float32((camera.height - 1) / 2), np.float32((camera.width - 1) / 2)
-        rows = np.arange(camera.height, dtype=np.float32)[:, None] - self._middle[0]
-        columns = np.arange(camera.width, dtype=np.float32)[None, :] - self._middle[1]
-        self._rows, self._columns = rows, columns
-        self._inverse = np.float32(1 / camera.apparent_height)
+        self.middle = np.float32((camera.height - 1) / 2), np.float32((camera.width - 1) / 2)
+        rows = np.arange(camera.height, dtype=np.float32)[:, None] - self.middle[0]
+        columns = np.arange(camera.width, dtype=np.float32)[None, :] - self.middle[1]
+        self.rows, self.columns = rows, columns
+        self.inverse = np.float32(1 / camera.apparent_height)
         self._begin_at(rest)
         for _ in range(SETTLING_STEPS):
             self._begin_at(self(rest))
 
     def _begin_at(self, seen: np.ndarray) -> None:
         """Start each search at heights (H, W) m near those that the pixels see."""
-        self._start, self._start_near = seen, 1 - seen * self._inverse
-        row, column = self._places(self._start_near)
-        self._start_nearest = _nearest(row, column, self.camera.width)
+        self.start, self.start_near = seen, 1 - seen * self.inverse
+        row, column = self._places(self.start_near)
+        self.start_nearest = _nearest(row, column, self.camera.width)
 
     def __call__(self, height: np.ndarray) -> np.ndarray:
         """Heights (H, W) float32, m, seen by the pixels; height : (H, W) float32, m, under the pixels.
@@ -56,15 +56,15 @@ class Perspective:
             return self._from_above(height)
         if available():
             return seen_heights(
-                height, steepness, self._start, self._start_near, self._start_nearest, self._rows[:, 0],
-                self._columns[0], self._inverse,
+                height, steepness, self.start, self.start_near, self.start_nearest, self.rows[:, 0],
+                self.columns[0], self.inverse,
             )  # fmt: skip
         # Newton's method: the tangent plane at q near is h = at + turn (seen - h). One step on the nearest pixels of
         # the map, one between them.
-        turn = steepness.take(self._start_nearest)
-        turn /= self._start_near
-        seen = (height.take(self._start_nearest) + turn * self._start) / (1 + turn)
-        near = 1 - seen * self._inverse
+        turn = steepness.take(self.start_nearest)
+        turn /= self.start_near
+        seen = (height.take(self.start_nearest) + turn * self.start) / (1 + turn)
+        near = 1 - seen * self.inverse
         row, column = self._places(near)
         turn = steepness.take(_nearest(row, column, self.camera.width))
         turn /= near
@@ -73,7 +73,7 @@ class Perspective:
     def _steepness(self, height: np.ndarray) -> tuple[np.ndarray, float]:
         """Slope along the position p from the picture's middle, times |p| / apparent height, (H, W), and its least."""
         slope_right, slope_down = slopes(height, self.camera)
-        right, down = self.right * self._inverse, self.down * self._inverse
+        right, down = self.right * self.inverse, self.down * self.inverse
         if available():
             weigh_slopes(slope_right, slope_down, right[0], down[:, 0])
         else:
@@ -84,11 +84,11 @@ class Perspective:
 
     def _places(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Fractional rows and columns of the map at the pixels' positions times near, within the map."""
-        row, column = near * self._rows, near * self._columns
-        row += self._middle[0]
-        column += self._middle[1]
-        row = np.clip(row, 0, 2 * self._middle[0], out=row)
-        return row, np.clip(column, 0, 2 * self._middle[1], out=column)
+        row, column = near * self.rows, near * self.columns
+        row += self.middle[0]
+        column += self.middle[1]
+        row = np.clip(row, 0, 2 * self.middle[0], out=row)
+        return row, np.clip(column, 0, 2 * self.middle[1], out=column)
 
     def _from_above(self, height: np.ndarray) -> np.ndarray:
         """Find the seen heights along each ray from the highest level down: slower, and right where gel hides gel."""
@@ -109,7 +109,7 @@ class Perspective:
         return (above + below) / 2
 
     def _at(self, height: np.ndarray, level: np.ndarray) -> np.ndarray:
-        return bilinear(height, *self._places(1 - level * self._inverse))
+        return bilinear(height, *self._places(1 - level * self.inverse))
 
 
 def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:

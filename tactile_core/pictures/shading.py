@@ -42,18 +42,18 @@ class Shader:
         self._dome = rest is None  # heights have the public mesh's dome, which the unit's own takes the place of
         self._resting = rest_height_map(camera) if rest is None else camera_array(rest, camera.shape, "rest height map")
         rest = of_unit(self._resting, calibration) if self._dome else self._resting
-        self._view = Perspective(camera, rest)
+        self.view = Perspective(camera, rest)
         check_reach(rest, calibration, "rest height map")
-        self.rest = self._view(rest)
-        self._spread = CoatingSpread(camera, calibration.coating.spread)
-        self._lamps = Lamps(camera, calibration.leds)
-        self._rest_radiance = self._seen_radiance(self.rest)
+        self.rest = self.view(rest)
+        self.spread = CoatingSpread(camera, calibration.coating.spread)
+        self.lamps = Lamps(camera, calibration.leds)
+        self.rest_radiance = self._seen_radiance(self.rest)
         if background is None:
-            background = resting_picture(calibration, np.moveaxis(self._rest_radiance, 0, -1))
+            background = resting_picture(calibration, np.moveaxis(self.rest_radiance, 0, -1))
         self.background = camera_array(background, (*camera.shape, 3), "background")
         self._levels = np.ascontiguousarray(np.moveaxis(self.background, -1, 0))
-        self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
-        self._rest_picture = self._drawn(self._rest_radiance)
+        self.response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
+        self._rest_picture = self._drawn(self.rest_radiance)
 
     def __call__(self, height_map: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed."""
@@ -64,12 +64,12 @@ class Shader:
     def _drawn(self, radiance: np.ndarray) -> np.ndarray:
         """Picture (H, W, 3) uint8 of the radiance (3, H, W) of the LEDs."""
         if available():
-            return in_picture(radiance, self._rest_radiance, self._response, self.background, np.float32(LARGEST_LEVEL))
-        change = radiance - self._rest_radiance
+            return in_picture(radiance, self.rest_radiance, self.response, self.background, np.float32(LARGEST_LEVEL))
+        change = radiance - self.rest_radiance
         picture = np.empty((*self.camera.shape, 3), np.uint8)
         for channel in range(len(COLOURS)):
             level = self._levels[channel].copy()
-            for response, light in zip(self._response[channel], change, strict=True):
+            for response, light in zip(self.response[channel], change, strict=True):
                 level += response * light
             np.rint(level, out=level)
             picture[..., channel] = np.clip(level, 0, LARGEST_LEVEL, out=level)
@@ -83,14 +83,14 @@ class Shader:
         heights = camera_array(height_map, self.camera.shape, "height map")
         heights = of_unit(heights, self.calibration) if self._dome else heights
         check_reach(heights, self.calibration, "height map")
-        return self._seen_radiance(self._view(heights))
+        return self._seen_radiance(self.view(heights))
 
     def _seen_radiance(self, seen: np.ndarray) -> np.ndarray:
         """Radiance (3, H, W) of heights (H, W) that the pixels see."""
-        light = self._lamps.light(self._view, seen)
+        light = self.lamps.light(self.view, seen)
         light *= self.calibration.facing.astype(np.float32)[:, None, None]
         light += raised_light(self.calibration, seen)
-        return self._spread(light)
+        return self.spread(light)
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:

@@ -31,6 +31,7 @@ from .labelled_recording import LabelledRecording, read_labelled
 from .modules import ContactPosterior
 from .stages import FORCE_FLOOR
 from .train import deterministic, prepared_folder
+from .trained_modules import posterior_of
 
 EPOCHS, BATCH, RATE = 30, 64, 2e-4  # a few passes at a low rate: the start is a trained network (assumed)
 HOLD = 0.3  # weight of the shape being held, against place and force, each about 1 at first (assumed)
@@ -87,7 +88,7 @@ def _train(
     nets: Networks, net: str, data: LabelledRecording, typical: np.ndarray, seed: int, progress: Progress
 ) -> dict[str, np.ndarray]:
     """The network's tensors, rounded as they are written, at the epoch that was best on the validation presses."""
-    module = _module(nets, net)
+    module = posterior_of(nets, net)
     latent = torch.from_numpy(nets.encode_signal(data.change, data.rectified))
     rehearsed = torch.from_numpy(nets.encode_signal(np.abs(typical) if data.rectified else typical, data.rectified))
     place, force = torch.from_numpy(data.place), torch.from_numpy(data.force)
@@ -127,14 +128,6 @@ def _state_and_latent(module: ContactPosterior, latent_signal: Tensor) -> Tensor
     """Map latent_signal (B, K) to the most plausible contact's state and latent_biotac, (B, STATE + L)."""
     state = module.contact(latent_signal)
     return torch.cat([state, module.given(latent_signal, state)], -1)
-
-
-def _module(nets: Networks, net: str) -> ContactPosterior:
-    """S2MPN or R2MPN of the weights as torch's module."""
-    sizes = nets.sizes[net]
-    module = ContactPosterior(*(sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components")))
-    module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in nets.tensors[net].items()})
-    return module
 
 
 def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:

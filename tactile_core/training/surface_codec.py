@@ -96,11 +96,8 @@ class SurfaceCodec:
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """Compute `MovingFrame.cells`: whole cells (B, 2) and the remainder, through which the place has gradients."""
-        middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
-        at = place * PLACE_UNIT + middle
-        cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
-        return cell.long(), (at - cell).clamp(-1.0, 1.0)
+        """Compute `cells_of` this surface."""
+        return cells_of(self.frame, place)
 
     def true_place(self, rows: np.ndarray) -> Tensor:
         """Return the places (B, 2) of the contacts' dents; 0 for silent ones."""
@@ -149,6 +146,14 @@ class SurfaceCodec:
             windows = torch.from_numpy(self.frame.windows(fields, cell[moved])).flatten(1)
             metres[moved, wide:] = 1e-3 * windows @ self.near.T
         return metres
+
+
+def cells_of(frame: ContactFrame, place: Tensor) -> tuple[Tensor, Tensor]:
+    """Compute `ContactFrame.cells`: whole cells (B, 2) and the remainder, through which the place has gradients."""
+    middle = torch.tensor([frame.rows - 1.0, frame.columns - 1.0], device=place.device) / 2
+    at = place * PLACE_UNIT + middle
+    cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
+    return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
 
 def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:

@@ -133,8 +133,16 @@ class Translator:
 
     def _latent_signal(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
         """Latents (T, K) of the signals, and which (T,) of them have no sign, lost and not recovered."""
-        change, unsigned = recovered(self._typical(signals), _rectified(signals), self._patterns)
+        change, unsigned = self.changes(signals)
         return self.nets.encode_signal(change, unsigned), unsigned
+
+    def changes(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
+        """Return what the networks see: changes (T, e) counts, with signs where they are known, and the frames (T,)
+        that are left rectified.
+
+        Raises TactileError for another sensor's signals.
+        """
+        return recovered(self._typical(signals), _rectified(signals), self._patterns)
 
     def _typical(self, signals: Signals) -> np.ndarray:
         """Changes (T, e) counts of the unit that the networks know. Raises TactileError for another sensor's."""
