@@ -105,7 +105,7 @@ class _PressProblem:
         return float(np.square(self._last).sum() / 2)
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """J^T J (n, n), levels squared / m2, and J^T r (n,), levels squared / m, of n unknowns, at x."""
-        last = self._missed(x)
+        """J^T J (n, n), levels squared / m2, and J^T r (n,), levels squared / m, of n numbers, at the last cost's x."""
+        last = self._last
         jacobian = np.stack([(self._missed(x + step) - last) / STEP for step in STEP * np.eye(len(x))], -1)
         return jacobian.T @ jacobian, jacobian.T @ last
