@@ -44,7 +44,7 @@ LESS = [
     ("--workers 8", "--workers 2"),
     ("scenes/press --keep displacement_digit --error 5um", "brief --keep displacement_digit --error 5um"),
 ]
-# A press of 0.1 s: each frame of the full tier takes a second or more, and scenes/press has 200.
+# A press of 0.04 s: each frame of the full tier takes a second or more, and scenes/press has 200.
 BRIEF = """\
 format = "tactile-scene-1"
 name = "brief"
@@ -58,7 +58,7 @@ indenter = "ball"
 friction = 0.0
 points = [
     { time_s = 0.0, x_mm = -8.0, z_mm = 0.0, force_n = 0.0 },
-    { time_s = 0.1, x_mm = -8.0, z_mm = 0.0, force_n = 0.6 },
+    { time_s = 0.04, x_mm = -8.0, z_mm = 0.0, force_n = 0.6 },
 ]
 """
 # What is run by another test -> its file, and the words it is run by.
