@@ -69,7 +69,8 @@ def report() -> Iterator[str]:
     for library, (version, trouble) in zip(LIBRARIES, tried, strict=True):
         found[library.module] = not trouble
         state = "missing" if trouble.startswith("missing") else "broken" if trouble else version or "works"
-        yield f"  {library.package:<22} {state:<12} {library.use}" + (f": {trouble}" if trouble else "")
+        words = trouble.removeprefix("missing, ")  # which the column before says
+        yield f"  {library.package:<22} {state:<12} {library.use}" + (f": {words}" if words else "")
     yield from _mitsuba(found["mitsuba"])
 
 

@@ -98,7 +98,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"tactile {__version__}")
     verbs = parser.add_subparsers(metavar="VERB", title="verbs")
     for name, verb in VERBS.items():
-        sub = verbs.add_parser(name, help=verb.BRIEF, description=verb.TEXT, epilog=verb.EPILOG, formatter_class=raw)
+        sub = verbs.add_parser(
+            name, help=verb.BRIEF, description=verb.TEXT, epilog=verb.EPILOG, formatter_class=raw,
+            allow_abbrev=False,  # of batch, --frames would mean --frames-apart
+        )  # fmt: skip
         verb.arguments(sub)
         sub.set_defaults(run=verb.run, leaves=verb.LEAVES)
     return parser

@@ -316,3 +316,10 @@ def test_progress_is_silent_without_a_terminal_unless_asked(tactile, slide_csv, 
     _, _, quiet = tactile("convert", path, "--out", tmp_path / "a", "--keep", "")
     _, _, said = tactile("convert", path, "--out", tmp_path / "b", "--keep", "", "--progress")
     assert "5/5" in said and "5/5" not in quiet
+
+
+def test_an_option_is_written_out(tmp_path, capsys):
+    """`batch` has no --frames; as an abbreviation of --frames-apart it was taken in silence."""
+    with pytest.raises(SystemExit):
+        main(["batch", str(tmp_path), "--out", str(tmp_path / "job"), "--frames"])
+    assert "unrecognized arguments: --frames" in capsys.readouterr().err

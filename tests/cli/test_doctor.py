@@ -18,6 +18,13 @@ def test_every_library_is_named(capsys, monkeypatch):
     assert "pictures: " in said
 
 
+def test_a_missing_library_is_called_so_once(monkeypatch):
+    monkeypatch.setattr(doctor, "LIBRARIES", (doctor.Library("mitsuba", "none", "fem", "nothing"),))
+    monkeypatch.setattr(doctor, "try_library", lambda library: ("", "missing, python -m pip install none"))
+    line = next(line for line in doctor.report() if "none" in line)
+    assert " ".join(line.split()) == "none missing nothing: python -m pip install none"
+
+
 @pytest.mark.parametrize(
     ("module", "words"),
     [
