@@ -7,14 +7,14 @@ python docs/convert_and_look.py touch.csv look.png
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 import tactile_core as tactile
+from tactile_core.files import example_scenes
 
-SHIPPED = Path(__file__).parent.parent / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+SHIPPED = example_scenes.folder() / "press_roll_slide" / "press_roll_slide.h5"
 path, out = (sys.argv[1:] + [SHIPPED, "convert_and_look.png"][len(sys.argv) - 1 :])[:2]
 
 # From the file to pictures.
