@@ -29,7 +29,8 @@ class ThinSheet:
             nodes, faces, finer = _halved(nodes, faces)
             self.prolong = finer @ self.prolong
         self.nodes, self.faces = nodes, faces
-        self.patches = np.stack([_disc(nodes, faces, center, radius) for center in centers], 1)
+        size = _longest_edges(nodes[faces])
+        self.patches = np.stack([_disc(nodes, faces, size, center, radius) for center in centers], 1)
         self._prepare_matrix()
 
     def potentials(self, film: np.ndarray, conductivity: float = 1.0) -> np.ndarray:
@@ -120,12 +121,15 @@ def _halved(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return finer @ nodes, cut, finer
 
 
-def _disc(nodes: np.ndarray, faces: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
-    """Mean over a disc as weights (n,) of the nodes; they sum to 1."""
-    corners = nodes[faces]
-    size = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
-    near = np.flatnonzero(np.linalg.norm(corners - center, axis=2).min(1) < radius + size)
-    corners = corners[near]
+def _longest_edges(corners: np.ndarray) -> np.ndarray:
+    """Return the longest edge (m,) m of each triangle (m, 3, 3) m."""
+    return np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
+
+
+def _disc(nodes: np.ndarray, faces: np.ndarray, size: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
+    """Mean over a disc as weights (n,) of the nodes; they sum to 1. size : (m,) m, the triangles' longest edges."""
+    near = np.flatnonzero(np.linalg.norm(nodes - center, axis=1)[faces].min(1) < radius + size)
+    corners = nodes[faces[near]]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     at = _sub_centroids(_DISC_SAMPLES)
     inside = np.linalg.norm(np.einsum("sk,fkd->fsd", at, corners) - center, axis=2) < radius
