@@ -72,6 +72,28 @@ def test_the_page_of_accuracy_gets_the_table(script, tmp_path):
         write_summary(tmp_path / "other.md", drawn)
 
 
+def test_the_page_that_ships_says_what_its_rows_say(script):
+    from benchmarks.table.benchmark_page import TITLES, as_line
+    from benchmarks.table.method import Method
+
+    docs = SCRIPTS.parent / "docs"
+    rows = {row["name"]: row for row in json.loads((docs / "benchmark.json").read_text())["rows"]}
+    parts = (docs / "benchmark.md").read_text().split("\n## ")
+    for stage, title in TITLES.items():
+        lines = [line for part in parts if part.startswith(title) for line in part.splitlines() if line[:3] == "| `"]
+        names = {line.split("`")[1] for line in lines}
+        assert names == {
+            name.removeprefix(f"{stage}_").removesuffix("_ms")
+            for name in rows
+            if name.startswith(f"{stage}_") and name.endswith("_ms")
+        }
+        for line in lines:
+            name = line.split("`")[1]
+            ms, mb, error = (rows[f"{stage}_{name}_{what}"] for what in ("ms", "MB", "error"))
+            numbers = ms["value"], mb["value"], error["value"], error["unit"], error["baseline"], error["set"]
+            assert line == as_line(Method(stage, name, *numbers))
+
+
 def test_the_report_that_ships_can_be_read_and_draws(script):
     from benchmarks.table.benchmark_page import plot
     from benchmarks.table.method import Method

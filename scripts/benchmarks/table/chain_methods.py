@@ -20,6 +20,7 @@ from tactile_core.training.step_errors import true_displacement
 from tactile_core.translation.translate import load_translator
 
 from .method import TEST_SET, Method, best_ms, peak_mb
+from .pictures_methods import spread_in_levels
 from .translation_methods import plain_signals
 
 NAMES = ("truth", FAST, "standard", "quality")
@@ -70,7 +71,7 @@ def _contacts(count: int) -> Pairs:
 def _draw_truth(unit, mapper, pairs, passes, file) -> None:  # noqa: ANN001
     variant = choose_variant().name
     one_thread(variant)
-    rest, in_levels = of_unit(rest_height_map(unit.camera), unit), Renderer(unit, FAST).in_levels
+    rest, in_levels = of_unit(rest_height_map(unit.camera), unit), spread_in_levels(unit)
     light = MitsubaLight(unit, dataclasses.replace(REFERENCE, passes=passes), variant, rest, 0)
     resting, true = light.radiance(rest), true_displacement(pairs, "digit", np.arange(len(pairs.press)))
     np.savez(file, pictures=[in_levels(light.radiance(of_unit(height, unit)) - resting) for height in mapper(true)])

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
 from benchmarks.measure_presets import QUICK_PASSES, fields, one_thread, rms
 from tactile_core.accuracy import row
+from tactile_core.pictures.coating_spread import CoatingSpread
 from tactile_core.pictures.height_map import of_unit, rest_height_map
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE, preset_named
 from tactile_core.pictures.renderer import MitsubaLight, Renderer
+from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
 
 from .method import Method, best_ms, peak_mb
@@ -46,6 +49,12 @@ def measure(name: str, quick: bool, truth: str) -> Method:
     return Method("pictures", label, ms, mb, rms(levels, list(true)), "levels", rms(list(true)), of, tuple(more))
 
 
+def spread_in_levels(unit: Calibration) -> Callable[[np.ndarray], np.ndarray]:
+    """Return what makes levels (H, W, 3) of a light's radiance (H, W, 3), spread by the coating as `Renderer` does."""
+    in_levels, spread = Renderer(unit, FAST).in_levels, CoatingSpread(unit.camera, unit.coating.spread)
+    return lambda radiance: in_levels(np.moveaxis(spread(np.moveaxis(radiance, -1, 0)), 0, -1))
+
+
 def _reference(unit, heights, quick, truth) -> Method:  # noqa: ANN001
     """Measure the reference, whose error is its noise: half of the squared difference between two seeds."""
     import time
@@ -53,7 +62,7 @@ def _reference(unit, heights, quick, truth) -> Method:  # noqa: ANN001
     preset = dataclasses.replace(preset_named(REFERENCE.name), passes=QUICK_PASSES) if quick else REFERENCE
     variant = choose_variant().name
     one_thread(variant)
-    rest, in_levels = of_unit(rest_height_map(unit.camera), unit), Renderer(unit, FAST).in_levels
+    rest, in_levels = of_unit(rest_height_map(unit.camera), unit), spread_in_levels(unit)
     pictures, ms = [], []
     for seed in (0, 1):
         light = MitsubaLight(unit, preset, variant, rest, seed)
