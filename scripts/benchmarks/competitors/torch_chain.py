@@ -6,7 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from tactile_core.training import modules
+from tactile_core.training.modules import compress
+from tactile_core.training.trained_modules import posterior_of, residual_of, signal_vae_of
 from tactile_core.translation.contact_frame import PLACE_UNIT
 from tactile_core.translation.network_sizes import PLACE
 from tactile_core.translation.networks import Networks
@@ -17,14 +18,14 @@ class TorchChain:
 
     def __init__(self, nets: Networks) -> None:
         self.latent = nets.sizes["SVB"]["latent"]
-        self.encoder = _filled(modules.signal_vae(self.latent).encoder, nets, "SVB", "encoder.")
-        self.s2m, self.m2m = _posterior(nets, "S2MPN"), _residual(nets, "M2MPN", "map.", "inputs", "outputs")
+        self.encoder = signal_vae_of(nets).encoder
+        self.s2m, self.m2m = posterior_of(nets, "S2MPN"), residual_of(nets, "M2MPN")
         self.skin, self.gel = _Decoder(nets, "MVB"), _Decoder(nets, "MVD")
 
     @torch.inference_mode()
     def __call__(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         signal = torch.cat([torch.from_numpy(change), torch.zeros(len(change), 1)], -1)
-        latent = self.encoder(modules.compress(signal))[:, : self.latent]
+        latent = self.encoder(compress(signal))[:, : self.latent]
         state = self.s2m.contact(latent)
         biotac = self.s2m.given(latent, state)
         digit = torch.cat([state[:, :PLACE], self.m2m(self.skin.placed(biotac)[0])[:, PLACE:]], -1)
@@ -35,9 +36,8 @@ class _Decoder:
     """A mesh's decoder with the frame that moves."""
 
     def __init__(self, nets: Networks, net: str) -> None:
-        sizes, tensors, self.frame = nets.sizes[net], nets.tensors[net], nets.frames[net]
-        size = sizes["latent"] + PLACE, sizes["wide"] + sizes["near"], sizes["width"], sizes["blocks"]
-        self.net = _filled(modules.Residual(*size), nets, net, "decoder.")
+        tensors, self.frame = nets.tensors[net], nets.frames[net]
+        self.net = residual_of(nets, net, "decoder")
         self.scale, self.wide, self.near = (torch.tensor(tensors[name]) for name in ("scale", "wide", "near"))
         self.cosine, self.sine = (torch.from_numpy(each) for each in self.frame._cosine_sine)
         self.middle = torch.tensor([self.frame.rows - 1, self.frame.columns - 1]) / 2
@@ -64,21 +64,3 @@ class _Decoder:
         along, inward, around = local.unbind(-1)
         turned = self.cosine * inward + self.sine * around, self.cosine * around - self.sine * inward
         return torch.stack([along, *turned], -1)
-
-
-def _posterior(nets: Networks, net: str) -> torch.nn.Module:
-    sizes = nets.sizes[net]
-    made = modules.ContactPosterior(*(sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components")))
-    return _filled(made, nets, net, "")
-
-
-def _residual(nets: Networks, net: str, prefix: str, inputs: str, outputs: str) -> torch.nn.Module:
-    sizes = nets.sizes[net]
-    made = modules.Residual(sizes[inputs], sizes[outputs], sizes["width"], sizes["blocks"])
-    return _filled(made, nets, net, prefix)
-
-
-def _filled(module: torch.nn.Module, nets: Networks, net: str, prefix: str) -> torch.nn.Module:
-    names = module.state_dict()
-    module.load_state_dict({name: torch.tensor(nets.tensors[net][prefix + name]) for name in names})
-    return module.requires_grad_(False).eval()
