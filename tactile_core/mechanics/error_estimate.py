@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from ..files.shipped import shipped
-from .sharpness import LEARNED_RADIUS
+from .sharpness import RESOLVED_RADIUS
 
 Errors = tuple[float, float]  # shape, m rms, and relative, of the force
 
@@ -37,7 +37,7 @@ def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
     """Return the errors of a contact ``depth`` m deep, of touching nodes, by an indenter as sharp as ``radius`` m."""
     if not nodes:
         return _of_nothing(depth)
-    sharper = max(LEARNED_RADIUS / radius, 1.0)
+    sharper = math.sqrt(max(RESOLVED_RADIUS / radius, 1.0))
     return sharper * table[0], min(sharper * table[1], 1.0)
 
 

@@ -36,7 +36,6 @@ CONTACTS: dict[str, tuple[str, Indenter, Placement, float, float]] = {
 LIMITS = {
     "edge_biotac_fast": "no wedge is among the indenters that stated errors were measured on: its line of contact lies "
     "between nodes",
-    "concave_digit_fast": "bumps and the face between them touch at once, which nothing that was learned from does",
 }
 # Blades between the nodes of lattices 0.35 and 0.5 mm apart, and of meshes 0.5 and 0.8 mm.
 SUNK = (("digit", "sharp_edge"), ("biotac", "sharp_edge"))
