@@ -71,6 +71,10 @@ def from_safetensors(data: bytes, where: str | os.PathLike) -> dict[str, np.ndar
         dtype, shape, (begin, end) = _entry(name, entry, len(body), where)
         spans.append((begin, end, name))
         arrays[name] = np.frombuffer(body[begin:end], dtype).reshape(shape)
+        if not np.isfinite(arrays[name]).all():
+            raise TactileError(
+                f"{os.fspath(where)}, tensor {name}", "values that are not finite", "finite numbers", ADVICE
+            )
     _check_spans(sorted(spans), len(body), where)
     return arrays
 
