@@ -63,8 +63,10 @@ def test_the_page_of_accuracy_gets_the_table(script, tmp_path):
     write_summary(file, [Method("chain", "fast", 2.0, 50.0, 1.0, "levels", 3.0, "set"), *drawn])
     assert file.read_text() == (
         f"before\n\n{HEADER}\n"
-        "| picture of a known gel | fast / standard / quality / reference | 1.3 / 30 / 120 / 9,900 | 100"
-        " | 2 levels | 9 levels |\n"
+        "| picture of a known gel | fast | 1.3 | 100 | 2 levels | 9 levels |\n"
+        "| picture of a known gel | standard | 30 | 100 | 2 levels | 9 levels |\n"
+        "| picture of a known gel | quality | 120 | 100 | 2 levels | 9 levels |\n"
+        "| picture of a known gel | reference | 9,900 | 100 | 2 levels | 9 levels |\n"
         "| signals → picture | fast | 2 | 50 | 1 levels | 3 levels |\n\nafter\n"
     )
     (tmp_path / "other.md").write_text("no table\n")
@@ -106,3 +108,9 @@ def test_the_report_that_ships_can_be_read_and_draws(script):
     assert len(names) == len(set(names))
     methods = [Method("chain", name, ms, 1.0, 5 / ms, "levels", 9.0, "set") for name, ms in (("a", 1.0), ("b", 3.0))]
     assert plot(methods).startswith(b"\x89PNG")
+
+
+def test_a_stage_that_does_not_exist_is_refused(script, capsys):
+    with pytest.raises(SystemExit):
+        script.main(["--only", "mechanic"])
+    assert "no stage mechanic; there are mechanics, translation" in capsys.readouterr().err

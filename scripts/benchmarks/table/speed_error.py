@@ -43,6 +43,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
     parser.add_argument("--across", type=Path, metavar="PAIRS", help="train both on these pairs first")
     options = parser.parse_args(arguments)
+    unknown = [each for each in options.only if each.split(" ")[0] not in STAGES]
+    if unknown:
+        parser.error(f"--only: no stage {', '.join(unknown)}; there are {', '.join(STAGES)}")
     missing: dict[str, str] = {}
     try:
         if options.across:

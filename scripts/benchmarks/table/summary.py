@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from tactile_core.errors import TactileError
@@ -12,21 +12,27 @@ from tactile_core.files import atomic
 from .method import Method
 
 HEADER = "| stage | method | ms a frame | peak MB | error | baseline |\n|---|---|---|---|---|---|"
-# Stage, what the methods are called, and their names as they begin in the rows.
+# Stage, what the method is called, and its name as it begins in the rows.
 LINES = (
-    ("contact, DIGIT", "fast / full / reference tier", ("mechanics digit_fast", "mechanics digit_full",
-                                                        "mechanics digit_reference")),
-    ("contact, BioTac", "fast / full / reference tier", ("mechanics biotac_fast", "mechanics biotac_full",
-                                                         "mechanics biotac_reference")),
-    ("signals → DIGIT gel", "ours, one frame / 500 at once", ("translation numpy_1", "translation numpy_500")),
-    ("the same, fewer pairs, equal training time", "ours / networks of ACROSS's shapes",
-     ("translation numpy_same_pairs_1", "translation across_1")),
-    ("picture of a known gel", "fast / standard / quality / reference",
-     ("pictures fast", "pictures standard", "pictures quality", "pictures reference")),
-    ("picture against photographs", "fast / quality / a table after Taxim",
-     ("photographs fast", "photographs quality", "photographs taxim_like")),
-    ("signals → picture", "fast", ("chain fast",)),
-)  # fmt: skip
+    ("contact, DIGIT", "fast tier", "mechanics digit_fast"),
+    ("", "full tier", "mechanics digit_full"),
+    ("", "reference tier", "mechanics digit_reference"),
+    ("contact, BioTac", "fast tier", "mechanics biotac_fast"),
+    ("", "full tier", "mechanics biotac_full"),
+    ("", "reference tier", "mechanics biotac_reference"),
+    ("signals → DIGIT gel", "ours, one frame", "translation numpy_1"),
+    ("", "ours, 500 at once", "translation numpy_500"),
+    ("the same, fewer pairs, equal training time", "ours", "translation numpy_same_pairs_1"),
+    ("", "networks of ACROSS's shapes", "translation across_1"),
+    ("picture of a known gel", "fast", "pictures fast"),
+    ("", "standard", "pictures standard"),
+    ("", "quality", "pictures quality"),
+    ("", "reference", "pictures reference"),
+    ("picture against photographs", "fast", "photographs fast"),
+    ("", "quality", "photographs quality"),
+    ("", "a table after Taxim", "photographs taxim_like"),
+    ("signals → picture", "fast", "chain fast"),
+)
 PLACE = re.compile(re.escape(HEADER) + r"\n(?:\|.*\n)+")
 
 
@@ -43,16 +49,13 @@ def write_summary(path: Path, methods: Sequence[Method]) -> None:
 
 def table(methods: Sequence[Method]) -> str:
     """Return the table as Markdown, without lines whose methods were left out."""
-    lines = [HEADER]
-    for stage, label, names in LINES:
-        found = [each for name in names for each in methods if named(each, name)]
-        if len(found) == len(names):
-            cells = [joined(found, lambda one: one.ms), joined(found, lambda one: one.mb)]
-            cells += [
-                f"{joined(found, lambda one: one.error)} {unit(found)}",
-                f"{short(found[0].baseline)} {unit(found)}",
-            ]
-            lines.append("| " + " | ".join([stage, label, *cells]) + " |")
+    lines, stage = [HEADER], ""
+    for begins, label, name in LINES:
+        stage = begins or stage
+        for each in methods:
+            if named(each, name):
+                errors = [f"{short(value)} {each.unit.replace('um', 'µm')}" for value in (each.error, each.baseline)]
+                lines.append("| " + " | ".join([stage, label, short(each.ms), short(each.mb), *errors]) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -61,17 +64,6 @@ def named(method: Method, name: str) -> bool:
     return f"{method.stage} {re.sub('_(llvm|scalar|cuda)_.*', '', method.name)}" == name
 
 
-def joined(methods: Sequence[Method], of: Callable[[Method], float | None]) -> str:
-    """Join the numbers of all methods, once where they read alike."""
-    texts = [short(of(method)) for method in methods]
-    return texts[0] if len(set(texts)) == 1 else " / ".join(texts)
-
-
 def short(value: float | None) -> str:
     """Format with two digits, hundreds whole."""
     return "-" if value is None else f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
-
-
-def unit(methods: Sequence[Method]) -> str:
-    """Unit of the methods' errors."""
-    return methods[0].unit.replace("um", "µm")
