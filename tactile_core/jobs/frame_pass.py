@@ -42,7 +42,7 @@ LEFT = ("expected_error_digit", "error_bound_digit")
 REMARKABLE = {
     "out_of_range": "signals unlike those the networks were trained on",
     "beyond_digit": "the contact has no counterpart on the DIGIT's gel",
-    "beyond_picture": "the contact lies on the gel beside its picture",
+    "beyond_picture": "the contact lies on the gel beside its picture (--mount-shift X,Z moves it there)",
     "undecided_place": "by its own signals the contact may as well lie elsewhere",
     "two_contacts": "the signals look like two contacts at once; the translation shows one",
     "unexplained": "the signals resemble no contact's: rest was perhaps taken under load (--tare, --sensor)",
