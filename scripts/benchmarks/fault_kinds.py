@@ -179,7 +179,7 @@ def clock_backwards(bench: Bench) -> Lost:
         os.utime(file, (4e9, 4e9) if index % 2 else (0, 0))
     next(out.glob("shards/*.h5")).unlink()
     output = call(bench.command(out)).stdout
-    return bench.lost(out) + ("1 shards made" not in output), 1
+    return bench.lost(out) + ("1 shard made" not in output), 1
 
 
 def dask_worker_dies(bench: Bench) -> Lost | None:

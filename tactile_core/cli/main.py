@@ -51,7 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # a path may hold what the terminal cannot show
     parser = _parser()
-    options = parser.parse_args(arguments)
+    options, unknown = parser.parse_known_args(arguments)
+    if unknown:
+        getattr(options, "parser", parser).error(f"unrecognized arguments: {' '.join(unknown)}")
     if not hasattr(options, "run"):
         parser.error(f"no verb given; `tactile --help` says what each does: {', '.join(VERBS)}")
     try:
@@ -103,5 +105,5 @@ def _parser() -> argparse.ArgumentParser:
             allow_abbrev=False,  # of batch, --frames would mean --frames-apart
         )  # fmt: skip
         verb.arguments(sub)
-        sub.set_defaults(run=verb.run, leaves=verb.LEAVES)
+        sub.set_defaults(run=verb.run, leaves=verb.LEAVES, parser=sub)
     return parser

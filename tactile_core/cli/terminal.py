@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -49,6 +50,18 @@ def printable(text: str) -> str:
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
 
 
+def next_step(text: str) -> None:
+    """Print what the user may open or run next, on stderr: stdout holds the result's path alone, for scripts."""
+    say("next: " + text)
+
+
+def counted(number: int, thing: str) -> str:
+    """Write a number of things: 1 shard, 2 shards, 3 presses; a unit such as % stays as it is."""
+    if number == 1 or not thing.isalpha():
+        return f"{number} {thing}"
+    return f"{number} {thing}{'es' if thing.endswith('s') else 's'}"
+
+
 def complain(text: str) -> None:
     """Print an error on stderr."""
     say("error: " + text)
@@ -80,11 +93,17 @@ def agree(cost: str, seconds: float, agreed: bool) -> None:
     raise TactileError("the cost", cost, f"at most {LONG:g} s, or --yes", "Add --yes, or allow a larger --error")
 
 
+EVERY = 10.0  # s between two lines of progress in a log
+
+
 @contextmanager
 def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], None]]:
-    """Return a callback (done, in all) that draws a bar: on a terminal, for over two seconds of work, or if forced."""
+    """Return a callback (done, in all) that shows progress.
+
+    A bar on a terminal, for over two seconds of work, or if forced; elsewhere, as in a log, a line every ten seconds.
+    """
     if not forced and not sys.stderr.isatty():
-        yield lambda done, total: None
+        yield _lines(name, unit)
         return
     from tqdm import tqdm
 
@@ -95,3 +114,16 @@ def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], Non
             shown.update(done - shown.n)
 
         yield show
+
+
+def _lines(name: str, unit: str) -> Callable[[int, int], None]:
+    """Return a callback (done, in all) that prints a line of progress when EVERY seconds have passed since the last."""
+    last = time.monotonic()
+
+    def show(done: int, total: int) -> None:
+        nonlocal last
+        if time.monotonic() - last >= EVERY:
+            last = time.monotonic()
+            say(f"{name}: {done} of {counted(total, unit)}")
+
+    return show

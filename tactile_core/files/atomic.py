@@ -197,9 +197,10 @@ def _sync_folder(path: Path) -> None:
             os.close(descriptor)
 
 
-def claim(path: str | os.PathLike) -> None:
+def claim(path: str | os.PathLike, advice: str = "Choose another name") -> None:
     """Check before a long job that `path` is free and can be written; make its folder.
 
+    advice : what to do where something is there
     Raises TactileError for an empty name, an existing file, or a folder that cannot be made or written.
     """
     if not os.fspath(path):
@@ -209,12 +210,19 @@ def claim(path: str | os.PathLike) -> None:
         found = f"a name of {len(os.fsencode(path.name))} bytes, which cannot be written"
         raise TactileError(path.parent, found, "at most 255, as file systems take", "Choose a shorter --out")
     if os.path.lexists(path):
-        raise TactileError(path, "exists already", "a new name", "Remove it or choose another name")
+        raise TactileError(path, f"exists already ({_kind(path)})", "a new name", advice)
     with writing(path, "a place in a writable folder", "Choose another --out"):
         path.parent.mkdir(parents=True, exist_ok=True)
         probe = _beside(path, "probe")
         probe.touch()
         probe.unlink()
+
+
+def _kind(path: Path) -> str:
+    """Say in words what is at a path."""
+    if path.is_symlink():
+        return "a link"
+    return "a folder" if path.is_dir() else "a file"
 
 
 @contextlib.contextmanager

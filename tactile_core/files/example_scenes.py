@@ -46,7 +46,7 @@ def copy(names: Sequence[str], out: str | Path) -> list[Path]:
             raise TactileError("scenes", f"no scene {name!r}", ", ".join(known))
     wanted = [Path(out) / name for name in dict.fromkeys(names or known)]
     for target in wanted:
-        atomic.claim(target)
+        atomic.claim(target, "To copy it to another place: tactile scenes copy --out OTHER")
     for target in wanted:
         with atomic.new_folder(target) as partial:
             shutil.copytree(folder() / target.name, partial, dirs_exist_ok=True, ignore=_CACHES)

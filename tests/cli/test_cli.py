@@ -89,7 +89,7 @@ def test_convert_names_its_folder_and_tells_its_warnings(tactile, slide_csv, tmp
     status, out, err = tactile("convert", slide_csv(), "--out", tmp_path / "out")
     assert status == 0
     assert only_line(out) == str(tmp_path / "out" / "touch")
-    assert all(line.startswith("tactile: warning: touch: ") for line in err.splitlines())
+    assert all(line.startswith(("tactile: warning: touch: ", "tactile: next: ")) for line in err.splitlines())
     assert "out_of_range" in err
 
 
@@ -308,7 +308,7 @@ def test_each_warning_is_one_line(tactile, slide_csv, tmp_path):
     status, _, err = tactile("convert", slide_csv("two\nlines"), "--out", tmp_path / "out", "--keep", "")
     assert status == 0
     assert err
-    assert all(line.startswith("tactile: warning: two lines: ") for line in err.splitlines())
+    assert all(line.startswith(("tactile: warning: two lines: ", "tactile: next: ")) for line in err.splitlines())
 
 
 def test_progress_is_silent_without_a_terminal_unless_asked(tactile, slide_csv, tmp_path):
@@ -322,4 +322,14 @@ def test_an_option_is_written_out(tmp_path, capsys):
     """`batch` has no --frames; as an abbreviation of --frames-apart it was taken in silence."""
     with pytest.raises(SystemExit):
         main(["batch", str(tmp_path), "--out", str(tmp_path / "job"), "--frames"])
-    assert "unrecognized arguments: --frames" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "unrecognized arguments: --frames" in said
+    assert said.startswith("usage: tactile batch ")  # its own, which lists the options that it has
+
+
+def test_what_to_open_after_a_conversion_is_told_once(tactile, slide_csv, tmp_path):
+    paths = [slide_csv(name, frames=5) for name in ("a", "b c")]
+    _, out, err = tactile("convert", *paths, "--out", tmp_path / "out", "--keep", "")
+    assert out.split("\n") == [str(tmp_path / "out" / "a"), str(tmp_path / "out" / "b c"), ""]
+    (told,) = [line for line in err.splitlines() if line.startswith("tactile: next: ")]
+    assert f"open {tmp_path / 'out' / 'a' / 'contact_sheet.png'}" in told

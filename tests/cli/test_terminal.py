@@ -28,6 +28,21 @@ def test_durations_in_the_unit_that_is_read_best():
     assert [terminal.duration(each) for each in (40, 90, 720, 12600)] == ["40 s", "90 s", "12 min", "3.5 h"]
 
 
+def test_numbers_of_things():
+    found = [terminal.counted(*each) for each in ((1, "shard"), (0, "shard"), (2, "press"), (1, "%"), (100, "%"))]
+    assert found == ["1 shard", "0 shards", "2 presses", "1 %", "100 %"]
+
+
+def test_progress_in_a_log_is_a_line_every_ten_seconds(monkeypatch, capsys):
+    now = 0.0
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now)
+    with terminal.bar("pairs", "block", forced=False) as show:
+        for done in range(1, 31):  # a block a second
+            now = float(done)
+            show(done, 30)
+    assert capsys.readouterr().err.splitlines() == [f"tactile: pairs: {done} of 30 blocks" for done in (10, 20, 30)]
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device stands for a full disk here")
 def test_a_full_disk_under_what_is_printed_is_named():
     with open("/dev/full", "w") as full:

@@ -2,6 +2,7 @@
 
 import subprocess
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -15,14 +16,16 @@ def test_scenes_are_listed_and_copied(tmp_path, monkeypatch, capsys):
     assert command.main(["scenes"]) == 0
     assert "press " in capsys.readouterr().out
     assert command.main(["scenes", "copy", "press", "user_mesh"]) == 0
+    assert f"next: tactile plan {Path('scenes', 'press')}" in capsys.readouterr().err
     assert {file.name for file in (tmp_path / "scenes" / "user_mesh").iterdir()} >= {"scene.toml", "star.stl"}
     assert sorted(each.name for each in (tmp_path / "scenes").iterdir()) == ["press", "user_mesh"]
 
 
 def test_nothing_is_written_over(tmp_path):
     (tmp_path / "ring").mkdir()
-    with pytest.raises(TactileError, match="exists already"):
+    with pytest.raises(TactileError, match=r"ring: exists already \(a folder\).* another place: .*--out") as refused:
         example_scenes.copy(["press", "ring"], tmp_path)
+    assert "Remove" not in str(refused.value)  # it may hold the user's own changes
     assert [each.name for each in tmp_path.iterdir()] == ["ring"]
     with pytest.raises(TactileError, match="no scene"):
         example_scenes.copy(["../press"], tmp_path)

@@ -60,7 +60,8 @@ def picture(path):
 
 def test_height_maps_become_pictures(render, heights, tmp_path, small):
     status, out, err = render(heights)
-    assert (status, out, err) == (0, f"{tmp_path / 'out'}\n", "")
+    first = tmp_path / "out" / "images" / "00000.png"
+    assert (status, out, err) == (0, f"{tmp_path / 'out'}\n", f"tactile: next: open {first}\n")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["images", "note.json", "timings.json"]
     expected = Renderer(small, "fast")(np.load(heights)["height_map"][1])
     np.testing.assert_array_equal(picture(tmp_path / "out" / "images" / "00001.png"), expected)

@@ -26,7 +26,9 @@ def arrays():
 def test_it_learns_the_sensor(arrays, tmp_path, capsys):
     path = write_labelled(tmp_path / "labelled.hdf5", arrays)
     assert main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
-    assert "real_force_percent" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "real_force_percent" in said.out
+    assert f"next: tactile convert touch.csv --out results --weights {tmp_path / 'tuned' / 'weights'}" in said.err
     before, after = networks.load(), networks.load(tmp_path / "tuned" / "weights")
     rows = {(row["name"], row["set"].rsplit(" ", 1)[1]): row for row in after.card["fine_tuned"]["errors"]}
     # Measured: places 1.8 -> 1.1 mm; forty contacts are kept to tell.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from shlex import quote
 
-from ..terminal import say, tell
+from ..terminal import next_step, say, tell
 from .common import NOTHING, columns_argument, columns_of, polarity_argument, weights_argument
 
 BRIEF = "fit rest, gains and offsets of a BioTac unit to its recordings"
@@ -53,4 +54,5 @@ def run(options: argparse.Namespace) -> int:
     electrode_gains.check(sensor, options.out)
     electrode_gains.write(options.out, sensor)
     tell(options.out)
+    next_step(f"tactile convert touch.csv --out results --sensor {quote(options.out)}")
     return 0

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
-from ..terminal import bar, complain, say, tell
+from ..terminal import bar, complain, counted, next_step, say, tell
 from . import engine
 from .common import (
     PRESETS,
@@ -42,6 +43,7 @@ examples:
   tactile batch --out job --cluster tcp://head:8786            on the workers of a Dask scheduler
   tactile batch day1 --out job --plan                          write job.json alone, as arrays need it"""
 LEAVES = RESUMES
+MOST_WARNINGS = 5  # that are printed
 RECIPE = (  # option, its value where it is not given
     *((name, None) for name in ("keep", "shard_frames", "weights", "sensor", "calibration", "preset")),
     *((name, None) for name in ("kind", "counts_per_unit", "smooth", "columns")),
@@ -93,14 +95,43 @@ def run(options: argparse.Namespace) -> int:
     with runs.opened(folder, part):
         job = _job(folder, options)
         if options.plan:
-            tell(str(folder / jobs.FILE))
+            engine.tell_plan(folder / jobs.FILE, folder, f"tactile batch --out {quote(str(folder))}")
             return 0
         place = engine.place(folder, options)
         with bar("batch", "task", options.progress) as shown:
             done = runs.run(folder, job, place, part, shown)
     status = engine.report_failures(done)
-    tell(f"{folder}: {done.made} shards made, {done.kept} kept, {len(done.aside)} set aside")
+    if part is None:
+        _say_warnings(folder)
+    where = str(folder) if part is None else f"{folder}, part {options.array}"
+    tell(f"{where}: {counted(done.made, 'shard')} made, {done.kept} kept, {len(done.aside)} set aside")
+    if not status:
+        next_step(_following(folder, job, part))
     return status
+
+
+def _say_warnings(folder: Path) -> None:
+    """Print the commonest warnings of the job's recordings, each once; the manifest lists those of each recording."""
+    from collections import Counter
+
+    from ...jobs.engine import manifest
+
+    counts = Counter(text for texts in manifest.warnings(folder).values() for text in texts)
+    for text, number in counts.most_common(MOST_WARNINGS):
+        say(f"warning: {counted(number, 'recording')}: {text}")
+    if len(counts) > MOST_WARNINGS:
+        say(f"warning: {len(counts) - MOST_WARNINGS} others: manifest.json lists those of each recording")
+
+
+def _following(folder: Path, job: Job, part: tuple[int, int] | None) -> str:
+    """Return what is done next with a job, or with one part of it, that ended without a failure."""
+    from ...jobs.engine.recipes import Translate
+
+    ours, name = isinstance(job.recipe, Translate), quote(str(folder))
+    if part is not None:
+        then = f"tactile batch --out {name}, which checks all of them" if ours else engine.ASSEMBLES
+        return f"when every part has ended: {then}"
+    return f"tactile export {name} --to npz --out {quote(str(folder) + '_npz')}" if ours else engine.ASSEMBLES
 
 
 def _job(folder: Path, options: argparse.Namespace) -> Job:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
-from ..terminal import bar, say, tell
+from ..terminal import bar, next_step, say, tell
 from .common import NOTHING, progress_argument
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ...pictures.calibrate.ball_pictures import BallPictures
+    from ...pictures.calibrate.evaluate import Evaluation
     from ...pictures.calibrate.photographs import Photographs
     from ...sensors.calibration import Calibration
 
@@ -109,7 +111,7 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
 
     start, diameter = load_calibration(options.start, options.gel), 1e-3 * options.ball_diameter
     check_orientation(photographs, diameter, start)
-    with bar("trial on held-out presses", "third", options.progress) as progress:
+    with bar("trial on held-out presses", "step", options.progress) as progress:
         apart = cross_validated(photographs, diameter, start, quick=options.quick, progress=progress)
     with bar("calibrate", "step", options.progress) as progress:
         name = options.unit or Path(options.out).stem
@@ -118,15 +120,18 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
         say(f"warning: {warning}")
     for each in done.tried:
         right, down, depth = (1e3 * value for value in each.ball.numbers[:3])
-        off = f"{each.metrics['roi_l1']:.1f} levels off, the background {each.baseline['roi_l1']:.1f}"
-        place = f"{depth:.2f} mm deep, {right:.1f} mm right and {down:.1f} down of the middle"
-        say(f"{each.press.name}: used; {place}; {off}")
+        place = f"{_way(right, 'left', 'right')} and {_way(down, 'above', 'below')} of the picture's middle"
+        say(f"{each.press.name}: used; {depth:.2f} mm deep, {place}; {_error([each])}")
     check_worth(apart or done.tried)
-    say(f"these photographs tell too little of: {', '.join(done.calibration.fit.not_identified)}")
+    unknown = ", ".join(done.calibration.fit.not_identified)
+    say(f"these photographs tell too little of: {unknown}; they stay near the values of --start")
     write_calibration(options.out, done.calibration)
     write_sheet(_sheet_beside(options.out), done.tried)
     _tell_rows(rows_of(done.tried, "presses it was fitted on") + rows_of(apart, "held-out presses, by thirds"))
+    say(f"{'held-out presses' if apart else 'the press'}: {_error(apart or done.tried)}")
     tell(options.out)
+    following = f"tactile convert touch.csv --out results --calibration {quote(options.out)}"
+    next_step(f"look at {_sheet_beside(options.out)}: photograph, picture, difference; then {following}")
     return 0
 
 
@@ -150,7 +155,24 @@ def _test(options: argparse.Namespace, photographs: Photographs) -> int:
     if options.sheet:
         write_sheet(options.sheet, tried)
     _tell_rows(rows)
+    say(f"{photographs.folder}: {_error(tried)}")
+    for file, held in ((options.json, "the errors of each press"), (options.sheet, "photograph, picture, difference")):
+        if file is not None:
+            next_step(f"{file} holds {held}")
     return 0
+
+
+def _error(tried: list[Evaluation]) -> str:
+    """Say how far the pictures are from the photographs in the region of the press, and the background alone."""
+    from ...pictures.calibrate.evaluate import mean_metrics
+
+    ours, baseline = (each["roi_l1"] for each in mean_metrics(tried))
+    return f"{ours:.1f} grey levels of 255 off, the background alone {baseline:.1f}"
+
+
+def _way(mm: float, less: str, more: str) -> str:
+    """Say where a press lies along a direction: 1.2 mm left."""
+    return f"{abs(mm):.1f} mm {less if mm < 0 else more}"
 
 
 def _pictures(preset: str) -> Callable[[Calibration], BallPictures]:

@@ -20,7 +20,9 @@ MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
 
 def progress_argument(verb: argparse.ArgumentParser) -> None:
     """Add ``--progress``."""
-    verb.add_argument("--progress", action="store_true", help="show progress even where stderr is no terminal")
+    verb.add_argument(
+        "--progress", action="store_true", help="show the bar of progress even where stderr is no terminal"
+    )
 
 
 def prepare_arguments(verb: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from ...errors import TactileError
 from ...files.threads import one_thread
-from ..terminal import bar, complain, say, tell
+from ..terminal import bar, complain, next_step, say, tell
 from .common import (
     NOTHING,
     answer_arguments,
@@ -106,6 +106,7 @@ def run(options: argparse.Namespace) -> int:
     preset = presets.FAST if levels is None else variant.fitting(levels)
     made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
+    converted = []
     tools = convert.load_tools(
         options.weights,
         options.calibration,
@@ -131,6 +132,10 @@ def run(options: argparse.Namespace) -> int:
         for remark in done.remarks:
             say(f"{folder.name}: {remark}")
         tell(str(done.folder))
+        converted.append(done.folder)
+    if converted:
+        sheet = converted[0] / results.SHEET
+        next_step(f"open {sheet}; the numbers of every frame are in {results.FRAMES} beside it")
     if made and failed == len(folders):
         with suppress(OSError):  # it holds something
             os.rmdir(options.out)

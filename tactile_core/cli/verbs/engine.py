@@ -6,13 +6,17 @@ import argparse
 import re
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
-from ..terminal import complain, say
+from ..terminal import complain, next_step, say, tell
 
 if TYPE_CHECKING:
     from ...jobs.engine.run import Done, Place
+
+
+ASSEMBLES = "the command that planned it, without --plan, which makes the result"
 
 
 def place_arguments(verb: argparse.ArgumentParser) -> None:
@@ -73,6 +77,18 @@ def place_or_none(options: argparse.Namespace) -> Callable[[Path], Place] | None
     if options.cluster is None and (options.workers or 1) == 1:
         return None
     return lambda folder: place(folder, options)
+
+
+def tell_plan(planned: Path, folder: Path, after: str) -> None:
+    """Print what was planned, and how the parts of the job in `folder` are made; after : the command once they are."""
+    tell(str(planned))
+    parts = f"tactile batch --out {quote(str(folder))} --array I/N"
+    next_step(f"{parts}, for each I from 0 to N - 1, on any machines; then {after}")
+
+
+def tell_planned_parts(folder: Path) -> None:
+    """Print the folder of a planned job whose shards are put together into one result, and how they are made."""
+    tell_plan(folder, folder, ASSEMBLES)
 
 
 def report_failures(done: Done) -> int:

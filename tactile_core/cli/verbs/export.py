@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..terminal import bar, say, tell
+from ..terminal import bar, next_step, say, tell
 from .common import NOTHING, progress_argument
 
 BRIEF = "write a finished batch job as NPZ, PNG, OpenEXR or LeRobot data"
@@ -39,4 +39,5 @@ def run(options: argparse.Namespace) -> int:
     for name, why in source.aside.items():
         say(f"warning: {name} was set aside and is left out: {why}")
     tell(options.out)
+    next_step(f"it holds {export.layouts()[options.to].BRIEF}; note.json in it names the job and what was left out")
     return 0

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from shlex import quote
 
 from ...files.threads import one_thread
-from ..terminal import bar, tell
+from ..terminal import bar, next_step, tell
 from . import engine
 from .common import RESUMES, check_seed, electrodes_argument, progress_argument, seed_argument
 
@@ -67,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     keep = () if options.keep is None else results.parse_words(options.keep, tuple(KEEPABLE))
     if options.plan:
         job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes, pair, keep)
-        tell(str(result_parts.write(options.out, job)))
+        engine.tell_planned_parts(result_parts.write(options.out, job))
         return 0
     place = engine.place_or_none(options)
     with bar("pairs", "block", options.progress) as shown:
@@ -76,4 +77,5 @@ def run(options: argparse.Namespace) -> int:
             electrodes=options.electrodes, pair=pair, keep=keep,
         )  # fmt: skip
     tell(options.out)
+    next_step(f"tactile train {quote(options.out)} --out trained")
     return 0

@@ -7,11 +7,13 @@ import re
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
-from ..terminal import bar, say, tell
+from ..terminal import bar, next_step, say, tell
 from . import engine
 from .common import NOTHING, PRESETS, error_argument, progress_argument
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ...jobs.render import Options
 
 BRIEF = "draw the camera's pictures of deformed gels"
@@ -102,8 +104,7 @@ def run(options: argparse.Namespace) -> int:
             asked.error.only("levels", "Simulate the scene first, with --error, and render that")
         return _run_in_parts(options, asked)
     done = render.render(options.input, options.out, asked, lambda word: bar(word, "frame", options.progress), say)
-    tell(str(done))
-    return 0
+    return _done(done)
 
 
 def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
@@ -112,11 +113,19 @@ def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
     from ...jobs.render_shards import plan, render_in_parts
 
     if options.plan:
-        tell(str(result_parts.write(options.out, plan(options.input, options.out, asked))))
+        engine.tell_planned_parts(result_parts.write(options.out, plan(options.input, options.out, asked)))
         return 0
     with bar("render", "task", options.progress) as shown:
         done = render_in_parts(options.input, options.out, asked, lambda folder: engine.place(folder, options), shown)
-    tell(str(done))
+    return _done(done)
+
+
+def _done(folder: Path) -> int:
+    """Print the folder and its first picture; returns the exit status."""
+    from ...jobs.results import IMAGES
+
+    tell(str(folder))
+    next_step(f"open {min((folder / IMAGES).iterdir())}")
     return 0
 
 

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from shlex import quote
+from typing import TYPE_CHECKING
 
-from ..terminal import tell
+from ..terminal import next_step, tell
 from .common import NOTHING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 BRIEF = "list or copy the example scenes"
 TEXT = """\
@@ -34,6 +39,20 @@ def run(options: argparse.Namespace) -> int:
         for line in example_scenes.described():
             tell(line)
         return 0
-    for folder in example_scenes.copy(options.names, options.out):
+    copied = example_scenes.copy(options.names, options.out)
+    for folder in copied:
         tell(str(folder))
+    if following := _following(copied):
+        next_step(following)
     return 0
+
+
+def _following(copied: list[Path]) -> str:
+    """Return a command that tries what was copied: a recording, or else a scene; "" where neither is among it."""
+    for recording in (folder / f"{folder.name}.h5" for folder in copied):
+        if recording.is_file():
+            return f"tactile convert {quote(str(recording))} --out results"
+    for folder in copied:
+        if (folder / "scene.toml").is_file():
+            return f"tactile plan {quote(str(folder))} says what this scene builds and costs"
+    return ""

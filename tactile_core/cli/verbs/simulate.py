@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 
 from ...errors import TactileError
-from ..terminal import agree, bar, duration, say, tell
+from ..terminal import agree, bar, duration, next_step, say, tell
 from . import engine
 from .common import NOTHING, check_seed, electrodes_argument, error_argument, progress_argument, seed_argument
 
@@ -78,6 +79,8 @@ def run(options: argparse.Namespace) -> int:
             options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers, electrodes=options.electrodes
         )
     tell(options.out)
+    if "electrodes" in keep:
+        next_step(f"tactile convert {quote(options.out)} --out results")
     return 0
 
 
@@ -135,9 +138,10 @@ def _run_grid(options: argparse.Namespace) -> int:
     keep = _keep(options.keep)
     job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep, options.electrodes)
     if options.plan:
-        tell(str(result_parts.write(options.out, job)))
+        engine.tell_planned_parts(result_parts.write(options.out, job))
         return 0
     with bar("simulate", "task", options.progress) as shown:
         simulate.simulate_grid(job, options.out, shown, engine.place_or_none(options))
     tell(options.out)
+    next_step(f"{Path(options.out) / 'grid.json'} lists the values of each recording")
     return 0

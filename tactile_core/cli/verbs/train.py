@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
+from shlex import quote
 
 from ...errors import TactileError
 from ...training.options import DEVICES
-from ..terminal import bar, say, tell
+from ..terminal import bar, next_step, say, tell
 from .common import RESUMES, check_seed, progress_argument, seed_argument
 
 BRIEF = "train the networks on pairs, or fine-tune one"
@@ -68,6 +70,7 @@ def run(options: argparse.Namespace) -> int:
         )
     _say_error(card)
     tell(options.out)
+    next_step(f"look at {os.path.join(options.out, 'loss.png')}, then {_convert(options.out)}")
     return 0
 
 
@@ -104,4 +107,10 @@ def _fine_tune(options: argparse.Namespace) -> int:
     for text in (HEADER, *map(line, rows)):
         tell(text)
     tell(options.out)
+    next_step(_convert(options.out))
     return 0
+
+
+def _convert(out: str) -> str:
+    """Return the command that converts with the weights of a training."""
+    return f"tactile convert touch.csv --out results --weights {quote(os.path.join(out, 'weights'))}"

@@ -89,13 +89,22 @@ def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
 
 
 def _read_checksums(folder: Path) -> dict[Path, str]:
-    """Shards of a manifest and their hashes; none where there is no manifest, or one that cannot be read."""
-    try:
-        found = msgspec.json.decode(read_small(folder / jobs.MANIFEST, jobs.MOST), type=_Manifest)
-    except (OSError, ValueError, RecursionError, TactileError):
-        return {}
-    shards = [shard for recording in found.recordings for shard in recording.shards]
+    """Shards of a manifest and their hashes."""
+    shards = [shard for recording in _read(folder) for shard in recording.shards]
     return {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
+
+
+def warnings(folder: Path) -> dict[str, list[str]]:
+    """Return the warnings of each recording that has some, by the manifest."""
+    return {recording.name: recording.warnings for recording in _read(folder) if recording.warnings}
+
+
+def _read(folder: Path) -> list[_Recording]:
+    """Recordings of a manifest; none where there is no manifest, or one that cannot be read."""
+    try:
+        return msgspec.json.decode(read_small(folder / jobs.MANIFEST, jobs.MOST), type=_Manifest).recordings
+    except (OSError, ValueError, RecursionError, TactileError):
+        return []
 
 
 class _Shard(msgspec.Struct):
@@ -105,6 +114,8 @@ class _Shard(msgspec.Struct):
 
 class _Recording(msgspec.Struct):
     shards: list[_Shard]
+    name: str = ""
+    warnings: list[str] = []
 
 
 class _Manifest(msgspec.Struct):

@@ -59,11 +59,16 @@ class Recorded:
 
 @dataclasses.dataclass(frozen=True)
 class Finished:
-    """A job whose shards are all there. id : of the job; aside : recording or shard -> why it is not among them"""
+    """A job whose shards are all there.
 
+    folder, id : of the job; aside : recording or shard -> why it is not among them; warnings : recording -> sentences
+    """
+
+    folder: Path
     id: str
     recordings: tuple[Recorded, ...]
     aside: dict[str, str]
+    warnings: dict[str, list[str]]
 
     @property
     def frames(self) -> int:
@@ -74,7 +79,7 @@ class Finished:
         """Raise TactileError where the job did not keep an array, as ``--keep`` word does."""
         if array not in self.recordings[0].arrays():
             advice = f"Make the job with --keep {word}"
-            raise TactileError("the job", f"holds no {array}", f"one that kept {word}", advice)
+            raise TactileError(self.folder, f"holds no {array}", f"a job that kept {word}", advice)
 
 
 def load(folder: Path) -> Finished:
@@ -98,7 +103,7 @@ def load(folder: Path) -> Finished:
             _check(path, job, index, number, frames)
         recordings.append(Recorded(one.name, frames, paths))
     _check_alike([path for one in recordings for path in one.shards])
-    return Finished(job.id, tuple(recordings), status.aside)
+    return Finished(folder, job.id, tuple(recordings), status.aside, manifest.warnings(folder))
 
 
 def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:

@@ -33,6 +33,7 @@ def export(
     source = finished_job.load(Path(job))
     with atomic.writing(out), atomic.new_folder(out) as partial:
         layouts()[layout].write(source, partial, progress)
-        note = {"layout": layout, "job": source.id, "left_out": source.aside, "versions": provenance.versions()}
+        note = {"layout": layout, "job": source.id, "left_out": source.aside, "warnings": source.warnings}
+        note["versions"] = provenance.versions()
         atomic.write_json(partial / NOTE, note)
     return source

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...errors import TactileError
+from ...files import installed
 from ...sensors.calibration import AMBIENT_DEGREE, PHOTOGRAPHED_DEGREE, Calibration, Fit
 from ..background import fit_ambient
 from ..height_map import rest_height_map
@@ -222,7 +223,7 @@ def finishing_trouble() -> str:
     try:
         import mitsuba  # noqa: F401
     except ModuleNotFoundError:
-        return 'Mitsuba is not installed (pip install "tactile-core[render]")'
+        return f"Mitsuba is not installed; to install it: {installed.advice('render')}"
     return llvm_trouble(os.environ.get("DRJIT_LIBLLVM_PATH", ""))
 
 

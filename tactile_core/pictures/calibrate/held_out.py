@@ -64,9 +64,12 @@ def cross_validated(
     for fold in range(folds if folds > 1 else 0):
         apart = names[fold::folds]
         others = chosen(photographs, [name for name in names if name not in apart])
-        done = calibrate(others, ball_diameter, start, unit="others", quick=quick).calibration
+
+        def step(done: int, total: int, before: int = fold) -> None:
+            progress(before * total + done, folds * total)
+
+        done = calibrate(others, ball_diameter, start, unit="others", quick=quick, progress=step).calibration
         tried += evaluate_unit(done, chosen(photographs, apart), ball_diameter / 2)
-        progress(fold + 1, folds)
     return tried
 
 

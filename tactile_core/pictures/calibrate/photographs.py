@@ -131,8 +131,9 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
     """
     first = np.median(pictures, axis=0).astype(np.float32)
     touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
-    found = np.nanmedian(np.where(touched, np.nan, pictures.astype(np.float32)), axis=0)
-    return np.where(np.isnan(found), first, found)
+    rest = np.where(touched, np.nan, pictures.astype(np.float32))
+    rest[:, touched.all(axis=0)[..., 0]] = first[touched.all(axis=0)[..., 0]]  # all differ: no median of none
+    return np.nanmedian(rest, axis=0)
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:

@@ -17,6 +17,7 @@ def test_a_job_from_start_to_end(command, recordings, tmp_path):
     out = tmp_path / "job"
     done = command(recordings[0].parent, "--out", out, "--keep", "latent", "--shard-frames", "60", "--workers", "2")
     assert done.returncode == 0 and "5 shards made, 0 kept, 0 set aside" in done.stdout, done.stderr
+    assert "warning: 1 recording: polarity assumed" in done.stderr and "next: tactile export" in done.stderr
     again = command("--out", out)
     assert "0 shards made, 5 kept" in again.stdout
     status = command("--out", out, "--status")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -22,6 +23,7 @@ from tactile_core.jobs import export
 from tactile_core.jobs.engine import inputs, local, recipes
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
+from tactile_core.jobs.export import finished_job
 
 WORKER = Path(__file__).resolve().parents[2] / "jobs" / "engine" / "fake_worker.py"
 FRAMES = {"00000_a": 70, "00001_b": 45}
@@ -210,6 +212,24 @@ def test_shards_of_strangers_are_read_with_care(change, said, job, tmp_path):
     with pytest.raises(TactileError, match=said):
         export.export(tmp_path / "job", "npz", tmp_path / "out", silent)
     assert not (tmp_path / "out").exists()
+
+
+def test_warnings_of_the_recordings_go_with_them(job, tmp_path):
+    export.export(job, "npz", tmp_path / "out", silent)
+    listed = {one["name"]: one["warnings"] for one in json.loads((job / jobs.MANIFEST).read_text())["recordings"]}
+    assert listed["00001_b"]
+    assert json.loads((tmp_path / "out" / "note.json").read_text())["warnings"] == listed
+
+
+def test_what_a_job_did_not_keep_is_said_of_its_folder(job):
+    with pytest.raises(TactileError, match=f"^{re.escape(str(job))}: holds no traction_digit"):
+        finished_job.load(job).check_kept("traction_digit", "traction")
+
+
+def test_what_was_written_is_told(job, tmp_path, capsys):
+    assert main(["export", str(job), "--to", "npz", "--out", str(tmp_path / "out")]) == 0
+    out, err = capsys.readouterr()
+    assert out == f"{tmp_path / 'out'}\n" and "next: it holds one NPZ file a recording" in err
 
 
 def test_what_was_set_aside_is_told(job, tmp_path, capsys):

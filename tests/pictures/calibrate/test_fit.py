@@ -165,6 +165,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     said = capsys.readouterr()
     assert "roi_psnr" in said.out and str(out) in said.out and "tell too little of" in said.err
     assert all(f"press_{number}.png: used; " in said.err for number in (0, 3))
+    assert f"next: look at {tmp_path / 'unit.png'}" in said.err and "the background alone" in said.err
     assert Image.open(tmp_path / "unit.png").size[0] > 3 * 240
     assert load_calibration(out).unit == "unit"
     rows, sheet = tmp_path / "rows.json", tmp_path / "trial.png"

@@ -52,6 +52,13 @@ def test_presses_hardly_pull_the_estimate(tmp_path: Path) -> None:
     assert error.max() < 18
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_spot_that_every_press_covers_is_estimated_in_silence() -> None:
+    """In two halves of two kinds of light no photograph is near the median of all."""
+    pictures = np.repeat(np.array([0, 200], np.uint8), 2)[:, None, None, None] * np.ones((1, 3, 3, 3), np.uint8)
+    assert (estimated_background(pictures) == 100).all()
+
+
 def test_some_are_chosen_by_name(folder: Path) -> None:
     whole = read_photographs(folder)
     some = chosen(whole, ["press_3.png", "press_1.png"])

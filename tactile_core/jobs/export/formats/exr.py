@@ -20,7 +20,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
     """Write one folder a recording. Raises TactileError for a job that kept neither heights nor pictures."""
     if not {"height_map", "image"} & set(source.recordings[0].arrays()):
         found, advice = "holds neither heights nor pictures", "Make the job with --keep height or image"
-        raise TactileError("the job", found, "one of them", advice)
+        raise TactileError(source.folder, found, "a job that kept one of them", advice)
     done = 0
     for one in source.recordings:
         (folder / one.name).mkdir()
