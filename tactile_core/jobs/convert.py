@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 from collections.abc import Callable
 from functools import partial
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from ..translation.answer import Answer
     from ..translation.translate import Translator
     from .error_budget import Budget
+    from .needed_rows import Needed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,10 +68,11 @@ def load_tools(
         shipped weights do not lead
     target : the gel, to which the weights must translate unless it is solved
     source : the sensor whose recordings they must translate; None for whichever they do
+    The fast shader is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
     Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
     ``renderer.Renderer`` raises.
     """
-    from ..pictures import height_map, shading
+    from ..pictures import background, height_map, shading
     from ..sensors.calibration_file import load_calibration
 
     translator, solves = load_networks(weights, answer, gel, target, source)
@@ -77,7 +80,9 @@ def load_tools(
     mapper = height_map.gel_mapper(unit.camera)
     dots = None
     if preset == "fast" and unit.markers is None:
-        shade = shading.Shader(unit)
+        if unit.photograph:
+            background.read_photograph(unit.photograph, unit.camera)  # a bad one is refused before any work
+        shade = OnDemand(partial(shading.Shader, unit))
     else:
         from ..pictures.renderer import Renderer
 
@@ -111,6 +116,16 @@ def load_networks(
     return translator, gel == SOLVED or translator.target != target
 
 
+class OnDemand:
+    """A tool that is made at its first call, by `make`."""
+
+    def __init__(self, make: Callable[[], Callable[..., np.ndarray]]) -> None:
+        self._made = functools.cache(make)
+
+    def __call__(self, *arguments: np.ndarray) -> np.ndarray:
+        return self._made()(*arguments)
+
+
 @dataclasses.dataclass(frozen=True)
 class Done:
     """A finished conversion. folder : the result; warnings : what the user should know of it
@@ -137,8 +152,8 @@ def convert(
     Raises TactileError for a recording that cannot be read, a selection without frames, a disk that cannot be written.
     """
     from .. import recordings
-    from ..recordings import electrode_gains
     from ..recordings.fingers import split
+    from .needed_rows import Needed
 
     if options.error is not None and options.error.um is not None:
         sampling_error.check_gel(tools.target)
@@ -155,15 +170,16 @@ def convert(
             if options.sensor is None
             else options.sensor.gains_for(recording_path, finger, "--sensor", recording.sensor)
         )
-        signals = electrode_gains.prepare_unit(recording, options.prepare, unit)
+        needed = Needed.prepared(recording, frames, tools.posterior is not None, options.prepare, unit)
+        del recording  # of a long one most rows are not needed any more
     try:
         with atomic.new_folder(folder, overwrite=options.overwrite) as partial:
-            made = FramePass(recording, signals, frames, options.keep, tools, clock)
+            made = FramePass(needed, options.keep, tools, clock)
             made.write(partial, progress or _silent)
             added = _added(options, made)
             with clock.stage("sheet"):
                 made.draw_sheet(partial / results.SHEET)
-            origin = note(recording, made, options, tools)
+            origin = note(needed, made, options, tools)
             atomic.write_json(partial / results.NOTE, origin)
             machine = provenance.machine()
             timings = {**clock.per_frame(len(frames)), "frames": len(frames), "machine": machine}
@@ -194,14 +210,15 @@ def _silent(done: int, total: int) -> None:
     """Discard progress."""
 
 
-def note(recording: Recording, made: FramePass, options: Options, tools: Tools) -> dict:
+def note(needed: Needed, made: FramePass, options: Options, tools: Tools) -> dict:
     """Return the origin of a result for JSON: what the same input reproduces, so no paths and no time of day."""
+    recording = needed.recording
     prepare = None if options.prepare is None else dataclasses.asdict(options.prepare)
     return {
         "format": results.FORMAT,
         "recording": {
             "file": os.path.basename(recording.path), "sha256": provenance.sha256(recording.path),
-            "layout": recording.layout, "frames": len(recording), "simulated": recording.simulated,
+            "layout": recording.layout, "frames": needed.count, "simulated": recording.simulated,
             "about": {name: value for name, value in recording.about.items() if name != "scene"},  # the file holds it
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,

@@ -14,7 +14,7 @@ from ..files.png_writer import pack_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import folds_counted
 from ..recordings import flags
-from ..sensors import PRESSURE_PER_COUNT, SOURCE, TARGET, title
+from ..sensors import PRESSURE_PER_COUNT, SOURCE, TARGET, sensor_surface, title
 from ..sensors.camera import Camera
 from ..translation.answer import Answer
 from ..translation.card_errors import doubt
@@ -27,8 +27,9 @@ from .sampling_error import depth_share
 
 if TYPE_CHECKING:
     from ..pictures.marker_field import MarkerField
-    from ..recordings import Recording, Signals
+    from ..recordings import Signals
     from ..translation.translate import Translation
+    from .needed_rows import Needed
 
 Solver = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
 BLOCK = 2**16  # frames of signals alone that are looked at at a time
@@ -86,6 +87,11 @@ class Tools:
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """Draw the picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
         return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
+
+    def warm_up(self) -> None:
+        """Draw the resting gel, so that the next picture need not wait for what the first one makes."""
+        still = np.zeros((1, len(sensor_surface(self.target).rest), 3), np.float32)
+        self.draw(self.height_map(still)[0], still[0])
 
     def gel_of(self, translation: Translation) -> np.ndarray:
         """Return the displacements (T, M, 3) m of the gel that is drawn: the networks', or solved."""
@@ -150,19 +156,17 @@ class FramePass:
 
     def __init__(
         self,
-        recording: Recording,
-        signals: Signals,
-        frames: np.ndarray,
+        needed: Needed,
         keep: tuple[str, ...],
         tools: Tools,
         clock: Stopwatch,
     ) -> None:
-        """Take frames : (T,) indices into the recording, in order; keep : words of results.KEEPABLE."""
+        """Take needed : the selected frames; keep : words of results.KEEPABLE."""
         if "marker_motion" in keep:
             tools.needed_dots()
-        self.recording, self.signals, self.frames, self.keep = recording, signals, frames, keep
-        self.tools, self.clock = tools, clock
-        self._tracked = tools.tracked(self._read, len(recording))
+        self.recording, self.signals, self.frames, self.keep = needed.recording, needed.signals, needed.frames, keep
+        self.tools, self.clock, self._needed = tools, clock, needed
+        self._tracked = tools.tracked(self._read, needed.count)
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._errors: list[np.ndarray] = []
         self._pressure: list[np.ndarray] = []
@@ -170,9 +174,10 @@ class FramePass:
         self.folded = 0  # height maps of a gel that folds over itself
         self._packed: tuple[np.ndarray, bytes] | None = None  # the last picture, and its file
         self.share = 0.0  # the deepest move of a node so far, over the gel's thickness
-        parts = [frames[start : start + BLOCK] for start in range(0, len(frames), BLOCK)]
-        chosen = choose_frames(np.concatenate([np.abs(signals.change[part]).mean(axis=1) for part in parts]))
-        self.shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
+        change, rows = self.signals.change, needed.at(self.frames)
+        parts = [rows[start : start + BLOCK] for start in range(0, len(rows), BLOCK)]
+        chosen = choose_frames(np.concatenate([np.abs(change[part]).mean(axis=1) for part in parts]))
+        self.shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in self.frames[chosen]}
 
     def write(self, folder: Path, progress: Callable[[int, int], None]) -> None:
         """Write ``frames.h5`` and the pictures; `progress` is called with (frames done, frames in all)."""
@@ -252,12 +257,14 @@ class FramePass:
 
     def _translate(self, frames: np.ndarray) -> dict[str, np.ndarray]:
         """Translate some frames to all arrays, T first, by the names of frames.h5."""
+        rows = self._needed.at(frames)
         with self.clock.stage("translate"):
-            arrays = translated(self.signals.at(frames), self.tools, self._tracked, frames)
-        return arrays | {"frame": frames.astype(np.int32), "time": self.recording.time[frames]}
+            arrays = translated(self.signals.at(rows), self.tools, self._tracked, frames)
+        return arrays | {"frame": frames.astype(np.int32), "time": self.recording.time[rows]}
 
     def _read(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
-        return self.recording.time[start:stop], self.signals.at(slice(start, stop))
+        rows = self._needed.between(start, stop)
+        return self.recording.time[rows], self.signals.at(rows)
 
     def _draw(self, folder: Path, frames: np.ndarray, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Heights, as far as they are kept; pictures go to their files. Frames neither kept nor shown are skipped."""
@@ -299,21 +306,21 @@ class FramePass:
 
     def draw_sheet(self, path: Path) -> None:
         """Draw the contact sheet of the frames kept for it; call after `write`."""
-        shown = np.array(list(self.shown))
+        shown, rows = np.array(list(self.shown)), self._needed.at(self.frames)
         columns = {name: np.stack([at[name] for at in self.shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
         truth, timeless = self.recording.truth, bool(np.isnan(self.recording.time).all())
         skin = None if truth is None else truth.displacement_biotac
         contents = Contents(
             name=self.recording.name,
-            time=self.frames if timeless else self.recording.time[self.frames],
+            time=self.frames if timeless else self.recording.time[rows],
             snapshots=timeless,
-            electrodes=self.signals.change[self.frames],
+            electrodes=self.signals.change[rows],
             frames=np.searchsorted(self.frames, shown),
-            true_displacement_biotac=None if skin is None else skin[shown],
+            true_displacement_biotac=None if skin is None else skin[self._needed.at(shown)],
             simulated=self.recording.simulated,
             mount_shift=self.tools.answer.mount_shift,
             pressure=np.concatenate(self._pressure),
-            pressure_measured=PRESSURE_PER_COUNT * self.signals.pdc[self.frames],
+            pressure_measured=PRESSURE_PER_COUNT * self.signals.pdc[rows],
             warnings=self.warnings(),
             source=self.tools.source,
             **columns,

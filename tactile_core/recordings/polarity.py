@@ -17,6 +17,7 @@ from ..sensors import SOURCE, contacts_of, title
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, POLARITIES, RISES, Fluid
 from .flags import Flag
+from .rest_level import BLOCK, Framewise
 
 AUTO = "auto"
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a change says nothing
@@ -26,7 +27,6 @@ TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; belo
 SWING = 15.0
 FEWEST = 20  # frames; of fewer no slope is taken (assumed)
 MOST = 500  # frames looked at, evenly spread
-BLOCK = 2**16  # frames at a time, which bounds the memory of a long recording
 # By how much the likeness of the one sign must exceed the other's; or how much less of the change it must leave over,
 # as a share of what the other leaves: simulated contacts, with noise of 1.5 counts and gains 10 % apart, leave .41 of
 # it in the median, and 1 of 100 more than .7. A light touch that makes the skin bulge is like a firm one upside down,
@@ -91,7 +91,7 @@ def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
 
 
 def polarity_of(
-    change: np.ndarray, quiet: np.ndarray, electrodes: np.ndarray, pdc: np.ndarray | None, *,
+    change: Framewise, quiet: np.ndarray, electrodes: np.ndarray, pdc: np.ndarray | None, *,
     rest_known: bool = False, sensor: str = SOURCE,
 ) -> Polarity:  # fmt: skip
     """Detect the polarity of a signed recording; "falls" and not sure where it shows nothing.
@@ -132,7 +132,7 @@ def by_contacts(touches: np.ndarray, sensor: str = SOURCE) -> Polarity | None:
     return _decided(touches[spread_out(len(touches), MOST)], "the change in contact", sensor)
 
 
-def touching(change: np.ndarray) -> np.ndarray:
+def touching(change: Framewise) -> np.ndarray:
     """Mark (T,) bool the changes (T, 19) counts that are contacts."""
     found = np.empty(len(change), bool)
     for start in range(0, len(change), BLOCK):  # their squares would take as much memory as a long recording

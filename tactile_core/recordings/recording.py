@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,14 @@ class Truth(Summary):
     traction_digit: np.ndarray | None = None
     displacement: Mapping[str, np.ndarray] = field(default_factory=dict)
     traction: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def at(self, frames: np.ndarray) -> Truth:
+        """Return the values of some frames alone."""
+        held: dict[str, Any] = {name: value for name, value in vars(self).items() if value is not None}
+        for name, value in held.items():
+            arrays = isinstance(value, Mapping)
+            held[name] = {sensor: each[frames] for sensor, each in value.items()} if arrays else value[frames]
+        return replace(self, **held)
 
     @property
     def displacements(self) -> dict[str, np.ndarray]:
@@ -92,6 +100,12 @@ class Recording(Summary):
 
     def __len__(self) -> int:
         return len(self.electrodes)
+
+    def at(self, frames: np.ndarray) -> Recording:
+        """Return some frames alone; what was found in all of them, as warnings, stays."""
+        held: dict[str, Any] = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        rows = {name: value[frames] for name, value in held.items()}
+        return replace(self, **rows, truth=None if self.truth is None else self.truth.at(frames))
 
     @property
     def rate(self) -> float:

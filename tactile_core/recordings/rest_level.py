@@ -1,4 +1,4 @@
-"""Find the parts of a recording without contact, wherever they lie, and the rest level from them."""
+"""Find the parts of a recording without contact, wherever they lie, the rest level from them, and changes from it."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ TRACKED = 60.0  # s; over longer times drift is followed, or it would come to be
 TARED_LEVEL = 15.0  # counts that rest may have drifted from a tared file's own zero (assumed)
 TARED_PDC = 500.0  # counts; a lower median PDC has been tared too, so that its zero means no contact (assumed)
 LOWEST = 1.0  # percentile of PDC that is taken for rest where nothing is quiet: robust as a least value (assumed)
+BLOCK = 2**14  # frames whose changes are made at a time, which bounds the memory of a long recording
 NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is preferred as rest
 
 
@@ -108,20 +109,69 @@ def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slic
     return slice(start, start + n)
 
 
-def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> np.ndarray:
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """Readings without contact: levels (P, 19) counts at frames (P,), linear between them, constant outside."""
+
+    frames: np.ndarray
+    levels: np.ndarray
+
+    @classmethod
+    def constant(cls, counts: np.ndarray) -> Baseline:
+        """Make the baseline that is at counts (19,) in every frame."""
+        return cls(np.zeros(1), np.asarray(counts, float)[None])
+
+    def at(self, frames: np.ndarray) -> np.ndarray:
+        """Return the readings (n, 19) counts, not to be written to, in frames (n,)."""
+        if len(self.levels) == 1:
+            return np.broadcast_to(self.levels[0], (len(frames), self.levels.shape[1]))
+        found = np.empty((len(frames), self.levels.shape[1]))
+        for j, levels in enumerate(self.levels.T):
+            found[:, j] = np.interp(frames, self.frames, levels)
+        return found
+
+
+class Changes:
+    """Changes (T, e) counts, indexed like an array: of all frames of a long recording they take twice its memory.
+
+    count : T; of : frames (n,) -> their changes (n, e)
+    """
+
+    def __init__(self, count: int, of: Callable[[np.ndarray], np.ndarray]) -> None:
+        self._count, self._of = count, of
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, rows: slice | np.ndarray) -> np.ndarray:
+        frames = np.arange(self._count)[rows] if isinstance(rows, slice) else rows
+        first = self._of(frames[:BLOCK])
+        if len(frames) <= BLOCK:
+            return first
+        found = np.empty((len(frames), first.shape[1]))
+        found[:BLOCK] = first
+        for start in range(BLOCK, len(frames), BLOCK):
+            found[start : start + BLOCK] = self._of(frames[start : start + BLOCK])
+        return found
+
+    def then(self, function: Callable[[np.ndarray], np.ndarray]) -> Changes:
+        """Return these changes (n, e) converted by a function that takes each frame by itself."""
+        return Changes(self._count, lambda frames: function(self._of(frames)))
+
+
+Framewise = np.ndarray | Changes
+
+
+def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> Baseline:
     """Estimate the readings (T, 19) counts without contact.
 
     Level of each quiet part, linear between their middles, constant before the first and after the last: nothing is
     known there, and contact is never taken for drift. Without drift: one level over all quiet frames.
     """
     if not drift or len(quiet.parts) < 2:
-        return np.broadcast_to(level(electrodes[quiet.mask]), electrodes.shape)
-    middles = [0.5 * (a + b - 1) for a, b in quiet.parts]
-    levels = np.array([level(electrodes[a:b]) for a, b in quiet.parts])
-    index, found = np.arange(len(electrodes)), np.empty(electrodes.shape)
-    for j in range(electrodes.shape[1]):
-        found[:, j] = np.interp(index, middles, levels[:, j])
-    return found
+        return Baseline.constant(level(electrodes[quiet.mask]))
+    middles = np.array([0.5 * (a + b - 1) for a, b in quiet.parts])
+    return Baseline(middles, np.array([level(electrodes[a:b]) for a, b in quiet.parts]))
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,15 @@ from .assemble import check_electrodes
 from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
-from .polarity import AUTO, BLOCK, Polarity, choose, polarity_of, polarity_of_sensor, spread_out, touching
+from .polarity import AUTO, Polarity, choose, polarity_of, polarity_of_sensor, spread_out, touching
 from .recording import Recording
 from .repair import fill, find_glitches, is_time_series, smooth
 from .rest_level import (
+    BLOCK,
     TARED_PDC,
+    Baseline,
+    Changes,
+    Framewise,
     Quiet,
     baseline,
     calmest,
@@ -140,7 +145,7 @@ class Signals:
         Only raw readings show their unit's rest counts; other changes are not converted, nor are those of a sensor of
         which no unit has been seen at rest: see `relative_to`.
         """
-        if self._converted_to() is None:
+        if _typical_rest(self.kind, self.sensor) is None:
             return self.change
         found = np.empty(self.change.shape)
         for start in range(0, len(found), BLOCK):
@@ -153,16 +158,17 @@ class Signals:
 
     def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
         """Change (n, 19) counts of some frames alone, as ``typical`` has them."""
-        rest = self._converted_to()
-        return self.change[rows] if rest is None else divider.typical(self.change[rows], self.rest, rest)
-
-    def _converted_to(self) -> np.ndarray | None:
-        """Counts at rest (e,) of the unit that changes are converted to; None where they are not."""
-        return typical_rest(self.sensor) if self.kind == "raw" else None
+        return _typical(self.change[rows], self.kind, self.rest, self.sensor)
 
 
-def prepare(recording: Recording, options: PrepareOptions | None = None) -> Signals:
-    """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet."""
+EVERY = slice(None)  # frame
+
+
+def prepare(recording: Recording, options: PrepareOptions | None = None, frames: slice | np.ndarray = EVERY) -> Signals:
+    """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet.
+
+    frames : those whose signals are returned; all of the recording decide what they are
+    """
     options = options or PrepareOptions()
     options.check()
     check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes", recording.sensor)
@@ -171,9 +177,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
     kind, evidence = _kind(recording, readings, options)
     unit = _counts_per_unit(recording, readings, kind, options, warnings)
     readings = readings if unit == 1 else readings * unit
-    glitches = _glitches(recording, readings, options, warnings)
-    flags[glitches.any(axis=1)] |= np.uint16(Flag.REPAIRED)
-    readings = fill(readings, glitches | ~np.isfinite(recording.electrodes))
+    readings, flags, repaired = _repaired(recording, readings, flags, options, warnings)
     if kind == "rectified":
         flags |= np.uint16(Flag.RECTIFIED)
         warnings.append("the recording holds absolute changes (rectified): their sign is lost, and much of the place")
@@ -184,25 +188,29 @@ def prepare(recording: Recording, options: PrepareOptions | None = None) -> Sign
         if not quiet.parts:
             flags |= np.uint16(Flag.NO_QUIET_PART)
     else:
-        rest = np.broadcast_to(np.array(unit_rest.counts), readings.shape)
+        rest = Baseline.constant(np.array(unit_rest.counts))
         quiet = Quiet(np.zeros(len(readings), bool), (), "the unit's own rest: no calm part near it")
     flags |= saturated(recording, readings, kind, warnings) | dead(recording, readings, warnings)
-    slope = (rest[-1] - rest[0]) / recording.duration if recording.duration > 0 else np.zeros(rest.shape[1])
-    frames, at_start = _smoothed_over(options, kind), rest[0].copy()
-    change = smooth(np.subtract(readings, rest, out=rest if rest.flags.writeable else None), frames)
-    del rest  # whose memory the changes have now, where it had any of its own
+    at_start, at_end = rest.at(np.array([0, len(recording) - 1]))
+    slope = (at_end - at_start) / recording.duration if recording.duration > 0 else np.zeros(len(at_start))
+    window = _smoothed_over(options, kind)
+    change = _changes(readings, rest, window)
     polarity = _polarity(recording, readings, change, kind, quiet, options, rest_known=unit_rest is not None)
     flags |= np.uint16(polarity.doubt)
     warnings += polarity.warnings
-    report = _report(recording, kind, evidence, options, unit, glitches, quiet, slope) | {"smoothed_frames": frames}
-    report |= {"polarity": polarity.name, "polarity_evidence": polarity.evidence}
-    change *= polarity.sign
-    signals = Signals(
-        change=change, rest=at_start, drift=slope, electrodes=readings, kind=kind,
-        quiet=quiet.mask, flags=flags, pdc=_pressure_change(recording, kind, quiet, unit_rest),
-        warnings=tuple(warnings), report=report, sensor=recording.sensor,
+    change = change.then(partial(np.multiply, polarity.sign))
+    pdc = _pressure_change(recording, kind, quiet, unit_rest)
+    typical = change.then(lambda each: _typical(each, kind, at_start, recording.sensor))
+    flags, doubt = _doubt_law(typical, kind, quiet.mask, flags, pdc, recording.sensor)
+    report = _report(recording, kind, evidence, options, unit, quiet, slope) | repaired
+    report |= {
+        "smoothed_frames": window, "polarity": polarity.name, "polarity_evidence": polarity.evidence,
+    }  # fmt: skip
+    return Signals(
+        change=change[frames], rest=at_start.copy(), drift=slope, electrodes=readings[frames], kind=kind,
+        quiet=quiet.mask[frames], flags=flags[frames], pdc=pdc[frames],
+        warnings=(*warnings, *filter(None, [doubt])), report=report, sensor=recording.sensor,
     )  # fmt: skip
-    return doubt_law(signals)
 
 
 def doubt_law(signals: Signals) -> Signals:
@@ -210,22 +218,45 @@ def doubt_law(signals: Signals) -> Signals:
 
     Simulated ones of a sensor whose descriptor has none come with its weights: their law is not judged.
     """
-    if signals.kind not in ("raw", "tared") or contacts_of(signals.sensor) is None:
-        return signals
-    contact = ~signals.quiet
-    for start in range(0, len(contact), BLOCK):
-        rows = slice(start, start + BLOCK)
-        contact[rows] &= touching(signals.typical_of(rows))
+    typical = Changes(len(signals.change), signals.typical_of)
+    flags, doubt = _doubt_law(typical, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
+    others = tuple(text for text in signals.warnings if not text.startswith(contact_law.BEGINNING))
+    return replace(signals, flags=flags, warnings=(*others, *filter(None, [doubt])))
+
+
+def _doubt_law(
+    typical: Changes, kind: str, quiet: np.ndarray, flags: np.ndarray, pdc: np.ndarray, sensor: str
+) -> tuple[np.ndarray, str]:
+    """Return the flags (T,) of changes of a typical unit, and why their law is doubted; empty where it is not."""
+    if kind not in ("raw", "tared") or contacts_of(sensor) is None:
+        return flags, ""
+    contact = touching(typical) & ~quiet
     frames = np.flatnonzero(contact)
     seen = frames[spread_out(len(frames), contact_law.MOST)]
-    guessed = bool(signals.flags[0] & np.uint16(Flag.NO_QUIET_PART))  # then so is what pressure rose from
-    pressure = None if guessed else of_kind(signals.sensor, Fluid).readout.pressure * signals.pdc[seen]
-    words = contact_law.doubt(signals.typical_of(seen), pressure, signals.sensor)
-    flags = signals.flags & ~np.uint16(Flag.LAW_DOUBTED)
+    guessed = bool(flags[0] & np.uint16(Flag.NO_QUIET_PART))  # then so is what pressure rose from
+    pressure = None if guessed else of_kind(sensor, Fluid).readout.pressure * pdc[seen]
+    words = contact_law.doubt(typical[seen], pressure, sensor)
+    flags = flags & ~np.uint16(Flag.LAW_DOUBTED)
     if words:
         flags[contact] |= np.uint16(Flag.LAW_DOUBTED)
-    others = tuple(text for text in signals.warnings if not text.startswith(contact_law.BEGINNING))
-    return replace(signals, flags=flags, warnings=(*others, *filter(None, [words])))
+    return flags, words
+
+
+def _changes(readings: np.ndarray, rest: Baseline, window: int) -> Changes:
+    """Return the changes of readings (T, 19) against rest, smoothed over so many frames."""
+    change = Changes(len(readings), lambda frames: readings[frames] - rest.at(frames))
+    return change if window == 1 else Changes(len(readings), smooth(change[EVERY], window).__getitem__)
+
+
+def _typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
+    """Convert changes (n, 19) counts of a unit at rest counts (19,) to a typical one's, where they are raw."""
+    to = _typical_rest(kind, sensor)
+    return change if to is None else divider.typical(change, rest, to)
+
+
+def _typical_rest(kind: str, sensor: str) -> np.ndarray | None:
+    """Return the counts at rest (e,) of the unit that changes are converted to; None where they are not."""
+    return typical_rest(sensor) if kind == "raw" else None
 
 
 def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -> tuple[str, str]:
@@ -268,7 +299,7 @@ def _is_tared(pdc: np.ndarray, rest: float) -> bool:
 
 
 def _polarity(
-    recording: Recording, readings: np.ndarray, change: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions,
+    recording: Recording, readings: np.ndarray, change: Framewise, kind: str, quiet: Quiet, options: PrepareOptions,
     *, rest_known: bool,
 ) -> Polarity:  # fmt: skip
     if kind == "rectified":
@@ -301,6 +332,20 @@ def _counts_per_unit(
         " counts, so depths and forces are only relative; give counts_per_unit to fix it"
     )
     return factor
+
+
+def _repaired(
+    recording: Recording, readings: np.ndarray, flags: np.ndarray, options: PrepareOptions, warnings: list[str]
+) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
+    """Return the readings (T, 19) without glitches, the flags (T,), and what was repaired, for the report."""
+    glitches, unreadable = _glitches(recording, readings, options, warnings), ~np.isfinite(recording.electrodes)
+    flags = np.where(glitches.any(axis=1), flags | np.uint16(Flag.REPAIRED), flags)
+    bad = glitches | unreadable
+    return fill(readings, bad), flags, {
+        "samples_interpolated": int(unreadable.sum()),
+        "samples_glitch": int(glitches.sum()),
+        "rows_repaired": recording.rows[bad.any(axis=1)].tolist(),
+    }  # fmt: skip
 
 
 def _glitches(recording: Recording, readings: np.ndarray, options: PrepareOptions, warnings: list[str]) -> np.ndarray:
@@ -347,24 +392,24 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
 
 def _rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
-) -> np.ndarray:
-    """Rest (T, 19) counts to subtract."""
+) -> Baseline:
+    """Rest to subtract."""
     if quiet.parts:
         return baseline(
             readings, quiet, options.drift and kind != "rectified"
         )  # drift of a rectified signal has no sign
     if options.tare == "none":
         warnings.append("no tare, as asked for: the file's own zero is taken for rest")
-        return np.zeros(readings.shape)
+        return Baseline.constant(np.zeros(readings.shape[1]))
     if kind == "raw":
         guess = calmest(readings, recording.pdc, recording.rate)
         warnings.append(
             f"no quiet part ({quiet.evidence}): rest is guessed from the calmest {guess.stop - guess.start} frames, "
             f"{guess.start}:{guess.stop}"
         )
-        return np.broadcast_to(level(readings[guess]), readings.shape)
+        return Baseline.constant(level(readings[guess]))
     warnings.append(f"no quiet part ({quiet.evidence}): the file's own zero is taken for rest")
-    return np.zeros(readings.shape)
+    return Baseline.constant(np.zeros(readings.shape[1]))
 
 
 def _report(
@@ -373,11 +418,9 @@ def _report(
     evidence: str,
     options: PrepareOptions,
     unit: float,
-    glitches: np.ndarray,
     quiet: Quiet,
     slope: np.ndarray,
 ) -> dict[str, Any]:
-    unreadable = ~np.isfinite(recording.electrodes)
     return {
         "layout": recording.layout,
         "frames": len(recording),
@@ -392,7 +435,4 @@ def _report(
         "quiet_evidence": quiet.evidence,
         "drift_removed": bool(options.drift and len(quiet.parts) > 1 and kind != "rectified"),
         "drift_counts_per_s": [round(float(value), 4) for value in slope],
-        "samples_interpolated": int(unreadable.sum()),
-        "samples_glitch": int(glitches.sum()),
-        "rows_repaired": recording.rows[(glitches | unreadable).any(axis=1)].tolist(),
     }

@@ -102,6 +102,17 @@ def _force_of(log_ratio: np.ndarray, size: np.ndarray) -> np.ndarray:
     return np.arcsinh(np.exp(log_ratio) * np.maximum(size, LEAST_SIZE))
 
 
+def needed(frames: np.ndarray, count: int) -> np.ndarray:
+    """Return the frames (n,), out of `count`, whose posteriors decide the states of rising frames (T,)."""
+    blocks = np.unique(frames // BLOCK)
+    return np.unique(np.concatenate([np.arange(*_span(int(block), count)) for block in blocks]))
+
+
+def _span(block: int, count: int) -> tuple[int, int]:
+    """Return the first frame, and the one past the last, that a block and its margins hold."""
+    return max(block * BLOCK - MARGIN, 0), min((block + 1) * BLOCK + MARGIN, count)
+
+
 class Tracked:
     """States of the contact in a whole recording, computed on demand."""
 
@@ -118,10 +129,9 @@ class Tracked:
 
     def _block(self, block: int) -> np.ndarray:
         if self._kept is None or self._kept[0] != block:
-            first = block * BLOCK
-            start, stop = max(first - MARGIN, 0), min(first + BLOCK + MARGIN, self._count)
+            start, stop = _span(block, self._count)
             time, posterior = self._read(start, stop)
-            self._kept = block, track(posterior, time)[first - start :][:BLOCK]
+            self._kept = block, track(posterior, time)[block * BLOCK - start :][:BLOCK]
         return self._kept[1]
 
 

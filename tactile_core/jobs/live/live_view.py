@@ -59,6 +59,7 @@ class View:
         """Take the recording's rate, Hz, and what `LiveSignals` takes."""
         self._tools, self._signals, self._rate = tools, LiveSignals(rate, polarity, tare, unit, tools.source), rate
         self._follow = Follower()
+        tools.warm_up()  # else the first row would wait a second for it
         self.frames, self.passed = 0, 0
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
