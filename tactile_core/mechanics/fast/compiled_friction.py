@@ -7,7 +7,6 @@ import numpy as np
 from . import friction_loops as loops
 from .friction import (
     BEYOND,
-    BEYOND_WAVERING,
     FLAT,
     GAP_NOISE,
     MAX_ITERATIONS,
@@ -55,7 +54,7 @@ class CompiledFriction(Friction):
             active, slips, changed, settled, widest, wrong = loops.sort(
                 force, core, active, slips, normal, lean, off, gap, self.core_gap + core_moved, turned, stuck_again,
                 left, self.friction, LEAST_FORCE, GAP_NOISE, GAP_TOLERANCE, SLIP_TOLERANCE, SIDEWAYS_TOLERANCE, BEYOND,
-                BEYOND_WAVERING, WAVERS, axial_force is None,
+                self._spare(force), WAVERS, axial_force is None,
             )  # fmt: skip
             state.settled = settled and (axial_force is None or _bears(force, direction, axial_force))
             if state.settled:

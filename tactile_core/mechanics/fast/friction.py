@@ -25,8 +25,9 @@ MAX_ITERATIONS = 24  # most contacts take 3 to 7; smaller steps help those that 
 LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
 GAP_NOISE = 1e-9  # m: below what single precision of the compliance resolves
 BEYOND = 1e-9  # relative, by which a sticking force may pass its limit before the node slips
-# ... and may for nodes that have stuck again so often: at edges a node may slip backward as soon as it slips.
-BEYOND_WAVERING, WAVERS = 0.01, 2
+# Share of a contact's friction by which a node that has stuck again so often may pass its limit: at an edge a node may
+# slip backward as soon as it slips, and a detour for its sake takes ten times as long, and seldom leads nearer.
+WAVERING, WAVERS = 5e-3, 2
 NEARLY_CLOSED = 5e-6  # m, assumed: with larger gaps Newton's step in turning normals leads astray at edges
 FLAT = np.empty(0, int), np.empty((0, 3, 3))  # no node feels the curvature
 _MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # as without friction: nodes, and curvature x force x compliance
@@ -95,8 +96,8 @@ class Friction:
             points = self.rest + displacement
             (gap, turned), off = there.distance(self.indenter, points), self._off(points, there)
             slip = _across(off, normal)
-            beyond = np.where(stuck_again < WAVERS, BEYOND, BEYOND_WAVERING)
-            active, slips, changed = self._sort(guess, seen, slip, gap, self.core_gap + core_moved, beyond)
+            spare = np.where(stuck_again < WAVERS, LEAST_FORCE, self._spare(guess.force))
+            active, slips, changed = self._sort(guess, seen, slip, gap, self.core_gap + core_moved, spare)
             stuck_again += guess.slips & ~slips & active[:k]
             state = Try(
                 displacement, guess.force, guess.core, guess.shift, guess.active,
@@ -192,7 +193,7 @@ class Friction:
         step = (axial_force - float(force.sum(axis=0) @ self.pose.direction) - carried) / per_step
         return min(max(float(step), -LARGEST_STEP), LARGEST_STEP)
 
-    def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap, beyond):  # noqa: ANN001, ANN202
+    def _sort(self, guess: _Guess, seen: _Seen, slip, gap, core_gap, spare):  # noqa: ANN001, ANN202
         """Update which points (k + c,) touch and which nodes (k,) slip; returns true if either changed."""
         k = len(gap)
         pressing = dot(guess.force, seen.normal)
@@ -200,11 +201,15 @@ class Friction:
         active = np.where(guess.active, np.concatenate([pressing, guess.core]) >= -LEAST_FORCE, opening < -GAP_NOISE)
         held = active[:k] & guess.active[:k]
         over = lengths(guess.force - pressing[:, None] * seen.normal) > (
-            self.friction * pressing * (1 + beyond) + LEAST_FORCE
+            self.friction * pressing * (1 + BEYOND) + spare
         )
         slips = held & np.where(guess.slips, dot(slip, seen.lean) <= SLIP_TOLERANCE, over)
         wrong = (guess.active & ~active).any() or (opening[~guess.active] < -GAP_TOLERANCE).any()
         return active, slips, bool(wrong or (slips != guess.slips)[held].any())
+
+    def _spare(self, force: np.ndarray) -> float:
+        """Friction, N, that a wavering node may bear beyond its limit, of forces (k, 3) N."""
+        return max(WAVERING * self.friction * abs(float(force.sum(axis=0) @ self.pose.direction)), LEAST_FORCE)
 
     def _come_back(self, guess: _Guess, back: np.ndarray, slip: np.ndarray, normal: np.ndarray) -> None:
         """Let nodes (k,) bool that touch again slip: sticking drew them off the indenter before."""

@@ -254,7 +254,7 @@ def advance(  # noqa: ANN201
 
 def sort(  # noqa: ANN201
     force, core, active, slips, normal, lean, off, gap, core_gap, turned, stuck_again, left, friction, least, noise,  # noqa: ANN001
-    gap_tolerance, slip_tolerance, sideways_tolerance, beyond, beyond_wavering, wavers, may_be_empty,  # noqa: ANN001
+    gap_tolerance, slip_tolerance, sideways_tolerance, beyond, most_spare, wavers, may_be_empty,  # noqa: ANN001
 ):  # fmt: skip
     """Sort points into touching and slipping ones after a step, and check whether nodes are where they belong.
 
@@ -264,7 +264,7 @@ def sort(  # noqa: ANN201
     """
     new_active, new_slips, changed, any_active, deepest, widest, wide_slip, tilted, size = _sort_points(
         force, core, active, slips, normal, lean, off, gap, core_gap, turned, stuck_again, friction, least, noise,
-        gap_tolerance, slip_tolerance, beyond, beyond_wavering, wavers,
+        gap_tolerance, slip_tolerance, beyond, most_spare, wavers,
     )  # fmt: skip
     settled = not changed and (any_active or may_be_empty) and deepest >= -gap_tolerance and widest <= gap_tolerance
     if settled and wide_slip <= slip_tolerance and tilted <= sideways_tolerance * size:
@@ -276,7 +276,7 @@ def sort(  # noqa: ANN201
 @Loop
 def _sort_points(  # noqa: ANN202
     force, core, active, slips, normal, lean, off, gap, core_gap, turned, stuck_again, friction, least, noise,  # noqa: ANN001
-    gap_tolerance, slip_tolerance, beyond, beyond_wavering, wavers,  # noqa: ANN001
+    gap_tolerance, slip_tolerance, beyond, most_spare, wavers,  # noqa: ANN001
 ):  # fmt: skip
     """Sort points into touching and slipping ones, for `sort`.
 
@@ -307,11 +307,11 @@ def _sort_points(  # noqa: ANN202
         new_active[a] = touches
         changed |= (active[a] and not touches) or (not active[a] and gap[a] < -gap_tolerance)
         if touches and active[a]:
-            over = beyond if stuck_again[a] < wavers else beyond_wavering
+            spare = least if stuck_again[a] < wavers else most_spare
             if slips[a]:
                 new_slips[a] = slip_lean <= slip_tolerance
             else:
-                new_slips[a] = sideways > friction * pressing * (1 + over) + least
+                new_slips[a] = sideways > friction * pressing * (1 + beyond) + spare
             changed |= new_slips[a] != slips[a]
         if slips[a] and not new_slips[a] and touches:
             stuck_again[a] += 1
