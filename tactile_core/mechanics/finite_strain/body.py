@@ -48,23 +48,30 @@ class Body:
     core_nodes: np.ndarray
     graded: GradedMesh
 
-    def contact(self, indenter: Indenter, pose: Pose, depth: float, friction: float) -> FiniteStrainContact:
-        """An indenter in front of this body, which will come ``depth`` m in at most."""
+    def contact(
+        self, indenter: Indenter, pose: Pose, depth: float, friction: float, *, every_edge: bool = False
+    ) -> FiniteStrainContact:
+        """An indenter in front of this body, which will come ``depth`` m in at most.
+
+        every_edge : hold out edges between nodes, too, that come to lie too deep under the resting nodes to be seen
+            from them
+        """
         mesh = self.solid.mesh
         distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])
         near = mesh.surface[distance < _REACH]
+        poses = (pose, pose.moved(depth)) if every_edge else (pose.moved(depth),)
         return FiniteStrainContact(
             self.solid, near[~mesh.clamped[near]], indenter, pose, self.cavity, friction=friction,
             core=Core(self.sensor) if len(self.core_nodes) else None, inner=self.core_nodes,
             factor=self.graded.factor, tolerance=_FULL if self.tier == "full" else EXACT,
             first_share=_first_share(self.sensor),
-            faces=None if friction else self._faces(indenter, pose.moved(depth), near),  # friction holds nodes at edges
+            faces=None if friction else self._faces(indenter, poses, near),  # friction holds nodes at edges
         )  # fmt: skip
 
-    def _faces(self, indenter: Indenter, pose: Pose, near: np.ndarray) -> np.ndarray | None:
+    def _faces(self, indenter: Indenter, poses: tuple[Pose, ...], near: np.ndarray) -> np.ndarray | None:
         """The faces (f, 9) between nodes ``near`` an indenter, where those slide off it and faces can bend round it."""
         mesh = self.solid.mesh
-        if not BENDS <= sharpest(indenter, pose, mesh.nodes[near]) < BLUNT:
+        if not BENDS <= min(sharpest(indenter, pose, mesh.nodes[near]) for pose in poses) < BLUNT:
             return None
         faces = outer_faces(mesh)
         return faces[np.isin(faces, near).all(axis=1)]

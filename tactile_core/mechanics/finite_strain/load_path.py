@@ -51,6 +51,7 @@ class LoadPath:
         self.thickness, self.limit = thickness, limit
         self.spacing = 1.0  # of the mesh's nodes, over the tier's own
         self.fading = False  # true while a step goes by friction that fades
+        self.patient = False  # true where short steps, every edge held out, are all that is left
         self.way: list[Pose] = []  # what was solved, which friction remembers
         self.made_for = max(depths, default=0.0)
         self.deeper = 1.0  # how deep the last force was found, over the guess
@@ -59,9 +60,11 @@ class LoadPath:
     def _make(self) -> None:
         """The mesh, with nothing pressed yet."""
         self.body = graded_body(self.sensor, self.indenter, self.pose, self.made_for, self.tier, self.spacing)
-        self.problem = self.body.contact(self.indenter, self.pose, self.made_for, self.friction)
-        self.step = FRICTION_STEP if self.friction or self.spacing < 1 else ONE_STEP
-        if self.tier == "full" and not self.friction:
+        self.problem = self.body.contact(
+            self.indenter, self.pose, self.made_for, self.friction, every_edge=self.patient
+        )
+        self.step = FRICTION_STEP if self.friction or self.spacing < 1 or self.patient else ONE_STEP
+        if self.tier == "full" and not self.friction and not self.patient:
             self.problem.most_failures = _FEW_FAILURES[self.spacing < 1]
         self.last = self.problem.start()
 
@@ -69,7 +72,8 @@ class LoadPath:
         """See ``solve_path``. Where the full tier's mesh does not hold the indenter, on a finer one from the start.
 
         guess : m, about where a force is found
-        Without friction, where no mesh holds it, on the tier's own by a way with friction that fades.
+        Without friction, where no mesh holds it, on the tier's own by a way with friction that fades, and at last by
+        short steps.
         """
         before = self.last
         try:
@@ -95,12 +99,18 @@ class LoadPath:
         try:
             return self._to(step, guess)
         except _FAILURES:
-            raise failure from None
+            if self.tier != "full":
+                raise failure from None
         finally:
             self.fading = False
+        self._remake(1.0, patient=True)
+        try:
+            return self._to(step, guess)
+        except _FAILURES:
+            raise failure from None
 
-    def _remake(self, spacing: float) -> None:
-        self.spacing = spacing
+    def _remake(self, spacing: float, *, patient: bool = False) -> None:
+        self.spacing, self.patient = spacing, patient
         self._make()
         for pose in self.way if self.friction else ():
             self.last = self.problem.move(pose, self.last, self.step)

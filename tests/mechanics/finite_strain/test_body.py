@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tactile_core.geometry.indenters import Sphere
-from tactile_core.mechanics.finite_strain.body import _footprint
+from tactile_core.geometry.indenters import Cylinder, Sphere
+from tactile_core.mechanics.finite_strain.body import _footprint, graded_body
 from tactile_core.mechanics.placement import Placement, biotac_pose, digit_pose
 from tactile_core.sensors import biotac, digit
 
@@ -32,3 +32,13 @@ def test_a_deeper_ball_has_a_larger_footprint(sensor):
     pose = POSES[sensor](BALL, PLACE)
     sizes = [np.ptp([f.low[1], f.high[1]]) for f in (_footprint(sensor, BALL, pose, d) for d in (0.1e-3, 1.2e-3))]
     assert sizes[1] > 1.2 * sizes[0]
+
+
+def test_a_rim_that_hides_under_the_resting_nodes_is_held_out_too():
+    """Round a tilted punch deep in the gel, the resting nodes near it see its blunt side alone."""
+    punch, depth = Cylinder(1.75e-3, 0.4e-3), 1.1554e-3
+    pose = digit_pose(punch, Placement(-0.962e-3, -4.745e-3, tilt=0.1768, tilt_heading=3.6407))
+    body = graded_body("digit", punch, pose, depth)
+    assert body.contact(punch, pose, depth, 0.0)._between is None
+    assert body.contact(punch, pose, depth, 0.0, every_edge=True)._between is not None
+    assert body.contact(punch, pose, depth, 0.5, every_edge=True)._between is None

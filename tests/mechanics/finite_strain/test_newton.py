@@ -5,9 +5,9 @@ import pytest
 from slab import slab_mesh
 
 from tactile_core.errors import TactileError
-from tactile_core.geometry.indenters import Box, Pose, Sphere, pose_on
+from tactile_core.geometry.indenters import Box, Cylinder, Pose, Sphere, pose_on
 from tactile_core.mechanics.finite_strain import newton
-from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact, NoEquilibriumError
+from tactile_core.mechanics.finite_strain.newton import MOST_FAILURES, FiniteStrainContact, NoEquilibriumError
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.mechanics.solve import solve
@@ -166,3 +166,22 @@ def test_a_contact_that_no_mesh_holds_is_found_by_friction(monkeypatch):
         monkeypatch.setattr(FiniteStrainContact, "_solve", lambda *_: (_ for _ in ()).throw(FloatingPointError))
         monkeypatch.setattr(FiniteStrainContact, "move", move)
         solve("digit", ball, place, depth=0.1e-3, tier="full", friction=0.5)
+
+
+def test_a_contact_that_nothing_else_finds_is_found_by_short_steps(monkeypatch):
+    """2.587, 0.500 N : along y and z with half the spacing, in steps of 0.2 mm. Its rim hides under the resting nodes.
+
+    The ways before, which fail after three minutes, are refused at once.
+    """
+    move = FiniteStrainContact.move
+
+    def at_last(self, pose, start, step):
+        if self.friction or self.most_failures < MOST_FAILURES:
+            raise NoEquilibriumError("finite-strain solver", "no equilibrium", "a smaller depth")
+        return move(self, pose, start, step)
+
+    monkeypatch.setattr(FiniteStrainContact, "move", at_last)
+    place = Placement(-0.962e-3, -4.745e-3, tilt=0.1768, tilt_heading=3.6407)
+    found = solve("digit", Cylinder(1.75e-3, 0.4e-3), place, depth=1.1554e-3, tier="full", friction=0)
+    assert found.penetration < 1e-9
+    np.testing.assert_allclose(found.force[1:], [2.587, 0.5], rtol=0.01)
