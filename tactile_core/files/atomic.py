@@ -9,6 +9,7 @@ import os
 import re
 import secrets
 import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -26,10 +27,10 @@ _LONGEST = 200  # bytes of a name; with a dot, a word and a token it stays below
 def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]:
     """Yield a temporary path in the same folder; leaving the block flushes it to disk and moves it to `path`.
 
-    An error inside the block removes the temporary file and leaves what was at `path` untouched. A killed process
-    leaves `.<name>.tactile-partial`, which the next writer of the same file replaces.
+    Folders above it that are missing are made. An error inside the block removes what was made and leaves what was at
+    `path` untouched. A killed process leaves `.<name>.tactile-partial`, which the next writer of the file replaces.
     shared : several processes may write the same file at once; each has its own temporary name, and `sweep_files`
-        clears those of killed ones
+        clears those of killed ones. Their folder is there: where it was removed, the file is no longer wanted
     """
     path = Path(path)
     partial = _beside(path, "partial")
@@ -37,13 +38,14 @@ def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]
         partial = path.with_name(f".{_short(path.name)}.{secrets.token_hex(6)}.tactile-partial")
     if os.path.lexists(partial):  # a killed writer's, or what a stranger put there: a link would be written through
         partial.unlink()
-    try:
-        yield partial
-        _sync(partial)
-        os.replace(partial, path)
-    except BaseException:  # Ctrl-C, too; raised again
-        partial.unlink(missing_ok=True)
-        raise
+    with contextlib.nullcontext() if shared else _parents(path):
+        try:
+            yield partial
+            _sync(partial)
+            os.replace(partial, path)
+        except BaseException:  # Ctrl-C, too; raised again
+            partial.unlink(missing_ok=True)
+            raise
     _sync_folder(path.parent)
 
 
@@ -75,7 +77,7 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Ite
     """
     path = Path(os.path.abspath(path))
     partial, old = _beside(path, "partial"), _beside(path, "old")
-    with _locked(path):
+    with _parents(path), locked(path):
         _recover(path)
         if path.exists() and not overwrite:
             advice = "Name another one" + ("" if overwrite is None else ", or add --overwrite")
@@ -99,7 +101,7 @@ def sweep(folder: str | os.PathLike) -> None:
         if name in ("", ".", "..") or file.is_symlink() or not file.is_file():
             continue
         path = file.with_name(name)
-        with contextlib.suppress(TactileError), _locked(path):
+        with contextlib.suppress(TactileError), locked(path):
             _recover(path)
 
 
@@ -141,14 +143,17 @@ def _recover(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
+def locked(path: Path) -> Iterator[None]:
     """Hold the lock of a folder's only writer; raises TactileError when another process holds it."""
     file = _beside(path, "lock")
     while True:
         try:
             descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
-            raise TactileError(file, f"cannot be opened ({error.strerror})", "no file of others there") from error
+            if os.path.lexists(file):
+                raise TactileError(file, f"cannot be opened ({error.strerror})", "no file of others there") from error
+            found = f"cannot be written ({error.strerror})"
+            raise TactileError(path, found, "a place in a writable folder", "Name another one") from error
         try:
             lock.take(descriptor)
         except OSError:
@@ -198,7 +203,7 @@ def _sync_folder(path: Path) -> None:
 
 
 def claim(path: str | os.PathLike, advice: str = "Choose another name") -> None:
-    """Check before a long job that `path` is free and can be written; make its folder.
+    """Check before a long job that `path` is free and can be written; the folders that this needs are made later.
 
     advice : what to do where something is there
     Raises TactileError for an empty name, an existing file, or a folder that cannot be made or written.
@@ -212,10 +217,41 @@ def claim(path: str | os.PathLike, advice: str = "Choose another name") -> None:
     if os.path.lexists(path):
         raise TactileError(path, f"exists already ({_kind(path)})", "a new name", advice)
     with writing(path, "a place in a writable folder", "Choose another --out"):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        probe = _beside(path, "probe")
-        probe.touch()
-        probe.unlink()
+        probe(path.parent)
+
+
+def probe(folder: str | os.PathLike) -> None:
+    """Try to write in a folder, and leave nothing: one that is missing is made and removed. Raises OSError."""
+    made = _make_parents(Path(folder) / "probe")
+    try:
+        with tempfile.TemporaryFile(dir=os.fspath(folder)):
+            pass
+    finally:
+        _remove_empty(made)
+
+
+@contextlib.contextmanager
+def _parents(path: Path) -> Iterator[None]:
+    """Make the folders above a path; an error inside the block removes those that were missing and are empty."""
+    made = _make_parents(path)
+    try:
+        yield
+    except BaseException:  # Ctrl-C, too; raised again
+        _remove_empty(made)
+        raise
+
+
+def _make_parents(path: Path) -> list[Path]:
+    """Make the folders above a path; returns those that were missing, the innermost first."""
+    missing = [folder for folder in path.parents if not os.path.lexists(folder)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in folders:
+        with contextlib.suppress(OSError):  # it holds something
+            folder.rmdir()
 
 
 def _kind(path: Path) -> str:

@@ -12,10 +12,10 @@ from ..errors import TactileError
 def parse_frames(text: str) -> slice:
     """Parse ``"A:B:STEP"`` as in Python, with STEP above 0; raises TactileError for anything else."""
     if not re.fullmatch(r"(-?\d{1,9})?:(-?\d{1,9})?(:\d{0,9})?", text):
-        raise TactileError("--frames", repr(text), "A:B or A:B:STEP, such as 100:200 or ::10", "Give it that way")
+        raise TactileError("--frames", repr(text), "A:B or A:B:STEP, such as 100:200 or ::10")
     first, last, step = ([int(part) if part else None for part in text.split(":")] + [None])[:3]
     if step == 0:
-        raise TactileError("--frames", repr(text), "a STEP above 0", "Give it that way")
+        raise TactileError("--frames", repr(text), "a STEP above 0")
     return slice(first, last, step)
 
 

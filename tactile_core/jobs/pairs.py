@@ -41,6 +41,7 @@ GROWS = True
 BLOCK = 4  # presses a block: a few seconds of work
 COUNT = "count"  # the array of a block that says how many contacts it holds
 GROWTH = 8  # times as many blocks as there are, at most, are asked for at once: the estimate is better then
+MOST = 10**8  # contacts of a file, 4 TB
 IN_VAIN = 20  # blocks without a contact after which a scene is given up (assumed)
 
 
@@ -92,8 +93,8 @@ def plan(
     scene, text, inputs, files = scene_input.read_inputs(scene_path, ["presses"])
     if scene.pairs is None:
         raise TactileError(f"{scene_path}, pairs", "missing", "a [pairs] table", "See scenes/press_sphere/scene.toml")
-    if count < 1:
-        raise TactileError("--count", str(count), "at least 1")
+    if not 1 <= count <= MOST:
+        raise TactileError("--count", str(count), f"1 to {MOST:,}")
     for spec in scene.indenters:
         spec.build()  # an impossible one is refused before anything is written
     atomic.claim(out)

@@ -23,7 +23,7 @@ from ..files import atomic, provenance
 from ..files.png_writer import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import gel_mapper, of_unit
-from ..pictures.mitsuba.scene_file import camera_planes, write_scene
+from ..pictures.mitsuba.scene_file import camera_planes, scene_files, write_scene
 from ..pictures.mitsuba.variant import fitting
 from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, measured
 from ..pictures.renderer import Renderer
@@ -133,6 +133,9 @@ def render(
 def claimed(out: Path, options: Options) -> str:
     """Check that `out` may be written and return the preset; raises TactileError, as `choose_preset` does."""
     results.check_free(out, options.overwrite, MAKER)
+    if options.scene_out is not None and not options.overwrite:
+        for file in scene_files(options.scene_out):
+            atomic.claim(file, "Name another --scene-out, or add --overwrite")
     results.check_writable(out.parent)
     atomic.sweep(out.parent)
     return choose_preset(options)

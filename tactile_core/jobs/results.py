@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -44,7 +43,7 @@ def parse_keep(text: str) -> tuple[str, ...]:
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:
     """Return the result folder of each recording, after all checks that need no work.
 
-    Makes `out` where it is missing, and clears what killed runs left in it. Raises TactileError: an empty `out`,
+    Clears what killed runs left in `out`. Raises TactileError: an empty `out`,
     two recordings of the same name, a result that exists (unless `overwrite`), something that is no result in its
     place, a folder that cannot be written.
     """
@@ -88,11 +87,9 @@ def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
 
 
 def check_writable(out: Path) -> None:
-    """Make the folder and try a file in it; raises TactileError."""
+    """Raise TactileError for a folder that cannot be made, or written; one that is missing stays so."""
     with atomic.writing(out, advice="Name another --out, or allow writing"):
-        out.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=out):
-            pass
+        atomic.probe(out)
 
 
 def is_result(folder: Path, maker: str = "") -> bool:

@@ -109,11 +109,13 @@ def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np
     """Picture (H, W, 3) uint8 of an image file; raises TactileError for another file, or another size."""
     from PIL import Image
 
-    expected = f"an image file ({', '.join(FORMATS)})"
+    expected = f"an image file of 8 bits a colour ({', '.join(FORMATS)})"
     try:
         with outside.open_file(path, expected) as file, Image.open(file, formats=FORMATS) as image:
             if image.width * image.height > MOST_PIXELS:
                 raise ValueError(f"{image.width} x {image.height} pixels, over {MOST_PIXELS // 10**6} million")
+            if image.mode[0] in "IF":  # which would be cut off at 255
+                raise ValueError("more than 8 bits a pixel")
             picture = np.asarray(image.convert("RGB"))
     except TactileError:
         raise

@@ -104,10 +104,13 @@ def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.nd
 
 
 def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
-    """Raise TactileError for heights (H, W) m that reach an LED's middle or the camera."""
+    """Raise TactileError for heights (H, W) m that reach an LED's middle or the camera, or as far the other way."""
     lowest = min(unit.leds, key=lambda led: led.position[2])
     limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
     for what, limit in limits.items():
         if float(height.max()) >= limit:
             found = f"{height.max() * 1e3:.2f} mm high, {what} {limit * 1e3:.2f} mm"
             raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")
+    if float(height.min()) <= -unit.camera.apparent_height:
+        found, expected = f"{height.min() * 1e3:.2f} mm high", f"above {-1e3 * unit.camera.apparent_height:.2f} mm"
+        raise TactileError(name, found, expected, "Check that heights are in metres")

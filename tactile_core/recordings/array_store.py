@@ -148,6 +148,10 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
             for member in archive.infolist():
                 if member.filename.endswith(".npy"):
                     _check_packing(path, member)
+                    if member.filename[:-4] in shapes:
+                        raise TactileError(
+                            f"{path}, {member.filename}", "there twice", "each array once", "Save it again"
+                        )
                     with archive.open(member) as stream:
                         shapes[member.filename[:-4]] = _npy_header(stream)
 

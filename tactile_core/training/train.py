@@ -18,6 +18,7 @@ import numpy as np
 import torch
 
 from ..errors import TactileError
+from ..files import atomic
 from ..sensors import sensor_surface
 from ..simulation.pairs_file import Pairs, Split, read_pairs, split_presses
 from ..translation.contact_frame import ContactFrame, frame_of
@@ -75,9 +76,9 @@ def train(
         model = Model(options, contacts, generator).to(where)
         history = run_stages(model, contacts, seed, out / CHECKPOINT, progress or quiet)
         card = export(model, contacts, bodies, seed, out / "weights")
-    write_log(out / "log.csv", history)
-    draw_losses(out / "loss.png", history)
-    (out / CHECKPOINT).unlink()
+        write_log(out / "log.csv", history)
+        draw_losses(out / "loss.png", history)
+        (out / CHECKPOINT).unlink()
     return card
 
 
@@ -114,27 +115,27 @@ def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
 
 @contextmanager
 def prepared_folder(out: Path, overwrite: bool) -> Iterator[None]:
-    """Make the folder; what ends with an error leaves none that is new and empty.
+    """Make the folder, for one training at a time; what ends with an error leaves none that is new and empty.
 
-    Raises TactileError if it cannot be made or already holds weights: a checkpoint beside them is of a training that
-    was killed after it wrote them, and goes on.
+    Raises TactileError if it cannot be made, is being written, or already holds weights: a checkpoint beside them is of
+    a training that was killed after it wrote them, and goes on.
     """
-    finished = (out / "weights" / "card.json").exists() and not (out / CHECKPOINT).exists()
-    if finished and not overwrite:
-        raise TactileError(out, "already holds weights", "a new folder", "Choose another folder, or overwrite")
     new = [folder for folder in (out / "weights", out) if not folder.exists()]
     try:
         (out / "weights").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         advice = "Choose another folder"
         raise TactileError(out, f"cannot be made ({error.strerror})", "a writable folder", advice) from error
-    try:
-        yield
-    except BaseException:  # Ctrl-C, too; raised again
-        for folder in new:
-            with suppress(OSError):  # it holds a checkpoint
-                folder.rmdir()
-        raise
+    with atomic.locked(Path(os.path.abspath(out))):
+        try:
+            if (out / "weights" / "card.json").exists() and not (out / CHECKPOINT).exists() and not overwrite:
+                raise TactileError(out, "already holds weights", "a new folder", "Choose another folder, or overwrite")
+            yield
+        except BaseException:  # Ctrl-C, too; raised again
+            for folder in new:
+                with suppress(OSError):  # it holds a checkpoint
+                    folder.rmdir()
+            raise
 
 
 @contextmanager

@@ -202,7 +202,7 @@ def test_missing_weights_end_in_one_message(slide_csv, tmp_path):
     done = command("convert", slide_csv(), "--out", tmp_path / "out", "--weights", tmp_path / "none")
     assert done.returncode == 2
     assert only_line(done.stderr).startswith(f"tactile: error: {tmp_path / 'none'}")
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
 
 
 def test_weights_with_a_flipped_byte_end_in_one_message(slide_csv, tmp_path, capsys):
@@ -214,7 +214,7 @@ def test_weights_with_a_flipped_byte_end_in_one_message(slide_csv, tmp_path, cap
     status = main(["convert", str(slide_csv()), "--out", str(tmp_path / "out"), "--weights", str(copy)])
     assert status == 2
     assert "S2MPN.safetensors" in only_line(capsys.readouterr().err)
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_shipped_weights_convert_a_recording(slide_csv, tmp_path):
@@ -325,6 +325,14 @@ def test_an_option_is_written_out(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "unrecognized arguments: --frames" in said
     assert said.startswith("usage: tactile batch ")  # its own, which lists the options that it has
+
+
+def test_a_refused_conversion_leaves_no_folder(slide_csv, tmp_path, capsys):
+    (tmp_path / "weights").mkdir()
+    words = ["--weights", str(tmp_path / "weights"), "--out", str(tmp_path / "new" / "out")]
+    assert main(["convert", str(slide_csv(frames=5)), *words]) == 2
+    assert "card.json" in only_line(capsys.readouterr().err)
+    assert not (tmp_path / "new").exists()
 
 
 def test_what_to_open_after_a_conversion_is_told_once(tactile, slide_csv, tmp_path):

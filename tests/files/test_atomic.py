@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -177,3 +178,27 @@ def test_json_has_plain_lists_on_one_line_and_reads_back(tmp_path):
     text = (tmp_path / "a.json").read_text(encoding="utf-8")
     assert json.loads(text) == content and list(json.loads(text)) == sorted(content)
     assert "[1, 2]" in text and '"b": [0.25]' in text and len(text.splitlines()) < 24
+
+
+def test_what_is_refused_leaves_no_folder(tmp_path):
+    """Folders above a result are made when it is written, not when its name is checked."""
+    path = tmp_path / "new" / "deep" / "a.txt"
+    atomic.claim(path)
+    assert not list(tmp_path.iterdir())
+    for writer in (atomic.new_file, atomic.new_folder):
+        with pytest.raises(ValueError, match="half-way"), writer(path):
+            raise ValueError("half-way")
+        assert not list(tmp_path.iterdir())
+    atomic.write_bytes(path, b"x")
+    assert path.read_bytes() == b"x"
+
+
+def test_a_folder_under_a_file_is_refused_by_its_own_name(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    with (
+        pytest.raises(TactileError, match=rf"^{re.escape(str(tmp_path / 'file' / 'x'))}: cannot be written"),
+        atomic.writing(tmp_path / "file" / "x"),
+        atomic.new_folder(tmp_path / "file" / "x"),
+    ):
+        pass
+    assert (tmp_path / "file").read_text() == "mine"

@@ -377,3 +377,12 @@ def test_llvm_that_is_missing_is_named_with_what_to_do(render, heights, monkeypa
     status, _, err = render(heights, "--preset", "standard", "--variant", "llvm")
     assert status == 2 and "/no/such/libLLVM.so, which is not there" in err and "tactile doctor" in err
     assert render(heights, "--preset", "standard")[0] == 0  # by the other variant
+
+
+def test_a_scene_file_takes_no_other_file_s_place(render, heights, tmp_path):
+    for name in ("gel.xml", "gel.ply", "gel.camera.exr"):
+        (tmp_path / name).write_text("mine")
+        status, _, err = render(heights, "--scene-out", tmp_path / "gel.xml")
+        assert status == 2 and f"{name}: exists already (a file)" in err and "--overwrite" in err
+        assert not (tmp_path / "out").exists() and (tmp_path / name).read_text() == "mine"
+        (tmp_path / name).unlink()

@@ -189,6 +189,12 @@ def test_a_gel_that_reaches_the_camera_is_refused(any_variant, small):
         Renderer(high, "standard", any_variant).radiance(np.full(small.camera.shape, 5.2e-3))
 
 
+def test_heights_in_millimetres_are_refused(small):
+    """A dent of half a millimetre, as half a metre: away from the camera nothing else stops it."""
+    with pytest.raises(TactileError, match=r"-500\.00 mm high; expected above .* metres"):
+        Renderer(small, "fast")(np.full(small.camera.shape, -0.5))
+
+
 def test_an_unknown_preset_or_variant_is_refused(any_variant, small):
     with pytest.raises(TactileError, match="--preset"):
         Renderer(small, "best")

@@ -1,7 +1,9 @@
 """What is wrong with a file is said with its line and field; a bad frame is repaired, a bad file refused."""
 
+import io
 import os
 import stat
+import zipfile
 
 import h5py
 import numpy as np
@@ -187,6 +189,17 @@ def test_names_that_are_no_text_are_told(press, in_layout):
 def test_arrays_that_disagree_are_refused(tmp_path):
     np.savez(tmp_path / "a.npz", electrodes=np.zeros((5, 19)), time=np.zeros(4))
     with pytest.raises(TactileError, match=r"time: shape \(4,\); expected \(5\)"):
+        recordings.read(tmp_path / "a.npz")
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_an_array_that_is_there_twice_is_refused(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        for value in (3000, 2000):
+            content = io.BytesIO()
+            np.save(content, np.full((5, 19), value))
+            archive.writestr("electrodes.npy", content.getvalue())
+    with pytest.raises(TactileError, match=r"electrodes\.npy: there twice"):
         recordings.read(tmp_path / "a.npz")
 
 

@@ -199,6 +199,20 @@ def test_an_existing_result_is_kept(quick, pairs):
     assert files(quick) == before
 
 
+def test_two_trainings_do_not_share_a_folder(quick, pairs, tmp_path):
+    refused = []
+
+    def other(share, text):
+        if not refused:
+            with pytest.raises(TactileError, match="another process is writing it") as error:
+                train(pairs, tmp_path / "out", 3, QUICK, **SURFACES)
+            refused.append(error)
+
+    train(pairs, tmp_path / "out", 3, QUICK, progress=other, **SURFACES)
+    assert refused and files(tmp_path / "out") == files(quick)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
 def test_unusable_output_folder(pairs, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(TactileError, match="cannot be made"):

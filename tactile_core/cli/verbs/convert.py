@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
-from contextlib import suppress
 
 from ...errors import TactileError
 from ...files.threads import one_thread
@@ -104,7 +102,6 @@ def run(options: argparse.Namespace) -> int:
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     levels = None if budget is None else budget.levels
     preset = presets.FAST if levels is None else variant.fitting(levels)
-    made = not os.path.lexists(options.out)
     folders = results.result_folders(paths, options.out, options.overwrite)
     converted = []
     tools = convert.load_tools(
@@ -136,9 +133,6 @@ def run(options: argparse.Namespace) -> int:
     if converted:
         sheet = converted[0] / results.SHEET
         next_step(f"open {sheet}; the numbers of every frame are in {results.FRAMES} beside it")
-    if made and failed == len(folders):
-        with suppress(OSError):  # it holds something
-            os.rmdir(options.out)
     if failed and len(folders) > 1:
         complain(f"{failed} of {len(folders)} recordings were not converted")
     return 2 if failed else 0

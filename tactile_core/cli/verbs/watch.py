@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
+import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
@@ -156,11 +158,31 @@ def _check(options: argparse.Namespace) -> None:
             raise TactileError("--speed", f"{options.speed:g}", "--play or --rosbag-play beside it")
         if not 0 <= options.speed <= 1000:
             raise TactileError("--speed", f"{options.speed:g}", "0 to 1000")
+    if options.idle is not None and not 0 <= options.idle < math.inf:
+        raise TactileError("--idle", f"{options.idle:g}", "seconds, 0 or more")
+    if options.out is not None:
+        _check_out(options.out)
     if options.rosbag_play is not None:
         from ...recordings.readers import container_of
 
         if container_of(options.rosbag_play) != "bag":
             raise TactileError(options.rosbag_play, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")
+
+
+def _check_out(path: str) -> None:
+    """Raise TactileError for a place that no picture may take, before the first one is drawn: it would be lost."""
+    from ...files import atomic, outside
+    from ...files.png_writer import SIGNATURE
+
+    expected, advice = "a new file, or a PNG picture to replace", "Name another --out"
+    if os.path.isdir(path):
+        raise TactileError(path, "a folder", expected, advice)
+    with atomic.writing(path, "a file in a writable folder", advice):
+        if os.path.lexists(path):
+            with outside.open_file(path, expected) as file:
+                if file.read(len(SIGNATURE)) not in (SIGNATURE, b""):
+                    raise TactileError(path, "a file that is no PNG picture", expected, advice)
+        atomic.probe(os.path.dirname(path) or ".")
 
 
 def _unit(sensor: str | None, path: str, of: str) -> ElectrodeGains | None:

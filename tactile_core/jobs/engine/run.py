@@ -48,7 +48,7 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
     Raises TactileError where another job runs in it, or where it cannot be written.
     """
-    made = not folder.exists()
+    made, new = not folder.exists(), not (folder / lock.FILE).exists()
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
         stack = contextlib.ExitStack()
@@ -60,6 +60,8 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
         except BaseException:  # Ctrl-C, too; raised again
             if made and not (folder / jobs.PREPARED).exists():
                 _unmake(folder)
+            elif new and not jobs.exists(folder):  # a folder of others' files, which is left as it was
+                (folder / lock.FILE).unlink(missing_ok=True)
             raise
         finally:
             if folder.exists():

@@ -178,7 +178,7 @@ def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
 def _files(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise TactileError(folder, "is no folder", "a folder of photographs of a pressed ball")
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES)
     if not files:
         raise TactileError(folder, "no photographs", f"files that end in {', '.join(SUFFIXES)}")
     return files

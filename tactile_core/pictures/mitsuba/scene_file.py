@@ -43,29 +43,38 @@ _TAGS = {
 }  # fmt: skip
 
 
+def scene_files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
+    """Return the files of a scene: itself, the gel's shape and what the camera does beside it.
+
+    Raises TactileError for another ending than .xml.
+    """
+    path = Path(path)
+    if path.suffix != ".xml":
+        raise TactileError(path, f"the ending {path.suffix!r}", "a name that ends in .xml")
+    return path, path.with_suffix(".ply"), path.with_suffix(".camera.exr")
+
+
 def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarray) -> None:
     """Write the scene of heights (H, W) m of the unit's own gel; each file appears whole or not at all.
 
     Raises TactileError for another ending than .xml and for heights that are not finite.
     """
-    path = Path(path)
-    if path.suffix != ".xml":
-        raise TactileError(path, f"the ending {path.suffix!r}", "a name that ends in .xml")
+    path, shape, eye = scene_files(path)
     mesh, height_map = GelMesh(unit.camera, SPACING / 2), np.asarray(height_map, np.float32)
     check_mesh(mesh.vertices(height_map), mesh.faces, mesh.count)
     square = square_pixels(unit.camera)
-    atomic.write_bytes(path.with_suffix(".ply"), _ply(mesh, height_map))
+    atomic.write_bytes(shape, _ply(mesh, height_map))
     view = dataclasses.replace(unit, camera=square)
     rows = np.rint((np.arange(square.height) + 0.5) * unit.camera.height / square.height - 0.5).astype(int)
     seen = Perspective(unit.camera, height_map)(height_map)[rows]
     ambient = by_led(view, np.moveaxis(raised_light(view, seen), 0, -1)).sum(-1)
     spread = f"{unit.coating.spread / square.pixel_size[0]:.6g}"
     about = {"calibration": unit.unit, "coating_spread_px": spread}
-    write_exr(path.with_suffix(".camera.exr"), camera_planes(view, ambient), about)
+    write_exr(eye, camera_planes(view, ambient), about)
     content = {
         "integrator": {"type": "path", "max_depth": DEPTH, "hide_emitters": True},
         "eye": _eye(square),
-        "gel": {"type": "ply", "filename": path.with_suffix(".ply").name,
+        "gel": {"type": "ply", "filename": shape.name,
                 "coating": material(unit.coating, unit.gel_index)},
         **lamps(unit), **walls(unit, mesh),
     }  # fmt: skip

@@ -67,6 +67,14 @@ def test_shards_that_are_gone_or_exchanged_are_seen_and_made_anew(finished, do, 
     assert (done.made, done.kept) == (2, 3) and content(folder) == before
 
 
+def test_a_refused_job_leaves_the_folder_of_others_as_it_was(command, recordings, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("mine")
+    done = command(*recordings, "--out", tmp_path / "mine")
+    assert done.returncode == 2 and "holds thesis.txt, and no job" in done.stderr
+    assert [each.name for each in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
+
+
 def test_verify_says_what_is_missing_and_what_is_not_complete(command, recordings, tmp_path):
     out = tmp_path / "job"
     command(*recordings, "--out", out, "--shard-frames", "50", "--plan")

@@ -237,6 +237,8 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
         (["a.csv", "--play", "--speed", "-1"], "0 to 1000"),
         (["a.csv", "--play", "--speed", "nan"], "0 to 1000"),
         (["a.csv", "--serve", "70000"], "0 to 65535"),
+        (["a.csv", "--idle", "nan"], "--idle: nan; expected seconds, 0 or more"),
+        (["a.csv", "--idle", "-1"], "--idle: -1; expected seconds, 0 or more"),
         (["--rosbag-play", "none.bag"], "there is no such file"),
         (["--rosbag-play", __file__], "no bag"),
     ],
@@ -244,6 +246,16 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
 def test_words_that_do_not_go_together_are_told(words, said, capsys):
     assert main(["watch", *words]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_picture_takes_no_other_file_s_place(slide_csv, tmp_path, capsys):
+    """The recording itself would be lost when its first picture is drawn."""
+    path = slide_csv(frames=90)
+    before = path.read_bytes()
+    for out, said in ((path, "a file that is no PNG picture"), (tmp_path, "a folder"), (path / "now.png", "written")):
+        assert main(["watch", str(path), "--play", "--speed", "0", "--out", str(out)]) == 2
+        assert said in capsys.readouterr().err
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -1,5 +1,6 @@
 """Folders of photographs: what is read out of them, and what is refused."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,18 @@ def test_presses_hardly_pull_the_estimate(tmp_path: Path) -> None:
     error = np.abs(estimated_background(pictures) - 128)
     assert (error > 5).mean() < 0.002
     assert error.max() < 18
+
+
+def test_what_is_no_photograph_of_8_bits_is_named(folder: Path, tmp_path: Path) -> None:
+    """Pillow cuts 16 bits off at 255, all white; what is no file was passed over without a word."""
+    Image.fromarray(np.full((320, 240), 40000, np.uint16)).save(tmp_path / "deep.png")
+    (tmp_path / "loop.png").symlink_to("loop.png")
+    for name, said in (("deep.png", "more than 8 bits"), ("loop.png", "symbolic links")):
+        mixed = tmp_path / f"with_{name}"
+        shutil.copytree(folder, mixed)
+        shutil.copy(tmp_path / name, mixed, follow_symlinks=False)
+        with pytest.raises(TactileError, match=rf"{name}: cannot be read .*{said}"):
+            read_photographs(mixed)
 
 
 @pytest.mark.filterwarnings("error")
