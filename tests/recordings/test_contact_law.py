@@ -16,14 +16,38 @@ from tactile_core.recordings.signals import doubt_law
 from tactile_core.sensors import PRESSURE_PER_COUNT
 
 
-def share_doubted(law, contacts):
-    found = wrong_laws.recordings(True, contacts, law, seed=2)[:60]
+def share_doubted(law, contacts, recordings=60):
+    found = wrong_laws.recordings(True, contacts, law, seed=2)[:recordings]
     return np.mean([bool(contact_law.doubt(*each)) for each in found])
 
 
 @pytest.mark.parametrize("law", wrong_laws.WRONG.values(), ids=wrong_laws.WRONG)
 def test_a_hundred_contacts_of_a_wrong_law_are_doubted(law):
     assert share_doubted(law, contacts=100) >= wrong_laws.TARGET
+
+
+@pytest.mark.parametrize("law", [wrong_laws.doubled, wrong_laws.swapped])
+def test_twenty_contacts_show_wrong_gains_and_exchanged_electrodes(law):
+    assert share_doubted(law, wrong_laws.FROM, recordings=150) >= wrong_laws.TARGET
+    assert share_doubted(wrong_laws.right, wrong_laws.FROM, recordings=150) <= wrong_laws.ALARMS
+
+
+@pytest.mark.parametrize("pair", [(0, 5), (3, 12), (7, 16)])
+def test_the_electrodes_that_are_exchanged_are_named(pair):
+    change = wrong_laws.touches(odd=True)[0]
+    change = change[contact_law.touching(change)]
+    change[:, pair] = change[:, pair[::-1]]
+    less, found = contact_law.exchanged_share(change)
+    assert found == pair and less > contact_law.EXCHANGED
+    assert f"if E{pair[0] + 1} and E{pair[1] + 1} are exchanged" in contact_law.doubt(change)
+
+
+def test_one_contact_unlike_simulated_ones_says_nothing_of_gains_and_exchanges():
+    """Within one grip of a real finger, gains and exchanges explain what makes it unlike simulated contacts."""
+    noise = wrong_laws.NOISE * np.random.default_rng(0).standard_normal((200, 19))
+    grip = wrong_laws.touches(odd=True)[0][100] * np.where(np.arange(19) % 3, 1.0, 2.5) + noise
+    assert contact_law.apart(grip) < contact_law.FEWEST_APART and contact_law.exchanged_share(grip)[0] > 0
+    assert "gains" not in contact_law.doubt(grip) and "exchanged" not in contact_law.doubt(grip)
 
 
 def test_contacts_as_simulated_are_not_doubted():
