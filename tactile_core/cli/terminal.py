@@ -52,6 +52,7 @@ def printable(text: str) -> str:
 
 def next_step(text: str) -> None:
     """Print what the user may open or run next, on stderr: stdout holds the result's path alone, for scripts."""
+    flush()  # after the path, in a log that takes both
     say("next: " + text)
 
 

@@ -52,6 +52,12 @@ def test_a_full_disk_under_what_is_printed_is_named():
     assert said.count("\n") == 1
 
 
+def test_what_comes_next_stands_below_the_result_in_a_log(tmp_path):
+    command = [sys.executable, "-m", "tactile_core", "scenes", "copy", "press", "--out", str(tmp_path)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=True)
+    assert [line.partition(":")[0] for line in done.stdout.splitlines()] == [str(tmp_path / "press"), "tactile"]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="a shell closes it")
 def test_a_closed_output_is_no_error():
     command = ["sh", "-c", '"$@" >&-', "sh", sys.executable, "-m", "tactile_core", "scenes"]
