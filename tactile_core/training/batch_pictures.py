@@ -21,10 +21,10 @@ from ..pictures.shading import Shader, check_reach
 from ..recordings import Signals
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..translation.translate import Translator
-from .batch_heights import BatchHeights
-from .batch_light import BatchLamp, BatchSurface
-from .batch_networks import BatchNetworks
-from .batch_view import BatchView
+from .batch.batch_heights import BatchHeights
+from .batch.batch_light import BatchLamp, BatchSurface
+from .batch.batch_networks import BatchNetworks
+from .batch.batch_view import BatchView
 from .device import device_of
 from .trained_modules import keep
 

@@ -7,9 +7,9 @@ import math
 import torch
 from torch import Tensor, nn
 
-from ..pictures.cast_shadows import FREE, GRID_STEP, ShadowCaster, disc_tables, march_steps
+from ...pictures.cast_shadows import FREE, GRID_STEP, ShadowCaster, disc_tables, march_steps
+from ..trained_modules import keep
 from .batch_view import bilinear
-from .trained_modules import keep
 
 Span = tuple[Tensor, Tensor]  # first and last (B,) of rows or columns, of each frame
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from ..geometry.cubic_spline import EvenSpline
-from ..pictures.height_map import MOVE_ITERATIONS, MOVE_TOLERANCE, SMALLEST_AREA, HeightMapper
-from .trained_modules import keep
+from ...geometry.cubic_spline import EvenSpline
+from ...pictures.height_map import MOVE_ITERATIONS, MOVE_TOLERANCE, SMALLEST_AREA, HeightMapper
+from ..trained_modules import keep
 
 
 class BatchHeights(nn.Module):

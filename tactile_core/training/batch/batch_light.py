@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from torch import Tensor, nn
 
-from ..pictures.lamp_light import TANGENT_MARGIN, Lamp
-from ..pictures.perspective import Perspective
+from ...pictures.lamp_light import TANGENT_MARGIN, Lamp
+from ...pictures.perspective import Perspective
 from .batch_shadows import BatchShadows
 from .batch_view import slopes
 

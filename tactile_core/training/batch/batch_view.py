@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from ..pictures.perspective import STEEPEST, Perspective
-from ..sensors.camera import Camera
-from .trained_modules import keep
+from ...pictures.perspective import STEEPEST, Perspective
+from ...sensors.camera import Camera
+from ..trained_modules import keep
 
 
 class BatchView(nn.Module):
