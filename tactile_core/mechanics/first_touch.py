@@ -47,11 +47,23 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     Between nodes the surface is the lattice's cubic (Catmull-Rom) interpolation. Raises TactileError for an indenter
     that passes the sensor by.
     """
+    return _touched(lattice, indenter, pose)[0]
+
+
+def touching_point(lattice: Lattice, indenter: Indenter, touch: Pose) -> np.ndarray:
+    """Return the point (3,) m of the resting surface, at a node or between, that an indenter at first touch meets."""
+    there, points = _touched(lattice, indenter, touch)
+    return points[np.argmin(there.distance(indenter, points)[0])]
+
+
+def _touched(lattice: Lattice, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
+    """The pose at first touch, and points (j, 3) m of the surface of which it touches one."""
     rows, columns = lattice.shape
     met = in_front(lattice.axes, indenter, pose, closed=lattice.closed) if indenter.least_side < _NARROW else None
     pose, nodes = _on_nodes(lattice, np.empty((0, 3)) if met is None else met[1], indenter, pose)
     before_tip = nodes < len(lattice.rest)
     tip = np.empty((0, 2)) if met is None or before_tip.all() else met[0]
+    found = lattice.rest[nodes[before_tip]]
     nodes = nodes[nodes < rows * columns]
     places = np.concatenate([np.array(np.divmod(nodes, columns), float), tip.T], axis=1)
     for finer in _FINER if places.size else ():
@@ -63,9 +75,9 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
         if len(best) > 1:  # neighbours find the same place
             row, column = tried[:, best]
             best = best[np.unique(_MANY * row + column, return_index=True)[1]]
-        places = tried[:, best]
-        pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), points[best])
-    return pose
+        places, found = tried[:, best], points[best]
+        pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), found)
+    return pose, found
 
 
 def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:

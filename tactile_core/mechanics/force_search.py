@@ -27,8 +27,11 @@ class UnreachableError(TactileError):
 class _Pressed(Protocol):
     """A contact at a ``depth``, m, under a ``force`` (3,) N."""
 
-    depth: float
-    force: np.ndarray
+    @property
+    def depth(self) -> float: ...
+
+    @property
+    def force(self) -> np.ndarray: ...
 
 
 _Found = TypeVar("_Found", bound=_Pressed)

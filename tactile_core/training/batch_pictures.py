@@ -9,6 +9,8 @@ each frame is estimated alone, as by `Answer(frames_apart=True)`: tracking a con
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -91,6 +93,24 @@ class BatchPictures(nn.Module):
 
         Raises TactileError for a gel that reaches an LED.
         """
+        return self._in_blocks(self._drawn, displacement)
+
+    def forward(self, change: Tensor, rectified: Tensor, state: Tensor | None = None) -> Tensor:
+        """Map changes (B, e) counts to pictures (B, H, W, 3): `displacement`, then `pictures`, a block at a time."""
+        given = [change, rectified] if state is None else [change, rectified, state]
+        return self._in_blocks(lambda *block: self._drawn(self.displacement(*block)), *given)
+
+    def _in_blocks(self, draw: Callable[..., Tensor], *given: Tensor) -> Tensor:
+        """Pictures of frames (B, ...) drawn a block at a time; without gradients only their own memory grows."""
+        blocks = zip(*(each.split(BLOCKS[each.device.type]) for each in given), strict=True)
+        if torch.is_grad_enabled():
+            return torch.cat([draw(*block) for block in blocks])
+        pictures = self.background.new_empty(len(given[0]), *self.background.shape)
+        for place, block in zip(pictures.split(BLOCKS[pictures.device.type]), blocks, strict=True):
+            place.copy_(draw(*block))
+        return pictures
+
+    def _drawn(self, displacement: Tensor) -> Tensor:
         heights = self.heights(displacement) - self.sunk
         check_reach(heights.detach().amax(0).cpu().numpy(), self._shader.calibration, "height map")
         seen = self.view(heights)
@@ -99,12 +119,6 @@ class BatchPictures(nn.Module):
         radiance = self.spread(radiance * self.facing + self.raised * seen[:, None])
         change = torch.einsum("clhw,blhw->bhwc", self.response, radiance - self.rest_radiance)
         return (self.background + change).clamp(0, LARGEST_LEVEL) / LARGEST_LEVEL
-
-    def forward(self, change: Tensor, rectified: Tensor, state: Tensor | None = None) -> Tensor:
-        """Map changes (B, e) counts to pictures (B, H, W, 3): `displacement`, then `pictures`, a block at a time."""
-        given = [change, rectified] if state is None else [change, rectified, state]
-        blocks = zip(*(each.split(BLOCKS[each.device.type]) for each in given), strict=True)
-        return torch.cat([self.pictures(self.displacement(*block)) for block in blocks])
 
 
 class BatchSpread(nn.Module):

@@ -18,7 +18,7 @@ from tactile_core.recordings.flags import Flag  # noqa: E402
 from tactile_core.sensors.calibration import LARGEST_LEVEL  # noqa: E402
 from tactile_core.sensors.calibration_file import load_calibration  # noqa: E402
 from tactile_core.sensors.markers import Markers  # noqa: E402
-from tactile_core.training.batch_pictures import BatchPictures  # noqa: E402
+from tactile_core.training.batch_pictures import BLOCKS, BatchPictures  # noqa: E402
 from tactile_core.translation.answer import Answer  # noqa: E402
 from tactile_core.translation.translate import load_translator  # noqa: E402
 
@@ -157,6 +157,27 @@ def test_gradients_by_place_and_force_are_those_of_differences(translator, signa
     # Shadows go in steps of their table, which differences see and gradients do not: measured below 0.6 %.
     np.testing.assert_allclose(gradient, found, rtol=0.02)
     assert np.abs(gradient).min() > 1
+
+
+def test_frames_of_several_blocks_are_those_of_each(batch, signals):
+    """Pictures without gradients and with them, and the gradients."""
+    change, rectified = (each[15:21] for each in batch.changes(signals))
+    state = batch.state(change, rectified)
+
+    def drawn(parts):
+        given = state.clone().requires_grad_()
+        pictures = [batch(change[part], rectified[part], given[part]) for part in parts]
+        sum(each.square().sum() for each in pictures).backward()
+        with torch.no_grad():
+            without = torch.cat([batch(change[part], rectified[part], state[part]) for part in parts])
+        np.testing.assert_allclose(torch.cat(pictures).detach(), without, rtol=0, atol=1e-6)
+        return without, given.grad
+
+    assert BLOCKS["cpu"] == 4
+    whole, apart = drawn([slice(0, 6)]), drawn([slice(0, 4), slice(4, 6)])
+    np.testing.assert_allclose(whole[0], apart[0], rtol=0, atol=1e-6)  # single precision's rounding
+    np.testing.assert_allclose(whole[1], apart[1], rtol=1e-4, atol=1e-4 * float(apart[1].abs().max()))
+    assert whole[1].abs().max() > 1
 
 
 def test_gradients_by_the_displacement_are_those_of_differences(translator):
