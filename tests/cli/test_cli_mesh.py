@@ -60,7 +60,8 @@ def solved(monkeypatch):
 def test_the_resting_surface_is_written(sensor, mesh, tmp_path):
     import trimesh
 
-    assert mesh(sensor, "--out", "rest.ply") == (0, "rest.ply\n", "")
+    told = "tactile: next: open rest.ply in MeshLab or Blender; lengths are in metres\n"
+    assert mesh(sensor, "--out", "rest.ply") == (0, "rest.ply\n", told)
     lattice = sensors.biotac_surface() if sensor == "biotac" else sensors.digit_surface()
     read = trimesh.load(tmp_path / "rest.ply", process=False)
     np.testing.assert_array_equal(read.faces, lattice.faces)

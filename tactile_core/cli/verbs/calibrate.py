@@ -110,7 +110,8 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     from ...sensors.calibration_file import load_calibration, write_calibration
 
     start, diameter = load_calibration(options.start, options.gel), 1e-3 * options.ball_diameter
-    check_orientation(photographs, diameter, start)
+    with bar("the way the photographs lie", "way", options.progress) as progress:
+        check_orientation(photographs, diameter, start, progress)
     with bar("trial on held-out presses", "step", options.progress) as progress:
         apart = cross_validated(photographs, diameter, start, quick=options.quick, progress=progress)
     with bar("calibrate", "step", options.progress) as progress:

@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
-from ..terminal import say, tell
+from ..terminal import next_step, say, tell
 from .common import NOTHING
 
 if TYPE_CHECKING:
@@ -87,6 +87,8 @@ def run(options: argparse.Namespace) -> int:
     else:
         sensor_meshes.write_rest(options.out, options.sensor)
     tell(options.out)
+    volume = os.path.splitext(options.out)[1].lower() == ".vtu"
+    next_step(f"open {options.out} in {'ParaView' if volume else 'MeshLab or Blender'}; lengths are in metres")
     return 0
 
 

@@ -26,9 +26,15 @@ LOOKED_AT = 4  # presses, the plainest, from which their orientation is found
 CLEARLY = 0.8  # of what is unexplained as they are given, that another way may leave (assumed)
 
 
-def check_orientation(photographs: Photographs, ball_diameter: float, start: Calibration) -> None:
+def check_orientation(
+    photographs: Photographs,
+    ball_diameter: float,
+    start: Calibration,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
     """Raise TactileError for photographs that are explained clearly better when turned or mirrored; ball_diameter : m.
 
+    progress : called with (ways tried, in all)
     The other four of the eight ways change the pictures' shape, by which they are recognised.
     """
     plain = sorted(photographs.presses, key=lambda press: -float(np.square(press.change).sum()))[:LOOKED_AT]
@@ -36,11 +42,13 @@ def check_orientation(photographs: Photographs, ball_diameter: float, start: Cal
     factor = working_factor(unit.camera.width, unit.camera.height)
     bench = FastPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
     given = _median_unexplained(plain, bench, ball_diameter / 2)
-    for (rows, columns), name in WAYS.items():
+    for number, ((rows, columns), name) in enumerate(WAYS.items(), 1):
+        progress(number, len(WAYS) + 1)
         left = _median_unexplained([turned(press, rows, columns) for press in plain], bench, ball_diameter / 2)
         if left < CLEARLY * given:
             found = f"{name}: {100 * left:.0f} % of the presses is unexplained so, {100 * given:.0f} % as they are"
             raise TactileError(photographs.folder, found, "fingertip up, as the camera sees the gel", "Turn them")
+    progress(len(WAYS) + 1, len(WAYS) + 1)
 
 
 def _median_unexplained(presses: list[Press], bench: BallPictures, radius: float) -> float:
