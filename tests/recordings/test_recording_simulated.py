@@ -75,9 +75,14 @@ def test_an_interrupted_write_leaves_the_old_file(press, simulated, tmp_path, mo
     assert path.read_bytes() == before and os.listdir(tmp_path) == ["a.h5"]
 
 
-def test_a_folder_that_is_not_there(press, simulated, tmp_path):
+def test_a_folder_that_is_not_there_is_made(press, simulated, tmp_path):
+    assert recordings.write_simulated(tmp_path / "absent" / "a.h5", **simulated(press)).is_file()
+
+
+def test_a_folder_that_cannot_be_made(press, simulated, tmp_path):
+    (tmp_path / "file").touch()
     with pytest.raises(TactileError, match="a folder that can be written to"):
-        recordings.write_simulated(tmp_path / "absent" / "a.h5", **simulated(press))
+        recordings.write_simulated(tmp_path / "file" / "a.h5", **simulated(press))
 
 
 FULL_DISK = """
