@@ -32,8 +32,8 @@ class BatchField(nn.Module):
         wide = len(self.wide)
         local = (modes[:, :wide] @ self.wide).view(len(latent), -1, 3)
         grid = self._frame.rows * self._frame.columns
-        near = self._on_lattice(modes[:, wide:] @ self.near, cell)
-        along, inward, around = torch.cat([local[:, :grid] + near, local[:, grid:]], 1).unbind(-1)
+        local[:, :grid] += self._on_lattice(modes[:, wide:] @ self.near, cell)
+        along, inward, around = local.unbind(-1)
         shared = along, self.cosine * inward + self.sine * around, self.cosine * around - self.sine * inward
         return torch.stack(shared, -1)
 
