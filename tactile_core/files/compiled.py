@@ -7,6 +7,7 @@ disk, beside the source or in the user's cache, and read from there by the next 
 from __future__ import annotations
 
 import functools
+import gc
 import importlib.util
 import os
 from collections.abc import Callable
@@ -26,16 +27,24 @@ class Loop:
 
     def __init__(self, function: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
-        self._function = function
+        self._function, self._run = function, self._compile_and_run
 
     def __call__(self, *arguments: Any) -> Any:
         """Run it. Raises ModuleNotFoundError where numba is missing: ask ``available`` first."""
-        return self._compiled(*arguments)
+        return self._run(*arguments)
 
-    @functools.cached_property
-    def _compiled(self) -> Callable[..., Any]:
+    def _compile_and_run(self, *arguments: Any) -> Any:
         import numba
 
         # numpy's rules for a division by zero; no fast-math: the same numbers on every machine of a kind.
         # Without the wrapper for callers in C compiling takes a tenth less.
-        return numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(self._function)
+        run = numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(self._function)
+        collects = gc.isenabled()
+        gc.disable()  # of the many objects that compiling makes and keeps: another tenth
+        try:
+            found = run(*arguments)
+        finally:
+            if collects:
+                gc.enable()
+        self._run = run
+        return found

@@ -56,7 +56,7 @@ class Perspective:
             return self._from_above(height)
         if available():
             return seen_heights(
-                height, steepness, self.start, self.start_near, self.start_nearest, self.rows[:, 0],
+                height.ravel(), steepness.ravel(), self.start, self.start_near, self.start_nearest, self.rows[:, 0],
                 self.columns[0], self.inverse,
             )  # fmt: skip
         # Newton's method: the tangent plane at q near is h = at + turn (seen - h). One step on the nearest pixels of

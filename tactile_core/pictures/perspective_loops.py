@@ -39,18 +39,23 @@ def weigh_slopes(slope_right, slope_down, right, down):  # noqa: ANN001, ANN201
 
 @Loop
 def seen_heights(height, steepness, start, start_near, start_nearest, rows, columns, inverse):  # noqa: ANN001, ANN201
-    """See ``Perspective.__call__``; rows (H,), columns (W,) from the map's middle; inverse : 1/m, of the camera's."""
-    count, width = height.shape
+    """See ``Perspective.__call__``; height, steepness (H W,); rows (H,), columns (W,) from the map's middle.
+
+    inverse : 1/m, of the camera's apparent height
+    """
+    count, width = start.shape
     middle_row, middle_column = np.float32((count - 1) / 2), np.float32((width - 1) / 2)
     last_row, last_column = np.float32(2) * middle_row, np.float32(2) * middle_column
     one, half, least = np.float32(1), np.float32(0.5), np.float32(0)
-    flat_height, flat_steepness, found = height.ravel(), steepness.ravel(), np.empty_like(height)
-    turn, there, near, seen, row, column = np.empty((6, width), np.float32)  # by row: half the time of by pixel
-    nearest, first = np.empty(width, np.int32), np.empty(width, np.int32)  # half as long: twice as many at a time
+    found = np.empty((count, width), np.float32)
+    turn, there, near = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    seen, row, column = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    # By row: half the time of by pixel. In 32 bits: twice as many at a time.
+    nearest, first = np.empty(width, np.int32), np.empty(width, np.int32)
     wide, most_row, most_column = np.int32(width), np.int32(count - 2), np.int32(width - 2)
     for a in range(count):
         for b in range(width):
-            turn[b], there[b] = flat_steepness[start_nearest[a, b]], flat_height[start_nearest[a, b]]
+            turn[b], there[b] = steepness[start_nearest[a, b]], height[start_nearest[a, b]]
         for b in range(width):
             share = turn[b] / start_near[a, b]
             seen[b] = (there[b] + share * start[a, b]) / (one + share)
@@ -61,10 +66,10 @@ def seen_heights(height, steepness, start, start_near, start_nearest, rows, colu
             i, j = min(np.int32(lower), most_row), min(np.int32(right), most_column)
             row[b], column[b], first[b] = lower - np.float32(i), right - np.float32(j), i * wide + j
         for b in range(width):
-            turn[b], at = flat_steepness[nearest[b]], first[b]
-            upper = flat_height[at] + (flat_height[at + 1] - flat_height[at]) * column[b]
+            turn[b], at = steepness[nearest[b]], first[b]
+            upper = height[at] + (height[at + 1] - height[at]) * column[b]
             at += wide
-            lower = flat_height[at] + (flat_height[at + 1] - flat_height[at]) * column[b]
+            lower = height[at] + (height[at + 1] - height[at]) * column[b]
             there[b] = upper + (lower - upper) * row[b]
         for b in range(width):
             share = turn[b] / near[b]

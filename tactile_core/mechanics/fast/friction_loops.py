@@ -15,14 +15,19 @@ def respond(matrix, force, core):  # noqa: ANN001, ANN201
     """Compute the displacement (k, 3) m of nodes and motion (c,) m of the core's points under forces (k, 3), (c,) N."""
     k, c = force.shape[0], core.shape[0]
     size = 3 * k + c
-    moved = np.zeros(size)
+    moved, displacement, core_moved = np.zeros(size), np.empty((k, 3)), np.empty(c)
     for row in range(size):
         load = force[row // 3, row % 3] if row < 3 * k else core[row - 3 * k]
         if load != 0.0:
             line = matrix[row]
             for column in range(size):
                 moved[column] += load * line[column]
-    return moved[: 3 * k].copy().reshape(k, 3), moved[3 * k :].copy()
+    for a in range(k):
+        for i in range(3):
+            displacement[a, i] = moved[3 * a + i]
+    for p in range(c):
+        core_moved[p] = moved[3 * k + p]
+    return displacement, core_moved
 
 
 @Loop

@@ -31,7 +31,7 @@ def gather_rows(move, entries, at, rows, mirrored, columns, mirrored_columns):  
 
 @Loop
 def surface_motion(move, rows, mirrored, image, force, inner_move, inner, inner_force):  # noqa: ANN001, ANN201
-    """Compute the displacement (n, 3) float32, m, of the whole surface; see ``surface_response.displacement``.
+    """Compute the displacement (3 n,) float32, m, of the whole surface; see ``surface_response.displacement``.
 
     rows : (k,) of ``move`` for each node; mirrored : (k,) bool; image : (n,), of every surface node
     """
@@ -57,7 +57,7 @@ def surface_motion(move, rows, mirrored, image, force, inner_move, inner, inner_
             moved[3 * node] += there[other]
             moved[3 * node + 1] += there[other + 1]
             moved[3 * node + 2] -= there[other + 2]
-    return moved.reshape(-1, 3)
+    return moved
 
 
 @Loop

@@ -27,7 +27,8 @@ def displacement(
     rows, mirror, image = compliance.answers
     row, mirrored = rows[nodes], mirror[nodes]
     if available():
-        return surface_motion(compliance.move, row, mirrored, image, force, compliance.inner_move, inner, inner_force)
+        moved = surface_motion(compliance.move, row, mirrored, image, force, compliance.inner_move, inner, inner_force)
+        return moved.reshape(-1, 3)
     moved = _under(compliance, row[~mirrored], force[~mirrored])
     if mirrored.any():
         order = np.argsort(row[mirrored], kind="stable")
