@@ -204,7 +204,7 @@ def _spread(values: np.ndarray, n: int) -> np.ndarray:
 def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
-    sums, calm = np.empty((count, electrodes.shape[1]), np.float32), np.ones(count, bool)
+    sums, calm = np.zeros((count, electrodes.shape[1]), np.float32), np.ones(count, bool)
     for j, column in enumerate(electrodes.T):  # one at a time: sums of all would take seven times the recording
         column = column.astype(float)
         halves = _sums(column, half) / half
