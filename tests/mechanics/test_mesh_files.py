@@ -125,9 +125,11 @@ def test_bad_values_and_places_are_refused_and_nothing_is_left(tmp_path):
         write_ply(tmp_path / "a.ply", GEL.rest, GEL.faces, {"temperature": nan})
     with pytest.raises(TactileError, match="2867 rows"):
         write_cells(tmp_path / "a.vtu", GEL.rest, GEL.faces, mesh_files.TRIANGLE, {"short": np.zeros(3)})
-    with pytest.raises(TactileError, match="cannot be written"):
-        write_stl(tmp_path / "absent" / "a.stl", GEL.rest, GEL.faces)
     assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").touch()
+    with pytest.raises(TactileError, match="cannot be written"):
+        write_stl(tmp_path / "file" / "a.stl", GEL.rest, GEL.faces)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_vtk_reads_the_volume(sheared, tmp_path):

@@ -167,7 +167,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path):
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(TactileError, match="cannot be written"):
-        weights.write_bytes(tmp_path / "absent" / "net", b"")
+        weights.write_bytes(path / "net", b"")
 
 
 @pytest.mark.parametrize(("text", "message"), [("", "not JSON"), ("[]", "format"), ('{"format": "other"}', "'other'")])
