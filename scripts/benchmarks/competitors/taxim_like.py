@@ -12,7 +12,6 @@ import dataclasses
 import numpy as np
 
 from tactile_core.pictures.calibrate.ball_pictures import BallPictures, FastPictures, working_factor
-from tactile_core.pictures.calibrate.ball_print import print_on
 from tactile_core.pictures.calibrate.photo_metrics import metrics
 from tactile_core.pictures.calibrate.photographs import Photographs
 from tactile_core.pictures.calibrate.press_fit import Sight, fit_ball
@@ -71,7 +70,7 @@ def try_table(table: Table, calibration: Calibration, photographs: Photographs, 
     found = []
     for press in photographs.presses:
         ball, _ = fit_ball(working, Sight(press), radius)
-        picture = np.rint(photographs.background + whole.change(ball.numbers)).clip(0, 255)
+        picture = np.rint(photographs.background + press.drift + whole.change(ball.numbers)).clip(0, 255)
         found.append(metrics(picture, press.picture, photographs.background, press.region))
     return found
 
@@ -90,7 +89,7 @@ def _terms(bench: BallPictures) -> np.ndarray:
 
 def _bins(bench: BallPictures, ball: tuple[float, float, float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Bins (H, W) of the size and direction of the slope that the press adds."""
-    rise = print_on(bench.rest, bench.right, bench.down, ball) - bench.rest
+    rise = bench.heights(ball) - bench.rest
     along_right, along_down = slopes(rise, bench.camera)
     size = np.arctan(np.hypot(along_right, along_down)) / STEEPEST * SIZES
     direction = (np.arctan2(along_down, along_right) / (2 * np.pi) + 0.5) * DIRECTIONS

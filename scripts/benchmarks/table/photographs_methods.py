@@ -12,13 +12,11 @@ import numpy as np
 
 from tactile_core.accuracy import row
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures
-from tactile_core.pictures.calibrate.ball_print import print_on
-from tactile_core.pictures.calibrate.evaluate import Evaluation, evaluate_unit, mean_metrics
+from tactile_core.pictures.calibrate.evaluate import evaluate_unit, mean_metrics
 from tactile_core.pictures.calibrate.photo_metrics import metrics
-from tactile_core.pictures.calibrate.photographs import chosen, read_photographs
+from tactile_core.pictures.calibrate.photographs import Press, chosen, read_photographs
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.renderer import Renderer
-from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
 
 from ..competitors.taxim_like import TableBench, fit_table, try_table
@@ -47,12 +45,13 @@ def measure(name: str, quick: bool, presses: str) -> Method:
         ms = best_ms(lambda: change(tried[0].ball.numbers))
         each = try_table(table, unit, test, BALL)
     else:
-        renderer = Renderer(unit, name, background=test.background, rest=FastPictures(unit).rest)
+        pressed = FastPictures(unit)
+        renderer = Renderer(unit, name, background=test.background, rest=pressed.rest)
         label = name if name == "fast" else f"{name}_{choose_variant().name}"
-        heights = [_heights(unit, each) for each in tried]
+        heights = [pressed.heights(each.ball.numbers) for each in tried]
         ms = best_ms(lambda: renderer(heights[0]))
         each = [
-            metrics(renderer(height), one.press.picture, test.background, one.press.region)
+            metrics(_drifted(renderer(height), one.press), one.press.picture, test.background, one.press.region)
             for height, one in zip(heights, tried, strict=True)
         ]
     values = _means(each)
@@ -74,9 +73,9 @@ def measure(name: str, quick: bool, presses: str) -> Method:
     return Method("photographs", label, ms, peak_mb(), *error, f"{of}, mean error in the region", tuple(more))
 
 
-def _heights(unit: Calibration, tried: Evaluation) -> np.ndarray:
-    bench = FastPictures(unit)
-    return print_on(bench.rest, bench.right, bench.down, tried.ball.numbers).astype(np.float32)
+def _drifted(picture: np.ndarray, press: Press) -> np.ndarray:
+    """Add to a picture (H, W, 3) by how much the light had drifted in a photograph, as the baseline's does."""
+    return np.rint(picture + press.drift).clip(0, 255)
 
 
 def _means(rows: list[dict]) -> dict[str, float]:
