@@ -70,9 +70,9 @@ def march(field, foot, distance, radii, steps, grid_step):  # noqa: ANN001, ANN2
         horizon[:] = -np.inf
         for step in steps:
             scale = np.float32(1 / (step * grid_step))
-            for column in range(step, columns):
-                rise = (field[row, column - step] - field[row, column]) * scale
-                horizon[column] = max(horizon[column], rise)
+            before, here, highest = field[row, : columns - step], field[row, step:], horizon[step:]
+            for column in range(columns - step):  # of slices alone, which is vectorised
+                highest[column] = max(highest[column], (before[column] - here[column]) * scale)
         for column in range(columns):
             seen = ((foot - field[row, column]) / distance[column] - horizon[column]) * radii[row, column]
             sight[row, column] = min(max(seen, np.float32(-1)), np.float32(1))
