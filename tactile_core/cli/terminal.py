@@ -122,6 +122,7 @@ def _lines(name: str, unit: str) -> Callable[[int, int], None]:
     last = time.monotonic()
 
     def show(done: int, total: int) -> None:
+        """Print a line if the last one is long ago."""
         nonlocal last
         if time.monotonic() - last >= EVERY:
             last = time.monotonic()

@@ -82,7 +82,7 @@ def load_tools(
     if preset == "fast" and unit.markers is None:
         if unit.photograph:
             background.read_photograph(unit.photograph, unit.camera)  # a bad one is refused before any work
-        shade = OnDemand(partial(shading.Shader, unit))
+        shade = made_at_first_call(partial(shading.Shader, unit))
     else:
         from ..pictures.renderer import Renderer
 
@@ -116,14 +116,10 @@ def load_networks(
     return translator, gel == SOLVED or translator.target != target
 
 
-class OnDemand:
-    """A tool that is made at its first call, by `make`."""
-
-    def __init__(self, make: Callable[[], Callable[..., np.ndarray]]) -> None:
-        self._made = functools.cache(make)
-
-    def __call__(self, *arguments: np.ndarray) -> np.ndarray:
-        return self._made()(*arguments)
+def made_at_first_call(make: Callable[[], Callable[..., np.ndarray]]) -> Callable[..., np.ndarray]:
+    """Return a tool that `make` makes when it is first called."""
+    made = functools.cache(make)
+    return lambda *arguments: made()(*arguments)
 
 
 @dataclasses.dataclass(frozen=True)

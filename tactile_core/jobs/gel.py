@@ -26,7 +26,7 @@ from ..geometry.indenters.rigid_pose import rigid_pose
 from ..mechanics.fast.active_set import UnsolvedError, Work
 from ..mechanics.fast.compliance import Compliance, compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
-from ..mechanics.first_touch import first_touch
+from ..mechanics.first_touch import first_touch_on_line
 from ..mechanics.force_search import MOST_FORCE
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
@@ -233,24 +233,15 @@ class Gel:
         x, z : m, place of its origin in the sensor's frame. Raises TactileError where it passes the sensor by.
         """
         axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
-        return _matrix(self._first_touch(Pose(np.array([x, 0.0, z]), axes, PUSH)).moved(depth))
+        place = Pose(np.array([x, 0.0, z]), axes, PUSH)
+        return _matrix(first_touch_on_line(self.surface, self.indenter, place).moved(depth))
 
     def _touch_and_limit(self, pose: Pose) -> tuple[Pose, float]:
-        """See ``_first_touch``, and the greatest depth, m; both as before where the pose differs in depth alone."""
+        """Return the pose at first touch and the greatest depth, m: as before where the pose differs in depth alone."""
         if self._touch is None or not same_line(self._touch[0], pose):
-            touch = self._first_touch(pose)
+            touch = first_touch_on_line(self.surface, self.indenter, pose)
             self._touch = touch, DEPTH_LIMIT * thickness_under(self.sensor, self.indenter, touch)
         return self._touch
-
-    def _first_touch(self, pose: Pose) -> Pose:
-        """Find the first touch of an indenter that comes along +y; raises TactileError where it misses the sensor."""
-        in_front = self._foremost - pose.support(self.indenter, PUSH)[1]  # from there the search is short
-        return first_touch(self.surface, self.indenter, pose.moved(in_front))
-
-    @functools.cached_property
-    def _foremost(self) -> float:
-        """The y, m, of the surface's foremost node."""
-        return float(self.surface.rest[:, 1].min())
 
     @functools.cached_property
     def _renderer(self) -> Renderer:

@@ -50,6 +50,15 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     return _touched(lattice, indenter, pose)[0]
 
 
+def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
+    """Find the first touch of an indenter that comes along a pose's direction, wherever on that line the pose lies.
+
+    Raises TactileError where it passes the sensor by.
+    """
+    before = float((lattice.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
+    return first_touch(lattice, indenter, pose.moved(before))  # from just in front the search is short
+
+
 def touching_point(lattice: Lattice, indenter: Indenter, touch: Pose) -> np.ndarray:
     """Return the point (3,) m of the resting surface, at a node or between, that an indenter at first touch meets."""
     there, points = _touched(lattice, indenter, touch)

@@ -81,7 +81,7 @@ class _Change(NamedTuple):
     depth: np.ndarray
 
     def contact_after(self, straight: StraightPress, k: int, step: float) -> Contact:
-        """What the correction is found from, a ``step`` along the k-th motion: a contact that moves nothing itself."""
+        """Return the contact a ``step`` along the k-th motion, without its displacement, for the correction alone."""
         contact = straight.found.linear
         force = contact.nodal_force + step * self.force[..., k]
         found = dataclasses.replace(

@@ -9,7 +9,7 @@ from ..errors import TactileError
 from ..geometry.indenters import Indenter, Pose
 from .fast.compliance import compliance_of
 from .fast.press import CorrectedPress, FastContact
-from .first_touch import first_touch
+from .first_touch import first_touch_on_line
 from .force_search import MOST_FORCE, UnreachableError, touch_at_force, unreachable
 from .thickness import DEPTH_LIMIT, thickness_under
 
@@ -36,10 +36,8 @@ def straight_press(
         raise TactileError(f"{where}, force", f"{force:g} N", f"0 to {MOST_FORCE:g} N")
     if force is not None and force < _LEAST_FORCE:
         return None
-    surface = sensors.sensor_surface(sensor)
-    in_front = float((surface.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
     try:
-        touch = first_touch(surface, indenter, pose.moved(in_front))
+        touch = first_touch_on_line(sensors.sensor_surface(sensor), indenter, pose)
     except TactileError:
         if force is not None:
             raise
@@ -48,6 +46,7 @@ def straight_press(
     press = CorrectedPress(compliance_of(sensor), indenter, touch, limit, friction)
 
     def at_depth(depth: float, _: FastContact | None = None) -> FastContact:
+        """Press from nothing to a depth, m, past first touch."""
         press.last = None
         found = press.at_depth(depth, touch, touches=True)
         if not found.linear.converged:

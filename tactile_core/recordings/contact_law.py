@@ -12,9 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..sensors import SOURCE, contact_pressures_of
+from ..sensors import SOURCE, contact_pressures_of, contacts_of
+from ..sensors.descriptor import of_kind
+from ..sensors.fluid_sensor import Fluid
+from .flags import Flag
 from .gain_matching import match
 from .polarity import contact_signals, patterns, spread_out, touching, unit
+from .rest_level import Framewise
 
 MOST = 2000  # frames looked at, evenly spread
 MOST_MATCHED = 200  # of them by which gains are fitted, which takes longer
@@ -168,6 +172,24 @@ def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = 
             " filled to another pressure: forces are wrong by about as much"
         )
     return ""
+
+
+def flagged(
+    typical: Framewise, kind: str, quiet: np.ndarray, flags: np.ndarray, pdc: np.ndarray, sensor: str
+) -> tuple[np.ndarray, str]:
+    """Return the flags (T,) of changes of a typical unit, and why their law is doubted; empty where it is not."""
+    if kind not in ("raw", "tared") or contacts_of(sensor) is None:
+        return flags, ""
+    contact = touching(typical) & ~quiet
+    frames = np.flatnonzero(contact)
+    seen = frames[spread_out(len(frames), MOST)]
+    guessed = bool(flags[0] & np.uint16(Flag.NO_QUIET_PART))  # then so is what pressure rose from
+    pressure = None if guessed else of_kind(sensor, Fluid).readout.pressure * pdc[seen]
+    words = doubt(typical[seen], pressure, sensor)
+    flags = flags & ~np.uint16(Flag.LAW_DOUBTED)
+    if words:
+        flags[contact] |= np.uint16(Flag.LAW_DOUBTED)
+    return flags, words
 
 
 def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> str:

@@ -10,14 +10,13 @@ import numpy as np
 
 from ..errors import TactileError
 from ..sensors import SOURCE, contacts_of, divider, typical_rest
-from ..sensors.descriptor import of_kind
-from ..sensors.fluid_sensor import FALLS, POLARITIES, Fluid
+from ..sensors.fluid_sensor import FALLS, POLARITIES
 from . import contact_law
 from .assemble import check_electrodes
 from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
-from .polarity import AUTO, Polarity, choose, polarity_of, polarity_of_sensor, spread_out, touching
+from .polarity import AUTO, Polarity, choose, polarity_of, polarity_of_sensor
 from .recording import Recording
 from .repair import fill, find_glitches, is_time_series, smooth
 from .rest_level import (
@@ -161,7 +160,7 @@ class Signals:
         return _typical(self.change[rows], self.kind, self.rest, self.sensor)
 
 
-EVERY = slice(None)  # frame
+EVERY = slice(None)  # of a recording's frames
 
 
 def prepare(recording: Recording, options: PrepareOptions | None = None, frames: slice | np.ndarray = EVERY) -> Signals:
@@ -201,7 +200,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None, frames:
     change = change.then(partial(np.multiply, polarity.sign))
     pdc = _pressure_change(recording, kind, quiet, unit_rest)
     typical = change.then(lambda each: _typical(each, kind, at_start, recording.sensor))
-    flags, doubt = _doubt_law(typical, kind, quiet.mask, flags, pdc, recording.sensor)
+    flags, doubt = contact_law.flagged(typical, kind, quiet.mask, flags, pdc, recording.sensor)
     report = _report(recording, kind, evidence, options, unit, quiet, slope) | repaired
     report |= {
         "smoothed_frames": window, "polarity": polarity.name, "polarity_evidence": polarity.evidence,
@@ -219,27 +218,9 @@ def doubt_law(signals: Signals) -> Signals:
     Simulated ones of a sensor whose descriptor has none come with its weights: their law is not judged.
     """
     typical = Changes(len(signals.change), signals.typical_of)
-    flags, doubt = _doubt_law(typical, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
+    flags, doubt = contact_law.flagged(typical, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
     others = tuple(text for text in signals.warnings if not text.startswith(contact_law.BEGINNING))
     return replace(signals, flags=flags, warnings=(*others, *filter(None, [doubt])))
-
-
-def _doubt_law(
-    typical: Changes, kind: str, quiet: np.ndarray, flags: np.ndarray, pdc: np.ndarray, sensor: str
-) -> tuple[np.ndarray, str]:
-    """Return the flags (T,) of changes of a typical unit, and why their law is doubted; empty where it is not."""
-    if kind not in ("raw", "tared") or contacts_of(sensor) is None:
-        return flags, ""
-    contact = touching(typical) & ~quiet
-    frames = np.flatnonzero(contact)
-    seen = frames[spread_out(len(frames), contact_law.MOST)]
-    guessed = bool(flags[0] & np.uint16(Flag.NO_QUIET_PART))  # then so is what pressure rose from
-    pressure = None if guessed else of_kind(sensor, Fluid).readout.pressure * pdc[seen]
-    words = contact_law.doubt(typical[seen], pressure, sensor)
-    flags = flags & ~np.uint16(Flag.LAW_DOUBTED)
-    if words:
-        flags[contact] |= np.uint16(Flag.LAW_DOUBTED)
-    return flags, words
 
 
 def _changes(readings: np.ndarray, rest: Baseline, window: int) -> Changes:

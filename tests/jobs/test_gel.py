@@ -9,6 +9,7 @@ import trimesh
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Sphere
+from tactile_core.jobs import gel as gel_module
 from tactile_core.jobs.gel import FLAGS, Gel, GelContact
 from tactile_core.mechanics.fast.active_set import UnsolvedError
 from tactile_core.mechanics.fast.press import CorrectedPress
@@ -324,15 +325,14 @@ def test_meshes_and_sensors_that_cannot_be_are_refused():
 
 def test_first_touch_is_looked_for_once_a_line(monkeypatch):
     """It is the same at every depth, and costs as much as a small contact; numbers are those without it."""
-    gel, looked = Gel("digit", indenter=Sphere(3e-3)), []
-    whole = Gel._first_touch
+    gel, looked, whole = Gel("digit", indenter=Sphere(3e-3)), [], gel_module.first_touch_on_line
 
-    def first_touch(self, pose):
+    def first_touch_on_line(lattice, indenter, pose):
         looked.append(pose)
-        return whole(self, pose)
+        return whole(lattice, indenter, pose)
 
     pose = gel.touching(x=-8e-3, z=0.5e-3)
-    monkeypatch.setattr(Gel, "_first_touch", first_touch)
+    monkeypatch.setattr(gel_module, "first_touch_on_line", first_touch_on_line)
     forces = []
     for depth in (0.1e-3, 0.2e-3, 0.3e-3):
         there = pose.copy()

@@ -132,7 +132,8 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
     first = np.median(pictures, axis=0).astype(np.float32)
     touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
     rest = np.where(touched, np.nan, pictures.astype(np.float32))
-    rest[:, touched.all(axis=0)[..., 0]] = first[touched.all(axis=0)[..., 0]]  # all differ: no median of none
+    always = touched.all(axis=0)[..., 0]
+    rest[:, always] = first[always]  # where no picture is untouched there is nothing else to take a median of
     return np.nanmedian(rest, axis=0)
 
 
