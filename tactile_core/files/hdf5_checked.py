@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from ..errors import TactileError
 from . import outside
-from .hdf5_heaps import Heaps
+from .memory_bound import bounded_memory
 
 if TYPE_CHECKING:
     import h5py
@@ -23,11 +24,11 @@ MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk (assumed enough: HDF5 advi
 MAX_RATIO = 1032  # the most that deflate packs (zlib, technical details); lzf at most 88
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}  # that are undone; the numbers are HDF5's
 DEFLATE, CHECKSUM, STEP = 1, 3, 2**20
-WIDTHS = {2, 4, 8, 16, 32}  # bytes of an address and of a size; the library opens no file with others
 MOST_CHUNKS = 20_000  # read at a time: the library takes 4 kB for each while it reads, 80 MB
 MAX_DEPTH = 32  # groups within groups, whose names the library looks up again and again (assumed enough; ours have 2)
 MAX_PLAIN_CHUNK = 2**24  # bytes of a chunk in a file of our own; they have 0.2 MB
-SIGNATURE, LONGEST = b"\x89HDF\r\n\x1a\n", 256  # LONGEST: bytes of the widest superblock up to the root's address
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+MAX_OPENING = 128 * 2**20  # bytes that names and headers may take (assumed enough: the library keeps at most 32 MB)
 
 
 @contextmanager
@@ -39,66 +40,44 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
     most one chunk of memory beyond the row, reading a dataset takes its declared size, which the caller has to limit:
     see ``declared``.
     """
-    import h5py
-
-    with open_plain(path) as file:
-        file.visititems(lambda name, item: _check(path, name, item) if isinstance(item, h5py.Dataset) else None)
+    packed: list[tuple[str, h5py.Dataset, int, list[int]]] = []
+    with open_plain(path, lambda path, name, item: packed.extend(_check(path, name, item))) as file:
+        for name, data, size, filters in packed:  # what unpacks may take more memory than opening does
+            data.id.chunk_iter(functools.partial(_check_chunk, path, name, data, size=size, filters=filters))
         yield file
 
 
 @contextmanager
-def open_plain(path: str | os.PathLike) -> Iterator[h5py.File]:
+def open_plain(path: str | os.PathLike, look: Callable = lambda *_: None) -> Iterator[h5py.File]:
     """Open for reading, with values unchecked. Raises h5py's errors; TactileError for what `open_checked` refuses else.
 
-    Meant for files of plain numbers, see ``check_plain``. On two kinds of file, found by fuzzing, the HDF5 library
-    would use up all memory: one begins with a driver's information, for which the library takes up to 4 GB whatever
-    the file holds, and only files in several parts have it; the other has an endless free list, see ``hdf5_heaps``.
+    Meant for files of plain numbers, see ``check_plain``. Every object is opened once under `bounded_memory`: on two
+    kinds of file, found by fuzzing, the HDF5 library (up to 2.0) would use up all memory. One begins with a driver's
+    information of up to 4 GB; in the other, one changed byte makes a list of free places circular.
+
+    look : called with path, name and object, of every group and dataset
     """
     import h5py
 
+    outside.check(path, "an HDF5 file")
     with contextlib.ExitStack() as stack:
-        heaps = _heaps(path, stack)
-        file = stack.enter_context(h5py.File(path, "r"))
-        wrong = file.id.links.visit(lambda name, link: _link(path, heaps, name, link), info=True)
-        if wrong is not None:
-            raise wrong
+        with bounded_memory(MAX_OPENING):
+            file = stack.enter_context(h5py.File(path, "r"))
+            _visit(file.id.links, path, _check_link)
+            _visit(file, path, look)
         yield file
 
 
-def _heaps(path: str | os.PathLike, stack: contextlib.ExitStack) -> Heaps | None:
-    """Return the heaps of a file whose root may be opened, None for a file that the library does not open.
-
-    Raises TactileError, and OSError. Places in the superblock: HDF5 file format, II.A.
-    """
-    block, start = _superblock(path)
-    if not block:
-        return None
-    old = block[8] <= 1
-    width, length = block[13:15] if old else block[9:11]
-    if not {width, length} <= WIDTHS:
-        return None
-    fourth = (24 + 4 * block[8] if old else 12) + 3 * width  # the address of the driver's, in later ones of the root
-    if old and block[fourth : fourth + width].strip(b"\xff"):
-        raise _refused(path, "superblock", "a driver's information: a file in several parts", "one whole file")
-    root = fourth + width + length if old else fourth
-    heaps = stack.enter_context(Heaps(path, start, width, length))
-    wrong = heaps.check_object(int.from_bytes(block[root : root + width], "little"))
+def _visit(place: h5py.File | h5py.h5g.LinkProxy, path: str | os.PathLike, check: Callable) -> None:
+    """Call check(path, name, item) for all objects of a file, or all links; raises the first error that it returns."""
+    links = {} if hasattr(place, "visititems") else {"info": True}
+    visit = place.visit if links else place.visititems
+    try:
+        wrong = visit(lambda name, item: check(path, name, item), **links)
+    except (RuntimeError, MemoryError) as error:  # what the library says of what it cannot read
+        raise _refused(path, "its groups", str(error), f"a whole file, opened in {MAX_OPENING // 2**20} MB") from error
     if wrong is not None:
         raise wrong
-    return heaps
-
-
-def _superblock(path: str | os.PathLike) -> tuple[bytes, int]:
-    """Read the superblock and what follows it, LONGEST bytes, and where it begins; no bytes where there is none."""
-    with outside.open_file(path, "an HDF5 file") as file:
-        size, start = os.fstat(file.fileno()).st_size, 0
-        while start < size:
-            file.seek(start)
-            block = file.read(LONGEST)
-            if block.startswith(SIGNATURE):
-                return block.ljust(LONGEST, b"\xff"), start
-            start = 2 * start or 512  # where the library looks, too
-    return b"", 0
 
 
 def declared(data: h5py.Dataset, where: str) -> None:
@@ -140,7 +119,7 @@ def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
         raise _refused(path, name, f"chunks of shape {data.chunks}", f"at most {MAX_PLAIN_CHUNK // 2**20} MB")
 
 
-def _link(path: str | os.PathLike, heaps: Heaps | None, name: bytes, link: h5py.h5l.LinkInfo) -> TactileError | None:
+def _check_link(path: str | os.PathLike, name: bytes, link: h5py.h5l.LinkInfo) -> TactileError | None:
     """Return what is wrong with a link, before the library follows it, which ends the walk; None for a good one."""
     import h5py
 
@@ -148,26 +127,29 @@ def _link(path: str | os.PathLike, heaps: Heaps | None, name: bytes, link: h5py.
         return _refused(path, name[:40], f"groups over {MAX_DEPTH} deep", "a few")
     if link.type == h5py.h5l.TYPE_EXTERNAL:
         return _refused(path, name, "a link to another file", "data inside this file")
-    return heaps.check_object(link.u) if heaps and link.type == h5py.h5l.TYPE_HARD else None
+    return None
 
 
-def _check(path: str | os.PathLike, name: str | bytes, data: h5py.Dataset) -> None:
+def _check(path: str | os.PathLike, name: str, data: h5py.Dataset | h5py.Group) -> list:
+    """Refuse a dataset with values elsewhere, large chunks or strange filters; return it where it is to be unpacked.
+
+    That is a list of no or one name, dataset, size of a chunk in bytes and list of filters.
+    """
+    if not hasattr(data, "chunks"):
+        return []
     layout = data.id.get_create_plist()
     if layout.get_external_count() or data.is_virtual:
         raise _refused(path, name, "its values lie in other files", "data inside this file")
     if data.chunks is None:
-        return
-    size = data.dtype.itemsize
-    for length in data.chunks:
-        size *= length
+        return []
+    size = math.prod(data.chunks) * data.dtype.itemsize
     if size > MAX_CHUNK:
         raise _refused(path, name, f"chunks of {size / 2**20:.0f} MB", f"at most {MAX_CHUNK // 2**20} MB")
     filters = [layout.get_filter(index)[0] for index in range(layout.get_nfilters())]
     unknown = [number for number in filters if number not in FILTERS]
     if unknown:
         raise _refused(path, name, f"HDF5 filter {unknown[0]}", f"no other than {', '.join(FILTERS.values())}")
-    if filters:
-        data.id.chunk_iter(lambda chunk: _check_chunk(path, name, data, chunk, size, filters))
+    return [(name, data, size, filters)] if filters else []
 
 
 def _check_chunk(path, name, data, chunk, size: int, filters: list[int]) -> None:  # noqa: ANN001

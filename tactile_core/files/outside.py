@@ -6,7 +6,9 @@ Whatever opens a user's or a stranger's file goes through here; a library that o
 from __future__ import annotations
 
 import errno
+import json
 import os
+import re
 import stat
 from io import BufferedReader
 from pathlib import Path
@@ -16,6 +18,8 @@ from ..errors import TactileError
 KINDS = {
     stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
 }  # fmt: skip
+MOST_TEXT = 16 * 2**20  # bytes: a list of 100,000 paths, a scene of 100,000 points (assumed enough)
+MOST_DOTS = 100  # in a TOML key; tomllib's time grows with the square of them (Python 3.11 to 3.13)
 
 
 def check(path: str | os.PathLike, expected: str = "a regular file") -> os.stat_result:
@@ -45,6 +49,27 @@ def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -
     if len(content) > most:
         raise TactileError(path, f"more than {_size(most)}", f"{expected} of at most {_size(most)}")
     return content
+
+
+def read_small(path: str | os.PathLike, most: int = MOST_TEXT) -> str:
+    """Read the UTF-8 text of a file of at most `most` bytes; a byte order mark is skipped.
+
+    Raises OSError and UnicodeDecodeError, TactileError for a longer file, a pipe or a device.
+    """
+    return read(path, most, "a text file").decode("utf-8-sig")
+
+
+def toml_quoted(text: str) -> str:
+    """Quote text as a TOML basic string: JSON's escapes are valid there, its ASCII keeps names that are no UTF-8."""
+    return json.dumps(text.encode(errors="replace").decode())
+
+
+def read_toml_text(path: str | os.PathLike) -> str:
+    """Read a TOML file by `read_small`. Raises TactileError for a key of over a hundred parts, too."""
+    text = read_small(path)
+    if any(piece.count(".") > MOST_DOTS for piece in re.split(r"[=,#{}\[\]\n]", text)):
+        raise TactileError(path, f"a key of over {MOST_DOTS} parts", "short keys")
+    return text
 
 
 def inside(folder: str | os.PathLike, name: str, expected: str = "a regular file") -> Path:

@@ -17,7 +17,7 @@ from typing import Literal
 
 from ..errors import TactileError
 from ..files import atomic
-from ..files.text_file import read_small
+from ..files.outside import read_small
 from ..recordings.fingers import name_of
 
 FORMAT = "tactile-result-1"

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from ..errors import TactileError
 from ..files import atomic
-from ..files.text_file import read_toml_text
+from ..files.outside import read_toml_text
 from ..sensors import ELECTRODES
 from ..sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
 from .assemble import assemble, check_electrodes

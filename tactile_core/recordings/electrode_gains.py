@@ -13,7 +13,7 @@ from msgspec import Meta
 
 from ..errors import TactileError
 from ..files import atomic
-from ..files.text_file import read_toml_text, toml_quoted
+from ..files.outside import read_toml_text, toml_quoted
 from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid

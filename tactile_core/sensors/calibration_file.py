@@ -13,7 +13,7 @@ from typing import Any
 
 from ..errors import TactileError
 from ..files import atomic, outside
-from ..files.text_file import read_toml_text
+from ..files.outside import read_toml_text
 from . import digit
 from .calibration import AMBIENT_TERMS, PHOTOGRAPHED_TERMS, Calibration, Fit, Response
 from .calibration_text import FORMAT, as_text

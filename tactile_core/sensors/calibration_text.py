@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..files.text_file import toml_quoted
+from ..files.outside import toml_quoted
 from .calibration import Calibration, Fit, Response
 from .camera import COLOURS, Camera, Led
 from .coating import Coating

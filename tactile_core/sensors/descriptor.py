@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import TactileError
-from ..files.text_file import read_toml_text
+from ..files.outside import read_toml_text
 from .descriptor_fields import check_names, read_table, read_value, required
 from .fluid_sensor import Fluid
 from .gel_sensor import Gel

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import TactileError
-from ..files.text_file import read_small
+from ..files.outside import read_small
 
 _RADII = "x_mm,theta_deg,r_outer_mm,r_inner_mm,r_core_mm"
 _HEIGHTS = "x_mm,z_mm,top_height_mm,bottom_height_mm"

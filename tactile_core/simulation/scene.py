@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import Meta
 
 from ..errors import TactileError
-from ..files.text_file import read_toml_text
+from ..files.outside import read_toml_text
 from ..mechanics.placement import FRICTION
 from .indenter_specs import IndenterSpec, NotNegative, Positive, with_files_of
 

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.isaac import tet_file
 
 from tactile_core import recordings
-from tactile_core.files.text_file import MOST
+from tactile_core.files.outside import MOST_TEXT
 from tactile_core.geometry.indenters import mesh_file
 from tactile_core.jobs.engine import dask_cluster, inputs
 from tactile_core.jobs.gel_frames import read_frames
@@ -183,7 +183,7 @@ def test_scenes_name_no_files_outside_of_their_folder(way, tmp_path):
 
 LONG_TOML = {
     "brackets": b"a = " + b"[" * 10**6,  # a thousand times as deep as Python goes
-    "comment": b"#" * (2 * MOST),
+    "comment": b"#" * (2 * MOST_TEXT),
     "key": b"a" + b".a" * 10**6 + b" = 1",
     "number": b"a = " + b"9" * 5000,  # Python reads whole numbers of up to 4,300 digits
 }
@@ -248,5 +248,5 @@ def test_lists_of_inputs(tmp_path):
     (tmp_path / "list.txt").write_bytes(b"\xff\xfe" * 1000)
     refused(lambda path: inputs.find([f"@{path}"], tmp_path / "out"), tmp_path / "list.txt", "list.txt")
     with open(tmp_path / "list.txt", "wb") as file:
-        file.truncate(2 * MOST)
+        file.truncate(2 * MOST_TEXT)
     refused(lambda path: inputs.find([f"@{path}"], tmp_path / "out"), tmp_path / "list.txt", "list.txt")

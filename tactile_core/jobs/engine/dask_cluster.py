@@ -21,7 +21,7 @@ from typing import Any, Literal
 import msgspec
 
 from ...errors import TactileError
-from ...files.text_file import read_toml_text
+from ...files.outside import read_toml_text
 from . import tasks
 from .local import KILLS
 from .tasks import Reply, Task

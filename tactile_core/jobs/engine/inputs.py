@@ -15,7 +15,7 @@ import msgspec
 
 from ...errors import TactileError
 from ...files import provenance
-from ...files.text_file import read_small
+from ...files.outside import read_small
 from ...recordings.bag import MARK
 from ...recordings.fingers import name_of, split
 from ...recordings.readers import list_fingers

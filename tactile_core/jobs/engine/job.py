@@ -13,7 +13,7 @@ import msgspec
 
 from ...errors import TactileError
 from ...files import atomic, provenance
-from ...files.text_file import read_small
+from ...files.outside import read_small
 from ...files.version import __version__
 from ...recordings import electrode_gains
 from .. import results

@@ -12,7 +12,7 @@ import msgspec
 
 from ...errors import TactileError
 from ...files import atomic, checksummed
-from ...files.text_file import read_small
+from ...files.outside import read_small
 from . import job as jobs
 from . import kinds
 from .job import Job
