@@ -208,6 +208,8 @@ def _silent(done: int, total: int) -> None:
 
 def note(needed: Needed, made: FramePass, options: Options, tools: Tools) -> dict:
     """Return the origin of a result for JSON: what the same input reproduces, so no paths and no time of day."""
+    from ..recordings import labels
+
     recording = needed.recording
     prepare = None if options.prepare is None else dataclasses.asdict(options.prepare)
     return {
@@ -215,6 +217,7 @@ def note(needed: Needed, made: FramePass, options: Options, tools: Tools) -> dic
         "recording": {
             "file": os.path.basename(recording.path), "sha256": provenance.sha256(recording.path),
             "layout": recording.layout, "frames": needed.count, "simulated": recording.simulated,
+            "labels": labels.summary(recording.labels),
             "about": {name: value for name, value in recording.about.items() if name != "scene"},  # the file holds it
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,

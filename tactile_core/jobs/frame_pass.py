@@ -200,6 +200,8 @@ class FramePass:
                 self._keep_measures(arrays)
                 self._remember(frames, arrays)
                 progress(start + len(frames), len(self.frames))
+            rows = self._needed.at(self.frames)
+            file.write_labels({label: column[rows] for label, column in self.recording.labels.items()})
             file.annotate("time", start_time=self.recording.start_time)
             file.annotate("electrodes", rest=self.signals.rest, kind=self.signals.kind)
             if "marker_motion" in self.keep:

@@ -161,6 +161,14 @@ class FramesFile:
                     data = self._file[own] if own in self._file else self._create(name, array)
                     data[start : start + len(array)] = array
 
+    def write_labels(self, labels: dict[str, np.ndarray]) -> None:
+        """Write the group ``labels``: a dataset (T,) of UTF-8 text for each label of the converted frames."""
+        import h5py
+
+        with self._checked():
+            for name, column in labels.items():
+                self._file.create_dataset(f"labels/{name}", data=column, dtype=h5py.string_dtype(), track_times=False)
+
     def annotate(self, name: str, **attributes: Any) -> None:
         """Add attributes to a dataset that exists."""
         with self._checked():

@@ -24,6 +24,7 @@ from ..recordings import PrepareOptions, Recording, Signals, electrode_gains, pr
 from ..recordings.chunks import read_parts
 from ..recordings.fingers import split
 from ..recordings.flags import Flag
+from ..recordings.labels import Runs, extend
 from ..recordings.polarity import AUTO
 from ..recordings.signals import Rest
 from ..sensors import SOURCE
@@ -48,7 +49,10 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """Facts reported of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all."""
+    """Facts reported of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all
+
+    labels : of all frames; see ``recordings.labels``
+    """
 
     recording: str
     layout: str
@@ -60,6 +64,7 @@ class About(TypedDict):
     sha256: str
     frames: int
     sensor: NotRequired[str]
+    labels: NotRequired[Runs]
 
 
 def make(folder: Path, job: Job, index: int) -> tuple[int, bool]:
@@ -178,7 +183,7 @@ class _Writer:
     def __init__(self, file: h5py.File) -> None:
         self.count, self._file = 0, file
         self._parts: list[tuple[int, np.ndarray]] = []
-        self._about: dict[str, Any] = {"warnings": [], "prepared": []}
+        self._about: dict[str, Any] = {"warnings": [], "prepared": [], "labels": {}}
 
     def append(self, recording: Recording, signals: Signals, repeated: int) -> None:
         """Add the frames of a part that are new."""
@@ -203,6 +208,8 @@ class _Writer:
         self._parts.append((self.count, signals.rest))
         self._about["warnings"] += [text for text in signals.warnings if text not in self._about["warnings"]]
         self._about["prepared"].append(signals.report)
+        labels = {name: column[repeated:] for name, column in recording.labels.items()}
+        extend(self._about["labels"], labels, self.count, end)
         self.count = end
 
     def close(self, digest: str) -> None:

@@ -74,6 +74,7 @@ class Recording(Summary):
     pdc, tac, tdc : (T,) float or None, counts
     pac : (T, P) float or None, counts; P = 22 at 2,200 Hz, or what the file holds
     position, force : (T, 3) float or None, in the file's own frame and unit
+    labels : name -> (T,) object array of str, such as object, material or trial, which no translation reads
     warnings : sentences for the user
     about : other information in the file (simulated: sensor, scene, seed, made_by, note; BioTac SP: finger, labels)
     """
@@ -97,6 +98,7 @@ class Recording(Summary):
     truth: Truth | None = None
     about: dict[str, Any] = field(default_factory=dict)
     sensor: str = SOURCE
+    labels: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.electrodes)
@@ -105,7 +107,8 @@ class Recording(Summary):
         """Return some frames alone; what was found in all of them, as warnings, stays."""
         held: dict[str, Any] = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         rows = {name: value[frames] for name, value in held.items()}
-        return replace(self, **rows, truth=None if self.truth is None else self.truth.at(frames))
+        labels = {name: column[frames] for name, column in self.labels.items()}
+        return replace(self, **rows, labels=labels, truth=None if self.truth is None else self.truth.at(frames))
 
     @property
     def rate(self) -> float:

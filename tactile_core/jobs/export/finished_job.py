@@ -13,6 +13,7 @@ from ...errors import TactileError
 from ...files import checksummed
 from ...files.hdf5_checked import declared, open_checked
 from ...recordings.array_store import damage_reported
+from ...recordings.labels import unfold
 from .. import frame_shard
 from ..engine import job as jobs
 from ..engine import manifest
@@ -37,11 +38,15 @@ def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
 
 @dataclasses.dataclass(frozen=True)
 class Recorded:
-    """Recording of a finished job. name : its name in the job; frames : their number; shards : its files, in order."""
+    """Recording of a finished job. name : its name in the job; frames : their number; shards : its files, in order
+
+    labels : name -> (T,) object array of str
+    """
 
     name: str
     frames: int
     shards: tuple[Path, ...]
+    labels: dict[str, np.ndarray]
 
     def blocks(self) -> Iterator[dict[str, np.ndarray]]:
         """Yield all arrays of blocks of frames in order, by the names of ``frames_file``."""
@@ -97,11 +102,12 @@ def load(folder: Path) -> Finished:
         file = jobs.prepared_file(folder, one.name)
         if not file.exists():
             continue
-        frames = len(Prepared(file))
+        about = Prepared(file).about()
+        frames = about["frames"]
         paths = tuple(jobs.shard_file(folder, one.name, number) for number in range(frame_shard.count(frames, job)))
         for number, path in enumerate(paths):
             _check(path, job, index, number, frames)
-        recordings.append(Recorded(one.name, frames, paths))
+        recordings.append(Recorded(one.name, frames, paths, unfold(about.get("labels", {}))))
     _check_alike([path for one in recordings for path in one.shards])
     return Finished(folder, job.id, tuple(recordings), status.aside, manifest.warnings(folder))
 
