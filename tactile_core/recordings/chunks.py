@@ -10,10 +10,10 @@ from ..sensors import SOURCE, title
 from .array_store import Store, open_hdf5
 from .assemble import check_electrodes
 from .bag import open_bag, read_bag
-from .column_map import ColumnMap, refuse_other
 from .readers import layout_of, names, opened, read, table_reader
 from .recording import Recording
-from .table import read_header, read_tables
+from .tables.column_map import ColumnMap, refuse_other
+from .tables.table import read_header, read_tables
 
 TEXT_BYTES = 32 * 2**20  # a part's text: about 150,000 frames, 25 minutes at 100 Hz
 ARRAY_BYTES = 256 * 2**20  # of a part's arrays, as the file declares them; a simulated one has 150 kB a frame

@@ -21,12 +21,12 @@ from . import formats
 from .array_store import Store, open_hdf5, open_npz
 from .assemble import check_electrodes
 from .bag import START_BYTES, fingers_of, is_bag_folder, kind_of, open_bag, read_bag
-from .column_map import ColumnMap, read_mapped, refuse_other
 from .fingers import named, split
 from .matlab import START, START_OF_HDF5, open_matlab
 from .recording import Recording
-from .table import Table, read_header, read_table
-from .truncated_cell import shown
+from .tables.column_map import ColumnMap, read_mapped, refuse_other
+from .tables.table import Table, read_header, read_table
+from .tables.truncated_cell import shown
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"

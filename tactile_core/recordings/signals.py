@@ -13,7 +13,6 @@ from ..sensors import SOURCE, contacts_of, divider, typical_rest
 from ..sensors.fluid_sensor import FALLS, POLARITIES
 from . import contact_law
 from .assemble import check_electrodes
-from .column_map import ColumnMap
 from .electrode_faults import dead, saturated
 from .flags import Flag
 from .polarity import AUTO, Polarity, choose, polarity_of, polarity_of_sensor
@@ -35,6 +34,7 @@ from .rest_level import (
     window_frames,
 )
 from .signal_kind import KINDS, detect
+from .tables.column_map import ColumnMap
 
 LONGEST = 101  # frames, a second, to smooth over: beyond, touch itself is smoothed away (assumed)
 # Frames where the user gives none. Rectified signals need it: folded noise does not average out in the networks.

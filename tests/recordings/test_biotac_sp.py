@@ -16,8 +16,8 @@ from tactile_core.jobs import convert, frame_shard, prepared_signals
 from tactile_core.jobs.engine import inputs, recipes
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.recordings import PrepareOptions, electrode_gains, info
-from tactile_core.recordings.column_map import ColumnMap
 from tactile_core.recordings.readers import each_finger, sensor_of
+from tactile_core.recordings.tables.column_map import ColumnMap
 from tactile_core.translation.answer import Answer
 from tactile_core.translation.unit_rest import find_rest_sp
 

@@ -11,7 +11,8 @@ from conftest import SLIDE_HEADER
 from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.recordings import chunks, column_map
+from tactile_core.recordings import chunks
+from tactile_core.recordings.tables import column_map
 
 FRAMES = 120
 

@@ -10,8 +10,9 @@ import pytest
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
-from tactile_core.recordings import chunks, rest_level, table
-from tactile_core.recordings.column_map import ColumnMap
+from tactile_core.recordings import chunks, rest_level
+from tactile_core.recordings.tables import table
+from tactile_core.recordings.tables.column_map import ColumnMap
 
 
 def joined(path):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.recordings import table
 from tactile_core.recordings.info import describe
+from tactile_core.recordings.tables import table
 
 
 def test_a_good_recording(press, in_layout):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import TactileError
 
 if TYPE_CHECKING:
-    from ...recordings.column_map import ColumnMap
+    from ...recordings.tables.column_map import ColumnMap
 
 # What a stopped verb leaves.
 NOTHING = "no half file is left"
@@ -72,7 +72,7 @@ def columns_of(options: argparse.Namespace) -> ColumnMap | None:
     """Return the map that ``--columns`` names; None where it is not given."""
     if options.columns is None:
         return None
-    from ...recordings import column_map
+    from ...recordings.tables import column_map
 
     return column_map.read(options.columns)
 

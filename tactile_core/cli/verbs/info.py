@@ -85,9 +85,9 @@ def _unit(path: str) -> SensorFile:
 
 def _write_columns(options: argparse.Namespace) -> None:
     """Write the map that the first recording's column names suggest."""
-    from ...recordings import column_map
     from ...recordings.readers import opened
-    from ...recordings.table import read_header
+    from ...recordings.tables import column_map
+    from ...recordings.tables.table import read_header
 
     path = options.recordings[0]
     with opened(path) as (container, where, _, file):

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from ...jobs.live import DigitCamera, Shown, View
     from ...recordings import Recording
-    from ...recordings.column_map import ColumnMap
     from ...recordings.electrode_gains import ElectrodeGains
+    from ...recordings.tables.column_map import ColumnMap
 
     Rows = Iterator[tuple[Recording | None, float]]  # new rows and when they came; None now and then without any
     Output = Callable[[Shown, dict[str, np.ndarray]], bool]  # takes a frame and its pictures; false: it has ended
@@ -89,8 +89,8 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     from ...jobs import live
     from ...jobs.convert import load_tools
-    from ...recordings.column_map import refuse_other
     from ...recordings.readers import container_of, sensor_of_first
+    from ...recordings.tables.column_map import refuse_other
 
     _check(options)
     path = options.rosbag_play or options.recording

@@ -9,8 +9,8 @@ from msgspec import Meta
 
 from ...files.version import __version__
 from ...recordings import PrepareOptions
-from ...recordings.column_map import ColumnMap
 from ...recordings.electrode_gains import SensorFile
+from ...recordings.tables.column_map import ColumnMap
 from ...sensors import SOURCE, TARGET
 from ...translation.answer import Answer
 from ..results import TRANSLATED, Gel

@@ -10,11 +10,11 @@ import numpy as np
 from ...errors import TactileError
 from ...files import outside
 from ...recordings.assemble import MAX_BAD_SHARE, BadRows
-from ...recordings.column_map import ColumnMap
 from ...recordings.fingers import split
 from ...recordings.readers import table_reader
 from ...recordings.recording import Recording
-from ...recordings.table import Header, read_lines
+from ...recordings.tables.column_map import ColumnMap
+from ...recordings.tables.table import Header, read_lines
 from ...sensors import SOURCE
 
 MOST = 2**24  # bytes taken at a time, so that a file that is long already costs bounded memory

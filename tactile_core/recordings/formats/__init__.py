@@ -22,7 +22,7 @@ from ...sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
 from ..array_store import Store
 from ..assemble import assemble, check_electrodes
 from ..recording import Recording
-from ..table import Table
+from ..tables.table import Table
 
 
 def share(keys: Collection[str], wanted: Collection[str]) -> float:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from ...sensors import ELECTRODES
 from ..assemble import check_electrodes
 from ..recording import Recording
-from ..table import Table
+from ..tables.table import Table
 from . import of_table, share
 
 CONTAINER = "csv"

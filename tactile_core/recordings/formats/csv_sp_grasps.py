@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from ..recording import Recording
-from ..table import Table
+from ..tables.table import Table
 from . import fingers_of, of_finger, share_of_fingers
 
 CONTAINER, SENSOR = "csv", "biotac_sp"

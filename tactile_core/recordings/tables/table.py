@@ -10,8 +10,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..errors import TactileError
-from .assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
+from ...errors import TactileError
+from ..assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from .truncated_cell import doubt_last_cell, shown
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)

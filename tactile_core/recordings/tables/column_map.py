@@ -14,13 +14,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
-from ..errors import TactileError
-from ..files import atomic
-from ..files.outside import read_toml_text
-from ..sensors import ELECTRODES
-from ..sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
-from .assemble import assemble, check_electrodes
-from .recording import Recording
+from ...errors import TactileError
+from ...files import atomic
+from ...files.outside import read_toml_text
+from ...sensors import ELECTRODES
+from ...sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
+from ..assemble import assemble, check_electrodes
+from ..recording import Recording
 from .table import Table
 
 FORMAT = "tactile-columns-1"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .assemble import Problem
+from ..assemble import Problem
 
 SHOWN = 40  # characters of a cell or header that a message repeats
 
