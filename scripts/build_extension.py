@@ -28,7 +28,7 @@ PLATFORMS = {
 }
 PYTHONS = ("3.11", "3.13", "3.14")
 # Never torch (users translate with numpy), never numpy (Blender ships it).
-WHEELS = ("h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "mitsuba", "drjit")
+WHEELS = ("h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "mitsuba", "drjit", "threadpoolctl")
 PACKED = ("__init__.py", "blender_manifest.toml", "LICENSE", "addon/", "tactile_core/", "scenes/")
 LEFT_OUT = ("scenes/training/", "tactile_core/training/")  # 1.8 MB for tests; torch
 KEPT = ("tactile_core/training/__init__.py", "tactile_core/training/options.py")  # the verb `train` names its choices

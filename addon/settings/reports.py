@@ -18,6 +18,7 @@ MODULES = {
     "trimesh": "meshes as indenters",
     "rtree": "meshes as indenters",
     "mitsuba": "the Mitsuba presets",
+    "threadpoolctl": "simulating contacts",
 }
 ADVICE = "Install the extension's zip for this platform, which brings it"
 

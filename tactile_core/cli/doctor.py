@@ -45,6 +45,7 @@ LIBRARIES = (
     Library("matplotlib", "matplotlib", "", "contact sheets"),
     Library("msgspec", "msgspec", "", "scenes"),
     Library("tqdm", "tqdm", "", "progress bars"),
+    Library("threadpoolctl", "threadpoolctl", "", "the same bytes whatever the number of threads"),
     Library("mitsuba", "mitsuba", "render", "physically based pictures (tactile render)"),
     Library("OpenEXR", "OpenEXR", "render", "float pictures (tactile render --exr)"),
     Library("scipy", "scipy", "fem", "contact mechanics (tactile simulate, pairs, mesh --press)"),

@@ -1,19 +1,25 @@
-"""Limit numpy to one thread a process: for parallel workers, and where a user waits for each frame."""
+"""Limit linear algebra to one thread: the sums of several differ by rounding, and on small matrices they only wait."""
 
 from __future__ import annotations
 
 import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import threadpoolctl
 
 VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 ONE = dict.fromkeys(VARIABLES, "1")
 
 
-def one_thread() -> None:
-    """Keep numpy, if it is not imported yet, from computing in several threads, unless the user said how many.
+def one_thread() -> threadpoolctl.threadpool_limits:
+    """Keep linear algebra in one thread: libraries loaded later, by the environment, and those loaded already.
 
-    A single frame or contact is too small to gain by several, and on a busy machine they wait for each other while
-    using the processor: a live picture took four times the processor time, pairs of contacts five times, a conversion
-    2.6 times.
+    For good, or, as the context manager that is returned, for a block; the environment stays. The same input then gives
+    the same bytes in every process of a machine. A single frame or contact gains nothing by several threads: on a busy
+    machine a live picture took four times the processor time, pairs of contacts five times, a conversion 2.6 times.
     """
-    for name, count in ONE.items():
-        os.environ.setdefault(name, count)
+    import threadpoolctl
+
+    os.environ.update(ONE)
+    return threadpoolctl.threadpool_limits(1, user_api="blas")  # torch's own threads, of training, stay

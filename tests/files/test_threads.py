@@ -1,17 +1,21 @@
-"""Verbs that work frame by frame, or contact by contact, keep numpy from using several threads, which only wait."""
+"""Linear algebra stays in one thread: where verbs work frame by frame or contact by contact, and in a block."""
 
 import subprocess
 import sys
 
+import numpy as np  # noqa: F401 - loads a library of linear algebra
 import pytest
+import threadpoolctl
 from conftest import ROOT
+
+from tactile_core.files import threads
 
 SCENE = ROOT / "scenes" / "training"
 CODE = """
 import os, sys
 from tactile_core.files import threads
 whole = threads.one_thread
-threads.one_thread = lambda: print("numpy" in sys.modules, whole(), os.environ["OPENBLAS_NUM_THREADS"])
+threads.one_thread = lambda: print("numpy" in sys.modules, whole() and os.environ["OPENBLAS_NUM_THREADS"])
 from tactile_core.cli.main import main
 main(sys.argv[1:])
 """
@@ -19,13 +23,32 @@ main(sys.argv[1:])
 
 @pytest.mark.parametrize(
     "words",
-    ["convert absent.csv --out out", f"pairs {SCENE} --count 0 --out pairs.h5", "watch absent.csv --out now.png"],
+    [
+        "convert absent.csv --out out",
+        f"pairs {SCENE} --count 0 --out pairs.h5",
+        "watch absent.csv --out now.png",
+        "render absent.npz --out out",
+    ],
 )
 @pytest.mark.parametrize("given", ["", "3"])
 def test_numpy_is_told_before_it_is_imported(words, given, tmp_path, monkeypatch):
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    if given:  # the user's own word stands
+    if given:  # the bytes would differ from those of workers
         monkeypatch.setenv("OPENBLAS_NUM_THREADS", given)
     command = [sys.executable, "-c", CODE, *words.split()]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
-    assert done.stdout.splitlines()[0] == f"False None {given or 1}"
+    assert done.stdout.splitlines()[0] == "False 1"
+
+
+def test_libraries_that_are_loaded_are_limited_and_have_their_threads_back(monkeypatch):
+    for name in threads.ONE:  # restored after the test
+        monkeypatch.setenv(name, "2")
+    with threadpoolctl.threadpool_limits(2, user_api="blas"):
+        before = counts()
+        with threads.one_thread():
+            assert set(counts()) <= {1}
+        assert counts() == before
+
+
+def counts():
+    return [each["num_threads"] for each in threadpoolctl.threadpool_info() if each["user_api"] == "blas"]

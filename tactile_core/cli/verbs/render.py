@@ -7,6 +7,7 @@ import re
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
+from ...files.threads import one_thread
 from ..terminal import bar, next_step, say, tell
 from . import engine
 from .common import NOTHING, PRESETS, error_argument, progress_argument
@@ -78,6 +79,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Render the pictures; returns the exit status."""
+    one_thread()  # before numpy is imported
     engine.check_counts(options, "workers", "restart")
     size = _size(options.size)
     from ...jobs import frame_range, render

@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 
 from ...errors import TactileError
+from ...files.threads import one_thread
 from . import disk_room, kinds
 from . import job as jobs
 
@@ -42,10 +43,17 @@ def name(job: jobs.Job, task: Task) -> str:
 def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
     """Do a task of the job in `folder`; both sides plain data, so that JSON and Dask carry them alike.
 
-    Never raises what the task's input or the disk brings about: the reply says it.
+    Never raises what the task's input or the disk brings about: the reply says it. From here on this process, which
+    may be anybody's, keeps linear algebra in one thread, as the bytes would else depend on who does the task.
     """
+    _one_thread_once()
     reply = _run(Path(folder), msgspec.convert(task, Task))
     return msgspec.to_builtins(reply)
+
+
+@functools.cache
+def _one_thread_once() -> None:
+    one_thread()
 
 
 def _run(folder: Path, task: Task) -> Reply:

@@ -20,6 +20,7 @@ from ... import sensors
 from ...errors import TactileError
 from ...files import array_cache, lock
 from ...files.cache import cache_folder
+from ...files.threads import one_thread
 from ...geometry.lattice import Lattice
 from ...sensors import Material, digit
 from ...sensors import unrolling as surface
@@ -178,7 +179,8 @@ def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
         if (folder / array_cache.HASHES).exists():
             log.warning("%s: damaged (%s); it is built again", folder, damage)
     log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)
-    array_cache.store(folder, build(solid), _ROOM)
+    with one_thread():  # what one process keeps, every other computes with
+        array_cache.store(folder, build(solid), _ROOM)
     return array_cache.load(folder, ARRAYS)
 
 
