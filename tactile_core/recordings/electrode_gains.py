@@ -13,7 +13,8 @@ from msgspec import Meta
 
 from ..errors import TactileError
 from ..files import atomic
-from ..files.outside import read_toml_text, toml_quoted
+from ..files.outside import read_toml_text
+from ..files.toml_text import as_toml
 from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
@@ -169,26 +170,10 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
 def write(path: str | os.PathLike, sensor: SensorFile) -> None:
     """Write a sensor file, whole or not at all; equal sensors give equal bytes."""
     name, last = title(sensor.sensor), f"E{electrode_count(sensor.sensor)}"
-    lines = [
-        f"# A {name} against the simulated one: reading - rest = gain * simulated change + offset, E1 to {last}.",
-        "# Used by: tactile convert RECORDING --sensor THIS_FILE",
-        f"format = {toml_quoted(sensor.format)}",
-    ]
+    head = (
+        f"A {name} against the simulated one: reading - rest = gain * simulated change + offset, E1 to {last}.",
+        "gain in counts a count, all else in counts. Used by: tactile convert RECORDING --sensor THIS_FILE",
+    )
     if typical_rest(sensor.sensor) is None:
-        lines[:2] = [f"# Rest of a {name}, E1 to {last}. Used by: tactile info RECORDING --sensor THIS_FILE"]
-    if "sensor" in msgspec.to_builtins(sensor):  # left out where it is the default
-        lines.append(f"sensor = {toml_quoted(sensor.sensor)}")
-    for name, section in sensor.sections().items():
-        lines += ["", f"[{name}]", f"note = {toml_quoted(section.note)}"]
-        lines += [f"gain = {_numbers(section.gain)}  # counts a count"]
-        lines += [f"offset_counts = {_numbers(section.offset_counts)}"]
-        for field in ("rest_counts", "rest_spread_counts"):
-            if getattr(section, field) is not None:
-                lines.append(f"{field} = {_numbers(getattr(section, field))}")
-        if section.rest_pdc is not None:
-            lines.append(f"rest_pdc = {section.rest_pdc:.4f}  # counts")
-    atomic.write_bytes(path, "\n".join([*lines, ""]).encode())
-
-
-def _numbers(values: list[float]) -> str:
-    return "[" + ", ".join(f"{value:.4f}" for value in values) + "]"
+        head = (f"Rest of a {name}, E1 to {last}, in counts. Used by: tactile info RECORDING --sensor THIS_FILE",)
+    atomic.write_bytes(path, as_toml(sensor, {}, head).encode())
