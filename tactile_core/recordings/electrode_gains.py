@@ -170,7 +170,7 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
 def write(path: str | os.PathLike, sensor: SensorFile) -> None:
     """Write a sensor file, whole or not at all; equal sensors give equal bytes."""
     name, last = title(sensor.sensor), f"E{electrode_count(sensor.sensor)}"
-    head = (
+    head: tuple[str, ...] = (
         f"A {name} against the simulated one: reading - rest = gain * simulated change + offset, E1 to {last}.",
         "gain in counts a count, all else in counts. Used by: tactile convert RECORDING --sensor THIS_FILE",
     )

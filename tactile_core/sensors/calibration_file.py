@@ -6,7 +6,7 @@ import functools
 import os
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -130,11 +130,7 @@ def _numbers(value: Any, where: str) -> Iterator[tuple[str, float]]:
 
 
 def _calibration(file: tables.CalibrationTables, folder: Path) -> Calibration:
-    leds = tuple(
-        Led(colour, _scaled(1e-3, led.position_mm), 1e-3 * led.radius_mm, led.radiance)
-        for colour in COLOURS
-        for led in [getattr(file.leds, colour)]
-    )
+    leds = _led("red", file.leds.red), _led("green", file.leds.green), _led("blue", file.leds.blue)
     photograph = _photograph(file.background.photograph, folder)
     fit = file.fit
     return Calibration(
@@ -162,7 +158,11 @@ def _calibration(file: tables.CalibrationTables, folder: Path) -> Calibration:
     )  # fmt: skip
 
 
-def _scaled(factor: float, values: tables.Three) -> tables.Three:
+def _led(colour: str, table: tables.LedTable) -> Led:
+    return Led(colour, _scaled(1e-3, table.position_mm), 1e-3 * table.radius_mm, table.radiance)
+
+
+def _scaled(factor: float, values: Sequence[float]) -> tables.Three:
     first, second, third = values
     return factor * first, factor * second, factor * third
 
@@ -210,31 +210,46 @@ def _photograph(name: str, folder: Path) -> str:
 
 def _content(unit: Calibration) -> tables.CalibrationTables:
     """Return what the file of a calibration holds."""
-    camera, coating, markers, fit = unit.camera, unit.coating, unit.markers, unit.fit
-    leds = (tables.LedTable(_scaled(1e3, led.position), 1e3 * led.radius, led.radiance) for led in unit.leds)
-    along = ([_scaled(1e-3, row) for row in each] for each in (unit.response.along_right, unit.response.along_down))
-    return tables.CalibrationTables(
-        FORMAT,
-        unit.unit,
-        None if camera.sensor == Camera.sensor else camera.sensor,
-        tables.CameraTable(
-            camera.width, camera.height, camera.px_per_mm_x, camera.px_per_mm_y, 1e3 * camera.centre_x,
-            1e3 * camera.centre_z, 1e3 * camera.apparent_height, camera.right_z, camera.down_x,
-        ),
-        tables.LedsTable(*leds),
-        tables.ResponseTable(unit.response.centre, *along),
-        tables.AmbientTable(*unit.ambient, _scaled(1e-3, unit.ambient_rise)),
-        tables.CoatingTable(
-            coating.bsdf, coating.albedo, coating.roughness, coating.gloss, coating.metallic, 1e3 * coating.spread
-        ),
-        tables.GelTable(unit.dome_scale, unit.gel_index),
-        tables.BackgroundTable(Path(unit.photograph).name),
-        None if markers is None else tables.MarkersTable(
-            markers.rows, markers.columns, 1e3 * markers.pitch, 1e3 * markers.diameter, markers.albedo
-        ),
-        tables.NoiseTable(unit.noise),
-        tables.FitTable(
-            fit.note, 1e3 * fit.ball_diameter, list(fit.photographs), list(fit.not_identified), dict(fit.errors),
-            dict(fit.standard_errors),
-        ),
-    )  # fmt: skip
+    camera, coating, markers, fit, response = unit.camera, unit.coating, unit.markers, unit.fit, unit.response
+    content = {
+        "format": FORMAT,
+        "unit": unit.unit,
+        "sensor": None if camera.sensor == Camera.sensor else camera.sensor,
+        "camera": {
+            "width_px": camera.width, "height_px": camera.height, "px_per_mm_x": camera.px_per_mm_x,
+            "px_per_mm_y": camera.px_per_mm_y, "centre_x_mm": 1e3 * camera.centre_x,
+            "centre_z_mm": 1e3 * camera.centre_z, "apparent_height_mm": 1e3 * camera.apparent_height,
+            "right_z": camera.right_z, "down_x": camera.down_x,
+        },
+        "leds": {
+            led.colour: {
+                "position_mm": _scaled(1e3, led.position), "radius_mm": 1e3 * led.radius, "radiance": led.radiance
+            }
+            for led in unit.leds
+        },
+        "response": {
+            "centre": response.centre,
+            "along_right_per_mm": [_scaled(1e-3, row) for row in response.along_right],
+            "along_down_per_mm": [_scaled(1e-3, row) for row in response.along_down],
+        },
+        "ambient": {
+            **dict(zip(COLOURS, unit.ambient, strict=True)), "rise_per_mm": _scaled(1e-3, unit.ambient_rise)
+        },
+        "coating": {
+            **{name: getattr(coating, name) for name in ("bsdf", "albedo", "roughness", "gloss", "metallic")},
+            "spread_mm": 1e3 * coating.spread,
+        },
+        "gel": {"dome_scale": unit.dome_scale, "index": unit.gel_index},
+        "background": {"photograph": Path(unit.photograph).name},
+        "markers": markers and {
+            "rows": markers.rows, "columns": markers.columns, "pitch_mm": 1e3 * markers.pitch,
+            "diameter_mm": 1e3 * markers.diameter, "albedo": markers.albedo,
+        },
+        "noise": {"levels": unit.noise},
+        "fit": {
+            "note": fit.note, "ball_diameter_mm": 1e3 * fit.ball_diameter, "photographs": fit.photographs,
+            "not_identified": fit.not_identified, "errors": dict(fit.errors),
+            "standard_errors": dict(fit.standard_errors),
+        },
+    }  # fmt: skip
+    return msgspec.convert(content, tables.CalibrationTables)

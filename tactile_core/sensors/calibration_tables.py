@@ -8,11 +8,13 @@ Three = tuple[float, float, float]
 Matrix = tuple[Three, Three, Three]
 
 
-class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class Table(msgspec.Struct, forbid_unknown_fields=True):
     """Table of the file."""
 
 
 class CameraTable(Table):
+    """Camera and how it looks at the gel."""
+
     width_px: int
     height_px: int
     px_per_mm_x: float
@@ -25,24 +27,32 @@ class CameraTable(Table):
 
 
 class LedTable(Table):
+    """A light: a sphere."""
+
     position_mm: Three
     radius_mm: float
     radiance: float
 
 
 class LedsTable(Table):
+    """The lights, by colour."""
+
     red: LedTable
     green: LedTable
     blue: LedTable
 
 
 class ResponseTable(Table):
+    """Levels of each channel by each light."""
+
     centre: Matrix
     along_right_per_mm: Matrix
     along_down_per_mm: Matrix
 
 
 class AmbientTable(Table):
+    """Light scattered in gel and acrylic."""
+
     red: list[float]
     green: list[float]
     blue: list[float]
@@ -50,6 +60,8 @@ class AmbientTable(Table):
 
 
 class CoatingTable(Table):
+    """Paint on the gel."""
+
     bsdf: str
     albedo: Three
     roughness: float
@@ -59,19 +71,27 @@ class CoatingTable(Table):
 
 
 class GelTable(Table):
+    """Gel and acrylic."""
+
     dome_scale: float
     index: float
 
 
 class BackgroundTable(Table):
+    """The picture at rest."""
+
     photograph: str
 
 
 class NoiseTable(Table):
+    """Noise of the camera."""
+
     levels: Three
 
 
 class MarkersTable(Table):
+    """Dots on the gel."""
+
     rows: int
     columns: int
     pitch_mm: float
@@ -80,6 +100,8 @@ class MarkersTable(Table):
 
 
 class FitTable(Table):
+    """How it was fitted."""
+
     note: str
     ball_diameter_mm: float
     photographs: list[str]
