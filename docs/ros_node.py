@@ -21,33 +21,35 @@ from tactile_core.jobs.convert import load_tools
 from tactile_core.jobs.frame_pass import Tools
 from tactile_core.jobs.live import Shown, View
 from tactile_core.recordings.assemble import assemble
-from tactile_core.recordings.formats import bag_biotac_all, bag_biotac_hand
-from tactile_core.sensors import ELECTRODES
 
-LAYOUTS = {layout.MESSAGE: layout for layout in (bag_biotac_hand, bag_biotac_all)}
+# Message -> names of its list of fingers, and of a finger's electrodes and fluid pressure.
+FIELDS = {
+    "biotac_sensors/msg/BioTacHand": ("bt_data", "electrode_data", "pdc_data"),
+    "sr_robot_msgs/msg/BiotacAll": ("tactiles", "electrodes", "pdc"),
+}
 
 
 class Finger:
     """A translator of one finger's messages to pictures; it knows nothing of ROS but the messages' fields.
 
-    kind : a key of LAYOUTS; number : of the finger in its messages, from 0; tools : what `load_tools` returns
+    kind : a key of FIELDS; number : of the finger in its messages, from 0; tools : what `load_tools` returns
     """
 
     def __init__(self, kind: str, number: int, tools: Tools, rate: float = 100.0) -> None:
-        self._kind, self._number, self._layout = kind, number, LAYOUTS[kind]
+        self._kind, self._number = kind, number
         self.view = View(tools, rate)
 
     def __call__(self, message: Any) -> Shown | None:
         """Translate and draw a message; returns a `live.Shown`, None before rest is known. Raises TactileError."""
-        came, sensors = time.perf_counter(), self._layout.sensors(message)
+        came, (fingers, electrodes, pdc) = time.perf_counter(), FIELDS[self._kind]
+        sensors = getattr(message, fingers)
         if self._number >= len(sensors):
             raise TactileError(
                 self._kind, f"{len(sensors)} fingers", f"finger {self._number}", "Choose another --finger"
             )
-        row = np.array(self._layout.row(sensors[self._number]), float)
-        frame = assemble(
-            self._kind, self._layout.NAME, electrodes=row[None, -ELECTRODES:], stamps=np.zeros(1), pdc=row[:1]
-        )
+        sensor = sensors[self._number]
+        counts, pressure = np.array([getattr(sensor, electrodes)], float), np.array([getattr(sensor, pdc)], float)
+        frame = assemble(self._kind, self._kind, electrodes=counts, stamps=np.zeros(1), pdc=pressure)
         return self.view.show(frame, came)
 
 
@@ -75,7 +77,7 @@ def main() -> None:
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--topic", required=True)
-    parser.add_argument("--type", choices=LAYOUTS, default=bag_biotac_hand.MESSAGE)
+    parser.add_argument("--type", choices=FIELDS, default="biotac_sensors/msg/BioTacHand")
     parser.add_argument("--finger", type=int, default=0, metavar="N")
     parser.add_argument("--weights", metavar="DIR", help="networks of your own training")
     options, ros = parser.parse_known_args()

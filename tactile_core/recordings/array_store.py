@@ -23,7 +23,11 @@ _NPY_START = 12  # bytes: magic, version, length
 
 @dataclass(frozen=True)
 class Store:
-    """Named arrays of an open file; shapes : name -> (shape, dtype) as declared; attributes : of the file's root."""
+    """Named arrays of an open file.
+
+    shapes : name -> (shape, dtype) as declared; attributes : of the file's root; taken : names of the arrays that were
+        read so far, or that belong to another recording of the file
+    """
 
     path: str
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]]
@@ -31,6 +35,7 @@ class Store:
     attributes: dict[str, Any] = field(default_factory=dict)
     attributes_of: Callable[[str], dict[str, Any]] = lambda name: {}
     load_rows: Callable[[str, slice], np.ndarray] | None = None
+    taken: set[str] = field(default_factory=set)
 
     def rows(self, rows: slice, count: int) -> Store:
         """Return the same store with only these rows of all arrays of length `count`; only HDF5 is read in parts."""
@@ -47,6 +52,7 @@ class Store:
         where = f"{self.path}, {name}"
         if name not in self.shapes:
             raise TactileError(where, "this array is missing", advice="Export the recording again with all arrays")
+        self.taken.add(name)
         found, kind = self.shapes[name]
         if kind.kind not in "iufb":
             raise TactileError(where, f"values of type {kind}", "numbers")
@@ -146,7 +152,9 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
         with damage_reported(path, "NPZ"):
             archive = stack.enter_context(zipfile.ZipFile(file))
             for member in archive.infolist():
-                if member.filename.endswith(".npy"):
+                if not member.filename.endswith(".npy"):
+                    shapes[member.filename] = ((), np.dtype(object))  # no array, but named as not taken
+                else:
                     _check_packing(path, member)
                     if member.filename[:-4] in shapes:
                         raise TactileError(

@@ -43,15 +43,19 @@ class BadRows(TactileError):
     """Error for more bad rows than a recording may have."""
 
 
+def sensor_with(count: int) -> str:
+    """Return the name of the sensor that has so many electrodes; empty where none has."""
+    fluid = ((each, found) for each in known_sensors() if isinstance(found := describe(each), Fluid))
+    return next((name for name, found in fluid if found.electrodes.count == count), "")
+
+
 def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -> None:
     """Raise for another number of electrodes than a sensor has. source says where the count was seen."""
     wanted = electrode_count(sensor)
     if count == wanted:
         return
     found, advice = f"{count} electrodes", "Check which sensor made this recording"
-    others = ((each, other) for each in known_sensors() if isinstance(other := describe(each), Fluid))
-    like = next((name for name, other in others if other.electrodes.count == count), "")
-    if like:
+    if like := sensor_with(count):
         found, advice = f"{found}: a {title(like)}", _advice(like)
     raise TactileError(f"{path}, {source}", found, f"the {wanted} electrodes of a {title(sensor)}", advice)
 
@@ -109,7 +113,7 @@ def assemble(
     seconds, start, more = _seconds(stamps)
     more += _tell_rate(seconds)
     jumps, jump_notes = _time_jumps(seconds, rows, row_word)
-    clean = {key: _finite(value) for key, value in channels.items() if value is not None}
+    clean: dict[str, Any] = {key: _finite(value) for key, value in channels.items() if value is not None}
     return Recording(
         name=Path(path).stem,
         path=path,

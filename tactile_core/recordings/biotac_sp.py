@@ -20,26 +20,30 @@ ADVICE = (
 )
 
 
-def describe_sp(recording: Recording, unit: ElectrodeGains | None = None) -> str:
+def describe_sp(
+    path: str, recording: Recording, unit: ElectrodeGains | None, channels: str, not_taken: list[tuple[str, str]]
+) -> str:
     """Describe sensor, channels, frames, rest and counts as a short table.
 
-    unit : with the rest against which changes are taken
+    unit : with the rest against which changes are taken; channels, not_taken : rows of the table, in words
     """
     count, electrodes = len(recording), recording.electrodes
-    finger = recording.about["finger"]
+    finger = recording.about.get("finger")
+    name = f", {HAND[finger]} ({finger})" if finger else ""
     whole = electrodes[np.isfinite(electrodes).all(axis=1)]
     kind, evidence = detect(whole) if len(whole) else ("unknown", "no line has a reading of every electrode")
     rows = [
         ("layout", recording.layout),
-        ("sensor", f"BioTac SP, {electrodes.shape[1]} electrodes, {HAND[finger]} ({finger})"),
-        ("channels", ", ".join(["electrodes", *recording.about["labels"]])),
-        ("frames", f"{count} in lines {recording.rows[0]} to {recording.rows[-1]}"),
+        ("sensor", f"BioTac SP, {electrodes.shape[1]} electrodes{name}"),
+        ("channels", ", ".join([channels, *recording.about.get("labels", ())])),
+        ("frames", f"{count} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
         ("time", _time(recording)),
         ("kind", f"{kind}: {evidence}"),
         ("rest", ADVICE if unit is None else unit.note),
         ("use", TRANSLATED_BY),
+        *not_taken,
     ]
-    lines = [recording.path, *(f"  {label:<11}{text}" for label, text in rows), ""]
+    lines = [path, *(f"  {label:<11}{text}" for label, text in rows), ""]
     lines += _counts(electrodes) if unit is None else _changes(electrodes, np.array(unit.rest_counts))
     if recording.warnings:
         lines += ["", "warnings"] + [f"  - {warning}" for warning in recording.warnings]
@@ -49,6 +53,8 @@ def describe_sp(recording: Recording, unit: ElectrodeGains | None = None) -> str
 def _time(recording: Recording) -> str:
     if np.isnan(recording.time).all():
         return "none: snapshots, one a line"
+    if recording.start_time:
+        return f"{recording.duration:.2f} s, {recording.rate:.2f} Hz (median)"
     return f"no time stamps; {len(recording) / SAMPLE_RATE:.2f} s at the sensor's {SAMPLE_RATE:g} Hz (assumed)"
 
 

@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 from ..sensors import SOURCE, title
 from .array_store import Store, open_hdf5
 from .assemble import check_electrodes
-from .bag import open_bag, read_bag
+from .bags.bag import open_bag
+from .bags.bag_recordings import read_bag
+from .fingers import split
 from .readers import layout_of, names, opened, read, table_reader
 from .recording import Recording
 from .tables.column_map import ColumnMap, refuse_other
@@ -59,9 +61,8 @@ def _parts(path: str, columns: ColumnMap | None, sensor: str) -> Iterator[Part]:
             with open_hdf5(path) as store:
                 yield from _of_store(store)
         elif container == "bag":
-            with open_bag(where, file, finger) as bag:
-                layout = layout_of(path, container, bag.topics)
-                for recording, repeated in read_bag(bag, layout, PART_FRAMES, CONTEXT):
+            with open_bag(where, file) as bag:
+                for recording, repeated in read_bag(bag, split(path), PART_FRAMES, CONTEXT):
                     yield Part(recording, repeated)
         else:
             yield Part(read(path, columns, sensor), 0)

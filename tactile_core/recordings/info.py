@@ -15,9 +15,12 @@ from .flags import Flag, names
 from .readers import pac_columns, read, sensor_of
 from .recording import Recording
 from .signals import PrepareOptions, Signals, prepare
+from .tables.truncated_cell import listed
 
 if TYPE_CHECKING:
     from .electrode_gains import SensorFile
+
+MOST_NOT_TAKEN = 40  # names that are spelled out; a file may have a thousand
 
 
 def describe(
@@ -33,9 +36,9 @@ def describe(
     recording = read(path, columns, sensor, lean=True)
     finger = split(os.fspath(path))[1]
     gains = None if unit is None else unit.gains_for(path, finger, "--sensor", sensor)
-    if typical_rest(sensor) is None:
-        return describe_sp(recording, gains)
     pac = pac_columns(path, columns) if recording.pac is None else recording.pac.shape[1]
+    if typical_rest(sensor) is None:
+        return describe_sp(os.fspath(path), recording, gains, _channels(recording, pac), _not_taken(recording))
     signals = prepare(recording, options)
     if gains is not None:
         from .electrode_gains import prepare_unit
@@ -71,6 +74,7 @@ def _rows(recording: Recording, signals: Signals, pac: int) -> list[tuple[str, s
             f"{_places(recording, signals)}",
         ),
         ("flags", _flags(signals.flags)),
+        *_not_taken(recording),
     ]
 
 
@@ -83,6 +87,10 @@ def _channels(recording: Recording, pac: int) -> str:
         pressed = " and traction" if recording.truth.tractions else ""
         held.append(f"truth ({' and '.join(nodes)} nodes{pressed})" if nodes else f"truth (force{pressed})")
     return ", ".join(["electrodes", *held])
+
+
+def _not_taken(recording: Recording) -> list[tuple[str, str]]:
+    return [("not taken", listed(recording.not_taken, MOST_NOT_TAKEN))] if recording.not_taken else []
 
 
 def _start(recording: Recording) -> str:

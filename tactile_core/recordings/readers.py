@@ -20,8 +20,9 @@ from ..sensors import SOURCE, electrode_count, title
 from . import formats
 from .array_store import Store, open_hdf5, open_npz
 from .assemble import check_electrodes
-from .bag import START_BYTES, fingers_of, is_bag_folder, kind_of, open_bag, read_bag
-from .fingers import named, split
+from .bags.bag import START_BYTES, is_bag_folder, kind_of, open_bag
+from .bags.bag_recordings import names_of, read_bag, streams_of
+from .fingers import Chosen, named, split
 from .matlab import START, START_OF_HDF5, open_matlab
 from .recording import Recording
 from .tables.column_map import ColumnMap, read_mapped, refuse_other
@@ -57,14 +58,16 @@ def read(
 ) -> Recording:
     """Read a recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
 
-    path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers
+    path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers, ``hands.bag#left/biotac/finger1`` that
+        of one topic of a bag
     columns : which column of a CSV file is what, where no known layout has its names; see ``column_map.read``
     sensor : ``"biotac"``, or another with a descriptor, as ``"biotac_sp"`` of 24 electrodes
     lean : a long CSV file leaves out what no translation needs, PAC and columns outside the map, and has its electrodes
         in single precision where that is exact, as it is of counts: a third of the memory
 
     Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19 or 24) counts, ``pdc``, ``pac``, ``tac``,
-    ``tdc`` where the file has them, ``warnings`` for what is odd in it. Nothing is resampled, repaired or dropped.
+    ``tdc`` where the file has them, ``warnings`` for what is odd in it, ``not_taken`` for what else the file holds.
+    Nothing is resampled, repaired or dropped.
     Raises TactileError for a file that is missing, not a recording, of another sensor, or mostly unreadable.
 
     >>> recording = tactile.read("touch.csv")
@@ -83,18 +86,27 @@ def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Reco
         refuse_other(path, container, columns)
         if container == "hdf5":
             with open_hdf5(where) as store:
-                return layout_of(where, container, names(store)).read(store)
+                return _noted(layout_of(where, container, names(store)).read(store), store)
         if container == "npz":
             with open_npz(where, file) as store:
-                return layout_of(where, container, store.shapes).read(store)
+                return _noted(layout_of(where, container, store.shapes).read(store), store)
         if container == "bag":
-            with open_bag(where, file, finger) as bag:
-                return next(read_bag(bag, layout_of(where, container, bag.topics)))[0]
+            with open_bag(where, file) as bag:
+                return next(read_bag(bag, split(path)))[0]
         if container == "mat":
             with open_matlab(where, file) as store:
-                return _read_finger(layout_of(where, container, store.shapes), store, finger)
-        reader = table_reader(where, read_header(where, file), columns, sensor, finger)
-        return reader(read_table(where, file, partial(_unneeded, columns) if lean else None))
+                return _noted(_read_finger(layout_of(where, container, store.shapes), store, finger), store)
+        header = read_header(where, file)
+        reader = table_reader(where, header, columns, sensor, finger)
+        table = read_table(where, file, partial(_unneeded, columns) if lean else None)
+        found = reader(table)
+        taken = table.taken | (table.left_out if columns is None else set())
+        return replace(found, not_taken=tuple(name for name in header if name not in taken))
+
+
+def _noted(recording: Recording, store: Store) -> Recording:
+    """Note the arrays of the file that the recording has not."""
+    return replace(recording, not_taken=tuple(name for name in store.shapes if name not in store.taken))
 
 
 def _unneeded(columns: ColumnMap | None, name: str) -> bool:
@@ -111,12 +123,15 @@ def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
 
 
 def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> str:
-    """Return the sensor of a recording, ``"biotac"`` or ``"biotac_sp"``, from the columns of a CSV file.
+    """Return the sensor of a recording, ``"biotac"`` or ``"biotac_sp"``, from a CSV file's columns or a bag's messages.
 
     Raises TactileError for what is no recording.
     """
     path = os.fspath(path)
     with opened(path) as (container, where, _, file):
+        if container == "bag":
+            with open_bag(where, file) as bag:
+                return streams_of(bag, split(path))[0].sensor or SOURCE
         if columns is not None or container != "csv":
             return SOURCE
         return _sensor(layout_of(where, "csv", read_header(where, file)))
@@ -143,30 +158,32 @@ def _read_finger(layout: ModuleType, store: Store | Table, finger: int | None) -
         raise TactileError(store.path, f"finger {chosen}", f"one that it holds: {listed}", "Name it as path#finger")
     found = layout.read(store, chosen)
     if finger is not None or len(known) == 1:
-        return named(found, finger)
+        return named(found, Chosen(store.path, finger))
     others = ", ".join(map(str, known[1:]))
     warning = f"finger {chosen} is read; others: {others} (ask for one as {os.path.basename(store.path)}#{known[-1]})"
     return replace(found, warnings=(warning, *found.warnings))
 
 
 def each_finger(path: str | os.PathLike[str]) -> list[str]:
-    """List the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for all others.
+    """List the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for a file of one.
+
+    Of a bag of several topics, ``path#topic/finger0`` and so on.
 
     Raises TactileError like `read` for a file that is no recording.
     """
     path = os.fspath(path)
-    if split(path)[1] is not None:
-        return [path]
-    with opened(path) as (container, _, _, file):
+    with opened(path) as (container, where, finger, file):
+        if container == "bag":
+            with open_bag(where, file) as bag:
+                return names_of(bag, path, split(path))
+        if finger is not None:
+            return [path]
         known: tuple[int, ...] = ()
         if container == "csv":
             known = _fingers_of_table(read_header(path, file))
         if container == "mat":
             with open_matlab(path, file) as store:
                 known = layout_of(path, container, store.shapes).fingers(store.shapes)
-        elif container == "bag":
-            with open_bag(path, file) as bag:
-                known = fingers_of(bag, layout_of(path, container, bag.topics))
     alone = len(known) < 2 and (container != "mat" or known == (0,))
     return [path] if alone else [f"{path}#{finger}" for finger in known]
 
@@ -218,7 +235,7 @@ def opened(path: str) -> Iterator[Opened]:
     Raises TactileError for what is no file, and for errors of the operating system while it is open.
     """
     with _reading(path):
-        file, finger = split(path)
+        file, finger, topic = split(path)
         if is_bag_folder(file):
             yield Opened("bag", file, finger, io.BytesIO())
             return
@@ -227,6 +244,8 @@ def opened(path: str) -> Iterator[Opened]:
             container = _container(stream.read(START_BYTES))
             if finger is not None and container in ("hdf5", "npz"):
                 raise TactileError(file, f"finger {finger} of a file of one", "one recording", "Leave out the #")
+            if topic and container != "bag":
+                raise TactileError(file, f"topic {topic!r} of a file without topics", "path, or path#finger")
             stream.seek(0)
             yield Opened(container, file, finger, stream)
 
@@ -281,12 +300,12 @@ def table_reader(
 
 
 def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
-    """Return the layout that knows most of the file's columns, arrays or messages. Raises TactileError if none does."""
+    """Return the layout that knows most of the file's columns or arrays. Raises TactileError if none does."""
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
     best, layout = max(scored, key=lambda pair: pair[0])
     if best < RECOGNISED:
         held = ", ".join(list(keys)[:6] if container == "csv" else sorted(keys)[:6])
-        word = {"csv": "columns", "bag": "messages"}.get(container, "arrays")
+        word = "columns" if container == "csv" else "arrays"
         known = " | ".join(layout.NAME for _, layout in scored)
         raise TactileError(
             path,

@@ -76,6 +76,7 @@ class Recording(Summary):
     position, force : (T, 3) float or None, in the file's own frame and unit
     labels : name -> (T,) object array of str, such as object, material or trial, which no translation reads
     warnings : sentences for the user
+    not_taken : what the file holds beside it and no recording is made of, in words: topics, arrays, columns, fields
     about : other information in the file (simulated: sensor, scene, seed, made_by, note; BioTac SP: finger, labels)
     """
 
@@ -94,6 +95,7 @@ class Recording(Summary):
     position: np.ndarray | None = None
     force: np.ndarray | None = None
     warnings: tuple[str, ...] = ()
+    not_taken: tuple[str, ...] = ()
     simulated: bool = False
     truth: Truth | None = None
     about: dict[str, Any] = field(default_factory=dict)

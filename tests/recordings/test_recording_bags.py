@@ -11,12 +11,15 @@ import pytest
 
 pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
 
-from bags import write_bag
+from bags import Topic, registered, write_bag, write_topics
 
 from tactile_core import recordings
+from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.recordings import bag, chunks
-from tactile_core.recordings.formats import bag_biotac_all, bag_biotac_hand
+from tactile_core.recordings import chunks
+from tactile_core.recordings.bags import bag, ros_messages
+from tactile_core.recordings.fingers import name_of
+from tactile_core.recordings.readers import each_finger, sensor_of
 
 
 @pytest.mark.parametrize("container", ["ros1", "mcap", "sqlite3"])
@@ -33,16 +36,12 @@ def test_every_container_and_version_reads_the_same(container, kind, version, ma
 
 
 def test_the_definitions_have_the_published_hashes():
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    for layout, version, published in (
-        (bag_biotac_all, 1, "47a346cfb98ba8199f53056f3ea612f1"),
-        (bag_biotac_hand, 0, "d96f900cbfb096d61de125081e11dcab"),
+    for kind, version, published in (
+        ("all", 1, "47a346cfb98ba8199f53056f3ea612f1"),
+        ("hand", 0, "d96f900cbfb096d61de125081e11dcab"),
     ):
-        store = get_typestore(Stores.ROS1_NOETIC)
-        for name, text in layout.VERSIONS[version].items():
-            store.register(get_types_from_msg(text, name))
-        assert store.generate_msgdef(layout.MESSAGE)[1] == published
+        name, store = registered(Topic("/x", kind, None, version=version), ros1=True)
+        assert store.generate_msgdef(name)[1] == published, kind
 
 
 def test_a_single_mcap_file_and_parts(make, tmp_path, monkeypatch):
@@ -78,19 +77,153 @@ def test_a_hand_without_signals_is_read_and_told(make, tmp_path):
     np.testing.assert_array_equal(recording.electrodes, 0)
 
 
-def test_another_version_of_a_message_is_refused_and_none_of_its_text_is_run(make, tmp_path, monkeypatch):
-    evil = {**bag_biotac_all.VERSIONS[0], "sr_robot_msgs/msg/Biotac": "int16 pac0\nint16[] electrodes\n"}
-    write_bag(tmp_path / "good.bag", make(frames=3), "ros1", "all")
-    monkeypatch.setattr(bag_biotac_all, "VERSIONS", [evil])
-    with pytest.raises(TactileError, match="of hash"):
-        recordings.read(tmp_path / "good.bag")
+def test_none_of_a_bag_s_definitions_is_compiled(make, tmp_path, monkeypatch):
+    from rosbags.typesys.store import Typestore
+
+    press = make(frames=3)
+    write_topics(tmp_path / "touch.bag", "ros1", [Topic("/biotac", "all", press, package="evil_msgs")])
+
+    def refuse(*_):
+        raise AssertionError("generates code from a stranger's text")
+
+    monkeypatch.setattr(Typestore, "register", refuse)
+    monkeypatch.setattr(Typestore, "get_msgdef", refuse)
+    np.testing.assert_array_equal(recordings.read(tmp_path / "touch.bag").electrodes, press.electrodes)
 
 
-def test_bags_without_a_biotac_are_refused(make, tmp_path, monkeypatch):
-    write_bag(tmp_path / "touch.bag", make(frames=3), "ros1", "all")
-    monkeypatch.setattr(bag_biotac_all, "MESSAGE", "other/msg/Thing")
-    with pytest.raises(TactileError, match="no known recording: messages"):
+def test_bags_without_a_biotac_are_refused_with_what_they_hold(make, tmp_path):
+    press = make(frames=3)
+    empty = Topic("/rh/tactile", "all", make(frames=2), package="")
+    empty.press.time = []
+    write_topics(tmp_path / "touch.bag", "ros1", [Topic("/chatter", "text", press), empty])
+    with pytest.raises(TactileError, match=r"no messages of a BioTac: topic /chatter \(std_msgs/msg/String, 3 m"):
         recordings.read(tmp_path / "touch.bag")
+
+
+def three_topics(press, empty) -> list[Topic]:
+    """Two hands in the messages of two drivers, one of other names, each with two fingers; and what is no touch."""
+    return [
+        Topic("/left/biotac", "hand", press, (0, 1), package="our_msgs"),
+        Topic("/right/biotac", "all", press, (1, 3), electrodes=24),
+        Topic("/ns/one", "one", press),
+        Topic("/chatter", "text", press),
+        Topic("/silent", "all", empty),
+    ]
+
+
+NAMED = ["left/biotac/finger0", "left/biotac/finger1", "ns/one/finger0", "right/biotac/finger1", "right/biotac/finger3"]
+
+
+@pytest.mark.parametrize("container", ["ros1", "mcap", "sqlite3"])
+def test_every_finger_of_every_topic_is_read_or_named(container, make, tmp_path, capsys):
+    press, empty = make(frames=60), make(frames=2)
+    empty.time = []
+    path = tmp_path / "hands.bag"
+    write_topics(path, container, three_topics(press, empty))
+    found = each_finger(path)
+    assert found == [f"{path}#{name}" for name in NAMED]
+    assert [name_of(one) for one in found] == ["hands_" + name.replace("/", "_") for name in NAMED]
+    for one, name in zip(found, NAMED, strict=True):
+        sensor = "biotac_sp" if "right" in name else "biotac"
+        assert sensor_of(one) == sensor
+        recording = recordings.read(one, sensor=sensor)
+        assert recording.name == name_of(one) and recording.warnings == ()
+        more = 0 if name.startswith("ns") else int(name[-1])
+        np.testing.assert_array_equal(recording.electrodes[:, :19], press.electrodes + more)
+        np.testing.assert_array_equal(recording.pdc, press.pdc)
+        np.testing.assert_allclose(recording.time, press.time, atol=1e-6)  # the lone one by the bag's own stamps
+    assert main(["info", str(path)]) == 0
+    told = capsys.readouterr().out
+    for text in (*NAMED, "/chatter (std_msgs/msg/String, 60 messages)", "finger 0, 2, 4 of /right/biotac (all zeros"):
+        assert text in told, text
+    assert "fields hand_id, bt_time, bt_serial, bt_position of /left/biotac" in told
+
+
+def test_a_topic_and_its_finger_are_chosen_in_any_spelling(make, tmp_path):
+    press, empty = make(frames=20), make(frames=2)
+    empty.time = []
+    path = tmp_path / "hands.bag"
+    write_topics(path, "ros1", three_topics(press, empty))
+    for word in ("left/biotac/finger1", "/left/biotac/finger1", "left/biotac/1", "//left/biotac//1"):
+        np.testing.assert_array_equal(recordings.read(f"{path}#{word}").electrodes, press.electrodes + 1)
+    assert each_finger(f"{path}#/left/biotac") == [f"{path}#left/biotac/finger{number}" for number in (0, 1)]
+    assert each_finger(f"{path}#1") == [f"{path}#{topic}/finger1" for topic in ("left/biotac", "right/biotac")]
+    warning = recordings.read(path).warnings[0]
+    assert warning.startswith("finger left/biotac/finger0 is read; others with signals: left/biotac/finger1, ns/one")
+    with pytest.raises(TactileError, match="no BioTac in a topic 'middle'; expected one of /left/biotac, "):
+        recordings.read(f"{path}#middle/finger0")
+    with pytest.raises(TactileError, match="2 fingers, no number 4"):
+        recordings.read(f"{path}#left/biotac/4")
+    with pytest.raises(TactileError, match="topic 'left' of a file without topics"):
+        recordings.read(f"{__file__}#left/0")
+
+
+def test_a_topic_may_be_called_like_a_finger(make, tmp_path):
+    press, path = make(frames=5), tmp_path / "touch.bag"
+    write_topics(path, "ros1", [Topic("/left/finger0", "one", press), Topic("/left/finger1", "one", press)])
+    assert each_finger(path) == [f"{path}#left/finger{number}/finger0" for number in (0, 1)]
+    assert name_of(f"{path}#left/finger1") == "touch_left_finger1" == recordings.read(f"{path}#left/finger1").name
+
+
+def test_messages_without_stamps_take_the_bag_s(make, tmp_path):
+    press, path = make(frames=30), tmp_path / "touch"
+    write_topics(path, "mcap", [Topic("/biotac", "hand", press, stamped=False)])
+    recording = recordings.read(path)
+    np.testing.assert_allclose(recording.time, press.time, atol=1e-6)
+    assert recording.start_time == 1.58e9
+
+
+def test_messages_that_are_not_as_defined_are_no_damage(make, tmp_path, monkeypatch):
+    """Bags of before 2023 have no definitions: the known ones are tried, the one that fits is taken."""
+    press, path = make(frames=5), tmp_path / "touch"
+    write_topics(path, "sqlite3", [Topic("/biotac", "all", press, version=1)])
+    (database,) = path.glob("*.db3")
+    with contextlib.closing(sqlite3.connect(database)) as opened, opened:
+        opened.execute("DELETE FROM message_definitions")
+    np.testing.assert_array_equal(recordings.read(path).electrodes, press.electrodes)
+    kind = "sr_robot_msgs/msg/BiotacAll"
+    monkeypatch.setitem(ros_messages.KNOWN, kind, ros_messages.KNOWN[kind][:1])
+    with pytest.raises(TactileError, match=f"message 0: is not as its type {kind} is defined") as refused:
+        recordings.read(path)
+    assert "damaged" not in str(refused.value)
+
+
+def test_a_bag_that_was_not_closed_is_not_called_damaged(make, tmp_path):
+    write_bag(tmp_path / "touch.bag", make(frames=5), "ros1", "all")
+    data = bytearray((tmp_path / "touch.bag").read_bytes())
+    place = data.index(b"index_pos=") + len(b"index_pos=")
+    data[place : place + 8] = bytes(8)
+    (tmp_path / "touch.bag").write_bytes(data)
+    with pytest.raises(TactileError, match=r"cannot be read \(Bag is not indexed.*rosbag reindex") as refused:
+        recordings.read(tmp_path / "touch.bag")
+    assert "damaged" not in str(refused.value)
+
+
+def test_the_decoder_agrees_with_the_library_s(make):
+    """Alignment, lists, texts, nested messages in both formats; the library compiles definitions, this one does not."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    text = "bool a\nfloat64[] empty\nuint8 b\nint64 c\nstring d\nuint8[3] e\nfloat64 f\nstring[] g\n"
+    text += "geometry_msgs/Point32[] h\nint16[] i\nbuiltin_interfaces/Duration j\nuint32 k\n"
+    for ros1, stores in ((True, Stores.ROS1_NOETIC), (False, Stores.ROS2_HUMBLE)):
+        store = get_typestore(stores)
+        store.register(get_types_from_msg(text, "x/msg/Odd"))
+        types = store.types
+        point, duration = types["geometry_msgs/msg/Point32"], types["builtin_interfaces/msg/Duration"]
+        sent = types["x/msg/Odd"](
+            True, np.empty(0), 7, -(2**40), "käse", np.array([1, 2, 3], np.uint8), 0.1, ["", "ab"],
+            [point(1.0, 2.0, 3.0), point(4.0, 5.0, 6.0)], np.array([-1, 5], np.int16), duration(1, 2), 9,
+        )  # fmt: skip
+        data = bytes((store.serialize_ros1 if ros1 else store.serialize_cdr)(sent, "x/msg/Odd"))
+        whole = store.generate_msgdef("x/msg/Odd", ros_version=1 if ros1 else 2)[0]
+        (definition,) = ros_messages.definitions("x/msg/Odd", whole, idl=False)
+        found = ros_messages.Decoder(definition, ros1)(data)
+        assert (found["a"], found["b"], found["c"], found["d"], found["f"]) == (True, 7, -(2**40), "käse", 0.1)
+        assert found["g"] == ["", "ab"] and found["i"].tolist() == [-1, 5] and found["k"] == 9
+        assert found["e"].tolist() == [1, 2, 3] and found["empty"].size == 0
+        assert [float(each["y"]) for each in found["h"]] == [2.0, 5.0] and found["j"]["sec"] == 1
+        with pytest.raises(ValueError, match="8 bytes are left"):
+            ros_messages.Decoder(definition, ros1)(data + bytes(8))
 
 
 def test_a_chunk_that_unpacks_to_too_much_is_refused(make, tmp_path, monkeypatch):

@@ -47,7 +47,7 @@ def test_one_frame_reads_and_prepares(layout, make, in_layout):
 
 def test_every_layout_has_a_row_here():
     names = {layout.__name__.rsplit(".", 1)[1] for layout in recordings.layouts()}
-    assert names == {row[0] for row in LAYOUTS} | {"csv_sp_slip", "csv_sp_grasps"}
+    assert names == {row[0] for row in LAYOUTS if not row[0].startswith("bag_")} | {"csv_sp_slip", "csv_sp_grasps"}
 
 
 @pytest.mark.parametrize(

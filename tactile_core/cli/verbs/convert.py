@@ -27,7 +27,8 @@ Translate recordings and draw them. Each gets the folder DIR/<file name without 
   note.json          versions, weights, options, warnings
   timings.json       ms a frame of each stage
 One frame for each data row, in file order; bad rows are repaired and flagged. A folder appears whole or not at all.
-A file of several fingers gives one result a finger, <name>_finger0, <name>_finger1, ...; hand.bag#1 picks one.
+A file of several fingers gives one result a finger, <name>_finger0, <name>_finger1, ...; hand.bag#1 picks one. A bag
+of several topics gives one a topic and finger, <name>_<topic>_finger0; hands.bag#left/biotac/finger0 picks one.
 
 --error bounds the error that drawing and rounding add to that of the networks. A bound in grey levels of the picture
 picks the cheapest preset of `tactile render` whose measured error is below it (without --error: fast). A bound in um of

@@ -52,7 +52,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("recording", nargs="?", metavar="PATH", help="a CSV file that grows; with --play any recording")
     verb.add_argument("--play", action="store_true", help="play a finished recording, of any layout, bags too")
-    verb.add_argument("--rosbag-play", metavar="FILE", help="play this ROS 1 or 2 bag or MCAP file (bag#2: a finger)")
+    verb.add_argument("--rosbag-play", metavar="FILE", help="play this ROS 1 or 2 bag or MCAP file (bag#topic/finger2)")
     verb.add_argument(
         "--speed",
         type=float,

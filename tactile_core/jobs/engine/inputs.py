@@ -16,7 +16,7 @@ import msgspec
 from ...errors import TactileError
 from ...files import provenance
 from ...files.outside import read_small
-from ...recordings.bag import MARK
+from ...recordings.bags.bag import MARK
 from ...recordings.fingers import name_of, split
 from ...recordings.readers import list_fingers
 from ...sensors.calibration_file import load_calibration

@@ -30,7 +30,7 @@ class Growing:
 
         ``path#1`` follows finger 1 of a file of several.
         """
-        file, self._finger = split(os.fspath(path))
+        file, self._finger, _ = split(os.fspath(path))
         self._path, self._columns, self._sensor = Path(file), columns, sensor
         self._place, self._rest, self._lines = 0, b"", 0
         self._header: Header | None = None

@@ -1,11 +1,11 @@
 """Layouts of recordings, one file each. Every module here is found automatically and has four names:
 
-``CONTAINER``  "csv", "hdf5", "npz", "mat" or "bag"
+``CONTAINER``  "csv", "hdf5", "npz" or "mat"
 ``NAME``       the layout in words, for messages
 ``score(keys) -> float``  share (0..1) of the layout's own columns or arrays among those of the file ``read(source) ->
 Recording``  source is a ``table.Table`` for CSV, a ``array_store.Store`` for HDF5 and NPZ; it picks its columns and
 hands them to ``assemble.assemble``, which checks them.
-Those of bags have no ``read``, but the message they know: see ``bag_biotac_hand``; those of MATLAB also have
+Arrays and columns that it does not pick are named to users as not taken. Those of MATLAB also have
 ``fingers(keys)``, and ``read(store, finger)``, as those of a BioTac SP, whose ``SENSOR`` names it. Those of HDF5 have
 ``ELECTRODES_NAME`` too, the array whose length is the number of frames: see ``chunks``.
 """
@@ -82,6 +82,7 @@ def of_finger(table: Table, layout: str, style: str, finger: int, *, snapshots: 
     """
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
+    table.taken.update(electrodes)
     return assemble(
         table.path,
         layout,

@@ -50,11 +50,12 @@ def read(table: Table) -> Recording:
     Raises TactileError for a column that is missing, more electrodes, or too many lines that cannot be read.
     """
     names = canonical(table.header)
-    called = dict(zip(table.header, names, strict=False))
+    known, called = dict(zip(table.header, names, strict=False)), dict(zip(names, table.header, strict=False))
+    table.taken.update(called.get(name, name) for name in COLUMNS)
     table = replace(
         table,
         header=tuple(names),
-        problems=tuple(replace(p, field=called.get(p.field, p.field)) for p in table.problems),
+        problems=tuple(replace(p, field=known.get(p.field, p.field)) for p in table.problems),
     )
     held = sum(name.startswith("electrodes") for name in names)
     if held > ELECTRODES:

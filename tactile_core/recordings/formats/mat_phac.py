@@ -45,6 +45,8 @@ def read(store: Store, finger: int) -> Recording:
         )
     electrodes = store.array(name, (ELECTRODES, None)).T
     frames = len(electrodes)
+    store.taken.update(f"F{other}{each}" for other in lengths for each in ("Electrodes", "pac", "pdc", "tac", "tdc")
+                       if other != finger)  # fmt: skip
     rows = {each: store.optional(f"F{finger}{each}", (1, frames)) for each in ("pdc", "tac", "tdc")}
     columns: dict[str, Any] = {each: None if values is None else values[0] for each, values in rows.items()}
     if f"F{finger}pac" in store.shapes:

@@ -31,6 +31,7 @@ class Table:
     exact : (T,) float64 of the columns that values, if float32, would round, such as time stamps
     start : line after which the rows begin
     left_out : columns that the file has, which were parsed and are not held
+    taken : names of the columns that were read so far, or that belong to another recording of the file
     """
 
     path: str
@@ -42,6 +43,7 @@ class Table:
     exact: dict[int, np.ndarray] = field(default_factory=dict)
     start: int = 0
     left_out: frozenset[str] = frozenset()
+    taken: set[str] = field(default_factory=set)
 
     def columns(self, names: list[str], dtype: type = np.float64) -> np.ndarray:
         """Return the values (T, len(names)) of the columns. Raises TactileError naming a column that is missing."""
@@ -54,6 +56,7 @@ class Table:
                 f"{names[0]} .. {names[-1]}" if len(names) > 1 else names[0],
                 "Export all columns, or name those there are in a map: tactile info FILE --columns map.toml writes one",
             )
+        self.taken.update(names)
         found: np.ndarray = np.empty((len(self.values), len(names)), dtype)
         with np.errstate(over="ignore"):
             for place, column in enumerate(self.header.index(name) for name in names):
@@ -62,6 +65,7 @@ class Table:
 
     def counts(self, names: list[str]) -> np.ndarray:
         """Return `columns` (T, n), as float32 where the table is kept small and that is exact, else as float64."""
+        self.taken.update(names)
         places = [self.header.index(name) for name in names if name in self.header]
         if not self.left_out or any(place in self.exact for place in places):
             return self.columns(names)

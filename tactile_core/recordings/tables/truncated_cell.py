@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..assemble import Problem
@@ -12,6 +14,12 @@ SHOWN = 40  # characters of a cell or header that a message repeats
 def shown(text: str) -> str:
     """Quote the text for a message, cut when long."""
     return repr(text if len(text) <= SHOWN else text[:SHOWN] + "…")
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """List names for a message, the first few and the number of the others."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 def doubt_last_cell(

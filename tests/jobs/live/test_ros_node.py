@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import io
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -14,11 +13,9 @@ import pytest
 
 pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
 
-from bags import write_bag
+from bags import Topic, registered, write_bag
 
 from tactile_core.errors import TactileError
-from tactile_core.recordings import bag
-from tactile_core.recordings.formats import bag_biotac_all, bag_biotac_hand
 
 NODE = Path(__file__).resolve().parents[3] / "docs" / "ros_node.py"
 
@@ -71,10 +68,14 @@ def a_press(frames: int) -> SimpleNamespace:
     return SimpleNamespace(time=time, electrodes=counts, **slow)
 
 
-def messages_of(press, folder, kind, layout, finger):
+def messages_of(press, folder, kind, finger):
+    """Return a bag's messages as the library decodes them: objects with fields, as rclpy's."""
+    from rosbags.rosbag2 import Reader
+
     write_bag(folder / "touch", press, "mcap", kind, finger=finger)
-    with bag.open_bag(str(folder / "touch"), io.BytesIO()) as opened:
-        return [message for _, message in bag._messages(opened, layout, opened.topics[layout.MESSAGE])]
+    name, store = registered(Topic("/biotac", kind, press), ros1=False)
+    with Reader(folder / "touch") as reader:
+        return [store.deserialize_cdr(data, name) for _, _, data in reader.messages()]
 
 
 def install(monkeypatch, node):
@@ -96,12 +97,12 @@ def install(monkeypatch, node):
 
 def test_messages_become_pictures_and_wrenches_and_a_bad_one_is_passed_over(script, tmp_path, monkeypatch):
     press = a_press(90)
-    messages = messages_of(press, tmp_path, "all", bag_biotac_all, 2)
+    messages = messages_of(press, tmp_path, "all", 2)
     messages.insert(80, SimpleNamespace(header=None, tactiles=[]))
     node = Node(messages)
     install(monkeypatch, node)
     monkeypatch.setattr(script, "load_tools", lambda weights: fake_tools.tools())
-    words = ["ros_node.py", "--topic", "/hand", "--type", bag_biotac_all.MESSAGE, "--finger", "2"]
+    words = ["ros_node.py", "--topic", "/hand", "--type", "sr_robot_msgs/msg/BiotacAll", "--finger", "2"]
     monkeypatch.setattr(sys, "argv", words)
     script.main()
     images, wrenches = node.published["tactile/image"], node.published["tactile/wrench"]
@@ -116,10 +117,10 @@ def test_messages_become_pictures_and_wrenches_and_a_bad_one_is_passed_over(scri
 
 def test_the_hand_s_messages_are_read_as_its_bag_is(script, tmp_path):
     press = a_press(60)
-    finger = script.Finger(bag_biotac_hand.MESSAGE, 1, fake_tools.tools())
-    for message in messages_of(press, tmp_path, "hand", bag_biotac_hand, 1):
+    finger = script.Finger("biotac_sensors/msg/BioTacHand", 1, fake_tools.tools())
+    for message in messages_of(press, tmp_path, "hand", 1):
         finger(message)
     assert finger.view.frames == 60 and finger.view.rest_source.startswith("frames")
     np.testing.assert_allclose(finger.view._signals.rest, press.electrodes[:30].mean(axis=0), atol=1.0)  # counts
     with pytest.raises(TactileError, match="2 fingers; expected finger 5"):
-        script.Finger(bag_biotac_hand.MESSAGE, 5, fake_tools.tools())(message)
+        script.Finger("biotac_sensors/msg/BioTacHand", 5, fake_tools.tools())(message)

@@ -1,0 +1,1 @@
+"""ROS bags: their topics, the messages in them, and the BioTacs in these."""

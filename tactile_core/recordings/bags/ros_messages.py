@@ -1,0 +1,173 @@
+"""Decode ROS messages by their definitions, which are parsed and never compiled.
+
+The decoding library generates code from definitions; those of bags come from strangers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+NUMBERS = {
+    "bool": "?", "byte": "u1", "octet": "u1", "char": "u1", "float32": "f4", "float64": "f8",
+    **{f"{sign}int{bits}": f"{code}{bits // 8}" for sign, code in (("", "i"), ("u", "u")) for bits in (8, 16, 32, 64)},
+}  # fmt: skip
+NAME, ARRAY, SEQUENCE = 2, 3, 4  # rosbags' numbers of a field's kind; 1 is a number or a text
+TIME = "builtin_interfaces/msg/Time"  # ROS 1 has it built in
+MOST_TEXT = 2**16  # characters of a definition (assumed enough: sensor_msgs/PointCloud2 has 3,000)
+PADDING = 3  # bytes that may follow a ROS 2 message
+# Types that definitions may leave out: those of time are built into ROS 1.
+_TIME = "int32 sec\nuint32 nanosec\n"
+PLAIN = {
+    "std_msgs/msg/Header": "builtin_interfaces/Time stamp\nstring frame_id\n", TIME: _TIME,
+    "builtin_interfaces/msg/Duration": _TIME,
+}  # fmt: skip
+_SENSOR = "int16 pac0\nint16 pac1\nint16 pdc\nint16 tac\nint16 tdc\nint16[{}] electrodes\n"
+_HAND = """\
+std_msgs/Header header
+string hand_id
+biotac_sensors/BioTacData[] bt_data
+biotac_sensors/BioTacTime bt_time
+"""
+_DATA = """\
+string bt_serial
+uint16 bt_position
+uint16 tdc_data
+uint16 tac_data
+uint16 pdc_data
+uint16[22] pac_data
+uint16[19] electrode_data
+"""
+_OFFSETS = """\
+builtin_interfaces/Time frame_start_time
+builtin_interfaces/Time frame_end_time
+uint32 tdc_ns_offset
+uint32 tac_ns_offset
+uint32 pdc_ns_offset
+uint32[22] pac_ns_offset
+uint32[19] electrode_ns_offset
+"""
+# Messages of the drivers of SynTouch and Shadow Robot, for bags that carry no definitions, as ROS 2 wrote before 2023.
+# Those of Shadow's have an open list of electrodes, in older versions one of 19.
+KNOWN: dict[str, list[dict[str, str]]] = {
+    "biotac_sensors/msg/BioTacHand": [{
+        "biotac_sensors/msg/BioTacHand": _HAND, "biotac_sensors/msg/BioTacData": _DATA,
+        "biotac_sensors/msg/BioTacTime": _OFFSETS,
+    }],
+    "sr_robot_msgs/msg/BiotacAll": [
+        {"sr_robot_msgs/msg/BiotacAll": "std_msgs/Header header\nsr_robot_msgs/Biotac[5] tactiles\n",
+         "sr_robot_msgs/msg/Biotac": _SENSOR.format(count)} for count in ("", "19")
+    ],
+    "sr_robot_msgs/msg/Biotac": [{"sr_robot_msgs/msg/Biotac": _SENSOR.format(count)} for count in ("", "19")],
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Definition:
+    """Fields of a message, and of those within it. types : name -> names and kinds of fields, as rosbags parses them"""
+
+    root: str
+    types: dict[str, list[tuple[str, Any]]]
+
+    def fields(self, name: str = "") -> list[tuple[str, Any]]:
+        """Return names and kinds of the fields of a type, by default of the message; none of an unknown type."""
+        return self.types.get(name or self.root, [])
+
+
+def definitions(kind: str, text: str, idl: bool) -> list[Definition]:
+    """Return the definitions that messages of a type may have: the bag's own, or without one those of `KNOWN`.
+
+    text : of the bag, empty where it has none. One that cannot be parsed is left out.
+    """
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
+
+    if len(text) > MOST_TEXT:
+        return []
+    try:
+        if text:
+            parsed = [get_types_from_idl(text) if idl else get_types_from_msg(text, kind)]
+        else:
+            parsed = [_parsed(version) for version in KNOWN.get(kind, [])]
+    except Exception:  # the library raises a dozen types on odd text
+        return []
+    plain = _parsed(PLAIN)
+    return [Definition(kind, {name: fields for name, (_, fields) in (plain | each).items()}) for each in parsed]
+
+
+def _parsed(texts: dict[str, str]) -> dict[str, Any]:
+    """Parse the definitions of types, by their names."""
+    from rosbags.typesys import get_types_from_msg
+
+    return {name: get_types_from_msg(text, name)[name] for name, text in texts.items()}
+
+
+class Decoder:
+    """A decoder of one type of message to dictionaries: numbers, arrays of numbers, texts, lists of dictionaries."""
+
+    def __init__(self, definition: Definition, ros1: bool) -> None:
+        self._definition, self._ros1 = definition, ros1
+
+    def __call__(self, data: bytes) -> dict[str, Any]:
+        """Decode a message. Raises ValueError, or another error of its bytes, where it does not fit the definition."""
+        cursor = _Cursor(data, self._ros1)
+        message = self._message(cursor, self._definition.root)
+        if not 0 <= len(data) - cursor.place <= PADDING * (not self._ros1):
+            raise ValueError(f"{len(data) - cursor.place} bytes are left")
+        return message
+
+    def _message(self, cursor: _Cursor, name: str) -> dict[str, Any]:
+        cursor.count()
+        return {field: self._value(cursor, kind) for field, kind in self._definition.types[name]}
+
+    def _value(self, cursor: _Cursor, kind: Any) -> Any:
+        node, what = int(kind[0]), kind[1]
+        if node == NAME:
+            return self._message(cursor, what)
+        if node not in (ARRAY, SEQUENCE):
+            return cursor.text(what[0]) if "string" in what[0] else cursor.numbers(NUMBERS[what[0]], 1)[0]
+        of, count = what
+        if node == SEQUENCE:
+            count = int(cursor.numbers("u4", 1)[0])
+        numbers = None if int(of[0]) == NAME else NUMBERS.get(of[1][0])
+        if numbers is not None:
+            return cursor.numbers(numbers, count)
+        if count > len(cursor.data):
+            raise ValueError(f"{count} entries in {len(cursor.data)} bytes")
+        return [self._value(cursor, of) for _ in range(count)]
+
+
+class _Cursor:
+    """A place in a message's bytes: ROS 1 packs them, ROS 2 (CDR) aligns each number to its own size."""
+
+    def __init__(self, data: bytes, ros1: bool) -> None:
+        self.data, self.place, self._aligned, self._order, self._messages = data, 0, not ros1, "<", 0
+        if not ros1:
+            self._order = {b"\0\0": ">", b"\0\1": "<"}[bytes(data[:2])]
+            self.place = 4
+
+    def count(self) -> None:
+        """Raise ValueError for more messages within than bytes, as empty ones in nested lists make."""
+        self._messages += 1
+        if self._messages > len(self.data) + 64:
+            raise ValueError("more entries than bytes")
+
+    def numbers(self, kind: str, count: int) -> np.ndarray:
+        """Return the next numbers (count,)."""
+        dtype = np.dtype(self._order + kind)
+        if count == 0:
+            return np.empty(0, dtype)
+        if self._aligned:
+            self.place += -(self.place - 4) % dtype.itemsize
+        found = np.frombuffer(self.data, dtype, count, self.place)
+        self.place += found.nbytes
+        return found
+
+    def text(self, kind: str) -> str:
+        """Return the next text, whose characters matter to nobody here."""
+        length = int(self.numbers("u4", 1)[0]) * (2 if kind == "wstring" else 1)
+        self.place += length
+        if self.place > len(self.data):
+            raise ValueError(f"a text of {length} bytes")
+        return bytes(self.data[self.place - length : self.place]).rstrip(b"\0").decode("utf-8", "replace")

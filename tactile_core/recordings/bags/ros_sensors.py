@@ -1,0 +1,95 @@
+"""Find the BioTacs in ROS messages by the names of their fields, whatever the messages are called."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from .ros_messages import ARRAY, NAME, NUMBERS, SEQUENCE, TIME, Definition
+
+DEEPEST = 4  # messages within messages that are searched (assumed enough: the drivers have 2)
+MOST_PAC = 1000  # samples of PAC a message (assumed enough: the drivers have 2 and 22)
+ELECTRODES = re.compile(r"electrodes?(_(data|values?|vals?|raw|counts))?$", re.IGNORECASE)
+SLOW = {name: re.compile(rf"(^|.*_){name}(_(data|value|val|raw))?$", re.IGNORECASE) for name in ("pdc", "tac", "tdc")}
+PAC = re.compile(r"(^|.*_)pac(\d*|_?(data|values?|vals?|raw))$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class SensorFields:
+    """Names of a sensor's fields. path : fields from the message to the sensor, or to a list of them
+
+    slow : of pdc, tac, tdc, empty where there is none; others : fields that nothing here reads
+    """
+
+    path: tuple[str, ...]
+    electrodes: str
+    slow: tuple[str, str, str]
+    pac: tuple[str, ...]
+    others: tuple[str, ...]
+
+
+def sensors_in(definition: Definition) -> list[SensorFields]:
+    """Return the fields of each sensor, or list of sensors, in a type of message; none where it has no electrodes."""
+    return list(_search(definition, "", (), DEEPEST))
+
+
+def _search(definition: Definition, name: str, path: tuple[str, ...], deeper: int) -> Iterator[SensorFields]:
+    fields = definition.fields(name)
+    row = next((field for field, kind in fields if ELECTRODES.search(field) and _is_row(kind)), None)
+    if row is not None:
+        slow = [next((field for field, _ in fields if each.match(field)), "") for each in SLOW.values()]
+        pac = tuple(field for field, _ in fields if PAC.match(field))
+        others = tuple(field for field, kind in fields if field not in {row, *slow, *pac} and not _is_time(kind))
+        yield SensorFields(path, row, (slow[0], slow[1], slow[2]), pac, others)
+        return
+    for field, kind in fields:
+        within = kind if int(kind[0]) == NAME else kind[1][0] if int(kind[0]) in (ARRAY, SEQUENCE) else None
+        if deeper and within is not None and int(within[0]) == NAME:
+            yield from _search(definition, within[1], (*path, field), deeper - 1)
+
+
+def _is_row(kind: Any) -> bool:
+    """Return true for a list of numbers."""
+    return int(kind[0]) in (ARRAY, SEQUENCE) and int(kind[1][0][0]) != NAME and kind[1][0][1][0] in NUMBERS
+
+
+def _is_time(kind: Any) -> bool:
+    return int(kind[0]) == NAME and kind[1] in (TIME, "std_msgs/msg/Header")
+
+
+def in_message(message: dict[str, Any], fields: SensorFields) -> list[dict[str, Any]]:
+    """Return the sensors of a decoded message that lie at these fields."""
+    found = [message]
+    for name in fields.path:
+        found = [each for one in found for each in (one[name] if isinstance(one[name], list) else [one[name]])]
+    return found
+
+
+def channels(sensor: dict[str, Any], fields: SensorFields) -> tuple[list[float], list[float]]:
+    """Return pdc, tac, tdc and the samples of pac; and the electrodes. NaN marks what the sensor has not.
+
+    Raises ValueError for more than MOST_PAC samples.
+    """
+    row = [float(sensor[name]) if name else float("nan") for name in fields.slow]
+    for name in fields.pac:
+        samples = sensor[name]
+        row += [float(samples)] if samples.ndim == 0 else samples.tolist()
+    if len(row) > 3 + MOST_PAC:
+        raise ValueError(f"{len(row) - 3} samples of PAC")
+    return row, sensor[fields.electrodes].tolist()
+
+
+def stamp_of(message: dict[str, Any]) -> float:
+    """Return the unix time, s, of a message's header or of its own stamp; 0 where it has none."""
+    held = message.get("header", message)
+    stamp = held.get("stamp", held.get("time")) if isinstance(held, dict) else None
+    return float(stamp["sec"] + 1e-9 * stamp["nanosec"]) if isinstance(stamp, dict) and "sec" in stamp else 0.0
+
+
+def not_read(definition: Definition, fields: list[SensorFields]) -> list[str]:
+    """Return the names of the fields of a message that nothing here reads."""
+    used = {each.path[0] for each in fields if each.path}
+    beside = [name for name, kind in definition.fields() if used and name not in used and not _is_time(kind)]
+    return [*beside, *(name for each in fields for name in each.others)]
