@@ -1,11 +1,11 @@
-"""Animate a surface in any of three ways, through one interface."""
+"""Animate a surface: a shape key a frame, or a mesh cache beside the .blend."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
-from . import axes, mesh_cache, shape_keys
+from . import axes, curves, mesh_cache
 
 
 def animate(
@@ -13,18 +13,41 @@ def animate(
 ) -> str:
     """Let an object play displacements (T, n, 3) m of rest (n, 3) m at frames (T,); returns a sentence.
 
-    motion : one of ``properties.MOTIONS``. Raises TactileError where a mesh cache cannot be written.
+    motion : one of ``properties.MOTIONS``; empty where a file of before has compact keys
+    Raises TactileError where a mesh cache cannot be written.
     """
     per_metre = thing.tactile.per_metre
     moved, nodes = axes.to_blender(displacement, per_metre), axes.to_blender(rest, per_metre)
-    thing.tactile.motion = motion
+    thing.tactile.motion = motion = motion or "SHAPE_KEYS"
     thing.tactile.largest = float(np.sqrt(np.square(displacement).sum(-1).max(initial=0.0)))
     if motion == "MESH_CACHE":
         path = mesh_cache.write_cache(thing, nodes, moved, frames)
         return f"{thing.name}: mesh cache {path.name}"
-    if motion == "COMPACT":
-        error = shape_keys.write_compact(thing, moved, frames, shape_keys.COMPACT_ERROR * per_metre)
-        count = len(thing.data.shape_keys.key_blocks) - 1
-        return f"{thing.name}: {count} basis keys, largest error {1e6 * error / per_metre:.1f} µm"
-    shape_keys.write_absolute(thing, nodes, moved, frames)
+    _write_keys(thing, nodes, moved, frames)
     return f"{thing.name}: {len(frames)} shape keys"
+
+
+def _write_keys(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray) -> None:
+    """Write one key a frame, shown one after the other by one F-curve of ``eval_time``.
+
+    rest : (n, 3), displacement : (T, n, 3), in the object's own units; frames : (T,) of the scene
+    """
+    keys = _keys_of(thing)
+    keys.use_relative = False
+    nodes = rest.astype(np.float32)
+    times = np.empty(len(frames))
+    for k, moved in enumerate(displacement):
+        block = thing.shape_key_add(name=f"{frames[k]:g}", from_mix=False)
+        block.interpolation = "KEY_LINEAR"
+        block.data.foreach_set("co", (nodes + moved).ravel())
+        times[k] = block.frame  # steps of 10 that drift by rounding: read back, not counted
+    curves.write_curve(keys, "eval_time", frames, times)
+
+
+def _keys_of(thing: bpy.types.Object) -> bpy.types.Key:
+    if thing.data.shape_keys is None:
+        thing.shape_key_add(name="Rest", from_mix=False)
+    keys = thing.data.shape_keys
+    for block in reversed(keys.key_blocks[1:]):
+        thing.shape_key_remove(block)
+    return keys

@@ -33,10 +33,9 @@ PRESS_BY = (
     ("HEIGHT", "Height", "It presses as deep as it is moved into the gel"),
     ("FORCE", "Force", "It presses with the keyframed force, wherever its height is"),
 )
-MOTIONS = (
-    ("SHAPE_KEYS", "Shape Keys", "One shape key a frame along one curve: exact, and fast to play"),
-    ("COMPACT", "Compact", "A few basis shape keys with animated weights: a small file; its largest error is reported"),
-    ("MESH_CACHE", "Mesh Cache", "A PC2 file beside the saved .blend: for recordings of thousands of frames"),
+MOTIONS = (  # numbers as in files of before: 1 was compact keys
+    ("SHAPE_KEYS", "Shape Keys", "One shape key a frame along one curve: exact, and fast to play", "", 0),
+    ("MESH_CACHE", "Mesh Cache", "A PC2 file beside the saved .blend: for recordings of thousands of frames", "", 2),
 )
 
 

@@ -80,7 +80,7 @@ def needs(extension: ModuleType):
 
 @pytest.fixture
 def imported(scene):
-    """``imported(motion="COMPACT")``: the shipped recording's frames 40 to 140, as the skin object."""
+    """``imported(motion="MESH_CACHE")``: the shipped recording's frames 40 to 140, as the skin object."""
     import bpy
 
     def run(**options):

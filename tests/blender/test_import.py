@@ -23,13 +23,11 @@ def _wanted(part, frame):
     return part("addon.objects.axes").to_blender(rest + moved, 1000)
 
 
-@pytest.mark.parametrize("motion", ["SHAPE_KEYS", "COMPACT"])
-def test_the_skin_moves_as_the_recording_says(imported, nodes_of, part, scene, motion):
-    skin = imported(motion=motion)
-    tolerance = TOLERANCE if motion == "SHAPE_KEYS" else 0.05  # 64 keys: error of a node in mm, reported to the user
+def test_the_skin_moves_as_the_recording_says(imported, nodes_of, part, scene):
+    skin = imported()
     for frame in (40, 77, 90, 139):
         scene.frame_set(frame)
-        np.testing.assert_allclose(nodes_of(skin), _wanted(part, frame), atol=tolerance)
+        np.testing.assert_allclose(nodes_of(skin), _wanted(part, frame), atol=TOLERANCE)
 
 
 def test_a_mesh_cache_plays_the_same(imported, nodes_of, part, scene, tmp_path):
