@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from .pictures.renderer import Renderer as Renderer
     from .recordings.readers import read as read
     from .sensors.calibration_file import load_calibration as load_calibration
-    from .translation.translate_recording import translate as translate
+    from .translation.translate import translate as translate
 
 _HOME = {  # of each public name: its module, and its name there; none for the module itself
     "Gel": (".jobs.gel", "Gel"),
@@ -51,7 +51,7 @@ _HOME = {  # of each public name: its module, and its name there; none for the m
     "load_calibration": (".sensors.calibration_file", "load_calibration"),
     "read": (".recordings.readers", "read"),
     "solve": (".mechanics.solve", "solve"),
-    "translate": (".translation.translate_recording", "translate"),
+    "translate": (".translation.translate", "translate"),
 }
 __all__ = [
     "Gel", "Placement", "Renderer", "TactileError", "indenters", "load_calibration", "read", "solve", "translate",

@@ -63,9 +63,9 @@ def write_slide() -> Callable[[str, int, Path], Path]:
 @pytest.fixture
 def no_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the contact sheet of a conversion empty: drawing it takes a second, and most tests look elsewhere."""
-    from tactile_core.jobs.frame_pass import FramePass
+    from tactile_core.jobs.conversion_report import ConversionReport
 
-    monkeypatch.setattr(FramePass, "draw_sheet", lambda made, path: path.write_bytes(b""))
+    monkeypatch.setattr(ConversionReport, "draw_sheet", lambda made, path: path.write_bytes(b""))
 
 
 @pytest.fixture

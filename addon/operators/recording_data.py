@@ -10,25 +10,21 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
-from ...tactile_core import recordings
 from ...tactile_core.errors import TactileError
 from ...tactile_core.jobs import frame_range
 from ...tactile_core.recordings import PrepareOptions, Recording, Signals, readers
 from ...tactile_core.recordings.polarity import AUTO
-from ...tactile_core.translation import translate
-from ...tactile_core.translation.contact_track import Evidence, Tracked
-from ...tactile_core.translation.translate import Translation
+from ...tactile_core.translation.translate import PreparedRows, load_translator, translated
+from ...tactile_core.translation.translator import Translation, Translator
 from ...tactile_core.translation.weights import CARD_NAME
 from ..process import recording_reader
-
-CHUNK = 64  # frames between two steps of the progress: the networks' own block
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Translated:
     """A recording, the numbers (T,) of its translated frames, their signals and translation, and the networks used."""
 
-    translator: translate.Translator
+    translator: Translator
     recording: Recording
     chosen: np.ndarray
     signals: Signals
@@ -50,12 +46,12 @@ class Translated:
 
 
 @functools.lru_cache(maxsize=2)
-def _translator(weights: str, source: str | None, _changed: int) -> translate.Translator:
+def _translator(weights: str, source: str | None, _changed: int) -> Translator:
     """Load networks once, for an empty text those that ship for a sensor, whichever gel they lead to."""
-    return translate.load_translator(weights or None, target=None, source=source)
+    return load_translator(weights or None, target=None, source=source)
 
 
-def translator_of(weights: str, path: str) -> translate.Translator:
+def translator_of(weights: str, path: str) -> Translator:
     """Return the networks in a folder, else those that ship for a recording. Raises TactileError without networks."""
     source = None if weights else readers.sensor_of_first([path])
     folder = bpy.path.abspath(weights) if weights else ""
@@ -87,7 +83,7 @@ _KEPT: dict[tuple, Translated] = {}  # the last one: importing and translating a
 
 
 def _translated(
-    translator: translate.Translator,
+    translator: Translator,
     path: str,
     tare: str,
     frames: str,
@@ -100,14 +96,6 @@ def _translated(
         raise TactileError(path, found, "frames in order", advice)
     chosen = frame_range.select(frame_range.parse_frames(frames), len(recording))
     options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)
-    signals = recordings.prepare(recording, options)
-
-    def read_posteriors(start: int, stop: int) -> tuple[np.ndarray, Evidence]:
-        return recording.time[start:stop], translator.posterior(signals.at(slice(start, stop)))
-
-    tracked, parts = Tracked(read_posteriors, len(recording)), []
-    for start in range(0, len(chosen), CHUNK):
-        frames = chosen[start : start + CHUNK]
-        parts.append(translator(signals.at(frames), tracked(frames)))
-        progress(min(1.0, (start + CHUNK) / len(chosen)))
-    return Translated(translator, recording, chosen, signals.at(chosen), Translation.joined(parts))
+    rows = PreparedRows(recording, chosen, translator.answer, options)
+    translation = translated(translator, rows, chosen, progress)
+    return Translated(translator, recording, chosen, rows.read(chosen)[1], translation)

@@ -66,7 +66,7 @@ class TACTILE_OT_translate(JobOperator):
             with np.load(self._folder.path / "gel.npz") as stored:
                 self._moved, self._flags = stored["displacement"], self._flags | stored["flags"]
             self._error = np.full(len(self._moved), custom_properties.UNKNOWN)
-            from ...tactile_core.jobs.frame_pass import describe_gel
+            from ...tactile_core.jobs.drawer import describe_gel
 
             for words in describe_gel(self._target, self._found.translator.target):
                 self.report({"WARNING"}, words)

@@ -26,7 +26,8 @@ from tactile_core.errors import TactileError
 from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.step_errors import digit_columns, our_bodies, parts, true_displacement
-from tactile_core.translation.translate import Translation, Translator, load_translator
+from tactile_core.translation.translate import load_translator
+from tactile_core.translation.translator import Translation, Translator
 
 GAINS, SEED = 0.1, 0  # standard deviation of the gains' logarithm
 DEEP = 0.3e-3  # m, on the BioTac

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import os
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +12,14 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic, provenance
+from ..files.png_writer import pack_png
 from ..files.stopwatch import Stopwatch
 from ..sensors import SOURCE, TARGET
+from ..translation.translate import PreparedRows, load_translator
 from . import results, sampling_error
-from .frame_pass import FramePass, Solver, Tools
+from .conversion_report import ConversionReport
+from .drawer import load_drawer
+from .frame_pass import FramePass, Tools
 from .frame_range import frames_text, select
 from .results import SOLVED, TRANSLATED, Gel
 
@@ -25,9 +27,8 @@ if TYPE_CHECKING:
     from ..recordings import PrepareOptions, Recording
     from ..recordings.electrode_gains import SensorFile
     from ..translation.answer import Answer
-    from ..translation.translate import Translator
+    from ..translation.translator import Translator
     from .error_budget import Budget
-    from .needed_rows import Needed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,62 +69,23 @@ def load_tools(
         shipped weights do not lead
     target : the gel, to which the weights must translate unless it is solved
     source : the sensor whose recordings they must translate; None for whichever they do
-    The fast shader is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
-    Raises TactileError for weights that are missing, changed or of another shape, for a bad calibration, and what
-    ``renderer.Renderer`` raises.
+    Raises TactileError for weights that are missing, changed or of another shape, and what `load_drawer` raises.
     """
-    from ..pictures import background, height_map, shading
-    from ..sensors.calibration_file import load_calibration
-
     translator, solves = load_networks(weights, answer, gel, target, source)
-    unit = load_calibration(calibration, target)
-    mapper = height_map.gel_mapper(unit.camera)
-    dots = None
-    if preset == "fast" and unit.markers is None:
-        if unit.photograph:
-            background.read_photograph(unit.photograph, unit.camera)  # a bad one is refused before any work
-        shade = made_at_first_call(partial(shading.Shader, unit))
-    else:
-        from ..pictures.renderer import Renderer
-
-        shade = Renderer(unit, preset, variant)
-        dots = shade.dots
-    solve: Solver | None = None
-    if solves:
-        from . import solved_gel
-
-        solved_gel.prepare(target)
-        solve = partial(solved_gel.solved, gel=target, found_on=translator.target)
-    asked = translator.answer
-    return Tools(
-        translate=translator, card=translator.card, sha256=translator.sha256,
-        height_map=mapper, shade=shade, preset=preset, camera=unit.camera,
-        posterior=translator.posterior if asked.follows else None,
-        plausible=translator.plausible if asked.samples else None,
-        answer=asked, solve=solve, dots=dots,
-        source=translator.source, target=target, found_on=translator.target,
-    )  # fmt: skip
+    return Tools(translator, load_drawer(calibration, preset, variant, target, translator.target, solves=solves))
 
 
 def load_networks(
     weights: str | os.PathLike | None, answer: Answer | None, gel: Gel, target: str, source: str | None
 ) -> tuple[Translator, bool]:
     """Load the networks, and tell whether the target is solved under the contacts that they find; see `load_tools`."""
-    from ..translation import translate
-
-    led = None if gel == SOLVED or weights is None else target
-    translator = translate.load_translator(weights, answer, led, source)
+    must_lead_to = None if gel == SOLVED or weights is None else target
+    translator = load_translator(weights, answer, must_lead_to, source)
     return translator, gel == SOLVED or translator.target != target
 
 
-def made_at_first_call(make: Callable[[], Callable[..., np.ndarray]]) -> Callable[..., np.ndarray]:
-    """Return a tool that `make` makes when it is first called."""
-    made = functools.cache(make)
-    return lambda *arguments: made()(*arguments)
-
-
 @dataclasses.dataclass(frozen=True)
-class Done:
+class Converted:
     """A finished conversion. folder : the result; warnings : what the user should know of it
 
     remarks : sentences on errors: by how much a kept traction misses the force; where a bound was given, what the
@@ -141,7 +103,7 @@ def convert(
     options: Options,
     tools: Tools,
     progress: Callable[[int, int], None] | None = None,
-) -> Done:
+) -> Converted:
     """Convert one recording into `folder`, which appears whole or not at all.
 
     progress : called with (frames done, frames in all)
@@ -149,43 +111,80 @@ def convert(
     """
     from .. import recordings
     from ..recordings.fingers import split
-    from .needed_rows import Needed
 
     if options.error is not None and options.error.um is not None:
-        sampling_error.check_gel(tools.target)
-    clock = Stopwatch()
+        sampling_error.check_gel(tools.drawer.target)
+    clock, answer = Stopwatch(), tools.translator.answer
     with clock.stage("read"):
         columns = None if options.prepare is None else options.prepare.columns
-        recording = recordings.read(recording_path, columns, tools.source, lean=True)
-        check_order(recording, tools.answer)
+        recording = recordings.read(recording_path, columns, tools.translator.source, lean=True)
+        check_order(recording, answer)
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
-        finger = split(os.fspath(recording_path))[1]
-        unit = (
-            None
-            if options.sensor is None
-            else options.sensor.gains_for(recording_path, finger, "--sensor", recording.sensor)
-        )
-        needed = Needed.prepared(recording, frames, tools.posterior is not None, options.prepare, unit)
+        unit = None
+        if options.sensor is not None:
+            finger = split(os.fspath(recording_path))[1]
+            unit = options.sensor.gains_for(recording_path, finger, "--sensor", recording.sensor)
+        rows = PreparedRows(recording, frames, answer, options.prepare, unit)
         del recording  # of a long one most rows are not needed any more
+    made = FramePass(tools, rows.read, rows.count, options.keep, clock)
+    report = ConversionReport(rows, frames, tools, made)
     try:
-        with atomic.new_folder(folder, overwrite=options.overwrite) as partial:
-            made = FramePass(needed, options.keep, tools, clock)
-            made.write(partial, progress or _silent)
-            added = _added(options, made)
+        with atomic.new_folder(folder, overwrite=options.overwrite) as unfinished:
+            _write_frames(unfinished, made, report, rows, frames, options, clock, progress)
+            added = _added(options, report)
             with clock.stage("sheet"):
-                made.draw_sheet(partial / results.SHEET)
-            origin = note(needed, made, options, tools)
-            atomic.write_json(partial / results.NOTE, origin)
-            machine = provenance.machine()
-            timings = {**clock.per_frame(len(frames)), "frames": len(frames), "machine": machine}
-            atomic.write_json(partial / results.TIMINGS, timings)
+                report.draw_sheet(unfinished / results.SHEET)
+            atomic.write_json(unfinished / results.NOTE, note(rows, frames, report, options, tools))
+            timings = {**clock.per_frame(len(frames)), "frames": len(frames), "machine": provenance.machine()}
+            atomic.write_json(unfinished / results.TIMINGS, timings)
     except OSError as error:
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
         found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
-    remarks = [made.describe_traction(), added, "" if options.error is None else made.describe_expected_error()]
-    return Done(Path(folder), made.warnings(), tuple(filter(None, remarks)))
+    remarks = [report.describe_traction(), added, "" if options.error is None else report.describe_expected_error()]
+    return Converted(Path(folder), report.warnings(), tuple(filter(None, remarks)))
+
+
+def _write_frames(
+    folder: Path, made: FramePass, report: ConversionReport, rows: PreparedRows, frames: np.ndarray, options: Options,
+    clock: Stopwatch, progress: Callable[[int, int], None] | None,
+) -> None:  # fmt: skip
+    """Write ``frames.h5`` and the pictures; `progress` is called with (frames done, frames in all)."""
+    pictures, done = _Pictures(folder / results.IMAGES) if "image" in options.keep else None, 0
+
+    def take(some: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
+        nonlocal done
+        report.take(some, arrays)
+        if pictures is not None:
+            with clock.stage("png"):
+                for frame, picture in zip(some, arrays["image"], strict=True):
+                    pictures.write(frame, picture)
+        done += len(some)
+        if progress is not None:
+            progress(done, len(frames))
+
+    recording = rows.recording
+    name = recording.name.encode(errors="replace").decode()  # HDF5 text is UTF-8, file names need not be
+    about = {"recording": name, "simulated": recording.simulated}
+    at = rows.at(frames)
+    labels = {name: column[at] for name, column in recording.labels.items()}
+    made.write(folder / results.FRAMES, frames, rows.signals, recording.start_time, about, take, labels)
+
+
+class _Pictures:
+    """Writes pictures as PNG; one that equals the one before, as while nothing touches, is not packed again."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir()
+        self._folder = folder
+        self._packed: tuple[np.ndarray, bytes] | None = None
+
+    def write(self, frame: int, picture: np.ndarray) -> None:
+        """Write the picture (H, W, 3) uint8 of a frame."""
+        if self._packed is None or not np.array_equal(picture, self._packed[0]):
+            self._packed = picture, pack_png(picture)
+        (self._folder / results.IMAGE_NAME.format(frame)).write_bytes(self._packed[1])
 
 
 def check_order(recording: Recording, answer: Answer) -> None:
@@ -195,39 +194,36 @@ def check_order(recording: Recording, answer: Answer) -> None:
         raise TactileError(recording.path, found, "frames in order", "Translate each alone: --frames-apart")
 
 
-def _added(options: Options, made: FramePass) -> str:
+def _added(options: Options, report: ConversionReport) -> str:
     """Describe the toolkit's own error in displacements or heights; raises TactileError for more than is allowed."""
     if options.error is None or options.error.um is None:
         return ""
-    return sampling_error.check(options.error.um, made.share if {"height", "image"} & set(options.keep) else None)
+    return sampling_error.check(options.error.um, report.share if {"height", "image"} & set(options.keep) else None)
 
 
-def _silent(done: int, total: int) -> None:
-    """Discard progress."""
-
-
-def note(needed: Needed, made: FramePass, options: Options, tools: Tools) -> dict:
+def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools) -> dict:
     """Return the origin of a result for JSON: what the same input reproduces, so no paths and no time of day."""
     from ..recordings import labels
 
-    recording = needed.recording
+    recording = rows.recording
     prepare = None if options.prepare is None else dataclasses.asdict(options.prepare)
     return {
         "format": results.FORMAT,
         "recording": {
             "file": os.path.basename(recording.path), "sha256": provenance.sha256(recording.path),
-            "layout": recording.layout, "frames": needed.count, "simulated": recording.simulated,
+            "layout": recording.layout, "frames": rows.count, "simulated": recording.simulated,
             "labels": labels.summary(recording.labels),
             "about": {name: value for name, value in recording.about.items() if name != "scene"},  # the file holds it
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
-                    "error": None if options.error is None else str(options.error), "preset": tools.preset,
-                    "answer": dataclasses.asdict(tools.answer), "gel": TRANSLATED if tools.solve is None else SOLVED},
-        "frames_converted": len(made.frames),
-        "prepared": made.signals.report,
-        "warnings": list(made.warnings()),
-        "flagged_frames": made.flagged,
-        "weights": weights_entry(tools),
+                    "error": None if options.error is None else str(options.error), "preset": tools.drawer.preset,
+                    "answer": dataclasses.asdict(tools.translator.answer),
+                    "gel": TRANSLATED if tools.drawer.solve is None else SOLVED},
+        "frames_converted": len(frames),
+        "prepared": rows.signals.report,
+        "warnings": list(report.warnings()),
+        "flagged_frames": report.flagged,
+        "weights": weights_entry(tools.translator),
         **_unit_entry(options.calibration),
         "versions": provenance.versions("PIL", "matplotlib"),
     }  # fmt: skip
@@ -240,10 +236,10 @@ def _unit_entry(calibration: str | os.PathLike | None) -> dict[str, dict[str, st
     return {"calibration": {"file": os.path.basename(calibration), "sha256": provenance.sha256(calibration)}}
 
 
-def weights_entry(tools: Tools) -> dict:
+def weights_entry(translator: Translator) -> dict:
     """Return the hash of the weights' card, and the error and baseline, um, that the card states."""
     from ..translation.card_errors import chain_error
 
-    found = chain_error(tools.card)
+    found = chain_error(translator.card)
     errors = {} if found is None else {"kept_apart_rms_um": found[0], "baseline_rms_um": found[1]}
-    return {"sha256": tools.sha256, **errors}
+    return {"sha256": translator.sha256, **errors}

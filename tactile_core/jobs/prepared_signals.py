@@ -240,26 +240,19 @@ class Prepared:
         """Return the facts reported of the recording."""
         return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
-    def rows(self, start: int, stop: int) -> tuple[np.ndarray, Signals]:
-        """Return the times (T,) s and signals of the frames from `start` up to `stop`, with the first one's `rest`."""
+    def read(self, frames: np.ndarray) -> tuple[np.ndarray, Signals]:
+        """Return the times (n,) s and signals of rising frames (n,), with the first one's `rest`."""
+        start, about = int(frames[0]), self.about()
 
         def read(file: h5py.File) -> tuple[np.ndarray, Signals]:
-            """Read times (T,) s and signals of frames `start` to `stop` of an open file."""
-            arrays = {name: file[name][start:stop] for name in COLUMNS}
-            part = int(np.searchsorted(file["part"][()], start, side="right")) - 1
-            rest = file["rest"][part]
-            time = arrays.pop("time")
-            return time, Signals(
-                rest=rest,
-                drift=np.zeros_like(rest),
-                kind=about["kind"],
-                warnings=(),
-                report={},
-                sensor=about.get("sensor", SOURCE),
-                **arrays,
-            )
+            """Read them from an open file."""
+            arrays = {name: file[name][start : frames[-1] + 1][frames - start] for name in COLUMNS}
+            rest = file["rest"][int(np.searchsorted(file["part"][()], start, side="right")) - 1]
+            return arrays.pop("time"), Signals(
+                rest=rest, drift=np.zeros_like(rest), kind=about["kind"], warnings=(), report={},
+                sensor=about.get("sensor", SOURCE), **arrays,
+            )  # fmt: skip
 
-        about = self.about()
         return self._read(read)
 
     def _read(self, what: Any) -> Any:

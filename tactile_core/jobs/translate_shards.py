@@ -1,4 +1,9 @@
-"""Recordings to translated frames: the signals of each are prepared once, then its shards are made of them."""
+"""Recordings to shards of translated frames: the signals of each are prepared once, then its shards are made of them.
+
+A shard is a checksummed HDF5 file of the layout of ``frames_file``, pictures included. Its attributes name the
+recording and its hash, the recipe's hash, and which shard of how many it is; its rows are frames
+`number * shard_frames` to those of the next.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +11,18 @@ import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import TactileError
-from . import frame_shard, prepared_signals
+from ..files import atomic, checksummed
+from ..files.hdf5_checked import open_plain
+from . import prepared_signals
+from .convert import load_tools
 from .engine import job as jobs
 from .engine.inputs import unit_hash
 from .engine.kinds import InputFacts
-from .frame_pass import Tools
+from .frame_pass import FramePass, Tools
+from .prepared_signals import Prepared
 
 if TYPE_CHECKING:
     from ..translation.answer import Answer
@@ -24,29 +35,67 @@ ALWAYS_KB = 0.8
 KEEP_KB = {"latent": 0.5, "displacement": 78, "height": 199, "image": 101, "traction": 0.2, "marker_motion": 0.5}
 
 
+def count(frames: int, job: Job) -> int:
+    """Return the number of shards of a recording of so many frames."""
+    return -(-frames // job.recipe.shard_frames)
+
+
 def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
     """Prepare a recording."""
     frames, made = prepared_signals.make(folder, job, index)
-    return frame_shard.count(frames, job), made
+    return count(frames, job), made
 
 
 def make(folder: Path, job: Job, index: int, number: int) -> bool:
-    """Translate some frames."""
-    recipe = job.recipe
+    """Translate the frames of a shard unless it is there and whole; returns whether it was made.
+
+    Raises TactileError for a damaged prepared file, OSError where the disk cannot be written.
+    """
+    recipe, name = job.recipe, job.inputs[index].name
     unit = job.calibration, recipe.calibration, recipe.preset, recipe.variant
-    way = recipe.answer, recipe.gel, recipe.source, recipe.target
-    return frame_shard.make(folder, job, index, number, _tools(job.weights, recipe.weights, *unit, *way))
+    tools = _tools(job.weights, recipe.weights, *unit, recipe.answer, recipe.gel, recipe.source, recipe.target)
+    file, prepared = jobs.shard_file(folder, name, number), Prepared(jobs.prepared_file(folder, name))
+    about, total = prepared.about(), len(prepared)
+    if checksummed.verified_checksum(file) is not None and is_of(file, job, index, number, total):
+        return False
+    start = number * recipe.shard_frames
+    frames = np.arange(start, min(start + recipe.shard_frames, total))
+    attributes = {
+        "recording": about["recording"].encode(errors="replace").decode(),
+        "simulated": about["simulated"], **_identity(job, index, number, total),
+    }  # fmt: skip
+    made, signals = FramePass(tools, prepared.read, total, recipe.keep), prepared.read(frames[:1])[1]
+    with atomic.new_file(file, shared=True) as unfinished:
+        made.write(unfinished, frames, signals, about["start_time"], attributes, room=checksummed.ROOM)
+        checksummed.write_checksum(unfinished)
+    return True
+
+
+def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
+    """Return true if a whole shard is shard `number` of recording `index`, alone under its name, with these frames."""
+    try:
+        with open_plain(file) as found:
+            return all(found.attrs[name] == value for name, value in _identity(job, index, number, frames).items())
+    except Exception:  # the library raises a dozen types on what is no shard
+        return False
+
+
+def _identity(job: Job, index: int, number: int, frames: int) -> dict[str, str | int]:
+    """The attributes that distinguish a shard from others."""
+    return {
+        "recording_sha256": job.inputs[index].sha256, "recipe": job.id, "shard": number, "shards": count(frames, job)
+    }  # fmt: skip
 
 
 def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
     """Return the shards, frames and warnings of a prepared recording."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
     try:
-        about = prepared_signals.Prepared(file).about()
+        about = Prepared(file).about()
     except TactileError:  # none yet, or a damaged one, which the next run makes again
         return None
     frames, kb = about["frames"], sum((KEEP_KB[word] for word in job.recipe.keep), ALWAYS_KB)
-    return InputFacts(frame_shard.count(frames, job), frames, tuple(about["warnings"]), int(1e3 * kb * frames))
+    return InputFacts(count(frames, job), frames, tuple(about["warnings"]), int(1e3 * kb * frames))
 
 
 @functools.lru_cache(maxsize=2)
@@ -63,12 +112,10 @@ def _tools(
     target: str,
 ) -> Tools:
     """Load the networks and the unit, once a process. Raises TactileError where they are not those of the job."""
-    from .convert import load_tools
-
     check_unit(calibration, unit_sha256)
     tools = load_tools(weights, calibration, preset, variant or None, answer, gel, target, source)
-    if tools.sha256 != sha256:
-        found, advice = f"sha256 {tools.sha256[:12]}...", "Use the weights that the job was made with"
+    if tools.translator.sha256 != sha256:
+        found, advice = f"sha256 {tools.translator.sha256[:12]}...", "Use the weights that the job was made with"
         raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)
     return tools
 

@@ -22,7 +22,7 @@ from ..pictures.height_map import gel_mapper
 from ..pictures.shading import Shader, check_reach
 from ..recordings import Signals
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
-from ..translation.translate import Translator
+from ..translation.translator import Translator
 from .batch.batch_heights import BatchHeights
 from .batch.batch_light import BatchLamp, BatchSurface
 from .batch.batch_networks import BatchNetworks

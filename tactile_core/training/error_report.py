@@ -15,7 +15,7 @@ from ..translation import error_bounds
 from ..translation.error_bounds import KINDS
 from ..translation.network_sizes import SURFACES
 from ..translation.networks import DISTANCES, Networks
-from ..translation.translate import silent_level
+from ..translation.translator import silent_level
 from ..translation.weights import write_bytes
 from .data import Contacts
 from .error_summary import metric_row, metric_rows

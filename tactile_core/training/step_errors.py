@@ -14,7 +14,7 @@ from ..simulation.pairs_file import Pairs
 from ..translation.contact_patch import contact_patch
 from ..translation.network_sizes import SURFACES
 from ..translation.networks import Networks
-from ..translation.translate import contact_center
+from ..translation.translator import contact_center
 
 ROWS = 128  # contacts at a time, to bound memory
 LEAST_PATCH = 20  # nodes: on smaller patches a share says little

@@ -5,15 +5,15 @@ Each frame's posterior is a mixture; first the best path through its components 
 of each step (Viterbi 1967), then the places on it are smoothed both ways (Kalman filter; Rauch, Tung and Striebel
 1965). Force and depth may change within a frame, so they are not smoothed: they are the frame's own estimates, given
 its place. What changes slowly is the force over the size of the signals (at one place, under one object, force is
-proportional to it), and that is smoothed in the force's stead. `Follower` runs the filters alone, frame by frame, on
-live signals.
+proportional to it), and that is smoothed in the force's stead. `Tracker` runs the filter both ways through a recording,
+`ForwardTracker` forward alone, frame by frame, on live signals.
 
 A path may jump without contact, where frames are missing, and, at a cost, anywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -49,17 +49,29 @@ class Evidence(Posterior):
     """Posterior of each frame alone, and what its signals show beside it.
 
     size : (T,) counts, root mean square of the changes; rectified : (T,) bool
+    latent : (T, K) of the signals; unsigned : (T,) bool, those of lost signs that were not recovered
     """
 
     size: np.ndarray
     rectified: np.ndarray
+    latent: np.ndarray
+    unsigned: np.ndarray
+
+    def at(self, frames: slice | np.ndarray) -> Evidence:
+        """Return the evidence of some frames alone."""
+        return Evidence(**{name: values[frames] for name, values in vars(self).items()})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Evidence]) -> Evidence:
+        """Join the evidence of frames that follow each other."""
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
 Read = Callable[[int, int], tuple[np.ndarray, Evidence]]
 
 
 class _Course(NamedTuple):
-    """Places on the best path.
+    """Places on a path through the frames' components.
 
     mean, variance : (T, PLACE); touched : (T,), true in contact; free : (T,), true where the path starts again
     """
@@ -74,32 +86,17 @@ def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
     """Estimate the contact's state (T, STATE) float32 at times (T,) s from posteriors, smoothed both ways."""
     if len(time) == 0:
         return np.zeros(evidence.mean.shape[::2], np.float32)
-    steps = _steps(time, evidence.rectified)
-    course = _best_course(evidence, steps)
+    elapsed = _elapsed(time)
+    steps = np.minimum(_step(elapsed, evidence.rectified), ANYWHERE**2)
+    course = _best_course(_components(evidence), steps)
     walk = np.where(course.free[:, None], ANYWHERE**2, steps[:, :PLACE])
-    place = _smoothed(course.mean, course.variance, walk)
-    state = np.concatenate([place, evidence.near(place, course.touched)[:, PLACE:]], axis=-1)
-    state[course.touched, PLACE] = _even_force(state[:, PLACE], evidence.size, course, time)[course.touched]
-    return state.astype(np.float32)
-
-
-def _even_force(force: np.ndarray, size: np.ndarray, course: _Course, time: np.ndarray) -> np.ndarray:
-    """Smooth force over size: (T,) asinh scale, of forces (T,) on it and signals' sizes (T,) counts."""
-    ratio, touched = _log_ratio(force, size), course.touched
+    state = _states(evidence, _smoothed(course.mean, course.variance, walk), course.touched)
+    ratio, touched = _log_ratio(state[:, PLACE], evidence.size), course.touched
     apart = course.free | ~touched | ~np.concatenate([[False], touched[:-1]])
-    step = np.where(apart, ANYWHERE**2, np.minimum(RATIO_STEP**2 * _elapsed(time) / FRAME, ANYWHERE**2))
-    noise = np.full((len(ratio), 1), RATIO_NOISE**2)
-    return _force_of(_smoothed(ratio[:, None], noise, step[:, None])[:, 0], size)
-
-
-def _log_ratio(force: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Logarithm of forces, given on their asinh scale, over signals' sizes, counts."""
-    return np.log(np.sinh(np.clip(force, LEAST_FORCE, COMPRESSED_LIMIT)) / np.maximum(size, LEAST_SIZE))
-
-
-def _force_of(log_ratio: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Forces on their asinh scale: the inverse of `_log_ratio`."""
-    return np.arcsinh(np.exp(log_ratio) * np.maximum(size, LEAST_SIZE))
+    walk = np.where(apart, ANYWHERE**2, np.minimum(_ratio_step(elapsed), ANYWHERE**2))
+    even = _smoothed(ratio[:, None], np.full((len(ratio), 1), RATIO_NOISE**2), walk[:, None])[:, 0]
+    state[touched, PLACE] = _force_of(even, evidence.size)[touched]
+    return state.astype(np.float32)
 
 
 def needed(frames: np.ndarray, count: int) -> np.ndarray:
@@ -113,65 +110,83 @@ def _span(block: int, count: int) -> tuple[int, int]:
     return max(block * BLOCK - MARGIN, 0), min((block + 1) * BLOCK + MARGIN, count)
 
 
-class Tracked:
-    """States of the contact in a whole recording, computed on demand."""
+class Tracker:
+    """Contact in a whole recording, smoothed both ways: block by block, computed on demand."""
 
     def __init__(self, read: Read, count: int) -> None:
-        """Take read(start, stop), which gives times and posterior of these frames; count : frames in all."""
+        """Take read(start, stop), which gives times and evidence of these frames; count : frames in all."""
         self._read, self._count = read, count
-        self._kept: tuple[int, np.ndarray] | None = None
+        self._kept: tuple[int, Evidence, np.ndarray] | None = None
 
-    def __call__(self, frames: np.ndarray) -> np.ndarray:
-        """States (n, STATE) of rising frames (n,); a frame's state does not depend on which others are asked for."""
-        blocks = frames // BLOCK
-        parts = [self._block(int(block))[frames[blocks == block] - block * BLOCK] for block in np.unique(blocks)]
-        return np.concatenate(parts)
+    def __call__(self, frames: np.ndarray) -> tuple[Evidence, np.ndarray]:
+        """Return evidence and states (n, STATE) of rising frames (n,), whichever others are asked for."""
+        blocks, parts, states = frames // BLOCK, [], []
+        for block in np.unique(blocks):
+            evidence, state = self._block(int(block))
+            rows = frames[blocks == block] - block * BLOCK
+            parts.append(evidence.at(rows))
+            states.append(state[rows])
+        return Evidence.joined(parts), np.concatenate(states)
 
-    def _block(self, block: int) -> np.ndarray:
+    def _block(self, block: int) -> tuple[Evidence, np.ndarray]:
         if self._kept is None or self._kept[0] != block:
             start, stop = _span(block, self._count)
-            time, posterior = self._read(start, stop)
-            self._kept = block, track(posterior, time)[block * BLOCK - start :][:BLOCK]
-        return self._kept[1]
+            time, evidence = self._read(start, stop)
+            rows = slice(block * BLOCK - start, (block + 1) * BLOCK - start)
+            self._kept = block, evidence.at(rows), track(evidence, time)[rows]
+        return self._kept[1:]
 
 
-class Follower:
-    """Forward filters alone: one frame after another, without later ones."""
+class ForwardTracker:
+    """Contact in a recording that grows: the same filter run forward alone, one frame after another."""
 
     def __init__(self) -> None:
-        self._score: np.ndarray | None = None
-        self._place, self._place_variance = np.zeros(PLACE), np.full(PLACE, ANYWHERE**2)
-        self._ratio: tuple[np.ndarray, np.ndarray] | None = None  # of the frame before, with its variance; in contact
-        self._frame: _Frame
-        self._time: float
+        self._time, self._score, self._frame = -np.inf, np.zeros(0), _Frame(*(np.zeros(0),) * 3)  # of the frame before
+        self._place, self._variance = np.zeros(PLACE), np.zeros(PLACE)
+        self._ratio: tuple[np.ndarray, np.ndarray] | None = None  # its mean and variance; None without contact
 
     def __call__(self, evidence: Evidence, time: float) -> np.ndarray:
         """Estimate the state (1, STATE) float32 of a contact from the posterior of one frame at `time` s."""
-        now = _Frame(*(each[0] for each in _components(evidence)))
-        score, before, ratio_before = now.weight, np.full(PLACE, ANYWHERE**2), None
-        if self._score is not None and 0 <= time - self._time < GAP:
-            step = _step(time - self._time, evidence.rectified[0])
-            moves, free = _moves(self._frame, now, step)
-            total = self._score[:, None] + moves
-            score = total.max(axis=0) + now.weight
-            if not free[total[:, score.argmax()].argmax(), score.argmax()]:
-                before = self._place_variance + step[:PLACE]
-                if self._ratio is not None:
-                    ratio_before = self._ratio[0], self._ratio[1] + RATIO_STEP**2 * (time - self._time) / FRAME
-        best = int(score.argmax())
-        place = now.mean[best, :PLACE], np.square(now.spread[best, :PLACE])
-        self._place, self._place_variance = _updated(self._place, before, *place)
-        self._score, self._frame, self._time = score - score.max(), now, time
-        touched = touches(now.mean[best])
-        state = np.concatenate([self._place[None], evidence.near(self._place[None], touched[None])[:, PLACE:]], axis=-1)
-        self._ratio = None
-        if touched:
-            ratio = _log_ratio(state[:, PLACE], evidence.size), np.full(1, RATIO_NOISE**2)
-            if ratio_before is not None:
-                ratio = _updated(*ratio_before, *ratio)
-            self._ratio = ratio
-            state[:, PLACE] = _force_of(ratio[0], evidence.size)
+        now, elapsed = _components(evidence), _elapsed(np.array([time]), self._time)
+        best, free, score = now.weight[0].argmax(), True, now.weight[0]
+        step = _step(elapsed, evidence.rectified)
+        if np.isfinite(elapsed[0]):
+            moves, begins = _moves(self._frame, now, step)
+            score, came = _scored(self._score, moves, now.weight)
+            best = score.argmax()
+            free = begins[0, came[0, best], best]
+        place, noise = now.mean[:, best, :PLACE], np.square(now.spread[:, best, :PLACE])
+        walk = np.where(free, ANYWHERE**2, step[:, :PLACE])
+        (self._place,), (self._variance,), _ = _filtered(
+            place, noise, walk, self._place, np.where(free, 0, self._variance)
+        )
+        touched = touches(now.mean[:, best])
+        state = _states(evidence, self._place[None], touched)
+        if touched[0]:
+            ratio, noise = _log_ratio(state[:, PLACE], evidence.size), np.full(1, RATIO_NOISE**2)
+            if not free and self._ratio is not None:
+                (ratio,), (noise,), _ = _filtered(ratio[None], noise[None], _ratio_step(elapsed)[None], *self._ratio)
+            self._ratio = ratio, noise
+            state[:, PLACE] = _force_of(ratio, evidence.size)
+        else:
+            self._ratio = None
+        self._time, self._score, self._frame = time, score - score.max(), now
         return state.astype(np.float32)
+
+
+def _states(evidence: Evidence, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
+    """States (T, STATE) of contacts at places (T, PLACE), their force and depth each frame's own there."""
+    return np.concatenate([place, evidence.near(place, touched)[:, PLACE:]], axis=-1)
+
+
+def _log_ratio(force: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Logarithm of forces, given on their asinh scale, over signals' sizes, counts."""
+    return np.log(np.sinh(np.clip(force, LEAST_FORCE, COMPRESSED_LIMIT)) / np.maximum(size, LEAST_SIZE))
+
+
+def _force_of(log_ratio: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Forces on their asinh scale: the inverse of `_log_ratio`."""
+    return np.arcsinh(np.exp(log_ratio) * np.maximum(size, LEAST_SIZE))
 
 
 class _Frame(NamedTuple):
@@ -193,15 +208,15 @@ def _step(seconds: np.ndarray | float, rectified: np.ndarray | bool) -> np.ndarr
     return np.square(shorter * STEP) * np.asarray(seconds)[..., None] / FRAME
 
 
-def _elapsed(time: np.ndarray) -> np.ndarray:
+def _ratio_step(seconds: np.ndarray) -> np.ndarray:
+    """Variance (T,) of the change of `_log_ratio` in that time (T,)."""
+    return RATIO_STEP**2 * seconds / FRAME
+
+
+def _elapsed(time: np.ndarray, before: float = -np.inf) -> np.ndarray:
     """Seconds (T,) since the frame before; infinite at the first frame, after gaps and where a clock runs backwards."""
-    seconds = np.diff(time, prepend=-np.inf)
+    seconds = np.diff(time, prepend=before)
     return np.where((seconds >= 0) & (seconds < GAP), seconds, np.inf)
-
-
-def _steps(time: np.ndarray, rectified: np.ndarray) -> np.ndarray:
-    """Variance (T, STATE) of the change since the frame before; free at the first frame and after gaps."""
-    return np.minimum(_step(_elapsed(time), rectified), ANYWHERE**2)
 
 
 def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -221,42 +236,55 @@ def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, n
     return -np.minimum(price, JUMP), untouched | (price > JUMP)
 
 
-def _best_course(evidence: Evidence, steps: np.ndarray) -> _Course:
-    """Find the best path through the components of each frame; steps (T, STATE) as of `_steps`."""
-    all_frames = _components(evidence)
-    before, now = (_Frame(*(each[part] for each in all_frames)) for part in (slice(None, -1), slice(1, None)))
-    moves, free = _moves(before, now, steps[1:])
-    score, came = all_frames.weight[0], np.zeros(evidence.weight.shape, int)
-    for frame in range(1, len(steps)):
-        total = score[:, None] + moves[frame - 1]
+def _scored(score: np.ndarray, moves: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the scores (C,) of paths to the last of frames after one that is scored (C,), and where they came from.
+
+    moves : (T, C, C); weight : (T, C), logarithms; the second, (T, C), is each component's best one in the frame before
+    """
+    came = np.empty(weight.shape, int)
+    for frame, move in enumerate(moves):
+        total = score[:, None] + move
         came[frame] = total.argmax(axis=0)
-        score = total.max(axis=0) + all_frames.weight[frame]
+        score = total.max(axis=0) + weight[frame]
+    return score, came
+
+
+def _best_course(frames: _Frame, steps: np.ndarray) -> _Course:
+    """Find the best path through the components of each frame; steps : (T, STATE), variances."""
+    before, now = (_Frame(*(each[part] for each in frames)) for part in (slice(None, -1), slice(1, None)))
+    moves, free = _moves(before, now, steps[1:])
+    score, came = _scored(frames.weight[0], moves, now.weight)
     path = np.empty(len(steps), int)
     path[-1] = score.argmax()
     for frame in range(len(steps) - 1, 0, -1):
-        path[frame - 1] = came[frame, path[frame]]
+        path[frame - 1] = came[frame - 1, path[frame]]
     each = np.arange(len(steps))
     begins = np.concatenate([[True], free[each[:-1], path[:-1], path[1:]]])
-    mean, spread = (values[each, path, :PLACE] for values in all_frames[1:])
-    return _Course(mean, np.square(spread), touches(all_frames.mean[each, path]), begins)
+    mean, spread = (values[each, path, :PLACE] for values in frames[1:])
+    return _Course(mean, np.square(spread), touches(frames.mean[each, path]), begins)
 
 
-def _updated(
-    mean: np.ndarray, variance: np.ndarray, value: np.ndarray, noise: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and variance of a state, known as given, once it is measured with a variance `noise` (Kalman 1960)."""
-    gain = variance / (variance + noise)
-    return mean + gain * (value - mean), (1 - gain) * variance
+def _filtered(
+    value: np.ndarray, noise: np.ndarray, steps: np.ndarray, mean: np.ndarray, variance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Filter a random walk forward (Kalman 1960): means, variances and, before each measurement, variances (T, k).
+
+    value, noise, steps : (T, k) measurements, their variances, and those of the walk before each
+    mean, variance : (k,) of the walk before the first
+    """
+    means, variances, expected = (np.empty_like(value) for _ in range(3))
+    for frame, step in enumerate(steps):
+        expected[frame] = variance + step
+        gain = expected[frame] / (expected[frame] + noise[frame])
+        mean = mean + gain * (value[frame] - mean)
+        variance = (1 - gain) * expected[frame]
+        means[frame], variances[frame] = mean, variance
+    return means, variances, expected
 
 
 def _smoothed(value: np.ndarray, noise: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Means (T, k) of a random walk of variances `steps` (T, k), given all its measurements and their variances."""
-    mean, variance, expected = (np.empty_like(value) for _ in range(3))
-    now, spread = value[0], np.zeros(value.shape[1])
-    for frame, step in enumerate(steps):
-        expected[frame] = spread + step
-        now, spread = _updated(now, expected[frame], value[frame], noise[frame])
-        mean[frame], variance[frame] = now, spread
+    mean, variance, expected = _filtered(value, noise, steps, value[0], np.zeros(value.shape[1]))
     for frame in range(len(steps) - 2, -1, -1):
         back = variance[frame] / expected[frame + 1]
         mean[frame] += back * (mean[frame + 1] - mean[frame])

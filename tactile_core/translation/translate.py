@@ -1,271 +1,167 @@
-"""Translate in one pure function: signals to BioTac deformation to DIGIT deformation, force and confidence."""
+"""One pass over a recording: its signals prepared, the contact tracked, every frame decoded."""
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import sys
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import accuracy, sensors
+from .. import sensors
 from ..errors import TactileError
-from ..files.short_text import Summary
-from ..recordings import Signals
-from ..recordings.flags import Flag
+from ..recordings import PrepareOptions, Recording, Signals, electrode_gains
+from ..recordings.electrode_gains import ElectrodeGains
+from ..recordings.fingers import split
 from ..sensors import SOURCE, TARGET
-from ..sensors import unrolling as surface
-from . import error_bounds, gel_place, networks, plausible, reference_signals
-from .answer import MEAN, Answer
-from .card_errors import doubt
-from .card_sensors import NODES, REST, pair_of
-from .contact_frame import STILL, ContactFrame
-from .contact_track import Evidence, track
+from . import error_bounds, networks, reference_signals
+from .answer import Answer
+from .card_sensors import NODES, pair_of
+from .contact_track import Evidence, Tracker, needed
 from .error_bounds import KINDS
-from .lost_signs import recovered
-from .network_sizes import PLACE, SURFACES
-from .networks import Networks
-from .posterior import Posterior, touches
-from .simulated_likeness import Patterns, patterns_of, residual_shares, shipped_patterns, two_contacts, unlike
+from .simulated_likeness import patterns_of, shipped_patterns
+from .translator import Translation, Translator
 from .weights import ADVICE
 
-# Frames that differ from training in kind, not in degree, are worth little.
-UNTRAINED_CONFIDENCE = 0.2  # assumed
-# Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
-# (scripts/evaluate_translation.py --held-out) it flags half of that part's frames, and most of those it should.
-# The largest change is another matter: signals of deep contacts at the tip are three times those that 99 % of the
-# contacts stay below, and training knows them. What exceeds all but one in a thousand is out of its range.
-IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
-# A place is undecided where more than this share of the posterior lies as far away, m, as two contacts must lie apart.
-UNDECIDED, APART = 0.3, 3e-3  # assumed
+CHUNK = 64  # frames decoded at a time: about 5 MB of displacements, and the networks' own block
+Read = Callable[[np.ndarray], tuple[np.ndarray, Signals]]  # times (n,) s and signals of rising frames (n,)
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Translation(Summary):
-    """Result of a translation; T frames first, float32, SI units.
+class Decoded(NamedTuple):
+    """Translated frames (T,) of a recording, with their times (T,) s, signals and evidence.
 
-    latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents, before a mount's shift
-    displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
-    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, as displacements are
-    pressure : (T,) Pa, rise of the fluid's pressure, estimated from the electrodes alone; zero where the force is
-    contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
-    confidence : (T,), 1 as in training, 0 far from it
-    expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
-        below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
-    flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
-        BEYOND_DIGIT, TWO_CONTACTS, UNDECIDED_PLACE and UNEXPLAINED
+    state : (T, STATE) of the tracked contact; None where each frame is estimated alone
     """
 
-    latent_signal: np.ndarray
-    latent_biotac: np.ndarray
-    latent_digit: np.ndarray
-    displacement_biotac: np.ndarray
-    displacement_digit: np.ndarray
-    force: np.ndarray
-    pressure: np.ndarray
-    contact_center: np.ndarray
-    confidence: np.ndarray
-    expected_error_biotac: np.ndarray
-    expected_error_digit: np.ndarray
-    error_bound_biotac: np.ndarray
-    error_bound_digit: np.ndarray
-    flags: np.ndarray
-
-    @classmethod
-    def joined(cls, parts: Sequence[Translation]) -> Translation:
-        """Join translations of frames that follow each other."""
-        names = [field.name for field in dataclasses.fields(cls)]
-        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+    frames: np.ndarray
+    time: np.ndarray
+    signals: Signals
+    evidence: Evidence
+    state: np.ndarray | None
+    translation: Translation
 
 
-def _rectified(signals: Signals) -> np.ndarray:
-    return (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
+class RecordingPass:
+    """Takes prepared frames of a recording, some at a time, through tracking and decoding.
+
+    What it returns of a frame does not depend on which others are asked for.
+    """
+
+    def __init__(self, translator: Translator, read: Read, count: int) -> None:
+        """Take read(frames), which gives their times and signals; count : frames of the whole recording."""
+        self._translator, self._read = translator, read
+        self._tracker = Tracker(self._evidence, count) if translator.answer.follows else None
+
+    def _evidence(self, start: int, stop: int) -> tuple[np.ndarray, Evidence]:
+        time, signals = self._read(np.arange(start, stop))
+        return time, self._translator.encode(signals)
+
+    def __call__(self, frames: np.ndarray) -> Decoded:
+        """Translate rising frames (T,)."""
+        time, signals = self._read(frames)
+        if self._tracker is None:
+            evidence, state = self._translator.encode(signals), None
+        else:
+            evidence, state = self._tracker(frames)
+        return Decoded(frames, time, signals, evidence, state, self._translator.decode(signals, evidence, state))
 
 
-def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
-    """Return the 99 % quantile of a quantity in a card's ``silence``, frames of noise without contact."""
-    return float(np.interp(0.99, silence["levels"], silence[quantity]))
+def pass_over(translator: Translator, signals: Signals, time: np.ndarray) -> RecordingPass:
+    """Return the pass over signals in memory at times (T,) s."""
+    return RecordingPass(translator, lambda frames: (time[frames], signals.at(frames)), len(time))
 
 
-def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
-    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN where no node moves by ``silent`` m."""
-    center = accuracy.dent_center(displacement, rest).astype(np.float32)
-    center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
-    return center
+class PreparedRows:
+    """Rows of a recording in memory, prepared: of a long one only those that some frames need.
+
+    recording, signals : of the rows alone, prepared by all of the recording; count : frames of the whole recording
+    """
+
+    def __init__(
+        self, recording: Recording, frames: np.ndarray, answer: Answer, options: PrepareOptions | None = None,
+        unit: ElectrodeGains | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare a recording for rising frames (T,); raises TactileError like `electrode_gains.prepare_unit`."""
+        rows, self.count = needed(frames, len(recording)) if answer.follows else frames, len(recording)
+        if 2 * len(rows) > self.count:  # a copy would take more than it lets go
+            self._rows, self.recording = np.arange(self.count), recording
+            self.signals = electrode_gains.prepare_unit(recording, options, unit)
+        else:
+            self._rows, self.recording = rows, recording.at(rows)
+            self.signals = electrode_gains.prepare_unit(recording, options, unit, rows)
+
+    def at(self, frames: np.ndarray) -> np.ndarray:
+        """Return the indices (n,) of needed frames (n,) among the rows."""
+        return np.searchsorted(self._rows, frames)
+
+    def read(self, frames: np.ndarray) -> tuple[np.ndarray, Signals]:
+        """Return times (n,) s and signals of needed frames (n,)."""
+        rows = self.at(frames)
+        return self.recording.time[rows], self.signals.at(rows)
 
 
-def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Return the posterior's share (T,) in contacts ``APART`` m and more on the gel from states (T, STATE)."""
-    place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
-    points = gel_place.on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
-    far = accuracy.lengths(points - gel_place.on_gel(frame, place)[:, None]) > APART
-    return (posterior.weight * (far & touches(posterior.mean))).sum(-1)
+def translate(
+    recording: Recording,
+    *,
+    frames: slice = slice(None),
+    prepare: PrepareOptions | None = None,
+    sensor: str | os.PathLike[str] | None = None,
+    weights: str | os.PathLike[str] | None = None,
+    answer: Answer | None = None,
+) -> Translation:
+    """Translate a recording to skin deformation, DIGIT gel deformation and force, as `tactile convert` does.
+
+    Recordings are of a BioTac, or of the sensor that the weights are for.
+
+    recording : of ``tactile.read``
+    frames : part of the recording to translate, such as ``slice(100, 200)``; the contact is tracked through all
+        frames, so a frame's values do not depend on which others are requested
+    prepare : options for repair, rest level and kind of the signals; None detects them
+    sensor : file of `tactile adapt` with the rest and gains of this BioTac; None assumes a typical unit
+    weights : folder of networks, which name their sensors; None for those that ship. Of another gel than a DIGIT's,
+        ``..._digit`` are that gel's
+    answer : options of the estimate (shift on the gel, mean in place of the most plausible contact); None for default
+
+    Returns a :class:`Translation`, arrays with the T requested frames first: ``displacement_biotac`` (T, 3650, 3) m,
+    ``displacement_digit`` (T, 2867, 3) m, ``force`` (T, 3) N, ``contact_center`` (T, 2) m, ``confidence`` (T,),
+    ``error_bound_digit`` (T,) m, ``flags`` (T,). A frame takes 80 kB.
+    Raises TactileError for signals without a rest level, bad options, and weights that are missing or changed.
+
+    >>> recording = tactile.read("touch.csv")
+    >>> touch = tactile.translate(recording)
+    >>> touch.force[:, 1].max()  # N, largest force into the skin
+    """
+    chosen = np.arange(len(recording))[frames]
+    if not len(chosen) or chosen[0] > chosen[-1]:
+        expected = f"a slice forward through {len(recording)} frames that holds at least one"
+        raise TactileError("translate, frames", str(frames), expected)
+    chosen_by = (None, recording.sensor) if weights is None else (os.fspath(weights), None)
+    translator, unit = _shared_translator(*chosen_by, answer or Answer()), None
+    if sensor is not None:
+        finger = split(recording.path)[1]
+        unit = electrode_gains.read(sensor).gains_for(recording.path, finger, sensor, recording.sensor)
+    rows = PreparedRows(recording, chosen, translator.answer, prepare, unit)
+    return translated(translator, rows, chosen)
 
 
-class Translator:
-    """Verified networks, ready to translate. card : their model card; sha256 : of the card, which names all weights."""
+def translated(
+    translator: Translator, rows: PreparedRows, frames: np.ndarray, progress: Callable[[float], None] | None = None
+) -> Translation:
+    """Translate rising frames (T,) of prepared rows; progress : called with the share that is done."""
+    whole, parts = RecordingPass(translator, rows.read, rows.count), []
+    for start in range(0, len(frames), CHUNK):
+        parts.append(whole(frames[start : start + CHUNK]).translation)
+        if progress is not None:
+            progress(min(1.0, (start + CHUNK) / len(frames)))
+    return Translation.joined(parts)
 
-    def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
-        """Take patterns : simulated contacts of the source; None for a BioTac's, which ship."""
-        self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
-        self.source, self.target, self._patterns = nets.source, nets.target, patterns
-        self.answer = answer or Answer()
-        moved = self.answer.mount_shift
-        self._shift = gel_place.Shift(nets.frames["MVD"], moved) if moved.any() else None
-        self._unrolled = surface.unrolled_nodes(self.source)
 
-    def posterior(self, signals: Signals) -> Evidence:
-        """Return each frame's own posterior of its contact, and what ``contact_track`` needs beside it."""
-        latent, unsigned = self._latent_signal(signals)
-        size = np.sqrt(np.square(self._typical(signals)).mean(axis=1))
-        return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, rectified=_rectified(signals))
-
-    def followed(self, signals: Signals, time: np.ndarray) -> Translation:
-        """Translate a recording at once: frames at times (T,) s, each estimated with its neighbours."""
-        return self(signals, track(self.posterior(signals), time) if self.answer.follows else None)
-
-    def plausible(self, signals: Signals, frames: np.ndarray) -> dict[str, np.ndarray]:
-        """Draw contacts for each frame, the number given by the options, by ``plausible.NAMES``; frames : (T,)."""
-        states = plausible.draw(self.nets.posterior(*self._latent_signal(signals)), frames, self.answer.samples)
-        return plausible.contacts(self.nets, states, self.answer.mount_shift)
-
-    def _latent_signal(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
-        """Latents (T, K) of the signals, and which (T,) of them have no sign, lost and not recovered."""
-        change, unsigned = self.changes(signals)
-        return self.nets.encode_signal(change, unsigned), unsigned
-
-    def changes(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
-        """Return what the networks see: changes (T, e) counts, with signs where they are known, and the frames (T,)
-        that are left rectified.
-
-        Raises TactileError for another sensor's signals.
-        """
-        return recovered(self._typical(signals), _rectified(signals), self._patterns)
-
-    def _typical(self, signals: Signals) -> np.ndarray:
-        """Changes (T, e) counts of the unit that the networks know. Raises TactileError for another sensor's."""
-        if signals.sensor != self.source:
-            found = f"signals of a {sensors.title(signals.sensor)}"
-            raise TactileError("translation", found, f"those of a {sensors.title(self.source)}, as the weights")
-        rest = self.card.get(REST)
-        return signals.typical if rest is None else signals.relative_to(np.array(rest))
-
-    def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
-        """Translate all frames of ``signals``; a frame's numbers do not depend on its neighbours.
-
-        state : (T, STATE) of the contacts, estimated from several frames; None: from each frame alone, as ``answer``
-            says
-        """
-        nets = self.nets
-        rectified = _rectified(signals)
-        change = np.asarray(self._typical(signals), np.float32)
-        latent_signal, unsigned = self._latent_signal(signals)
-        alone = state is None
-        posterior = nets.posterior(latent_signal, unsigned)
-        if state is None:
-            state = posterior.average if self.answer.kind == MEAN else posterior.likely
-        latent_biotac, latent_digit = nets.latents(latent_signal, state, unsigned)
-        touched = touches(state)
-        biotac, digit = (
-            decode(latent) * touched[:, None, None]
-            for decode, latent in ((nets.decode_biotac, latent_biotac), (nets.decode_digit, latent_digit))
-        )
-        if self._shift is not None:
-            digit = self._shift(digit)
-        # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
-        center = contact_center(
-            digit, sensors.sensor_surface(self.target).rest, self.silent("digit_m") if alone else STILL
-        )
-        silent = np.isnan(center[:, 0])
-        flags = signals.flags.copy()
-        flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
-        shares = residual_shares(change, rectified, self._patterns)
-        flags[unlike(shares)] |= np.uint16(Flag.UNEXPLAINED)
-        confidence = self._confidence(change, flags, rectified)
-        flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
-        flags[two_contacts(shares)] |= np.uint16(Flag.TWO_CONTACTS)
-        undecided = touched & (elsewhere(posterior, state, nets.frames["MVD"]) > UNDECIDED)
-        flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
-        return Translation(
-            latent_signal, latent_biotac, latent_digit, biotac, digit,
-            force=np.where(silent[:, None], np.float32(0), nets.force_in(state, latent_biotac)),
-            pressure=np.where(silent, np.float32(0), nets.pressure(change, rectified)),
-            contact_center=center,
-            confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
-        )  # fmt: skip
-
-    def silent(self, quantity: str) -> float:
-        """Return the `silent_level` of a quantity in this card."""
-        return silent_level(self.card["silence"], quantity)
-
-    def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
-        """Compute expected largest errors and their bounds, by `Translation`'s names; x : (T,) m, of the contact."""
-        expected, found = self.nets.expected_error(change, rectified), {}
-        for index, name in enumerate(SURFACES):
-            kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
-            found[f"expected_error_{name}"] = expected[:, index]
-            found[f"error_bound_{name}"] = np.where(rectified, kinds["rectified"], kinds["signed"])
-        return found
-
-    def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
-        """Bound (T,) m on 95 of 100 largest errors, by `error_bounds.bound`."""
-        return error_bounds.bound(expected, x, self.card["error_bounds"][kind][surface])
-
-    def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Mark (T,) bool the changes (T, 19) counts outside those of the training, by any distance's quantile."""
-        return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
-
-    def _confidence(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> np.ndarray:
-        """Confidence (T,): 1 for signals like those of the training, 0 far from them.
-
-        Each distance to the training signals counts against its quantiles in validation: it is 1 up to the 95 %
-        quantile, 0 at the outermost, and at most UNTRAINED_CONFIDENCE where a flag says that training did not know it,
-        or the card that the networks hardly translate.
-        Not a calibrated probability: that is what bounds are for.
-        """
-        usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))
-        confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
-        untrained = flags & np.uint16(
-            Flag.NO_QUIET_PART
-            | Flag.SATURATED
-            | Flag.DEAD_CHANNEL
-            | Flag.LAW_DOUBTED
-            | Flag.OUT_OF_RANGE
-            | Flag.UNEXPLAINED
-        )
-        doubted = (untrained > 0) | bool(doubt(self.card))
-        confidence = np.where(doubted, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
-        return confidence.astype(np.float32)
-
-    def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """Stack the distances (distances, T) of `networks.SignalDistance`."""
-        distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
-        return np.stack([getattr(distance, name) for name in networks.DISTANCES])
-
-    def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
-        """Quantiles (distances, T) or (distances, 1) at each distance's level over like validation frames."""
-        table = self.card["distance"]
-        limits = {
-            kind: np.array(
-                [[np.interp(level[name], table["levels"], table[kind][name])] for name in networks.DISTANCES]
-            )
-            for kind in KINDS
-        }
-        return np.where(rectified, limits["rectified"], limits["signed"])
-
-    def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
-        """Mark (T,) contacts of the BioTac without counterpart on the gel: the dent's centre unrolls beyond it."""
-        moved = accuracy.lengths(displacement)
-        peak = moved.max(axis=1, keepdims=True)
-        core = (moved > accuracy.CORE * peak) & (peak > self.silent("biotac_m"))
-        weight = np.where(core & np.isfinite(self._unrolled[:, 0]), moved, 0)
-        total = weight.sum(axis=1)
-        center = weight @ np.nan_to_num(self._unrolled) / np.where(total > 0, total, 1)[:, None]
-        center += self.answer.mount_shift
-        outside = sensors.shape_of(self.target).outline_distance(center[:, 0], center[:, 1]) <= 0
-        return core.any(axis=1) & (outside | (total == 0))
+@lru_cache(maxsize=2)
+def _shared_translator(weights: str | None, source: str | None, answer: Answer) -> Translator:
+    """Load networks once a process: 13 MB, a quarter of a second."""
+    return load_translator(weights, answer, None, source)
 
 
 def _check_quantiles(card: dict, where: str) -> None:

@@ -20,7 +20,8 @@ from tactile_core.pictures.shading import Shader
 from tactile_core.recordings import Recording, Signals
 from tactile_core.recordings.flags import Flag
 from tactile_core.translation import networks
-from tactile_core.translation.translate import UNTRAINED_CONFIDENCE, Translation, load_translator
+from tactile_core.translation.translate import load_translator
+from tactile_core.translation.translator import UNTRAINED_CONFIDENCE, Translation
 
 from .case import FAST_PICTURE, HEIGHT_MAP, TRANSLATION, Found, case
 

@@ -14,10 +14,12 @@ import time
 import numpy as np
 
 from tactile_core import sensors
+from tactile_core.jobs.drawer import Drawer
 from tactile_core.jobs.frame_pass import Tools
 from tactile_core.recordings import Signals
 from tactile_core.recordings.flags import Flag
-from tactile_core.translation.translate import Translation
+from tactile_core.translation.answer import Answer
+from tactile_core.translation.translator import Translation
 
 SHAPE = (320, 240)
 PARENT = os.getppid()  # when this process began; another once that one has died
@@ -64,8 +66,23 @@ def shade(height: np.ndarray) -> np.ndarray:
     return picture
 
 
-def tools() -> Tools:
-    return Tools(translate, {"name": "fake"}, "0" * 64, height_map, shade)
+class Networks:
+    """What stands for a Translator: each frame alone."""
+
+    card, sha256, source, target = {"name": "fake"}, "0" * 64, "biotac", "digit"
+    answer = Answer(frames_apart=True)
+
+    def encode(self, signals: Signals) -> None:
+        """Nothing that `decode` needs."""
+
+    def decode(self, signals: Signals, evidence: None, state: None) -> Translation:
+        return translate(signals)
+
+
+def tools(source: str = "biotac", answer: Answer = Networks.answer) -> Tools:
+    networks = Networks()
+    networks.source, networks.answer = source, answer
+    return Tools(networks, Drawer(height_map, shade))
 
 
 if __name__ == "__main__":

@@ -123,7 +123,8 @@ def test_a_kept_traction_is_zero_without_contact_and_adds_up(run, slide_csv):
 
 def test_marker_motion_needs_a_unit_with_dots_and_has_their_rest(slide_csv, tmp_path, tools):
     unit = dataclasses.replace(plain_unit(), markers=Markers(3, 2, 2e-3, 0.6e-3, 0.1))
-    dotted = dataclasses.replace(tools, dots=MarkerField(unit), shade=lambda height, marks: fake_tools.shade(height))
+    drawer = dataclasses.replace(tools.drawer, dots=MarkerField(unit), shade=lambda height, _: fake_tools.shade(height))
+    dotted = dataclasses.replace(tools, drawer=drawer)
     options, path = convert.Options(slice(60, 80, 10), ("marker_motion", "image")), slide_csv(frames=80)
     with pytest.raises(TactileError, match=r"unit without dots.*--calibration"):
         convert.convert(path, tmp_path / "none", options, tools)
@@ -222,7 +223,7 @@ def test_a_disk_that_fills_up_ends_in_one_message_and_no_folder(slide_csv, tmp_p
     def full(*arguments, **more):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("tactile_core.jobs.frame_pass.pack_png", full)
+    monkeypatch.setattr("tactile_core.jobs.convert.pack_png", full)
     out = tmp_path / "out"
     (folder,) = results.result_folders([tmp_path / "touch.csv"], out, False)
     with pytest.raises(TactileError, match="No space left on device"):
@@ -324,7 +325,7 @@ def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
     assert variant.fitting(5) == "fast" and "fast" in presets.describe_choice("fast", 5)
     exact = presets.measured()["presets"]["quality"]["error"]
     assert (preset := variant.fitting(exact)) == "quality" and "quality" in presets.describe_choice(preset, exact)
-    assert convert.load_tools(preset=preset).preset == "quality" and drawn == ["quality"]
+    assert convert.load_tools(preset=preset).drawer.preset == "quality" and drawn == ["quality"]
 
 
 def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys, no_sheet):

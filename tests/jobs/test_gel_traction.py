@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.jobs.gel_traction import describe_miss, gel_traction
+from tactile_core.jobs.solved_gel import describe_miss, gel_traction
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve

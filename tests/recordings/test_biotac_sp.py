@@ -1,6 +1,5 @@
 """Recordings of a BioTac SP: read and described, never taken for those of a BioTac, nor the reverse."""
 
-import dataclasses
 import re
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.jobs import convert, frame_shard, prepared_signals
+from tactile_core.jobs import convert, prepared_signals, translate_shards
 from tactile_core.jobs.engine import inputs, recipes
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.recordings import PrepareOptions, electrode_gains, info
@@ -163,7 +162,8 @@ def test_public_recordings_are_described(outside_data):
 
 
 def test_tools_of_it_convert_its_recordings_alone(counts, write, press, in_layout, tmp_path):
-    tools = dataclasses.replace(fake_tools.tools(), source="biotac_sp")
+    tools = fake_tools.tools("biotac_sp")
+    followed = fake_tools.tools("biotac_sp", Answer())
     slip = written(write, SLIP, counts)
     rows = [["ball", 1, *row, *row, *row] for row in counts]
     grasp = written(lambda lines: write(lines, "grasp.csv"), GRASP, rows)
@@ -173,9 +173,8 @@ def test_tools_of_it_convert_its_recordings_alone(counts, write, press, in_layou
         assert "displacement_biotac_sp" in file and "displacement_biotac" not in file
         assert "sensor_surface('biotac_sp')" in file["displacement_biotac_sp"].attrs["description"]
     with pytest.raises(TactileError, match=r"snapshots, which do not follow each other.*--frames-apart"):
-        convert.convert(f"{grasp}#0", tmp_path / "grasp", convert.Options(), tools)
-    alone = dataclasses.replace(tools, answer=Answer(frames_apart=True))
-    convert.convert(f"{grasp}#0", tmp_path / "grasp", convert.Options(keep=()), alone)
+        convert.convert(f"{grasp}#0", tmp_path / "grasp", convert.Options(), followed)
+    convert.convert(f"{grasp}#0", tmp_path / "grasp", convert.Options(keep=()), tools)
     with pytest.raises(TactileError, match="19 electrodes: a BioTac; expected the 24 electrodes of a BioTac SP"):
         convert.convert(in_layout("csv_slide", press), tmp_path / "biotac", convert.Options(), tools)
     with pytest.raises(TactileError, match="24 electrodes: a BioTac SP; expected the 19 electrodes of a BioTac"):
@@ -183,7 +182,7 @@ def test_tools_of_it_convert_its_recordings_alone(counts, write, press, in_layou
 
 
 def test_a_job_and_a_live_view_take_its_recordings(counts, write, tmp_path, monkeypatch, capsys):
-    tools = dataclasses.replace(fake_tools.tools(), source="biotac_sp")
+    tools = fake_tools.tools("biotac_sp")
     slip = written(write, SLIP, [*counts[:1]] * 40 + [*(counts[:10] - 200)])
     recipe = recipes.Translate(["displacement"], "0" * 64, source="biotac_sp")
     job = jobs.make(inputs.hashed([Path(slip)], lambda done, total: None), recipe, None)
@@ -191,7 +190,8 @@ def test_a_job_and_a_live_view_take_its_recordings(counts, write, tmp_path, monk
     for folder in (jobs.PREPARED, jobs.SHARDS):
         (tmp_path / "job" / folder).mkdir(exist_ok=True)
     assert prepared_signals.make(tmp_path / "job", job, 0) == (50, True)
-    assert frame_shard.make(tmp_path / "job", job, 0, 0, tools)
+    monkeypatch.setattr(translate_shards, "_tools", lambda *words: tools)
+    assert translate_shards.make(tmp_path / "job", job, 0, 0)
     done = convert.convert(slip, tmp_path / "slip", convert.Options(keep=("displacement",)), tools)
     file = jobs.shard_file(tmp_path / "job", job.inputs[0].name, 0)
     with h5py.File(file) as shard, h5py.File(done.folder / "frames.h5") as whole:

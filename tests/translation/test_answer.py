@@ -7,7 +7,7 @@ import pytest
 from tactile_core import accuracy, recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.translation import gel_place, plausible
+from tactile_core.translation import gel_place, translator
 from tactile_core.translation.answer import Answer, parse_shift
 from tactile_core.translation.contact_frame import PLACE_UNIT
 from tactile_core.translation.translate import load_translator
@@ -61,7 +61,7 @@ def test_what_is_shifted_off_the_gel_is_flagged(touched):
 def test_the_mean_is_another_answer(touched):
     signals, _ = touched
     likely, mean = (load_translator(answer=Answer(kind)) for kind in ("likely", "mean"))
-    said = likely.posterior(signals)
+    said = likely.encode(signals)
     assert np.array_equal(mean(signals).force, likely(signals, said.average).force)
     assert not np.array_equal(mean(signals).force, likely(signals).force)
     assert not mean.answer.follows and likely.answer.follows
@@ -69,12 +69,12 @@ def test_the_mean_is_another_answer(touched):
 
 def test_drawn_contacts_spread_as_the_posterior_says(touched):
     signals, frames = touched
-    said = load_translator().posterior(signals)
-    drawn = plausible.draw(said, frames, 40_000)
+    said = load_translator().encode(signals)
+    drawn = translator.drawn(said, frames, 40_000)
     spread = np.sqrt((said.weight[..., None] * (said.spread**2 + (said.mean - said.average[:, None]) ** 2)).sum(1))
     assert np.abs((drawn.mean(1) - said.average) / spread).max() < 5 / np.sqrt(40_000)  # 80 means, 5 standard errors
     assert np.allclose(drawn.std(1) / spread, 1, atol=0.25)  # rare far components are drawn a few times
-    assert np.array_equal(plausible.draw(said, frames, 7), plausible.draw(said, frames, 7))
+    assert np.array_equal(translator.drawn(said, frames, 7), translator.drawn(said, frames, 7))
 
 
 def test_drawn_contacts_lie_round_the_answer(request, tmp_path):
@@ -92,10 +92,10 @@ def test_drawn_contacts_lie_round_the_answer(request, tmp_path):
 
 def test_a_frame_s_draws_do_not_depend_on_the_other_frames(touched):
     signals, frames = touched
-    translator = load_translator(answer=Answer(samples=5))
+    network = load_translator(answer=Answer(samples=5))
     some = signals.at(slice(3, 7))
-    whole, part = translator.plausible(signals, frames), translator.plausible(some, frames[3:7])
-    for name in plausible.NAMES:
+    whole, part = (network.plausible(network.encode(each), at) for each, at in ((signals, frames), (some, frames[3:7])))
+    for name in translator.SAMPLES:
         assert np.allclose(part[name], whole[name][3:7], rtol=1e-5, atol=1e-8, equal_nan=True)
 
 

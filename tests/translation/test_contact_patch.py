@@ -7,7 +7,7 @@ import pytest
 
 from tactile_core import recordings, sensors
 from tactile_core.translation import contact_patch, translate
-from tactile_core.translation.contact_track import Tracked
+from tactile_core.translation.contact_track import Tracker
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +37,8 @@ def test_what_the_networks_make_of_noise_alone_shows_no_contact(request, gel):
     translator = translate.load_translator()
 
     def posteriors(start, stop):
-        return recording.time[start:stop], translator.posterior(silent.at(np.arange(start, stop)))
+        return recording.time[start:stop], translator.encode(silent.at(np.arange(start, stop)))
 
     every = np.arange(len(recording))
-    moved = translator(silent, Tracked(posteriors, len(recording))(every)).displacement_digit
+    moved = translator(silent, Tracker(posteriors, len(recording))(every)[1]).displacement_digit
     assert not contact_patch.contact_patch(moved, gel).any()

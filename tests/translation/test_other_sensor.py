@@ -13,7 +13,7 @@ from tactile_core import recordings, sensors
 from tactile_core.errors import TactileError
 from tactile_core.jobs.frames_file import described, named
 from tactile_core.sensors import descriptor
-from tactile_core.translation import networks, translate
+from tactile_core.translation import networks, translate, translator
 from tactile_core.translation.card_sensors import pair_of
 
 NAME = "finger"
@@ -52,7 +52,7 @@ def test_the_same_shape_and_signals_give_the_same_by_another_name(weights, signa
 def test_a_unit_that_rests_elsewhere_is_read_by_the_cards_rest(weights, signals):
     network = translate.load_translator(weights, source=None)
     card = network.nets.card | {"rest_counts": (sensors.REST_COUNTS - 300).tolist()}
-    other = translate.Translator(networks.Networks(network.nets.tensors, card))
+    other = translator.Translator(networks.Networks(network.nets.tensors, card))
     named_so = dataclasses.replace(signals, sensor=NAME)
     # a unit at fewer counts answers more strongly
     assert np.abs(other(named_so).force[:, 1]).max() > 1.05 * np.abs(network(named_so).force[:, 1]).max()

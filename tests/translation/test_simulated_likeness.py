@@ -10,7 +10,8 @@ from tactile_core.recordings.readers import each_finger
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.translation import simulated_likeness as module
 from tactile_core.translation.simulated_likeness import residual_lengths, residual_shares, two_contacts, unlike
-from tactile_core.translation.translate import UNTRAINED_CONFIDENCE, load_translator
+from tactile_core.translation.translate import load_translator
+from tactile_core.translation.translator import UNTRAINED_CONFIDENCE
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
 from tactile_core.translation import contact_frame, network_sizes, networks, translate
 from tactile_core.translation.posterior import Posterior
+from tactile_core.translation.translator import UNTRAINED_CONFIDENCE, Translator
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +107,7 @@ def test_confidence_is_high_where_trained_and_low_elsewhere(translator, shipped,
     assert np.median(odd.confidence[touched(shipped)]) == 0
     assert (odd.flags[touched(shipped)] & Flag.OUT_OF_RANGE).mean() > 0.9
     restless = dataclasses.replace(signals, flags=signals.flags | np.uint16(Flag.NO_QUIET_PART))
-    assert translator(restless).confidence.max() <= np.float32(translate.UNTRAINED_CONFIDENCE)
+    assert translator(restless).confidence.max() <= np.float32(UNTRAINED_CONFIDENCE)
 
 
 def test_rectified_signals_are_read_as_such(translator, shipped, signals, translation):
@@ -207,9 +208,9 @@ def test_a_changed_card_is_refused(tmp_path):
 
 def test_weights_worse_than_none_give_no_confidence(translator, signals, translation):
     nets = translator.nets
-    found = translate.Translator(networks.Networks(nets.tensors, worse_than_none(nets.card)))(signals)
+    found = Translator(networks.Networks(nets.tensors, worse_than_none(nets.card)))(signals)
     assert translation.confidence.max() > 0.9
-    assert 0 < found.confidence.max() <= np.float32(translate.UNTRAINED_CONFIDENCE)
+    assert 0 < found.confidence.max() <= np.float32(UNTRAINED_CONFIDENCE)
 
 
 def worse_than_none(card):

@@ -13,7 +13,7 @@ from tactile_core.jobs.convert import Options, convert, load_tools
 from tactile_core.recordings import electrode_gains, read
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile
 from tactile_core.translation.answer import Answer
-from tactile_core.translation.translate_recording import translate
+from tactile_core.translation.translate import translate
 
 NAMES = ("displacement_biotac", "displacement_digit", "force", "pressure", "contact_center", "confidence")
 

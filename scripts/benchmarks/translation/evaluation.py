@@ -38,6 +38,7 @@ from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training.step_errors import our_bodies
 from tactile_core.translation import translate
+from tactile_core.translation.translator import Translator
 
 QUICK = 6  # recordings
 QUICK_PRESSES = 7  # of as many one is looked at, or a sequence; prime to how box, ring and others take turns
@@ -73,7 +74,7 @@ def main(arguments: list[str] | None = None) -> int:
     return finished(printed(found), options.json)
 
 
-def on_recordings(network: translate.Translator, options: argparse.Namespace) -> list[Row]:
+def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]:
     """Rows of real recordings: grips of the PHAC set, or slides."""
     folder, file = Path(options.recordings), options.sensor
     if grips.find(folder):
@@ -85,14 +86,12 @@ def on_recordings(network: translate.Translator, options: argparse.Namespace) ->
     return [*found, *fluid_pressure.slide_rows(folder, network, most, sensor)]
 
 
-def _slide_prints(
-    folder: Path, network: translate.Translator, most: int | None, sensor: ElectrodeGains | None
-) -> list[Row]:
+def _slide_prints(folder: Path, network: Translator, most: int | None, sensor: ElectrodeGains | None) -> list[Row]:
     paths = slide_set.reporting(folder)[:most]
     return prints.rows("recordings", (prepare_unit(read(path), None, sensor) for path in paths), network)
 
 
-def on_test_set(network: translate.Translator, options: argparse.Namespace) -> list[Row]:
+def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
     """Rows of simulated contacts."""
     pairs, bodies = read_pairs(options.test_set), our_bodies()
     if options.quick:

@@ -15,7 +15,8 @@ from tactile_core.accuracy import Row, row
 from tactile_core.recordings import Signals, read
 from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
 from tactile_core.sensors import PRESSURE_PER_COUNT
-from tactile_core.translation.translate import Translator
+from tactile_core.translation.translate import pass_over
+from tactile_core.translation.translator import Translator
 
 from . import slide_set
 from .prints import CONTACT
@@ -77,7 +78,7 @@ def _frames(path: Path, network: Translator, sensor: ElectrodeGains | None) -> n
     recording = read(path)
     signals = prepare_unit(recording, None, sensor)
     measured = PRESSURE_PER_COUNT * signals.pdc
-    estimated = network.followed(signals, recording.time).pressure
+    estimated = pass_over(network, signals, recording.time)(np.arange(len(recording))).translation.pressure
     columns = np.column_stack([measured, estimated, np.abs(signals.change).sum(axis=1)])
     return columns[measured > CONTACT]
 

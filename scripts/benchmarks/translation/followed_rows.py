@@ -14,7 +14,8 @@ import numpy as np
 from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.recordings import Recording, Signals, prepare, read
-from tactile_core.translation.translate import Translation, Translator
+from tactile_core.translation.translate import pass_over
+from tactile_core.translation.translator import Translation, Translator
 
 SHIPPED = Path(__file__).resolve().parents[3] / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 UNITS = 8  # of gains drawn 10 % apart
@@ -28,7 +29,8 @@ def rows(network: Translator, file: Path = SHIPPED) -> list[Row]:
     recording = read(file)
     signals = prepare(recording)
     units = [_read_by(signals, np.random.default_rng(seed)) for seed in range(UNITS)]
-    followed = _judged(recording, [network.followed(unit, recording.time) for unit in units])
+    every = np.arange(len(recording))
+    followed = _judged(recording, [pass_over(network, unit, recording.time)(every).translation for unit in units])
     alone = _judged(recording, [network(unit) for unit in units])
     of = f"{len(followed['place'])} frames of {UNITS} units; baseline: each frame alone"
     metrics = [

@@ -22,9 +22,9 @@ from tactile_core.recordings.signals import Signals
 from tactile_core.sensors import digit, digit_surface, electrodes
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation import adapt, networks, reference_signals
-from tactile_core.translation.contact_track import track
 from tactile_core.translation.simulated_likeness import residual_shares, unlike
-from tactile_core.translation.translate import Translator, contact_center
+from tactile_core.translation.translate import pass_over
+from tactile_core.translation.translator import Translator, contact_center
 from tactile_core.translation.unit_rest import find_rest
 
 from . import fluid_pressure, prints
@@ -133,8 +133,7 @@ def _judged(
     """Return whether the median place lies in the box; shares of frames with a place, and of those out of range."""
     signals = prepare_unit(recording, None, unit)
     signals = dataclasses.replace(signals, change=signals.change[:, order], rest=signals.rest[order])
-    state = track(network.posterior(signals), recording.time)[::EVERY]
-    found = network(signals.at(slice(None, None, EVERY)), state)
+    found = pass_over(network, signals, recording.time)(np.arange(0, len(recording), EVERY)).translation
     known = np.isfinite(found.contact_center[:, 0])
     within = known.any() and in_box(np.median(found.contact_center[known], axis=0))
     return float(within), float(known.mean()), float((found.flags & Flag.OUT_OF_RANGE > 0).mean())

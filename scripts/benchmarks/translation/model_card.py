@@ -14,7 +14,7 @@ from tactile_core.accuracy import HEADER, Row, line
 from tactile_core.files import atomic
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import mesh_columns, true_displacement
-from tactile_core.translation.translate import Translator
+from tactile_core.translation.translator import Translator
 
 from ..table.summary import short
 from .noise import as_read

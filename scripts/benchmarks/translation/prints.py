@@ -16,8 +16,9 @@ from tactile_core.pictures.height_map import folds_counted, height_map
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.recordings import Signals
 from tactile_core.sensors import PRESSURE_PER_COUNT
-from tactile_core.translation.contact_track import FRAME, track
-from tactile_core.translation.translate import Translator
+from tactile_core.translation.contact_track import FRAME
+from tactile_core.translation.translate import Decoded, pass_over
+from tactile_core.translation.translator import Translator
 
 WINDOW = 32  # px
 VISIBLE = 2.0  # grey levels rms in the strongest window: what one sees beside the camera's noise (a target)
@@ -57,17 +58,17 @@ def _over(metric: Callable[[np.ndarray], float], values: np.ndarray) -> float | 
 
 def _frames(signals: Signals, network: Translator) -> np.ndarray:
     """Rows (T, 3) of every 20th frame: pressure Pa, whether the contact lies in the picture, levels of `strongest`."""
-    render, state = Renderer(preset="fast"), track(network.posterior(signals), np.arange(len(signals.change)) * FRAME)
-    return np.concatenate([_drawn(signals, network, state, render, rows) for rows in _chunks(len(signals.change))])
+    every, render = np.arange(len(signals.change)), Renderer(preset="fast")
+    whole = pass_over(network, signals, every * FRAME)
+    return np.concatenate([_drawn(whole(rows), render) for rows in _chunks(every[::EVERY])])
 
 
-def _chunks(count: int) -> list[slice]:
-    return [slice(start, start + EVERY * CHUNK, EVERY) for start in range(0, count, EVERY * CHUNK)]
+def _chunks(frames: np.ndarray) -> list[np.ndarray]:
+    return [frames[start : start + CHUNK] for start in range(0, len(frames), CHUNK)]
 
 
-def _drawn(signals: Signals, network: Translator, state: np.ndarray, render: Renderer, rows: slice) -> np.ndarray:
-    signals = signals.at(rows)
-    found = network(signals, state[rows])
+def _drawn(decoded: Decoded, render: Renderer) -> np.ndarray:
+    signals, found = decoded.signals, decoded.translation
     place = found.contact_center
     seen = np.isfinite(place[:, 0]) & render.camera.sees(*place.T)
     rest = np.rint(render.background)

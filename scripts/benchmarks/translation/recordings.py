@@ -21,8 +21,8 @@ from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.repair import fill
 from tactile_core.sensors import unrolling
-from tactile_core.translation.contact_track import track
-from tactile_core.translation.translate import Translation, Translator
+from tactile_core.translation.translate import pass_over
+from tactile_core.translation.translator import Translation, Translator
 
 from . import slide_set
 from .slide_metrics import CONTACT, SlideMetrics, largest_step, metrics
@@ -62,9 +62,13 @@ def translate(
     """Translate one recording as `tactile convert` does. Raises TactileError for a file that cannot be read."""
     recording = read(path)
     signals = prepare_unit(recording, options, sensor)
-    tracked = isinstance(network, Translator)  # a baseline answers by itself
-    state = track(network.posterior(signals), recording.time) if tracked else [None] * len(recording)
-    parts = [_translate(signals.at(rows), network, state[rows]) for rows in _chunks(len(recording))]
+    every = np.arange(len(recording))
+    if isinstance(network, Translator):
+        whole = pass_over(network, signals, recording.time)
+        found = (whole(every[rows]).translation for rows in _chunks(len(recording)))
+    else:  # a baseline answers by itself
+        found = (network(signals.at(rows)) for rows in _chunks(len(recording)))
+    parts = [_numbers(each) for each in found]
     force, volume, centre, latent = (np.concatenate([part[k] for part in parts]) for k in range(4))
     missed = ~np.isfinite(centre).all(axis=1)
     return Translated(
@@ -80,11 +84,8 @@ def _chunks(count: int) -> list[slice]:
     return [slice(start, start + CHUNK) for start in range(0, count, CHUNK)]
 
 
-def _translate(
-    signals: Signals, network: Translate, state: np.ndarray | list[None]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
-    """Translate to force N, volume mm3, centre mm, latent, and the count of NaN."""
-    found = network(signals, state) if isinstance(state, np.ndarray) else network(signals)
+def _numbers(found: Translation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
+    """Force N, volume mm3, centre mm, latent, and the count of NaN of a translation."""
     arrays = (found.force, found.displacement_biotac, found.displacement_digit, found.latent_digit, found.confidence)
     not_finite = sum(int(np.count_nonzero(~np.isfinite(array))) for array in arrays)
     volume = 1e9 * displaced_volume(found.displacement_digit)

@@ -18,7 +18,8 @@ from tactile_core.sensors import SAMPLE_RATE
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import LEAST_PATCH
 from tactile_core.translation.contact_patch import contact_patch
-from tactile_core.translation.translate import Translation, Translator
+from tactile_core.translation.translate import pass_over
+from tactile_core.translation.translator import Translation, Translator
 
 from . import full_sequences
 from .followed_rows import FORCE, PEAK, PLACE, TOUCHED
@@ -72,7 +73,7 @@ def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[
     for number, signal in enumerate(truth["signal"]):
         signals = plain_signals(read_by_a_unit(signal, np.random.default_rng([SEED, number]), rest_off))
         one = {name: values[number] for name, values in truth.items()}
-        followed.append(judged(network.followed(signals, time), one))
+        followed.append(judged(pass_over(network, signals, time)(np.arange(len(time))).translation, one))
         alone.append(judged(network(signals), one))
     return _joined(followed), _joined(alone)
 

@@ -21,10 +21,10 @@ from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, Recording
 from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
 from tactile_core.recordings.signals import Signals
-from tactile_core.translation.contact_track import track
 from tactile_core.translation.gel_place import on_gel
 from tactile_core.translation.network_sizes import PLACE
-from tactile_core.translation.translate import Translator
+from tactile_core.translation.translate import pass_over
+from tactile_core.translation.translator import Translator
 from tactile_core.translation.unit_rest import find_rest_sp
 
 FIRST = 10  # frames, the first 0.1 s
@@ -54,9 +54,8 @@ def unit_of(found: list[tuple[str, str, Recording]]) -> ElectrodeGains:
 
 def translated(network: Translator, signals: Signals, time: np.ndarray) -> np.ndarray:
     """Numbers (T, 6) of the contact: (x, z) mm on the gel, force N, depth of the gel's dent mm, all frames followed."""
-    state = track(network.posterior(signals), time)
-    found = network(signals, state)
-    place = on_gel(network.nets.frames["MVD"], state[:, :PLACE])
+    whole = pass_over(network, signals, time)(np.arange(len(time)))
+    place, found = on_gel(network.nets.frames["MVD"], whole.state[:, :PLACE]), whole.translation
     depth = found.displacement_digit[:, :, 1].max(axis=1, keepdims=True)
     return np.concatenate([1e3 * place, found.force, 1e3 * depth], axis=1)
 

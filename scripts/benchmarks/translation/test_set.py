@@ -13,7 +13,7 @@ from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.error_summary import metric_row, metric_rows, slices
 from tactile_core.training.step_errors import Bodies, error_columns, joined, parts, translation_metrics
 from tactile_core.translation.network_sizes import SURFACES
-from tactile_core.translation.translate import Translator
+from tactile_core.translation.translator import Translator
 
 from .contact_rows import answer_rows, gel_force_rows, posterior_rows, rectified_rows
 from .mechanics_rows import mechanics_rows

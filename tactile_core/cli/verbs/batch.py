@@ -164,9 +164,9 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
 def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     """Return the recipe that the options describe, of these recordings."""
     from ...jobs import convert, results
+    from ...jobs.drawer import describe_gel
     from ...jobs.engine.inputs import unit_hash
     from ...jobs.engine.recipes import MAX_SHARD_FRAMES, SHARD_FRAMES, Prepare, Translate
-    from ...jobs.frame_pass import describe_gel
     from ...pictures.mitsuba.variant import variant_for
     from ...recordings import electrode_gains, readers
     from ...sensors.calibration_file import load_calibration

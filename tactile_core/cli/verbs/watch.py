@@ -105,11 +105,12 @@ def run(options: argparse.Namespace) -> int:
     speed = 1.0 if options.speed is None else options.speed
     sensor = None if options.weights else sensor_of_first([path], columns)
     tools = load_tools(options.weights, options.calibration, target=options.target, source=sensor)
-    source = _played(path, speed, columns, tools.source) if playing else _followed(options, columns, tools.source)
+    sensor = tools.translator.source
+    source = _played(path, speed, columns, sensor) if playing else _followed(options, columns, sensor)
     tare = None if options.tare == "auto" else options.tare
-    unit = _unit(options.sensor, path, tools.source)
+    unit = _unit(options.sensor, path, sensor)
     view = live.View(tools, options.rate, options.polarity, tare, unit)
-    for sentence in tools.describe_gel():
+    for sentence in tools.drawer.describe_gel():
         say(sentence)
     with contextlib.ExitStack() as opened:
         camera = None

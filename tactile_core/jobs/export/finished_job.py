@@ -14,7 +14,7 @@ from ...files import checksummed
 from ...files.hdf5_checked import declared, open_checked
 from ...recordings.array_store import damage_reported
 from ...recordings.labels import unfold
-from .. import frame_shard
+from .. import translate_shards
 from ..engine import job as jobs
 from ..engine import manifest
 from ..engine.recipes import Translate
@@ -104,7 +104,8 @@ def load(folder: Path) -> Finished:
             continue
         about = Prepared(file).about()
         frames = about["frames"]
-        paths = tuple(jobs.shard_file(folder, one.name, number) for number in range(frame_shard.count(frames, job)))
+        count = translate_shards.count(frames, job)
+        paths = tuple(jobs.shard_file(folder, one.name, number) for number in range(count))
         for number, path in enumerate(paths):
             _check(path, job, index, number, frames)
         recordings.append(Recorded(one.name, frames, paths, unfold(about.get("labels", {}))))
@@ -119,7 +120,7 @@ def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
     rows = min(job.recipe.shard_frames, frames - number * job.recipe.shard_frames)
     expected = set(arrays_of(kept(job.recipe.keep, job.recipe.answer), shard=True))
     with damage_reported(str(path), "shard"), open_checked(path) as file:
-        if not frame_shard.is_of(path, job, index, number, frames):
+        if not translate_shards.is_of(path, job, index, number, frames):
             expected_shard = f"shard {number} of {job.inputs[index].name}"
             raise TactileError(path, "another shard under this name", expected_shard, ADVICE)
         if set(file) != expected:

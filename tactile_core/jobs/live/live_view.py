@@ -13,8 +13,8 @@ from ...pictures.height_map import folds_counted
 from ...recordings.polarity import AUTO, Polarity
 from ...recordings.recording import Recording
 from ...recordings.signals import Signals
-from ...translation.contact_track import Follower
-from ...translation.translate import Translation
+from ...translation.contact_track import ForwardTracker
+from ...translation.translator import Translation
 from ..frame_pass import Tools
 from .growing_file import newest
 from .live_signals import LiveSignals
@@ -57,9 +57,10 @@ class View:
         unit: ElectrodeGains | None = None,
     ) -> None:
         """Take the recording's rate, Hz, and what `LiveSignals` takes."""
-        self._tools, self._signals, self._rate = tools, LiveSignals(rate, polarity, tare, unit, tools.source), rate
-        self._follow = Follower()
-        tools.warm_up()  # else the first row would wait a second for it
+        self._signals = LiveSignals(rate, polarity, tare, unit, tools.translator.source)
+        self._tools, self._rate = tools, rate
+        self._track = ForwardTracker()
+        tools.drawer.warm_up()  # else the first row would wait a second for it
         self.frames, self.passed = 0, 0
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
@@ -81,10 +82,11 @@ class View:
             return None
         self.passed += len(rows) - 1
         translation = self._translation(self._signals.signals(newest(rows)[None]))
-        gel = self._tools.gel_of(translation)
+        drawer = self._tools.drawer
+        gel = drawer.gel(vars(translation))["displacement_digit"]
         with folds_counted():  # a line for each such picture would hide the latencies
-            heights = self._tools.height_map(gel)
-        picture = self._tools.draw(heights[0], gel[0])
+            heights = drawer.height_map(gel)
+        picture = drawer.draw(heights[0], gel[0])
         latency, work = time.perf_counter() - came, time.thread_time() - began
         shown = Shown(self.frames - 1, picture, translation.force[0], latency, work)
         self.latencies.append((latency, work))
@@ -92,10 +94,11 @@ class View:
 
     def _translation(self, signals: Signals) -> Translation:
         """Translate the newest frame, with the help of those before it, without delay."""
-        if self._tools.posterior is None:
-            return self._tools.translate(signals)
-        state = self._follow(self._tools.posterior(signals), self.frames / self._rate)
-        return self._tools.translate(signals, state)
+        translator = self._tools.translator
+        evidence, state = translator.encode(signals), None
+        if translator.answer.follows:
+            state = self._track(evidence, self.frames / self._rate)
+        return translator.decode(signals, evidence, state)
 
     def describe_latency(self) -> str:
         """Describe the latencies of the last pictures."""

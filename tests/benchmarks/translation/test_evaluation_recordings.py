@@ -16,7 +16,8 @@ from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.recordings import Signals
 from tactile_core.recordings.electrode_gains import ElectrodeGains
-from tactile_core.translation.translate import Translation, Translator, load_translator
+from tactile_core.translation.translate import load_translator
+from tactile_core.translation.translator import Translation, Translator
 
 ROOT = Path(__file__).resolve().parents[3]
 FRAMES = 500

@@ -9,7 +9,8 @@ from benchmarks.translation import prints
 
 from tactile_core import recordings
 from tactile_core.recordings.signals import prepare
-from tactile_core.translation.translate import Translator, load_translator
+from tactile_core.translation.translate import load_translator
+from tactile_core.translation.translator import Translator
 
 SHIPPED = Path(__file__).resolve().parents[3] / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 
@@ -28,8 +29,8 @@ def test_a_blank_answer_has_no_print():
     network = load_translator()
 
     class Blank(Translator):
-        def __call__(self, some, state=None):
-            found = super().__call__(some, state)
+        def decode(self, *of_frames):
+            found = super().decode(*of_frames)
             return dataclasses.replace(found, displacement_digit=0 * found.displacement_digit)
 
     found = {row["name"]: row["value"] for row in prints.rows("a", [signals], network)}

@@ -10,7 +10,6 @@ import os
 import signal
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 TESTS = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(TESTS / "helpers"), str(TESTS.parent)]
@@ -18,12 +17,8 @@ sys.path[:0] = [str(TESTS / "helpers"), str(TESTS.parent)]
 import fake_tools  # noqa: E402
 
 from tactile_core.cli.main import main  # noqa: E402
-from tactile_core.jobs import (  # noqa: E402
-    convert,
-    frame_shard,
-)
+from tactile_core.jobs import convert, translate_shards  # noqa: E402
 from tactile_core.jobs.engine import local, task_worker  # noqa: E402
-from tactile_core.translation import translate  # noqa: E402
 
 COMMAND = (sys.executable, str(Path(__file__).resolve()))
 
@@ -31,7 +26,7 @@ COMMAND = (sys.executable, str(Path(__file__).resolve()))
 def killing(make):
     """`make`, but for the shard that FAKE_KILL names: the worker dies over it."""
 
-    def made(folder, job, index, number, tools):
+    def made(folder, job, index, number):
         once = os.environ.get("FAKE_KILL_ONCE")
         if f"{job.inputs[index].name}-{number:06d}" == os.environ.get("FAKE_KILL") and not (
             once and Path(once).exists()
@@ -39,16 +34,15 @@ def killing(make):
             if once:
                 Path(once).touch()
             os.kill(os.getpid(), signal.SIGKILL)
-        return make(folder, job, index, number, tools)
+        return make(folder, job, index, number)
 
     return made
 
 
 if __name__ == "__main__":
-    convert.load_tools = lambda *words, answer=None: fake_tools.tools()
-    networks = SimpleNamespace(sha256="0" * 64, source="biotac", target="digit")
-    translate.load_translator = lambda *words: networks
-    frame_shard.make = killing(frame_shard.make)
+    translate_shards.load_tools = lambda *words: fake_tools.tools()
+    convert.load_translator = lambda *words: fake_tools.Networks()
+    translate_shards.make = killing(translate_shards.make)
     local.WORKER_COMMAND = COMMAND
     if sys.argv[1] == "batch":
         sys.exit(main())

@@ -11,12 +11,13 @@ import pytest
 
 from tactile_core import recordings
 from tactile_core.jobs import convert
-from tactile_core.jobs.needed_rows import Needed
 from tactile_core.pictures import shading
 from tactile_core.recordings import PrepareOptions, electrode_gains
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.electrode_gains import ElectrodeGains
+from tactile_core.translation.answer import Answer
 from tactile_core.translation.contact_track import BLOCK, MARGIN
+from tactile_core.translation.translate import PreparedRows
 
 RECORDING = "scenes/press_roll_slide/press_roll_slide.h5"
 ARRAYS = "change", "rest", "drift", "electrodes", "quiet", "flags", "pdc"
@@ -75,13 +76,14 @@ def test_a_part_of_a_long_recording_is_as_in_the_whole(shipped, tmp_path):
 def test_only_the_frames_that_decide_a_selection_are_kept(shipped):
     recording = repeated(shipped, 10)
     frames = np.arange(5 * BLOCK, 5 * BLOCK + 10)
-    part = Needed.prepared(recording, frames, tracked=True)
-    assert part.rows.tolist() == list(range(5 * BLOCK - MARGIN, 6 * BLOCK + MARGIN)) and part.count == len(recording)
+    part = PreparedRows(recording, frames, Answer())
+    rows = np.arange(5 * BLOCK - MARGIN, 6 * BLOCK + MARGIN)
+    np.testing.assert_array_equal(part.at(rows), np.arange(len(rows)))
+    assert part.count == len(recording)
     assert len(part.recording) == len(part.signals.change) == BLOCK + 2 * MARGIN
-    np.testing.assert_array_equal(part.rows[part.at(frames)], frames)
-    np.testing.assert_array_equal(part.rows[part.between(1250, 1300)], np.arange(1250, 1300))
-    assert Needed.prepared(recording, frames, tracked=False).rows.tolist() == frames.tolist()
-    most = Needed.prepared(recording, np.arange(len(recording)), tracked=True)
+    np.testing.assert_array_equal(part.read(frames)[0], recording.time[frames])
+    assert len(PreparedRows(recording, frames, Answer(frames_apart=True)).signals.change) == len(frames)
+    most = PreparedRows(recording, np.arange(len(recording)), Answer())
     assert most.recording is recording and len(most.signals.change) == len(recording)
     np.testing.assert_array_equal(shipped.at(frames[:3] - 1200).truth.force, shipped.truth.force[frames[:3] - 1200])
 
@@ -95,11 +97,11 @@ def test_a_part_of_a_long_recording_takes_little_beside_it(shipped):
     recording = repeated(shipped, 250, single=True)
     tracemalloc.start()
     try:
-        part = Needed.prepared(recording, np.arange(10), tracked=True)
+        part = PreparedRows(recording, np.arange(10), Answer())
         kept, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert len(part.frames) == 10 and kept < 0.05 * recording.electrodes.nbytes
+    assert part.count == len(recording) and kept < 0.05 * recording.electrodes.nbytes
     assert peak < 2.2 * recording.electrodes.nbytes + 20e6
 
 
@@ -108,6 +110,6 @@ def test_the_shader_is_made_with_the_first_picture(monkeypatch):
     monkeypatch.setattr(shading, "Shader", lambda unit: made.append(unit) or (lambda height: height))
     tools = convert.load_tools()
     assert not made
-    tools.warm_up()
-    tools.warm_up()
+    tools.drawer.warm_up()
+    tools.drawer.warm_up()
     assert len(made) == 1

@@ -1,0 +1,120 @@
+"""Draw translated gels: solved where that is asked for, their heights under the camera, pictures, and printed dots."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import TactileError
+from ..sensors import TARGET, sensor_surface, title
+from ..sensors.camera import Camera
+
+if TYPE_CHECKING:
+    from ..pictures.marker_field import MarkerField
+
+Solver = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Drawer:
+    """Camera and lights of a gel, ready to draw it; the same for every recording.
+
+    height_map : (T, M, 3) m -> (T, H, W) m
+    shade : (H, W) m, and the ``marks`` of dots if there are any -> (H, W, 3) uint8, by a preset of ``pictures.presets``
+    camera : of the gel that is drawn, by which contacts beside its picture are flagged; None: none are
+    solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
+    dots : on the gel that is drawn; None: it has none
+    target : the gel; found_on : the gel of the networks, on which contacts are found that are solved on another
+    """
+
+    height_map: Callable[[np.ndarray], np.ndarray]
+    shade: Callable[..., np.ndarray]
+    preset: str = "fast"
+    camera: Camera | None = None
+    solve: Solver | None = None
+    dots: MarkerField | None = None
+    target: str = TARGET
+    found_on: str = TARGET
+
+    def gel(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return arrays by the names of frames.h5 with the gel that is drawn: the networks', or solved."""
+        return arrays if self.solve is None else self.solve(arrays)
+
+    def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+        """Draw the picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
+        return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
+
+    def warm_up(self) -> None:
+        """Draw the resting gel, so that the next picture need not wait for what the first one makes."""
+        still = np.zeros((1, len(sensor_surface(self.target).rest), 3), np.float32)
+        self.draw(self.height_map(still)[0], still[0])
+
+    def needed_dots(self) -> MarkerField:
+        """Return the unit's dots; raises TactileError where it has none."""
+        if self.dots is None:
+            found = "asked of a unit without dots"
+            advice = "Give a --calibration with a [markers] table (docs/calibration.md)"
+            raise TactileError("--keep marker_motion", found, "a gel with dots printed on it", advice)
+        return self.dots
+
+    def describe_gel(self) -> tuple[str, ...]:
+        """Say that contacts are solved on another gel than that of the networks, where they are."""
+        return describe_gel(self.target, self.found_on)
+
+
+def describe_gel(target: str, found_on: str) -> tuple[str, ...]:
+    """Say that contacts found on one gel are solved on another; nothing where both are the same."""
+    if target == found_on:
+        return ()
+    return (
+        f"no networks lead to the {title(target)}: its gel is solved under the contacts found on a {title(found_on)}'s",
+    )
+
+
+def load_drawer(
+    calibration: str | os.PathLike | None = None,
+    preset: str = "fast",
+    variant: str | None = None,
+    target: str = TARGET,
+    found_on: str = TARGET,
+    *,
+    solves: bool = False,
+) -> Drawer:
+    """Load camera and lights of a gel: the unit's that ships, or a file's.
+
+    preset, variant : of ``renderer.Renderer``, for all pictures but fast ones; solves : whether contacts are solved
+    The fast shader is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
+    Raises TactileError for a bad calibration, and what ``renderer.Renderer`` raises.
+    """
+    from ..pictures import background, height_map, shading
+    from ..sensors.calibration_file import load_calibration
+
+    unit = load_calibration(calibration, target)
+    mapper, dots = height_map.gel_mapper(unit.camera), None
+    if preset == "fast" and unit.markers is None:
+        if unit.photograph:
+            background.read_photograph(unit.photograph, unit.camera)  # a bad one is refused before any work
+        shade = _made_at_first_call(functools.partial(shading.Shader, unit))
+    else:
+        from ..pictures.renderer import Renderer
+
+        shade = Renderer(unit, preset, variant)
+        dots = shade.dots
+    solve: Solver | None = None
+    if solves:
+        from . import solved_gel
+
+        solved_gel.prepare(target)
+        solve = functools.partial(solved_gel.solved, gel=target, found_on=found_on)
+    return Drawer(mapper, shade, preset, unit.camera, solve, dots, target, found_on)
+
+
+def _made_at_first_call(make: Callable[[], Callable[..., np.ndarray]]) -> Callable[..., np.ndarray]:
+    """Return a tool that `make` makes when it is first called."""
+    made = functools.cache(make)
+    return lambda *arguments: made()(*arguments)

@@ -1,0 +1,287 @@
+"""Decode frames: signals to BioTac deformation to DIGIT deformation, force and confidence."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from .. import accuracy, sensors
+from ..errors import TactileError
+from ..files.short_text import Summary
+from ..recordings import Signals
+from ..recordings.flags import Flag
+from ..sensors import unrolling as surface
+from . import error_bounds, gel_place, networks
+from .answer import MEAN, Answer
+from .card_errors import doubt
+from .card_sensors import REST
+from .contact_frame import STILL, ContactFrame
+from .contact_track import Evidence
+from .error_bounds import KINDS
+from .lost_signs import recovered
+from .network_sizes import PLACE, STATE, SURFACES
+from .networks import COMPRESSED_LIMIT, Networks
+from .posterior import FORCE_SCALE, Posterior, touches
+from .simulated_likeness import Patterns, residual_shares, two_contacts, unlike
+
+# Frames that differ from training in kind, not in degree, are worth little.
+UNTRAINED_CONFIDENCE = 0.2  # assumed
+# Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
+# (scripts/evaluate_translation.py --held-out) it flags half of that part's frames, and most of those it should.
+# The largest change is another matter: signals of deep contacts at the tip are three times those that 99 % of the
+# contacts stay below, and training knows them. What exceeds all but one in a thousand is out of its range.
+IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
+# A place is undecided where more than this share of the posterior lies as far away, m, as two contacts must lie apart.
+UNDECIDED, APART = 0.3, 3e-3  # assumed
+SAMPLES = "sample_center", "sample_force"  # of contacts drawn from the posterior
+SEED = 0  # of them: the same recording, the same contacts
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Translation(Summary):
+    """Result of a translation; T frames first, float32, SI units.
+
+    latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents, before a mount's shift
+    displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
+    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, as displacements are
+    pressure : (T,) Pa, rise of the fluid's pressure, estimated from the electrodes alone; zero where the force is
+    contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
+    confidence : (T,), 1 as in training, 0 far from it
+    expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
+        below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
+    flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
+        BEYOND_DIGIT, TWO_CONTACTS, UNDECIDED_PLACE and UNEXPLAINED
+    """
+
+    latent_signal: np.ndarray
+    latent_biotac: np.ndarray
+    latent_digit: np.ndarray
+    displacement_biotac: np.ndarray
+    displacement_digit: np.ndarray
+    force: np.ndarray
+    pressure: np.ndarray
+    contact_center: np.ndarray
+    confidence: np.ndarray
+    expected_error_biotac: np.ndarray
+    expected_error_digit: np.ndarray
+    error_bound_biotac: np.ndarray
+    error_bound_digit: np.ndarray
+    flags: np.ndarray
+
+    @classmethod
+    def joined(cls, parts: Sequence[Translation]) -> Translation:
+        """Join translations of frames that follow each other."""
+        names = [field.name for field in dataclasses.fields(cls)]
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+
+
+def _rectified(signals: Signals) -> np.ndarray:
+    return (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
+
+
+def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
+    """Return the 99 % quantile of a quantity in a card's ``silence``, frames of noise without contact."""
+    return float(np.interp(0.99, silence["levels"], silence[quantity]))
+
+
+def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
+    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN where no node moves by ``silent`` m."""
+    center = accuracy.dent_center(displacement, rest).astype(np.float32)
+    center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
+    return center
+
+
+def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
+    """Return the posterior's share (T,) in contacts ``APART`` m and more on the gel from states (T, STATE)."""
+    place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
+    points = gel_place.on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
+    far = accuracy.lengths(points - gel_place.on_gel(frame, place)[:, None]) > APART
+    return (posterior.weight * (far & touches(posterior.mean))).sum(-1)
+
+
+def drawn(posterior: Posterior, frames: np.ndarray, count: int) -> np.ndarray:
+    """Draw states (T, count, STATE) from a posterior of frames (T,), whose numbers are the only seeds."""
+    found = np.empty((len(frames), count, STATE), np.float32)
+    for row, frame in enumerate(frames):
+        random = np.random.default_rng([SEED, int(frame)])
+        share = posterior.weight[row].astype(np.float64)
+        which = random.choice(len(share), count, p=share / share.sum())
+        noise = random.standard_normal((count, STATE), dtype=np.float32)
+        found[row] = posterior.mean[row, which] + posterior.spread[row, which] * noise
+    return found
+
+
+class Translator:
+    """Verified networks that encode signals and decode contacts.
+
+    card : their model card; sha256 : of the card, which names all weights
+    """
+
+    def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
+        """Take patterns : simulated contacts of the source; None for a BioTac's, which ship."""
+        self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
+        self.source, self.target, self._patterns = nets.source, nets.target, patterns
+        self.answer = answer or Answer()
+        moved = self.answer.mount_shift
+        self._shift = gel_place.Shift(nets.frames["MVD"], moved) if moved.any() else None
+        self._unrolled = surface.unrolled_nodes(self.source)
+
+    def encode(self, signals: Signals) -> Evidence:
+        """Return each frame's own posterior of its contact, and what tracking and decoding need beside it.
+
+        Raises TactileError for another sensor's signals.
+        """
+        change, unsigned = self.changes(signals)
+        latent = self.nets.encode_signal(change, unsigned)
+        size = np.sqrt(np.square(self._typical(signals)).mean(axis=1))
+        posterior = self.nets.posterior(latent, unsigned)
+        return Evidence(**vars(posterior), size=size, rectified=_rectified(signals), latent=latent, unsigned=unsigned)
+
+    def plausible(self, evidence: Evidence, frames: np.ndarray) -> dict[str, np.ndarray]:
+        """Draw contacts on the gel for each frame from its posterior, as many as the answer asks for, by ``SAMPLES``.
+
+        frames : (T,) in the recording, whose numbers are the only seeds
+        sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N
+        """
+        states = drawn(evidence, frames, self.answer.samples)
+        shape, flat = states.shape[:2], states.reshape(-1, STATE)
+        center = gel_place.on_gel(self.nets.frames["MVD"], flat[:, :PLACE]) + self.answer.mount_shift
+        touched = touches(flat)
+        force = FORCE_SCALE * np.sinh(np.clip(flat[:, PLACE], 0, COMPRESSED_LIMIT))
+        center = np.where(touched[:, None], center, np.nan).reshape(*shape, 2)
+        return dict(zip(SAMPLES, (center, np.where(touched, force, 0).reshape(shape)), strict=True))
+
+    def changes(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
+        """Return what the networks see: changes (T, e) counts, with signs where they are known, and the frames (T,)
+        that are left rectified.
+
+        Raises TactileError for another sensor's signals.
+        """
+        return recovered(self._typical(signals), _rectified(signals), self._patterns)
+
+    def _typical(self, signals: Signals) -> np.ndarray:
+        """Changes (T, e) counts of the unit that the networks know. Raises TactileError for another sensor's."""
+        if signals.sensor != self.source:
+            found = f"signals of a {sensors.title(signals.sensor)}"
+            raise TactileError("translation", found, f"those of a {sensors.title(self.source)}, as the weights")
+        rest = self.card.get(REST)
+        return signals.typical if rest is None else signals.relative_to(np.array(rest))
+
+    def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
+        """Translate all frames of ``signals``; see `decode`."""
+        return self.decode(signals, self.encode(signals), state)
+
+    def decode(self, signals: Signals, evidence: Evidence, state: np.ndarray | None = None) -> Translation:
+        """Translate frames with their own evidence; a frame's numbers do not depend on its neighbours.
+
+        state : (T, STATE) of the contacts, estimated from several frames; None: from each frame alone, as ``answer``
+            says
+        """
+        nets = self.nets
+        rectified, alone = evidence.rectified, state is None
+        change = np.asarray(self._typical(signals), np.float32)
+        latent_signal, unsigned = evidence.latent, evidence.unsigned
+        if state is None:
+            state = evidence.average if self.answer.kind == MEAN else evidence.likely
+        latent_biotac, latent_digit = nets.latents(latent_signal, state, unsigned)
+        touched = touches(state)
+        biotac, digit = (
+            decode(latent) * touched[:, None, None]
+            for decode, latent in ((nets.decode_biotac, latent_biotac), (nets.decode_digit, latent_digit))
+        )
+        if self._shift is not None:
+            digit = self._shift(digit)
+        # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
+        center = contact_center(
+            digit, sensors.sensor_surface(self.target).rest, self.silent("digit_m") if alone else STILL
+        )
+        silent = np.isnan(center[:, 0])
+        flags = signals.flags.copy()
+        flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
+        shares = residual_shares(change, rectified, self._patterns)
+        flags[unlike(shares)] |= np.uint16(Flag.UNEXPLAINED)
+        confidence = self._confidence(change, flags, rectified)
+        flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
+        flags[two_contacts(shares)] |= np.uint16(Flag.TWO_CONTACTS)
+        undecided = touched & (elsewhere(evidence, state, nets.frames["MVD"]) > UNDECIDED)
+        flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
+        return Translation(
+            latent_signal, latent_biotac, latent_digit, biotac, digit,
+            force=np.where(silent[:, None], np.float32(0), nets.force_in(state, latent_biotac)),
+            pressure=np.where(silent, np.float32(0), nets.pressure(change, rectified)),
+            contact_center=center,
+            confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
+        )  # fmt: skip
+
+    def silent(self, quantity: str) -> float:
+        """Return the `silent_level` of a quantity in this card."""
+        return silent_level(self.card["silence"], quantity)
+
+    def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
+        """Compute expected largest errors and their bounds, by `Translation`'s names; x : (T,) m, of the contact."""
+        expected, found = self.nets.expected_error(change, rectified), {}
+        for index, name in enumerate(SURFACES):
+            kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
+            found[f"expected_error_{name}"] = expected[:, index]
+            found[f"error_bound_{name}"] = np.where(rectified, kinds["rectified"], kinds["signed"])
+        return found
+
+    def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
+        """Bound (T,) m on 95 of 100 largest errors, by `error_bounds.bound`."""
+        return error_bounds.bound(expected, x, self.card["error_bounds"][kind][surface])
+
+    def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
+        """Mark (T,) bool the changes (T, 19) counts outside those of the training, by any distance's quantile."""
+        return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
+
+    def _confidence(self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray) -> np.ndarray:
+        """Confidence (T,): 1 for signals like those of the training, 0 far from them.
+
+        Each distance to the training signals counts against its quantiles in validation: it is 1 up to the 95 %
+        quantile, 0 at the outermost, and at most UNTRAINED_CONFIDENCE where a flag says that training did not know it,
+        or the card that the networks hardly translate.
+        Not a calibrated probability: that is what bounds are for.
+        """
+        usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))
+        confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
+        untrained = flags & np.uint16(
+            Flag.NO_QUIET_PART
+            | Flag.SATURATED
+            | Flag.DEAD_CHANNEL
+            | Flag.LAW_DOUBTED
+            | Flag.OUT_OF_RANGE
+            | Flag.UNEXPLAINED
+        )
+        doubted = (untrained > 0) | bool(doubt(self.card))
+        confidence = np.where(doubted, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
+        return confidence.astype(np.float32)
+
+    def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
+        """Stack the distances (distances, T) of `networks.SignalDistance`."""
+        distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
+        return np.stack([getattr(distance, name) for name in networks.DISTANCES])
+
+    def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
+        """Quantiles (distances, T) or (distances, 1) at each distance's level over like validation frames."""
+        table = self.card["distance"]
+        limits = {
+            kind: np.array(
+                [[np.interp(level[name], table["levels"], table[kind][name])] for name in networks.DISTANCES]
+            )
+            for kind in KINDS
+        }
+        return np.where(rectified, limits["rectified"], limits["signed"])
+
+    def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
+        """Mark (T,) contacts of the BioTac without counterpart on the gel: the dent's centre unrolls beyond it."""
+        moved = accuracy.lengths(displacement)
+        peak = moved.max(axis=1, keepdims=True)
+        core = (moved > accuracy.CORE * peak) & (peak > self.silent("biotac_m"))
+        weight = np.where(core & np.isfinite(self._unrolled[:, 0]), moved, 0)
+        total = weight.sum(axis=1)
+        center = weight @ np.nan_to_num(self._unrolled) / np.where(total > 0, total, 1)[:, None]
+        center += self.answer.mount_shift
+        outside = sensors.shape_of(self.target).outline_distance(center[:, 0], center[:, 1]) <= 0
+        return core.any(axis=1) & (outside | (total == 0))
