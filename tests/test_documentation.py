@@ -256,7 +256,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     reference = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
     assert all(
-        name in reference for name in ("readers.read", "translate_recording.translate", "Renderer", "solve.solve")
+        name in reference for name in ("readers.read", "translate.translate", "Renderer", "solve.solve")
     )
 
 

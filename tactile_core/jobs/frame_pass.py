@@ -63,7 +63,8 @@ class FramePass:
         """Write the arrays of rising frames (T,) to a new file.
 
         signals : of any of them, for their rest and kind; start_time : unix s; about : attributes of the file
-        take : called with each chunk's frames and arrays; labels : name -> (T,) texts; room : before the HDF5 part, as of `FramesFile`
+        take : called with each chunk's frames and arrays; labels : name -> (T,) texts
+        room : before the HDF5 part, as of `FramesFile`
         """
         words = kept(self._keep, self._translator.answer)
         with FramesFile(path, len(frames), words, about, room=room, pair=self._pair) as file:

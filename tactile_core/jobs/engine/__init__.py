@@ -2,7 +2,7 @@
 
 <job>/job.json                    what is to be made: inputs and their hashes, weights, options
 <job>/prepared/<recording>.h5     signals of one recording, ready for the networks; see ``prepared_signals``
-<job>/shards/<recording>-%06d.h5  translated frames, numbered within their recording; see ``frame_shard``
+<job>/shards/<recording>-%06d.h5  translated frames, numbered within their recording; see ``translate_shards``
 <job>/aside/<task>.json           what could not be done, and why; the next run tries it again <job>/manifest.json
 all shards and their hashes, once the job is done
 
