@@ -55,7 +55,7 @@ LIBRARIES = (
     Library("rosbags", "rosbags", "ros", "ROS bags and MCAP"),
     Library("distributed", "distributed", "batch", "batches on many machines (tactile batch --cluster)"),
     Library("pyarrow", "pyarrow", "batch", "LeRobot data sets (tactile export)"),
-    Library("zmq", "pyzmq", "live", "frames for other programs (tactile watch --serve)"),
+    Library("zmq", "pyzmq", "live", "reading what tactile watch --serve publishes (docs/read_frames.py)"),
     Library("cv2", "opencv-python-headless", "camera", "a real DIGIT's camera (tactile watch --camera)"),
     Library("torch", "torch", "train", "training (tactile train)"),
 )

@@ -1,13 +1,17 @@
 """Frames for other programs on this machine: a ZeroMQ message each, to whoever listens.
 
 A message is one line of JSON and then the bytes of the arrays that it names, one after the other;
-docs/read_frames.py reads it.
+docs/read_frames.py reads it. The publisher's half of ZeroMQ's protocol (ZMTP 3.0, rfc.zeromq.org/spec/23) is spoken
+here: the library's own publisher keeps whatever strangers subscribe to, without a bound, in the thread that sends.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import socket
+import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,38 +23,71 @@ if TYPE_CHECKING:
 
 FORMAT = "tactile-frame-1"
 HOST = "127.0.0.1"  # this machine alone
-_KEPT = 2  # messages for a reader that is slow; what comes meanwhile it does not get
+MOST = 64  # readers at a time (assumed); further ones are turned away
+PATIENCE = 5.0  # s that a reader may take nothing (assumed), after which its place is another's
+GREETING = b"\xff" + 8 * b"\0" + b"\x7f\x03\0" + b"NULL".ljust(20, b"\0") + 32 * b"\0"  # version 3.0, no encryption
+READY = b"\x04\x19\x05READY\x0bSocket-Type" + (3).to_bytes(4, "big") + b"PUB"
 
 
 class FrameServer:
     """Publishes frames at a port of this machine: whether anybody reads them, and how fast, changes nothing here.
 
-    port : 0 for any free one. Every user of this machine can read them.
-    Raises TactileError for a port that cannot be had, ModuleNotFoundError without the extra [live].
+    port : 0 for any free one. Every user of this machine can read them. Nothing that readers send is read: their
+    own libraries drop what they did not subscribe to. A slow reader misses frames.
+    Raises TactileError for a port that cannot be had.
     """
 
     def __init__(self, port: int) -> None:
-        import zmq
-
-        self._context = zmq.Context()
-        self._socket = self._context.socket(zmq.PUB)
-        self._socket.set(zmq.SNDHWM, _KEPT)
-        self._socket.set(zmq.LINGER, 0)
         try:
-            self._socket.bind(f"tcp://{HOST}:{'*' if port == 0 else port}")
-        except zmq.ZMQError as error:
-            self.close()
+            self._listener = socket.create_server((HOST, port))
+        except OSError as error:
             found = f"{port}: {error.strerror or error}"
             raise TactileError("--serve, port", found, "a free port of this machine", "0 takes any") from error
-        self.address = self._socket.get(zmq.LAST_ENDPOINT).rstrip(b"\0").decode()
+        self.address = f"tcp://{HOST}:{self._listener.getsockname()[1]}"
+        self._news, self._message, self._sent, self._closed = threading.Condition(), b"", 0, False
+        self._places = threading.BoundedSemaphore(MOST)
+        threading.Thread(target=self._accept, daemon=True).start()
 
     def send(self, shown: Shown, arrays: dict[str, np.ndarray]) -> None:
         """Publish a frame; never waits for a reader."""
-        self._socket.send(message(shown, arrays))
+        content = message(shown, arrays)
+        with self._news:
+            self._message, self._sent = b"\x02" + len(content).to_bytes(8, "big") + content, self._sent + 1
+            self._news.notify_all()
 
     def close(self) -> None:
-        """Close the port."""
-        self._context.destroy(linger=0)
+        """Close the port; readers lose the connection."""
+        with self._news:
+            self._closed = True
+            self._news.notify_all()
+        with suppress(OSError):  # macOS refuses it, and wakes the waiting thread by closing alone
+            self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+
+    def _accept(self) -> None:
+        """Give each reader a thread, until the port is closed."""
+        with suppress(OSError):
+            while True:
+                reader, _ = self._listener.accept()
+                if self._places.acquire(blocking=False):
+                    threading.Thread(target=self._feed, args=(reader,), daemon=True).start()
+                else:
+                    reader.close()
+
+    def _feed(self, reader: socket.socket) -> None:
+        """Send a reader the newest message as often as there is a new one, until it goes or takes nothing."""
+        sent = self._sent
+        with reader, suppress(OSError):
+            reader.settimeout(PATIENCE)
+            reader.sendall(GREETING + READY)
+            while True:
+                with self._news:
+                    self._news.wait_for(lambda last=sent: self._closed or self._sent > last)
+                    content, sent = self._message, self._sent
+                if self._closed:
+                    break
+                reader.sendall(content)
+        self._places.release()
 
 
 def message(shown: Shown, arrays: dict[str, np.ndarray]) -> bytes:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import socket
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 import fake_tools
@@ -15,7 +19,7 @@ import pytest
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert, live
-from tactile_core.jobs.live.frame_server import FORMAT, message
+from tactile_core.jobs.live.frame_server import FORMAT, GREETING, MOST, READY, message
 from tactile_core.jobs.live.live_view import Shown
 
 READER = Path(__file__).resolve().parents[3] / "docs" / "read_frames.py"
@@ -61,6 +65,61 @@ def test_the_page_s_reader_reads_what_is_served_on_this_machine_alone(zmq):
     frame, force, levels = line.split(maxsplit=2)
     assert (frame, force) == ("7", "1.5")
     np.testing.assert_allclose(np.array(levels.strip("[]\n ").split(), float), PICTURE.mean(axis=(0, 1)))
+
+
+CODE = """
+import resource
+import numpy as np
+from tactile_core.cli.stop_signals import stopping
+from tactile_core.jobs.live.frame_server import FrameServer
+from tactile_core.jobs.live.live_view import Shown
+import time
+used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+server, picture = FrameServer(0), np.zeros((320, 240, 3), np.uint8)
+print(server.address, flush=True)
+try:
+    with stopping():
+        for frame in range(10**9):
+            server.send(Shown(frame, picture, np.zeros(3), 0.01, 0.008), {"picture": picture})
+            time.sleep(0.01)
+except KeyboardInterrupt as stop:
+    server.close()
+    print(stop, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - used)
+"""
+
+
+def subscription(word: bytes) -> bytes:
+    return b"\x02" + (1 + len(word)).to_bytes(8, "big") + b"\x01" + word
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGTERM to hear")
+def test_what_readers_subscribe_to_costs_neither_memory_nor_frames_nor_the_end(zmq):
+    """Four strangers subscribe to 50 MB each, one to very many words; others say nothing, and take all places."""
+    words = [subscription(bytes([number]) * 50_000_000) for number in range(4)]
+    words.append(b"".join(subscription(b"%d" % number) for number in range(1_000_000)))
+    with subprocess.Popen([sys.executable, "-c", CODE], stdout=subprocess.PIPE, text=True) as child:
+        address = child.stdout.readline().strip()
+        host, port = address.removeprefix("tcp://").split(":")
+        strangers = [socket.create_connection((host, int(port))) for _ in range(MOST + 5)]
+        for stranger, word in zip(strangers, words, strict=False):
+            threading.Thread(target=said, args=(stranger, word), daemon=True).start()
+        for stranger in strangers[5:]:
+            stranger.close()
+        reader = zmq.Context().socket(zmq.SUB)
+        reader.subscribe(b"")
+        reader.connect(address)  # again and again, until a place is free
+        for _ in range(100):
+            assert reader.poll(60_000)
+            reader.recv()
+        child.send_signal(signal.SIGTERM)
+        word, kilobytes = child.stdout.read().split()
+        reader.context.destroy(linger=0)
+    assert word == "SIGTERM" and int(kilobytes) < 64_000  # a frame for each of 64 readers would be 15,000
+
+
+def said(stranger: socket.socket, word: bytes) -> None:
+    with suppress(OSError):  # ended by the server
+        stranger.sendall(GREETING + READY.replace(b"PUB", b"SUB") + word)
 
 
 def test_without_a_reader_nothing_is_waited_for_and_a_port_is_had_once(zmq):
