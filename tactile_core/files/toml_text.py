@@ -60,7 +60,8 @@ def _value(value: Any) -> str:
     if isinstance(value, str):
         return toml_quoted(value)
     if isinstance(value, msgspec.Struct):
-        pairs = ", ".join(f"{name} = {_value(item)}" for name, item in msgspec.structs.asdict(value).items())
+        held = msgspec.structs.asdict(value).items()
+        pairs = ", ".join(f"{name} = {_value(item)}" for name, item in held if item is not None)
         return f"{{ {pairs} }}"
     if isinstance(value, Sequence):
         return "[" + ", ".join(map(_value, value)) + "]"

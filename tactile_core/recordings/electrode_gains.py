@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -18,7 +18,7 @@ from ..files.toml_text import as_toml
 from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
-from .fingers import FINGERS
+from .fingers import FINGERS, short_of, split
 from .recording import Recording
 from .signals import EVERY, PrepareOptions, Rest, Signals, doubt_law, prepare
 
@@ -55,6 +55,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
     """Calibration of one unit, or of the units of a hand's fingers, each in its own section.
 
+    topics : units of bags with several topics, by topic and finger, as ``left/biotac/finger2``
     sensor : of the units, "biotac" or another, which has a rest and no gains
     """
 
@@ -66,11 +67,12 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     finger3: ElectrodeGains | None = None
     finger4: ElectrodeGains | None = None
     sensor: str = SOURCE
+    topics: dict[str, ElectrodeGains] | None = None
 
     def sections(self) -> dict[str, ElectrodeGains]:
-        """Return the sections present, by name."""
+        """Return the sections present, by name: ``unit``, ``finger2``, ``left/biotac/finger2``."""
         names = ("unit", *(f"finger{number}" for number in range(FINGERS)))
-        return {name: found for name in names if (found := getattr(self, name)) is not None}
+        return {name: found for name in names if (found := getattr(self, name)) is not None} | (self.topics or {})
 
     def gains_for(
         self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike, sensor: str = SOURCE
@@ -80,12 +82,24 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
             found = f"a unit of {electrode_count(self.sensor)} electrodes, {self.sensor!r}"
             expected = f"one of {electrode_count(sensor)} electrodes, {sensor!r}, as {recording} is of"
             raise TactileError(where, found, expected)
-        name = "unit" if finger is None else f"finger{finger}"
+        name = section_of(split(os.fspath(recording)).topic, finger)
         sections = self.sections()
         if name in sections:
             return sections[name]
-        found = f"[{'], ['.join(sections)}], and {os.path.basename(recording)} is of {_in_words(finger)}"
+        found = f"[{'], ['.join(sections)}], and {short_of(recording)} is of {_in_words(finger)}"
         raise TactileError(where, found, f"a section [{name}]", "Adapt to recordings of that unit")
+
+
+def section_of(topic: str, finger: int | None) -> str:
+    """Return the name of the section of a recording's unit. topic, finger : of `fingers.split`"""
+    return (f"{topic}/" if topic else "") + ("unit" if finger is None else f"finger{finger}")
+
+
+def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> SensorFile:
+    """Put units together, by the names of their sections."""
+    topics = {name: unit for name, unit in units.items() if "/" in name}
+    plain: dict[str, Any] = {name: unit for name, unit in units.items() if name not in topics}
+    return SensorFile(FORMAT, **plain, sensor=sensor, topics=topics or None)
 
 
 def _in_words(finger: int | None) -> str:

@@ -45,6 +45,12 @@ def name_of(path: str | os.PathLike) -> str:
     return split(os.fspath(path)).name
 
 
+def short_of(path: str | os.PathLike) -> str:
+    """Return a recording's path without its folders, as ``hand.bag#left/biotac/finger2``."""
+    file, text = split(os.fspath(path)).file, os.fspath(path)
+    return Path(file).name + text[len(file) :]
+
+
 def named(recording: Recording, chosen: Chosen) -> Recording:
     """Rename a recording by its topic and finger, as `name_of` does."""
     return dataclasses.replace(recording, name=chosen.name)

@@ -6,7 +6,6 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -14,10 +13,11 @@ import numpy as np
 from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_faults import named_electrodes
-from ..recordings.electrode_gains import FORMAT, LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit
-from ..recordings.fingers import split
+from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit, section_of, units_file
+from ..recordings.fingers import FINGERS, short_of, split
 from ..recordings.gain_matching import PRIOR, Match, match
 from ..recordings.readers import each_finger, sensor_of
+from ..recordings.tables.truncated_cell import listed
 from ..sensors import title, typical_rest
 from . import reference_signals
 from .reference_signals import ReferenceSignals
@@ -69,16 +69,16 @@ def adapt(
             advice = "Give its counts a unit, or use another recording"
             raise TactileError(path, "a scaled recording, whose unit is not known", "counts", advice)
         if not signals.quiet.any() and bare is None:
-            restless.append(os.path.basename(path))
+            restless.append(short_of(path))
         kinds.add(signals.kind == "rectified")
         parts.append(_contacts(signals))
     if len(kinds) > 1:
         raise TactileError(paths[0], "signed and rectified recordings together", "one kind", "Adapt to each by itself")
-    note = f"fitted by tactile adapt from {_listed([os.path.basename(path) for path in paths])}"
+    note = f"fitted by tactile adapt from {listed([short_of(path) for path in paths], SHOWN)}"
     fitted = _fitted(parts, kinds.pop(), typical, note, bare)
     if not restless:
         return fitted
-    warning = f"no quiet part in {_listed(restless)}: where the tare is off, so are the gains and offsets"
+    warning = f"no quiet part in {listed(restless, SHOWN)}: where the tare is off, so are the gains and offsets"
     return dataclasses.replace(fitted, warnings=(warning, *fitted.warnings))
 
 
@@ -90,45 +90,43 @@ def adapt_hand(
     Raises TactileError like `adapt`, and for files of hands and of single fingers together.
     """
     columns = None if options is None else options.columns
-    found = {sensor_of(path, columns) for path in paths}
+    every = [one for path in paths for one in each_finger(path)]
+    found = {sensor_of(one, columns) for one in every}
     if len(found) > 1:
         raise TactileError(paths[0], f"recordings of {' and '.join(sorted(found))} together", "one sensor")
-    units = _units(paths)
-    sensor = found.pop()
+    units, sensor = _units(every), found.pop()
     if typical_rest(sensor) is None:
-        return _rests_alone(units, sensor), (
+        rests = {unit: _rest_of_files(files, sensor) for unit, files in units.items()}
+        return units_file(rests, sensor), (
             f"no gains are fitted to a {title(sensor)}: its recordings give its rest alone",
         )
-    sections: dict[str, Any] = {}
+    fitted: dict[str, ElectrodeGains] = {}
     warnings: list[str] = []
-    for finger, files in sorted(units.items(), key=lambda unit: unit[0] or 0):
+    for unit, files in units.items():
         done = adapt(files, typical, options)
-        name = "unit" if finger is None else f"finger{finger}"
-        sections[name] = done.sensor
-        warnings += [text if finger is None else f"{name}: {text}" for text in done.warnings]
-    return SensorFile(FORMAT, **sections), tuple(warnings)
+        fitted[unit] = done.sensor
+        warnings += [text if unit == "unit" else f"{unit}: {text}" for text in done.warnings]
+    return units_file(fitted), tuple(warnings)
 
 
-def _units(paths: Sequence[str | os.PathLike]) -> dict[int | None, list[str]]:
-    """Recordings by finger, None for files of one. Raises TactileError for both together."""
-    units: dict[int | None, list[str]] = {}
-    for path in paths:
-        for one in each_finger(path):
-            units.setdefault(split(one)[1], []).append(one)
-    if len(units) > 1 and None in units:
+def _units(every: Sequence[str]) -> dict[str, list[str]]:
+    """Sort recordings by the sections of their units. Raises TactileError for files of one unit and of several."""
+    units: dict[str, list[str]] = {}
+    for one in every:
+        _, finger, topic = split(one)
+        if finger is not None and finger >= FINGERS and not topic:
+            raise TactileError(one, f"finger {finger}", f"a hand of at most {FINGERS} fingers")
+        units.setdefault(section_of(topic, finger), []).append(one)
+    if len(units) > 1 and "unit" in units:
         found = "files of several fingers, and of one"
-        raise TactileError(paths[0], found, "one kind", "Adapt to each by itself")
-    return units
+        raise TactileError(every[0], found, "one kind", "Adapt to each by itself")
+    return dict(sorted(units.items()))
 
 
-def _rests_alone(units: dict[int | None, list[str]], sensor: str) -> SensorFile:
-    """Rest of each unit of a sensor, without gains."""
-    sections: dict[str, Any] = {}
-    for finger, files in sorted(units.items(), key=lambda unit: unit[0] or 0):
-        rest = find_rest_sp([read(path, sensor=sensor) for path in files])
-        note = f"median of each electrode's least loaded tenth, {rest.recordings} contacts"
-        sections["unit" if finger is None else f"finger{finger}"] = _rest_alone(rest, note)
-    return SensorFile(FORMAT, **sections, sensor=sensor)
+def _rest_of_files(files: list[str], sensor: str) -> ElectrodeGains:
+    """Rest of a unit of a sensor that has no gains."""
+    rest = find_rest_sp([read(path, sensor=sensor) for path in files])
+    return _rest_alone(rest, f"median of each electrode's least loaded tenth, {rest.recordings} contacts")
 
 
 def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
@@ -165,11 +163,6 @@ def _fitted(
         return Adapted(bare, np.zeros(change.shape[1], bool), (f"no gains: {error}",), np.nan)
     fields = {name: getattr(bare, name) for name in ("rest_counts", "rest_spread_counts", "rest_pdc")}
     return dataclasses.replace(found, sensor=msgspec.structs.replace(found.sensor, **fields))
-
-
-def _listed(names: list[str]) -> str:
-    """List the names, or the first few and the number of the others."""
-    return ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
 
 
 def _contacts(signals: Signals) -> np.ndarray:

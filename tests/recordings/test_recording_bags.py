@@ -16,7 +16,7 @@ from bags import Topic, registered, write_bag, write_topics
 from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.recordings import chunks
+from tactile_core.recordings import chunks, electrode_gains
 from tactile_core.recordings.bags import bag, ros_messages
 from tactile_core.recordings.fingers import name_of
 from tactile_core.recordings.readers import each_finger, sensor_of
@@ -156,6 +156,22 @@ def test_a_topic_and_its_finger_are_chosen_in_any_spelling(make, tmp_path):
         recordings.read(f"{path}#left/biotac/4")
     with pytest.raises(TactileError, match="topic 'left' of a file without topics"):
         recordings.read(f"{__file__}#left/0")
+
+
+def test_each_topic_s_finger_is_a_unit_of_its_own(make, tmp_path):
+    """Two hands' first fingers are two units: one section for both would be the rest of neither."""
+    for number in range(3):
+        press = make(frames=60, seed=number)
+        other = type(press)(**(vars(press) | {"electrodes": press.electrodes + 100}))
+        topics = [Topic(f"/{name}", "one", each, electrodes=24) for name, each in (("left", press), ("right", other))]
+        write_topics(tmp_path / f"{number}.bag", "ros1", topics)
+    bags, out = [str(tmp_path / f"{number}.bag") for number in range(3)], str(tmp_path / "rest.toml")
+    assert main(["adapt", *bags, "--out", out]) == 0
+    units = electrode_gains.read(out).sections()
+    assert list(units) == ["left/finger0", "right/finger0"]
+    left, right = (np.array(unit.rest_counts) for unit in units.values())
+    np.testing.assert_allclose(right - left, 100, atol=1e-6)
+    assert main(["info", f"{bags[0]}#right/finger0", "--sensor", out]) == 0
 
 
 def test_a_topic_may_be_called_like_a_finger(make, tmp_path):

@@ -1,11 +1,17 @@
 """``describe`` tells a person what a recording holds."""
 
+import zipfile
+
+import h5py
 import numpy as np
 import pytest
 
+from tactile_core import recordings
 from tactile_core.errors import TactileError
+from tactile_core.recordings import PrepareOptions
 from tactile_core.recordings.info import describe
 from tactile_core.recordings.tables import table
+from tactile_core.recordings.tables.column_map import ColumnMap
 
 
 def test_a_good_recording(press, in_layout):
@@ -54,6 +60,46 @@ def test_suspicious_places_are_named_by_line(press, in_layout):
         "repaired 2, time_jump 1 of 700 frames",
     ):
         assert part in text, part
+
+
+def test_what_is_not_taken_is_named(press, tmp_path, write, slide_lines):
+    """Whatever the container, an array or column that no layout picks is named."""
+    scipy_io = pytest.importorskip("scipy.io", reason="scipy is absent: pip install tactile-core[matlab]")
+    slide = [slide_lines[0] + ",wrench,label", *(line + "1,2" for line in slide_lines[1:])]
+    write(slide, "touch.csv")
+    arrays = {"electrodes": press.electrodes, "time": press.time, "wrench": np.zeros((700, 6)), "label": np.array("a")}
+    np.savez(tmp_path / "touch.npz", **arrays)
+    with zipfile.ZipFile(tmp_path / "touch.npz", "a") as archive:
+        archive.writestr("notes.txt", "who, when")
+    with h5py.File(tmp_path / "touch.h5", "w") as file:
+        file["electrode_vals/data"], file["wrench/data"], file["label"] = press.electrodes, np.zeros((700, 6)), "a"
+    fingers = {f"F{number}Electrodes": press.electrodes.T for number in (0, 1)}
+    scipy_io.savemat(
+        tmp_path / "touch.mat", {**fingers, "F1pdc": press.pdc[None], "wrench": 1.0, "label": "a", "F3pac": 2}
+    )
+    for name, left in (
+        ("touch.csv", ("wrench", "label")),
+        ("touch.npz", ("wrench", "label", "notes.txt")),
+        ("touch.h5", ("label", "wrench/data")),
+        ("touch.mat#0", ("wrench", "label", "F3pac")),
+    ):
+        assert recordings.read(tmp_path / name).not_taken == left
+        assert f"not taken  {', '.join(left)}" in describe(tmp_path / name)
+
+
+def test_what_is_not_taken_of_a_long_one_is_named_too(press, write, slide_lines, monkeypatch):
+    path = write([slide_lines[0] + ",wrench", *(line + "1" for line in slide_lines[1:])])
+    columns = ColumnMap(electrodes=tuple(f"ele{number}" for number in range(1, 20)), time="timestamp")
+    told = [describe(path), describe(path, PrepareOptions(columns=columns))]
+    assert "not taken  wrench\n" in told[0] and "not taken  tdc, tac, pdc, pac1" in told[1]
+    monkeypatch.setattr(table, "WHOLE", 20_000)
+    monkeypatch.setattr(table, "BLOCK", 20_000)
+    assert [describe(path), describe(path, PrepareOptions(columns=columns))] == told
+
+
+@pytest.mark.parametrize("layout", ["csv_slide", "csv_31", "npz_electrodes", "hdf5_electrode_vals", "hdf5_simulated"])
+def test_a_known_layout_is_taken_whole(layout, press, in_layout):
+    assert recordings.read(in_layout(layout, press)).not_taken == ()
 
 
 @pytest.mark.parametrize("frames", [1, 2])

@@ -9,8 +9,8 @@ import pytest
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
-from tactile_core.recordings import PrepareOptions, polarity
-from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile, prepare_unit
+from tactile_core.recordings import PrepareOptions, electrode_gains, polarity
+from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile, prepare_unit, units_file
 from tactile_core.recordings.flags import Flag
 from tactile_core.translation.unit_rest import find_rest
 
@@ -71,6 +71,19 @@ def test_a_hand_s_file_is_read_by_finger(tmp_path):
         sensor.gains_for("hand.mat#1", 1, "unit.toml")
     with pytest.raises(TactileError, match=r"of one unit.*\[unit\]"):
         sensor.gains_for("touch.csv", None, "unit.toml")
+
+
+def test_a_bag_s_units_are_read_by_topic_and_finger(tmp_path):
+    left, right = (ElectrodeGains(name, [1.0] * 19, [0.0] * 19, rest_pdc=9.0) for name in ("left", "right"))
+    electrode_gains.write(
+        tmp_path / "hands.toml", units_file({"left/biotac/finger0": left, "right/biotac/finger0": right})
+    )
+    (tmp_path / "hands.bag").touch()
+    sensor = electrode_gains.read(tmp_path / "hands.toml")
+    for unit in (left, right):
+        assert sensor.gains_for(f"{tmp_path}/hands.bag#/{unit.note}/biotac/finger0", 0, "hands.toml") == unit
+    with pytest.raises(TactileError, match=r"hands.bag#up/biotac/finger0 is of finger 0.*\[up/biotac/finger0\]"):
+        sensor.gains_for(f"{tmp_path}/hands.bag#up/biotac/finger0", 0, "hands.toml")
 
 
 def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):

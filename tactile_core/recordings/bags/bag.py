@@ -23,7 +23,7 @@ MARK = "metadata.yaml"  # of a folder that is a ROS 2 bag
 MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk; recorders make them of 1 to 16 MB (assumed enough)
 MAX_METADATA = 2**20  # bytes of YAML, of which four times as many take 30 s (assumed enough)
 PACKED = re.compile(rb"compression_mode:\s*[\"']?(file|message)", re.IGNORECASE)
-# Errors of the library about whole files that it does not read; all others are of damage.
+# Errors of the library about whole files that it does not read, as are KeyErrors, of formats that it does not know.
 UNDAMAGED = re.compile(r"not supported|[Uu]nsupported|not ros2|not indexed|not in timestamp order|are missing")
 
 
@@ -104,7 +104,7 @@ def refused(path: str) -> Iterator[None]:
         with damage_reported(path, "bag"):
             yield
     except TactileError as error:
-        if not UNDAMAGED.search(str(error.__cause__)):
+        if not UNDAMAGED.search(str(error.__cause__)) and not isinstance(error.__cause__, KeyError):
             raise
         advice = "Mend or convert it with ROS: rosbag reindex, ros2 bag reindex, ros2 bag convert"
         raise TactileError(path, f"cannot be read ({error.__cause__})", "a plain, indexed bag", advice) from error
@@ -120,13 +120,13 @@ def _sorted(path: str, reader: Any, ros1: bool) -> Bag:
     for (name, kind), connections in sorted(grouped.items()):
         text = connections[0].msgdef
         known = [each for each in definitions(kind, text.data, text.format.name == "IDL") if sensors_in(each)]
-        with refused(path):
-            empty = next(iter(reader.messages(connections)), None) is None
+        with refused(path):  # counts that a file states may be missing
+            empty = bool(known) and next(iter(reader.messages(connections)), None) is None
         if known and not empty and name not in topics:
             topics[name] = Topic(name, kind, connections, known)
         else:
-            count = "no" if empty else sum(each.msgcount for each in connections)
-            others.append(f"topic {name} ({kind}, {count} messages)")
+            count = sum(each.msgcount for each in connections)
+            others.append(f"topic {name} ({kind}, {'no' if empty else count} messages)")
     if not topics:
         found = f"no messages of a BioTac: {listed(others)}" if others else "no topics"
         expected = "messages with a list of 19 or 24 electrodes, such as sr_robot_msgs/msg/BiotacAll"
