@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bpy
 
-from ...tactile_core.sensors.coating import DIFFUSE, Coating
+from ...tactile_core.sensors.calibration import DIFFUSE, Coating
 
 ALBEDO, ROUGHNESS, GLOSS = "Albedo", "Roughness", "Gloss"
 _PLACES = {ALBEDO: (-300, 200), ROUGHNESS: (-300, 0), GLOSS: (-300, -150)}

@@ -10,9 +10,8 @@ import numpy as np
 
 from ...tactile_core.errors import TactileError
 from ...tactile_core.pictures.mitsuba.surroundings import Lamp, Occluder, Surroundings
-from ...tactile_core.sensors.calibration import Calibration
+from ...tactile_core.sensors.calibration import DIFFUSE, ROUGH_PLASTIC, Calibration, Coating
 from ...tactile_core.sensors.camera import Camera
-from ...tactile_core.sensors.coating import DIFFUSE, ROUGH_PLASTIC, Coating
 from . import axes, digit_body, digit_materials, image_frame
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved

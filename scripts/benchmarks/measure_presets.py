@@ -41,9 +41,8 @@ from tactile_core.pictures.mitsuba.gel_light import PATHS_A_PASS, GelLight
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR, choose_variant
 from tactile_core.pictures.presets import FAST, NAMES, PRESETS, QUALITY, REFERENCE, STANDARD, TABLE, Preset
 from tactile_core.pictures.renderer import MitsubaLight, Renderer
-from tactile_core.sensors.calibration import Calibration
+from tactile_core.sensors.calibration import Calibration, Coating
 from tactile_core.sensors.calibration_file import load_calibration
-from tactile_core.sensors.coating import Coating
 
 SEED = 20261122  # of the fields
 FIELDS = 10

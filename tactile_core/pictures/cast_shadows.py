@@ -12,9 +12,8 @@ import functools
 import numpy as np
 
 from ..errors import TactileError
-from ..files.compiled import available
+from ..files.compiled import Loop, available
 from ..sensors.camera import Camera, Led
-from .lamp_loops import march
 from .perspective import bilinear
 
 GRID_STEP = 0.1e-3  # m, of the polar grid along a ray, and across rays in the picture's middle
@@ -172,3 +171,22 @@ def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     share, moment = disc_tables()
     place = ((sight + 1) * (_TABLE_STEPS / 2)).astype(np.intp)
     return share.take(place), moment.take(place)
+
+
+@Loop
+def march(field, foot, distance, radii, steps, grid_step):  # noqa: ANN001, ANN201
+    """See ``ShadowCaster._march``; distance : (columns,) m, radii : (rows, columns), steps : (k,) columns."""
+    rows, columns = field.shape
+    sight = np.empty((rows, columns), np.float32)
+    horizon = np.empty(columns, np.float32)
+    for row in range(rows):
+        horizon[:] = -np.inf
+        for step in steps:
+            scale = np.float32(1 / (step * grid_step))
+            before, here, highest = field[row, : columns - step], field[row, step:], horizon[step:]
+            for column in range(columns - step):  # of slices alone, which is vectorised
+                highest[column] = max(highest[column], (before[column] - here[column]) * scale)
+        for column in range(columns):
+            seen = ((foot - field[row, column]) / distance[column] - horizon[column]) * radii[row, column]
+            sight[row, column] = min(max(seen, np.float32(-1)), np.float32(1))
+    return sight

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..files.compiled import available
+from ..files.compiled import Loop, available
 from ..sensors.camera import Camera, Led
 from .cast_shadows import ShadowCaster, bounding_box, disc_share
-from .lamp_loops import light_of_lamps
 from .perspective import Perspective, slopes
 
 # A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
@@ -140,3 +139,56 @@ class Lamp:
         share *= facing
         share += moment
         return np.maximum(share, 0, out=share)
+
+
+@Loop
+def light_of_lamps(  # noqa: ANN201
+    seen, slope_right, slope_down, right, down, inverse, position, strength, tangent,  # noqa: ANN001
+    near, tilt, normal, mapped, facing, distance, light,  # noqa: ANN001
+):  # fmt: skip
+    """Fill in the light (3, H, W) of all LEDs without shadows, and what it is of; return where shadows may begin.
+
+    seen, slope_right, slope_down, near, tilt, normal, mapped : (H, W), see ``SeenSurface``; right (W,), down (H,) m
+    inverse : 1/m, of the camera's apparent height; position : (3, 3) m of the LEDs; strength : (3,), squared distances
+    from the middle, m2; tangent : (3,) m, see ``TANGENT``
+    facing : (3, H, W) m, cosine times distance times the normal's length; distance : (3, H, W), squared, m2
+    edges : (3, 4), first and last row and column of each LED; the first row beyond the last where there is none
+    """
+    rows, columns = seen.shape
+    one, zero, two = np.float32(1), np.float32(0), np.float32(-2)
+    own, square, edges = np.empty(columns, np.float32), np.empty(columns, np.float32), np.empty((3, 4), np.int64)
+    edges[:, 0], edges[:, 1], edges[:, 2], edges[:, 3] = rows, -1, columns, -1
+    for a in range(rows):  # a row stays in the processor's cache; loops without conditions are vectorised
+        for b in range(columns):
+            x, y, height = slope_right[a, b], slope_down[a, b], seen[a, b]
+            nearness = one - height * inverse
+            outward = right[b] * x + down[a] * y
+            tilted = nearness - outward * inverse
+            near[a, b], tilt[a, b] = nearness, tilted
+            own[b] = outward * nearness - tilted * height
+            normal[a, b] = np.sqrt(x * x + y * y + tilted * tilted)
+            square[b] = nearness * nearness * (right[b] * right[b] + down[a] * down[a]) + height * height
+            mapped[a, b] = height / nearness
+        for led in range(3):
+            aside, ahead, up = position[led, 0], position[led, 1], position[led, 2]
+            begins, lower = False, down[a] * ahead
+            for b in range(columns):
+                far = (right[b] * aside + lower) * near[a, b]
+                far += up * seen[a, b]
+                far *= two
+                far += square[b]
+                far += strength[led]
+                faces = up * tilt[a, b]
+                faces -= aside * slope_right[a, b]
+                faces -= ahead * slope_down[a, b]
+                faces += own[b]
+                facing[led, a, b], distance[led, a, b] = faces, far
+                light[led, a, b] = max(faces, zero) / (far * np.sqrt(far) * normal[a, b]) * strength[led]
+            for b in range(columns):
+                begins |= facing[led, a, b] < tangent[led] * normal[a, b]
+            if begins:
+                edges[led, 0], edges[led, 1] = min(edges[led, 0], a), a
+                for b in range(columns):
+                    if facing[led, a, b] < tangent[led] * normal[a, b]:
+                        edges[led, 2], edges[led, 3] = min(edges[led, 2], b), max(edges[led, 3], b)
+    return edges

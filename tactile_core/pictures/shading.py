@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import TactileError
-from ..files.compiled import available
+from ..files.compiled import Loop, available
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import COLOURS
@@ -17,7 +17,6 @@ from .background import raised_light, resting_picture
 from .coating_spread import CoatingSpread
 from .height_map import of_unit, rest_height_map
 from .lamp_light import Lamps
-from .level_loops import in_picture
 from .perspective import Perspective
 
 
@@ -114,3 +113,36 @@ def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
     if float(height.min()) <= -unit.camera.apparent_height:
         found, expected = f"{height.min() * 1e3:.2f} mm high", f"above {-1e3 * unit.camera.apparent_height:.2f} mm"
         raise TactileError(name, found, expected, "Check that heights are in metres")
+
+
+def in_picture(
+    radiance: np.ndarray, rest: np.ndarray, response: np.ndarray, background: np.ndarray, largest: np.float32
+) -> np.ndarray:
+    """Compute (H, W, 3) uint8: background (H, W, 3) + response (3, 3, H, W) times radiance less that at rest (3, H, W).
+
+    All float32; largest : level
+    """
+    picture = np.empty(background.shape, np.uint8)
+    rows = len(picture), -1
+    _fill_levels(radiance, rest, response, background.reshape(rows), largest, picture.reshape(rows))
+    return picture
+
+
+@Loop
+def _fill_levels(radiance, rest, response, background, largest, picture):  # noqa: ANN001, ANN202
+    """Fill in the picture of ``in_picture``; background, picture : (H, 3 W)."""
+    _, height, width = radiance.shape
+    lowest, change, line = np.float32(0), np.empty((3, width), np.float32), np.empty(3 * width, np.float32)
+    for row in range(height):  # a row stays in the processor's cache
+        for led in range(3):
+            for column in range(width):
+                change[led, column] = radiance[led, row, column] - rest[led, row, column]
+        for channel in range(3):
+            for column in range(width):
+                level = np.float32(0)
+                for led in range(3):
+                    level += response[channel, led, row, column] * change[led, column]
+                line[3 * column + channel] = level
+        for k in range(3 * width):
+            value = np.rint(line[k] + background[row, k])
+            picture[row, k] = np.uint8(np.int32(min(max(value, lowest), largest)))  # by way of 32 bits: vectorised

@@ -16,8 +16,82 @@ import numpy as np
 
 from ..errors import TactileError
 from .camera import COLOURS, Camera, Led
-from .coating import Coating
-from .markers import Markers
+
+MOST_DOTS = 10_000  # of a grid (assumed enough: 7 x 9 to 20 x 25 are printed)
+MOST_LENGTH = 20e-3  # m of pitch or diameter: the gel itself is 18 x 25 mm
+
+
+@dataclasses.dataclass(frozen=True)
+class Markers:
+    """A square grid of round dots on the coating, in the middle of the picture. Raises TactileError out of range.
+
+    rows, columns : down the picture and to its right
+    pitch, diameter : m, between neighbours' middles, and of a dot
+    albedo : share of the coating's light that a dot throws back, 0 black to 1 unseen
+    """
+
+    rows: int
+    columns: int
+    pitch: float
+    diameter: float
+    albedo: float
+
+    def __post_init__(self) -> None:
+        for name in ("rows", "columns"):
+            if getattr(self, name) < 1:
+                raise TactileError(f"markers, {name}", str(getattr(self, name)), "1 or more")
+        if self.count > MOST_DOTS:
+            raise TactileError("markers, rows x columns", f"{self.count} dots", f"at most {MOST_DOTS}")
+        for name in ("pitch", "diameter"):
+            length = getattr(self, name)
+            if not (math.isfinite(length) and 0 < length <= MOST_LENGTH):
+                expected = f"above 0, at most {1e3 * MOST_LENGTH:g} mm"
+                raise TactileError(f"markers, {name}_mm", f"{1e3 * length:g}", expected)
+        if not 0 <= self.albedo <= 1:
+            raise TactileError("markers, albedo", f"{self.albedo:g}", "0 (black) to 1 (unseen)")
+
+    @property
+    def count(self) -> int:
+        """Count the dots."""
+        return self.rows * self.columns
+
+
+DIFFUSE, ROUGH_PLASTIC, PRINCIPLED = MATERIALS = ("diffuse", "roughplastic", "principled")
+MOST_SPREAD = 2e-3  # m; the gel is 4 mm thick, its coating far thinner
+
+
+@dataclasses.dataclass(frozen=True)
+class Coating:
+    """Material of the coating, one of three of Mitsuba's. Raises TactileError for a number out of its range.
+
+    bsdf : "diffuse" (Lambert), "roughplastic" (Lambert under a rough clear coat) or "principled" (Burley 2012)
+    albedo : 0..1 share of each LED's light that it scatters back
+    roughness : 0.02..1, width of highlights: GGX's alpha of roughplastic, Burley's roughness; not of diffuse
+    gloss : 0..1, size of highlights; not of diffuse
+    metallic : 0..1, of principled alone; 1 reflects like metal of that albedo
+    spread : m, standard deviation of how far light goes sideways in it, at most 2 mm; over the picture, in every preset
+    """
+
+    bsdf: str = DIFFUSE
+    albedo: tuple[float, float, float] = (0.5, 0.5, 0.5)
+    roughness: float = 0.3
+    gloss: float = 0.5
+    metallic: float = 0.0
+    spread: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.bsdf not in MATERIALS:
+            raise TactileError("coating, bsdf", repr(self.bsdf), f"one of {', '.join(MATERIALS)}")
+        if len(self.albedo) != 3:
+            raise TactileError("coating, albedo", f"{len(self.albedo)} numbers", "three, one a LED")
+        ranges = [("albedo", value, 0.0) for value in self.albedo]
+        ranges += [("roughness", self.roughness, 0.02), ("gloss", self.gloss, 0.0), ("metallic", self.metallic, 0.0)]
+        for name, value, least in ranges:
+            if not least <= value <= 1:  # false for NaN
+                raise TactileError(f"coating, {name}", f"{value:g}", f"{least:g} to 1")
+        if not 0 <= self.spread <= MOST_SPREAD:
+            raise TactileError("coating, spread_mm", f"{1e3 * self.spread:g}", f"0 to {1e3 * MOST_SPREAD:g}")
+
 
 # Degrees of the polynomial of the ambient light over the picture, and how many terms they have. The second is for units
 # whose untouched gel is photographed; a background estimated from presses would bend it round their traces. On the

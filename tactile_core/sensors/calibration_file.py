@@ -18,12 +18,10 @@ from ..files.outside import read_toml_text
 from ..files.toml_text import as_toml
 from . import calibration_tables as tables
 from . import digit
-from .calibration import AMBIENT_TERMS, PHOTOGRAPHED_TERMS, Calibration, Fit, Response
+from .calibration import AMBIENT_TERMS, PHOTOGRAPHED_TERMS, Calibration, Coating, Fit, Markers, Response
 from .camera import COLOURS, Camera, Led
-from .coating import Coating
 from .descriptor import describe, of_kind
 from .gel_sensor import Gel
-from .markers import Markers
 
 FORMAT = "tactile-calibration-3"
 FORMER = "tactile-calibration-1"

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from tactile_core.sensors.calibration import AMBIENT_TERMS, Calibration, Fit, Response
+from tactile_core.sensors.calibration import AMBIENT_TERMS, Calibration, Coating, Fit, Response
 from tactile_core.sensors.camera import Camera, Led
-from tactile_core.sensors.coating import Coating
 
 LEDS = (
     Led("red", (10.8e-3, -10.9e-3, 7.0e-3), 1.0e-3, 0.0),

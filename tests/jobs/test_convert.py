@@ -29,7 +29,7 @@ from tactile_core.pictures.marker_field import MarkerField
 from tactile_core.pictures.mitsuba import variant
 from tactile_core.pictures.mitsuba.variant import SCALAR, Choice
 from tactile_core.recordings.flags import Flag
-from tactile_core.sensors.markers import Markers
+from tactile_core.sensors.calibration import Markers
 
 FRAMES = 150  # of slide_csv: more than two chunks
 

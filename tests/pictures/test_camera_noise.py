@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from plain_unit import plain_unit
 
-from tactile_core.pictures.camera_noise import camera_noise
-from tactile_core.pictures.renderer import Renderer
+from tactile_core.pictures.renderer import Renderer, camera_noise
 
 NOISE = (1.0, 2.0, 4.0)
 MEASURED = 0.74, 0.49, 0.25  # correlation over 1, 2 and 3 px on real pictures (docs/sources.md, DIGIT camera)

@@ -14,7 +14,7 @@ from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR
 from tactile_core.pictures.perspective import Perspective
 from tactile_core.pictures.presets import NAMES, PRESETS, REFERENCE
 from tactile_core.pictures.renderer import MitsubaLight, Renderer
-from tactile_core.sensors.coating import Coating
+from tactile_core.sensors.calibration import Coating
 
 SHORT = dataclasses.replace(REFERENCE, name="short", passes=2)
 

@@ -15,9 +15,8 @@ from tactile_core.pictures.height_map import HeightMapper, gel_mapper  # noqa: E
 from tactile_core.pictures.shading import Shader  # noqa: E402
 from tactile_core.recordings.electrode_gains import prepare_unit  # noqa: E402
 from tactile_core.recordings.flags import Flag  # noqa: E402
-from tactile_core.sensors.calibration import LARGEST_LEVEL  # noqa: E402
+from tactile_core.sensors.calibration import LARGEST_LEVEL, Markers  # noqa: E402
 from tactile_core.sensors.calibration_file import load_calibration  # noqa: E402
-from tactile_core.sensors.markers import Markers  # noqa: E402
 from tactile_core.training.batch_pictures import BLOCKS, BatchPictures  # noqa: E402
 from tactile_core.translation.answer import Answer  # noqa: E402
 from tactile_core.translation.translate import load_translator  # noqa: E402

@@ -12,7 +12,6 @@ from ...sensors.calibration import Calibration
 from ..direct_light import evened, lookup
 from ..perspective import slopes
 from ..presets import Preset
-from .camera_rays import camera_rays
 from .gel_mesh import MM, GelMesh, check_mesh
 from .gel_scene import change_numbers, gel_shape, lamps, plugin_names, walls
 from .highlights import mirrored, narrow_lobe
@@ -20,6 +19,7 @@ from .led_integrator import DIRECTIONS, bounced, direct, register
 from .surroundings import NOTHING, Surroundings
 from .tracer import MOST_MISSED
 from .variant import LLVM, activate
+from .window import camera_rays
 
 # Pixels off each pixel's middle, where else rays would meet vertices exactly and slip between triangles.
 ASIDE = (0.013, 0.0071)

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ...sensors.calibration import Calibration
+from ...sensors.calibration import DIFFUSE, PRINCIPLED, Calibration, Coating
 from ...sensors.camera import Led
-from ...sensors.coating import DIFFUSE, PRINCIPLED, Coating
 from .gel_mesh import MM, GelMesh, check_mesh
 
 PIGMENT_INDEX = 1.5  # of the clear coat of a glossy paint: acrylic and polyurethane binders

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...sensors.coating import DIFFUSE, PRINCIPLED, Coating
+from ...sensors.calibration import DIFFUSE, PRINCIPLED, Coating
 from .led_integrator import DIRECTIONS, RING, RINGS, SPOKES
 
 NARROW = 0.2  # GGX's alpha: wider lobes are as wide as the bounce's directions lie apart

@@ -16,7 +16,7 @@ from tactile_core.pictures.mitsuba.scene_file import square_pixels, write_scene
 from tactile_core.pictures.mitsuba.surroundings import NOTHING, Lamp, Occluder, Surroundings
 from tactile_core.pictures.mitsuba.variant import LLVM, activate
 from tactile_core.pictures.presets import QUALITY, REFERENCE, STANDARD
-from tactile_core.sensors.coating import Coating
+from tactile_core.sensors.calibration import Coating
 
 PRESS = Press(depth=1.2e-3)
 COATINGS = (Coating(), Coating("roughplastic"), Coating("principled", roughness=0.4))

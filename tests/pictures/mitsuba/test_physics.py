@@ -19,7 +19,7 @@ from tactile_core.pictures.perspective import slopes
 from tactile_core.pictures.presets import REFERENCE, STANDARD, Gather
 from tactile_core.pictures.renderer import MitsubaLight
 from tactile_core.pictures.shading import Shader
-from tactile_core.sensors.coating import Coating
+from tactile_core.sensors.calibration import Coating
 
 UNBOUNCED = dataclasses.replace(STANDARD, gather=None)
 DIRECT = dataclasses.replace(REFERENCE, gather=None, window=False)
