@@ -255,9 +255,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=SECONDS)
     assert done.returncode == 0, done.stdout + done.stderr
     reference = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
-    assert all(
-        name in reference for name in ("readers.read", "translate.translate", "Renderer", "solve.solve")
-    )
+    assert all(name in reference for name in ("readers.read", "translate.translate", "Renderer", "solve.solve"))
 
 
 @pytest.mark.parametrize("text", [each for each in shown(PAGES, "toml") if "tactile-scene-1" in each.values[0]])

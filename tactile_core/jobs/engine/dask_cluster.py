@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import functools
 import gc
+import logging
 import queue
 import tempfile
 import threading
@@ -64,7 +65,8 @@ class Cluster:
     def submit(self, task: Task) -> None:
         """Submit a task; `results` gives its reply."""
         plain = msgspec.to_builtins(task)
-        future = self._client.submit(tasks.run, self._folder, plain, pure=False)
+        with self._answering():
+            future = self._client.submit(tasks.run, self._folder, plain, pure=False)
         self._tasks[future.key] = task, future
         future.add_done_callback(self._done.put)
 
@@ -82,18 +84,33 @@ class Cluster:
                 return self._done.get(timeout=patience)
             except queue.Empty:
                 patience = AGAIN
-                if not self._client.scheduler_info()["workers"]:
+                with self._answering():
+                    workers = self._client.scheduler_info()["workers"]
+                if not workers:
                     self._say(f"{self._address}: no worker has come yet; {len(self._tasks)} tasks wait for one")
 
     def _reply(self, future: Any) -> Reply:
         from distributed import KilledWorker
 
-        error = future.exception() if future.status in ("error", "lost", "cancelled") else None
-        if isinstance(error, KilledWorker):
-            return Reply(error=f"killed its worker {KILLS} times ({error.last_worker.address}); set aside")
-        if future.status != "finished":
-            raise TactileError(self._address, f"a task was lost ({error or future.status})", "a working scheduler")
-        return msgspec.convert(future.result(), Reply)
+        with self._answering():
+            error = future.exception() if future.status in ("error", "lost", "cancelled") else None
+            if isinstance(error, KilledWorker):
+                return Reply(error=f"killed its worker {KILLS} times ({error.last_worker.address}); set aside")
+            if future.status != "finished":
+                raise error or RuntimeError(future.status)
+            return msgspec.convert(future.result(), Reply)
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Turn what the library raises once its scheduler is gone, a dozen types, into a TactileError."""
+        try:
+            yield
+        except Exception as error:
+            found, advice = (
+                f"a task was lost ({error})",
+                "Start one, and give the same command again: what is done stays",
+            )
+            raise TactileError(self._address, found, "a working scheduler", advice) from error
 
     def __enter__(self) -> Cluster:
         with ExitStack() as stack:
@@ -124,6 +141,11 @@ class Cluster:
         """A client of the scheduler. Raises TactileError where none answers."""
         from distributed import Client, Security
 
+        for name in (
+            "distributed",
+            "distributed.client",
+        ):  # what its logs tell of a lost scheduler is told in a sentence
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         security = Security(require_encryption=True) if self._address.startswith("tls://") else None
         try:
             return Client(place, security=security, timeout=wait(), set_as_default=False, loop=loop())

@@ -17,8 +17,10 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # disk, quota, the system's li
 def refused(folder: Path, job: Job, error: OSError) -> TactileError:
     """Return the error for what the system refused to write in a job's folder.
 
-    A full disk is the folder's affair, not that of the file which happened to be the next.
+    A full disk is the folder's affair, not that of the file which happened to be the next, and so is its removal.
     """
+    if not jobs.exists(folder):
+        return TactileError(folder, "was removed while the job ran", "the job's folder", "Begin it again")
     reason = error.strerror or str(error)
     if error.errno not in FULL:
         where = error.filename2 or error.filename or folder

@@ -129,7 +129,7 @@ def write(folder: Path, job: Job) -> None:
         "job": job.id,
         "recordings": [_recording(folder, job, i) for i in range(len(job.inputs))],
     }
-    atomic.write_json(folder / jobs.MANIFEST, content | {"aside": _aside(folder)})
+    atomic.write_json(folder / jobs.MANIFEST, content | {"aside": _aside(folder)}, shared=True)
 
 
 def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:

@@ -70,9 +70,10 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
 def _unmake(folder: Path) -> None:
     """Remove a folder that holds nothing but our locks and a job that never began, after that was refused."""
-    if all(path.name.startswith((lock.FILE, jobs.FILE)) for path in folder.iterdir()):
-        with contextlib.suppress(OSError):
-            for path in folder.iterdir():
+    with contextlib.suppress(OSError):  # others have removed it already
+        files = list(folder.iterdir())
+        if all(path.name.startswith((lock.FILE, jobs.FILE)) for path in files):
+            for path in files:
                 path.unlink()
             folder.rmdir()
 
@@ -80,8 +81,9 @@ def _unmake(folder: Path) -> None:
 def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
     """Clear what killed workers left; not in an array, whose other parts may be writing, nor where no job is."""
     if part is None and jobs.exists(folder):
-        for place in (".", jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
-            atomic.sweep_files(folder / place)
+        with atomic.writing(folder, "a job folder of ours that can be written", "Make it writable"):
+            for place in (".", jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
+                atomic.sweep_files(folder / place)
 
 
 def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:

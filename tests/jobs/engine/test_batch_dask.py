@@ -16,6 +16,7 @@ import pytest
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert
 from tactile_core.jobs.engine import dask_cluster
+from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine.dask_cluster import CONFIGURED, Cluster, QueueFile, _read, loop
 from tactile_core.jobs.render import Options, render
@@ -115,6 +116,16 @@ def test_a_queue_without_workers_is_told(new_job, monkeypatch):
         with runs.opened(folder, None):
             assert runs.run(folder, job, place, None, lambda done, total: None).made == 5
         assert said == [f"{cluster.scheduler_address}: no worker has come yet; 2 tasks wait for one"]
+
+
+def test_a_scheduler_that_dies_is_told_in_a_sentence(new_job, capfd):
+    folder, job = new_job()
+    with workers(protocol="tcp://") as cluster, runs.opened(folder, None):
+        place = Cluster(folder, cluster.scheduler_address)
+        with pytest.raises(TactileError, match=r"a task was lost .* expected a working scheduler"):
+            runs.run(folder, job, place, None, lambda done, total: cluster.close())
+    assert "Traceback" not in capfd.readouterr().err
+    assert jobs.exists(folder)  # and the same command goes on
 
 
 def test_nobody_listening_is_told(new_job):

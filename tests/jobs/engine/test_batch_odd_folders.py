@@ -191,3 +191,38 @@ def test_a_job_file_with_impossible_paths_is_refused(path, new_job):
     (folder / jobs.FILE).write_text(json.dumps(said))
     with pytest.raises(TactileError, match="inputs"):
         jobs.read(folder)
+
+
+@pytest.mark.parametrize("after", [0, 1, 3])
+def test_a_folder_that_is_removed_while_the_job_runs_is_told_in_a_sentence(
+    after, command, recordings, tmp_path, monkeypatch
+):
+    out, submitted = tmp_path / "job", []
+
+    def submit(self, task):
+        if len(submitted) == after:
+            out.rename(tmp_path / "gone")  # at once, whatever workers are writing
+        submitted.append(task)
+        self._todo.put(task)
+
+    monkeypatch.setattr(local.Local, "submit", submit)
+    done = command(*recordings, "--out", out, "--keep", "latent", "--shard-frames", "50")
+    assert done.returncode == 2 and not out.exists()
+    assert (
+        done.stderr
+        == f"tactile: error: {out}: was removed while the job ran; expected the job's folder. Begin it again\n"
+    )
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="needs a user who may not write everywhere")
+def test_folders_that_cannot_be_written_are_told_in_a_sentence(finished, command):
+    folder, _ = finished
+    next((folder / jobs.SHARDS).iterdir()).unlink()
+    left = folder / jobs.SHARDS / ".killed.tactile-partial"
+    for present in (False, True):
+        if present:
+            left.touch()
+        (folder / jobs.SHARDS).chmod(0o555)
+        done = command("--out", folder)
+        (folder / jobs.SHARDS).chmod(0o755)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1 and "cannot be written" in done.stderr
