@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import contextlib
 import sqlite3
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.recordings import chunks, electrode_gains
-from tactile_core.recordings.bags import bag, ros_messages
+from tactile_core.recordings.bags import bag, ros_messages, ros_sensors
 from tactile_core.recordings.fingers import name_of
 from tactile_core.recordings.readers import each_finger, sensor_of
 
@@ -215,12 +216,47 @@ def test_a_bag_that_was_not_closed_is_not_called_damaged(make, tmp_path):
     assert "damaged" not in str(refused.value)
 
 
+def defined(*types: str):
+    """The definition of the first of these types, each written as ROS writes it, such as ``x/A`` and its fields."""
+    first, *others = types
+    text = first.split("\n", 1)[1] + "".join(f"{'=' * 80}\nMSG: {each}" for each in others)
+    (definition,) = ros_messages.definitions("x/msg/A", text, idl=False)
+    return definition
+
+
+def test_definitions_that_multiply_cost_no_time():
+    """From strangers: lists of lists of nothing, and messages of messages, would be searched for years."""
+    nothing = [f"x/{name}\nx/{within}[1000] a\n" for name, within in ("BC", "CD", "DE")]
+    bomb = defined("x/A\nint16[19] electrodes\nx/B[1000] a\n", *nothing, "x/E\n")
+    with pytest.raises(ValueError, match="more entries than bytes"):
+        ros_messages.Decoder(bomb, ros1=True)(bytes(4000))
+    wide = [f"x/{name}\n" + "".join(f"x/{within} f{i}\n" for i in range(100)) for name, within in pairwise("ABCDEF")]
+    assert ros_sensors.sensors_in(defined(*wide, "x/F\nint16 electrodes\n")) == []
+    assert len(ros_sensors.sensors_in(defined(*wide, "x/F\nint16[] electrodes\n"))) == ros_sensors.MOST
+    assert ros_sensors.sensors_in(defined("x/A\nx/A[] electrodes\n")) == []
+
+
+def test_the_bags_of_others_are_read_whole(outside_data):
+    """Two hands of SynTouch's driver, two of Shadow's, and a BioTac SP in Shadow's message, called damaged before."""
+    folder = outside_data("outside/bags")
+    for name, sensor, fingers in (
+        ("two_hands.bag", "biotac", ["left_hand/biotac_pub/finger0", "right_hand/biotac_pub/finger0"]),
+        ("shadow_bimanual", "biotac", [f"{hand}/tactile/finger{number}" for hand in ("lh", "rh") for number in (0, 1)]),
+        ("shadow24_sp", "biotac_sp", ["0", "1"]),
+        ("shadow24_sp/shadow24_sp.mcap", "biotac_sp", ["0", "1"]),
+    ):
+        found = each_finger(folder / name)
+        assert found == [f"{folder / name}#{finger}" for finger in fingers]
+        for one in found:
+            assert recordings.read(one, sensor=sensor).electrodes.mean() > 3000  # counts: none is a finger of zeros
+
+
 def test_the_decoder_agrees_with_the_library_s(make):
     """Alignment, lists, texts, nested messages in both formats; the library compiles definitions, this one does not."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     text = "bool a\nfloat64[] empty\nuint8 b\nint64 c\nstring d\nuint8[3] e\nfloat64 f\nstring[] g\n"
-    text += "geometry_msgs/Point32[] h\nint16[] i\nbuiltin_interfaces/Duration j\nuint32 k\n"
+    text += "geometry_msgs/Point32[] h\nint16[] electrodes\nbuiltin_interfaces/Duration j\nuint32 k\n"
     for ros1, stores in ((True, Stores.ROS1_NOETIC), (False, Stores.ROS2_HUMBLE)):
         store = get_typestore(stores)
         store.register(get_types_from_msg(text, "x/msg/Odd"))
@@ -235,7 +271,7 @@ def test_the_decoder_agrees_with_the_library_s(make):
         (definition,) = ros_messages.definitions("x/msg/Odd", whole, idl=False)
         found = ros_messages.Decoder(definition, ros1)(data)
         assert (found["a"], found["b"], found["c"], found["d"], found["f"]) == (True, 7, -(2**40), "käse", 0.1)
-        assert found["g"] == ["", "ab"] and found["i"].tolist() == [-1, 5] and found["k"] == 9
+        assert found["g"] == ["", "ab"] and found["electrodes"].tolist() == [-1, 5] and found["k"] == 9
         assert found["e"].tolist() == [1, 2, 3] and found["empty"].size == 0
         assert [float(each["y"]) for each in found["h"]] == [2.0, 5.0] and found["j"]["sec"] == 1
         with pytest.raises(ValueError, match="8 bytes are left"):

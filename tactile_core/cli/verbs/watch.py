@@ -221,6 +221,8 @@ def _played(path: str, speed: float, columns: ColumnMap | None, sensor: str) -> 
     began = time.perf_counter()
     for part in read_parts(path, columns, sensor):
         recording, done = part.recording, part.repeated
+        for warning in recording.warnings if not done else ():
+            say(f"warning: {warning}")
         while done < len(recording):
             ahead = recording.time[done] / speed - (time.perf_counter() - began) if speed else 0.0
             if ahead > LONGEST_WAIT:

@@ -71,19 +71,19 @@ class Definition:
     root: str
     types: dict[str, list[tuple[str, Any]]]
 
-    def fields(self, name: str = "") -> list[tuple[str, Any]]:
-        """Return names and kinds of the fields of a type, by default of the message; none of an unknown type."""
-        return self.types.get(name or self.root, [])
+    def fields(self, name: str) -> list[tuple[str, Any]]:
+        """Return names and kinds of the fields of a type; none of an unknown type."""
+        return self.types.get(name, [])
 
 
 def definitions(kind: str, text: str, idl: bool) -> list[Definition]:
     """Return the definitions that messages of a type may have: the bag's own, or without one those of `KNOWN`.
 
-    text : of the bag, empty where it has none. One that cannot be parsed is left out.
+    text : of the bag, empty where it has none. One that cannot be parsed, or has no electrodes, is left out.
     """
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
-    if len(text) > MOST_TEXT:
+    if len(text) > MOST_TEXT or (text and "electrode" not in text.lower()):
         return []
     try:
         if text:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from .ros_messages import ARRAY, NAME, NUMBERS, SEQUENCE, TIME, Definition
 
-DEEPEST = 4  # messages within messages that are searched (assumed enough: the drivers have 2)
+MOST = 100  # sensors, or lists of them, of one type of message (assumed enough: the drivers have one list)
 MOST_PAC = 1000  # samples of PAC a message (assumed enough: the drivers have 2 and 22)
 ELECTRODES = re.compile(r"electrodes?(_(data|values?|vals?|raw|counts))?$", re.IGNORECASE)
 SLOW = {name: re.compile(rf"(^|.*_){name}(_(data|value|val|raw))?$", re.IGNORECASE) for name in ("pdc", "tac", "tdc")}
@@ -32,10 +33,11 @@ class SensorFields:
 
 def sensors_in(definition: Definition) -> list[SensorFields]:
     """Return the fields of each sensor, or list of sensors, in a type of message; none where it has no electrodes."""
-    return list(_search(definition, "", (), DEEPEST))
+    return list(islice(_search(definition, definition.root, (), set()), MOST))
 
 
-def _search(definition: Definition, name: str, path: tuple[str, ...], deeper: int) -> Iterator[SensorFields]:
+def _search(definition: Definition, name: str, path: tuple[str, ...], searched: set[str]) -> Iterator[SensorFields]:
+    """Yield the sensors in a type of message. searched : types without any, or that are being searched"""
     fields = definition.fields(name)
     row = next((field for field, kind in fields if ELECTRODES.search(field) and _is_row(kind)), None)
     if row is not None:
@@ -44,10 +46,16 @@ def _search(definition: Definition, name: str, path: tuple[str, ...], deeper: in
         others = tuple(field for field, kind in fields if field not in {row, *slow, *pac} and not _is_time(kind))
         yield SensorFields(path, row, (slow[0], slow[1], slow[2]), pac, others)
         return
+    searched.add(name)
+    barren = True
     for field, kind in fields:
         within = kind if int(kind[0]) == NAME else kind[1][0] if int(kind[0]) in (ARRAY, SEQUENCE) else None
-        if deeper and within is not None and int(within[0]) == NAME:
-            yield from _search(definition, within[1], (*path, field), deeper - 1)
+        if within is not None and int(within[0]) == NAME and within[1] not in searched:
+            for found in _search(definition, within[1], (*path, field), searched):
+                yield found
+                barren = False
+    if not barren:
+        searched.discard(name)
 
 
 def _is_row(kind: Any) -> bool:
@@ -91,5 +99,7 @@ def stamp_of(message: dict[str, Any]) -> float:
 def not_read(definition: Definition, fields: list[SensorFields]) -> list[str]:
     """Return the names of the fields of a message that nothing here reads."""
     used = {each.path[0] for each in fields if each.path}
-    beside = [name for name, kind in definition.fields() if used and name not in used and not _is_time(kind)]
+    beside = [
+        name for name, kind in definition.fields(definition.root) if used and name not in used and not _is_time(kind)
+    ]
     return [*beside, *(name for each in fields for name in each.others)]
