@@ -17,9 +17,9 @@ from ..translation.network_sizes import ERROR_FEATURES, NETS, PLACE, POSTERIORS,
 from ..translation.networks import Networks, load
 from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
-from .device import label
 from .error_report import QUANTILES, Measure, distance_quantiles, error_rows, fit_error_bounds, silence_quantiles
 from .modules import compress
+from .options import label
 from .stages import FORCE_BLOCKS, FORCE_WIDTH, Model
 from .step_errors import PRESSURE_FROM, Bodies
 from .surface_codec import SurfaceCodec

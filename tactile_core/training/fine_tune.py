@@ -31,7 +31,6 @@ from .labelled_recording import LabelledRecording, read_labelled
 from .modules import ContactPosterior
 from .stages import FORCE_FLOOR
 from .train import deterministic, prepared_folder
-from .trained_modules import posterior_of
 
 EPOCHS, BATCH, RATE = 30, 64, 2e-4  # a few passes at a low rate: the start is a trained network (assumed)
 HOLD = 0.3  # weight of the shape being held, against place and force, each about 1 at first (assumed)
@@ -88,7 +87,9 @@ def _train(
     nets: Networks, net: str, data: LabelledRecording, typical: np.ndarray, seed: int, progress: Progress
 ) -> dict[str, np.ndarray]:
     """The network's tensors, rounded as they are written, at the epoch that was best on the validation presses."""
-    module = posterior_of(nets, net)
+    sizes = nets.sizes[net]
+    module = ContactPosterior(*(sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components")))
+    module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in nets.tensors[net].items()})
     latent = torch.from_numpy(nets.encode_signal(data.change, data.rectified))
     rehearsed = torch.from_numpy(nets.encode_signal(np.abs(typical) if data.rectified else typical, data.rectified))
     place, force = torch.from_numpy(data.place), torch.from_numpy(data.force)

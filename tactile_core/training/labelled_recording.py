@@ -51,20 +51,21 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
     Raises TactileError: no labels, places that are not on the skin, too few contacts.
     """
     recording = read(path)
-    for name, values in (("contact places", recording.position), ("forces", recording.force)):
-        if values is None:
-            advice = "Give a file with electrode_vals/data, contact_loc/data and force_vec/data"
-            raise TactileError(path, f"no {name}", "a contact place and a force a frame", advice)
+    position, forces = recording.position, recording.force
+    if position is None or forces is None:
+        found = "no contact places" if position is None else "no forces"
+        advice = "Give a file with electrode_vals/data, contact_loc/data and force_vec/data"
+        raise TactileError(path, found, "a contact place and a force a frame", advice)
     signals = prepare(recording)
-    force = np.linalg.norm(recording.force, axis=1)
-    known = np.isfinite(recording.position).all(1) & np.isfinite(force)
+    force = np.linalg.norm(forces, axis=1)
+    known = np.isfinite(position).all(1) & np.isfinite(force)
     whole = (signals.flags & np.uint16(BAD)) == 0
     touched = known & (force > TOUCH)
     used = np.flatnonzero(touched & whole)
     dropped = [f"{(~known).sum()} frames without a label"] if not known.all() else []
     if (touched & ~whole).any():
         dropped.append(f"{(touched & ~whole).sum()} frames with a saturated or dead electrode")
-    place, off = _places(recording.position[used], frame, path)
+    place, off = _places(position[used], frame, path)
     if off.any():
         dropped.append(f"{off.sum()} contacts that are not on the pad")
     used, place = used[~off], place[~off]

@@ -1,10 +1,19 @@
-"""Options of a training; all of them are written into the card."""
+"""Options of a training, all of them written into the card, and the device that it runs on."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+from ..errors import TactileError
+
+if TYPE_CHECKING:
+    import torch  # imported inside functions: the command line reads DEVICES without it
 
 DEVICES = ("auto", "cpu", "cuda")  # where networks may be trained; auto: on a GPU when torch sees one
+# What cuBLAS asks for before it repeats itself to the bit: NVIDIA, cuBLAS Library, "Results reproducibility".
+_REPEATABLE = ("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
 
 
 @dataclass(frozen=True)
@@ -101,3 +110,26 @@ class Options:
         settings = asdict(self) | {"without": list(self.without), "left_out": list(self.left_out)}
         settings.pop("checkpoint_seconds")
         return settings
+
+
+def device_of(name: str) -> torch.device:
+    """Return one of DEVICES. Raises TactileError for another name, and for a GPU that torch does not see."""
+    import torch
+
+    if name not in DEVICES:
+        raise TactileError("device", repr(name), ", ".join(DEVICES))
+    there = torch.cuda.is_available()
+    if name == "cuda" and not there:
+        found = f"torch {torch.__version__} sees none"
+        raise TactileError("device cuda", found, "a GPU", "Install torch for it, or leave the device to auto")
+    if name == "cpu" or not there:
+        return torch.device("cpu")
+    os.environ.setdefault(*_REPEATABLE)
+    return torch.device("cuda")
+
+
+def label(device: torch.device) -> str:
+    """Return the device's name, for a card: numbers depend on it."""
+    import torch
+
+    return torch.cuda.get_device_name(device) if device.type == "cuda" else device.type

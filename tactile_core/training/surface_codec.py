@@ -11,14 +11,17 @@ from torch import Tensor
 from ..accuracy import MOVING
 from ..translation.contact_frame import PLACE_UNIT, ContactFrame
 from .mirror_augmentation import across, image_of_nodes
-from .pca import ROWS, principal_basis
 
+ROWS = 512  # contacts at a time: bounds the float32 copy of the int16 data to tens of megabytes
+EXTRA = 16  # columns of oversampling and
+ROUNDS = 4  # power iterations: Halko, Martinsson and Tropp 2011, ample for a spectrum that decays as fast as this one
 SILENT = -1  # row number of a sample without contact
 FEWEST = 100  # nodes that an error is shared by at least: light touches move few (assumed)
 ROOT_FLOOR = 1e-6  # m, rounds the root of the loss at zero error
 LEAST_AWAY = 0.01  # cells, rounds the distance of places at zero
 BASIS_ROWS = 12_000  # contacts that the bases are drawn from, fifty times as many as fields are taken (assumed)
 SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, but none is blown up without end (assumed)
+Fields = Callable[[np.ndarray], Tensor]  # row numbers (B,) -> (B, size) in millimetres: float32's middle range
 
 
 class SurfaceCodec:
@@ -96,8 +99,11 @@ class SurfaceCodec:
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """Compute `cells_of` this surface."""
-        return cells_of(self.frame, place)
+        """Compute `ContactFrame.cells`: whole cells (B, 2) and the remainder, through which the place has gradients."""
+        middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
+        at = place * PLACE_UNIT + middle
+        cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
+        return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
     def true_place(self, rows: np.ndarray) -> Tensor:
         """Return the places (B, 2) of the contacts' dents; 0 for silent ones."""
@@ -148,14 +154,6 @@ class SurfaceCodec:
         return metres
 
 
-def cells_of(frame: ContactFrame, place: Tensor) -> tuple[Tensor, Tensor]:
-    """Compute `ContactFrame.cells`: whole cells (B, 2) and the remainder, through which the place has gradients."""
-    middle = torch.tensor([frame.rows - 1.0, frame.columns - 1.0], device=place.device) / 2
-    at = place * PLACE_UNIT + middle
-    cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
-    return cell.long(), (at - cell).clamp(-1.0, 1.0)
-
-
 def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
     """Displacements (C, n, 3) int16 in the nodes' own frames; where none is turned the (large) data themselves."""
     if not frame.turn.any():
@@ -184,3 +182,30 @@ def _parts(count: int) -> list[slice]:
 def touching(rows: np.ndarray) -> Tensor:
     """Return the mask (B, 1): 1 for contacts, 0 for silent samples."""
     return torch.from_numpy((rows != SILENT).astype(np.float32))[:, None]
+
+
+def principal_basis(fields: Fields, rows: np.ndarray, modes: int, generator: torch.Generator) -> Tensor:
+    """Return the orthonormal rows (K, size) that span most of the fields; K = min(modes, contacts, size).
+
+    Not centred: no displacement has the coefficients zero. Rounded to float16, the dtype it is shipped in.
+    rows : contacts to use
+    """
+    size = fields(rows[:1]).shape[1]
+    modes = min(modes, len(rows), size)
+    columns = min(modes + EXTRA, len(rows), size)
+    basis = torch.randn(size, columns, generator=generator)
+    for _ in range(ROUNDS):
+        basis, _ = torch.linalg.qr(_covariance(fields, rows, basis))
+    small = basis.T @ _covariance(fields, rows, basis)
+    values, vectors = torch.linalg.eigh((small + small.T) / 2)
+    leading = vectors[:, torch.argsort(values, descending=True)[:modes]]
+    return (basis @ leading).T.contiguous().half().float()
+
+
+def _covariance(fields: Fields, rows: np.ndarray, basis: Tensor) -> Tensor:
+    """Compute (X^T X) basis with X (rows, size)."""
+    total = torch.zeros_like(basis)
+    for start in range(0, len(rows), ROWS):
+        part = fields(rows[start : start + ROWS])
+        total += part.T @ (part @ basis)
+    return total

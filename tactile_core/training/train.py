@@ -12,6 +12,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +26,9 @@ from ..translation.contact_frame import ContactFrame, frame_of
 from ..translation.network_sizes import SURFACES
 from . import checkpoint
 from .data import Contacts
-from .device import device_of
 from .error_report import draw_losses, write_log
 from .export_weights import export, versions
-from .options import Options
+from .options import Options, device_of
 from .stages import STAGES, Model, Stage
 from .step_errors import Bodies, our_bodies
 
@@ -216,7 +216,7 @@ def epoch_losses(
         batch = contacts.batch(rows[part], signal[part])
         return stage.loss(model, contacts, batch, options, generator)
 
-    return [lambda step=step: loss(step) for step in range(math.ceil(len(rows) / options.batch))]
+    return [partial(loss, step) for step in range(math.ceil(len(rows) / options.batch))]
 
 
 def train_epoch(

@@ -15,8 +15,7 @@ from tactile_core.simulation.pairs_file import read_pairs, split_presses  # noqa
 from tactile_core.training.data import Contacts  # noqa: E402
 from tactile_core.training.noise_model import measured  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
-from tactile_core.training.pca import principal_basis  # noqa: E402
-from tactile_core.training.surface_codec import SILENT  # noqa: E402
+from tactile_core.training.surface_codec import SILENT, principal_basis  # noqa: E402
 
 OPTIONS = Options(wide_biotac=10, near_biotac=10, half_biotac=3, wide_digit=10, near_digit=10, half_digit=3, mirrored=0)
 FRAMES = {"biotac": frame("biotac", 3), "digit": frame("digit", 3)}

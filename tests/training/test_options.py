@@ -11,8 +11,7 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.simulation.pairs_file import read_pairs, split_presses  # noqa: E402
 from tactile_core.training.data import Contacts  # noqa: E402
-from tactile_core.training.device import device_of, label  # noqa: E402
-from tactile_core.training.options import Options  # noqa: E402
+from tactile_core.training.options import Options, device_of, label  # noqa: E402
 from tactile_core.training.stages import STAGES, Model  # noqa: E402
 from tactile_core.training.surface_codec import SurfaceCodec  # noqa: E402
 
