@@ -6,7 +6,7 @@
 
 The fast tier is held against the full tier on the test contacts that ship, with friction, and on random contacts
 without. The full tier is held against the reference tier on the first of these random contacts, and on the presses of a
-7 mm ball at one place that scripts/validate_mechanics.py left in docs/mechanics.md. What the reference tier itself is
+7 mm ball at one place that scripts/validate_mechanics.py left in docs/mechanics.csv. What the reference tier itself is
 off is a third of the full tier's error (assumed: halving cells of order 2 leaves a quarter; the rest a margin). Times
 are CPU time on one core of a contact from rest, its mesh included, without friction: the median.
 Stop it at any time: what the finite-strain tiers solved stays in DIR and is not solved again. Needs the extra [fem].
@@ -26,6 +26,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
+from benchmarks.measured_rows import read_table
 from benchmarks.mechanics import tiers
 from benchmarks.mechanics.contact_tiers import SENSORS, Miss, by_depth, drawn, fast_misses, miss, solved
 from benchmarks.mechanics.random_contacts import RandomContact
@@ -39,7 +40,7 @@ from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.simulation.scene import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
-TRAINING, REPORT = ROOT / "scenes" / "training", ROOT / "docs" / "mechanics.md"
+TRAINING, REPORT = ROOT / "scenes" / "training", ROOT / "docs" / "mechanics.csv"
 SEED = 20261122  # of the random contacts: the correction has learned from those of seed 0
 # Random contacts: one of each indenter, five on the BioTac, whose full tier finds deep edges sooner; the first three.
 FULL, REFERENCE = {"digit": 9, "biotac": 45}, 3
@@ -132,16 +133,13 @@ def misses(found: list[dict], true: list[dict]) -> Iterator[Miss]:
 
 def validated(sensor: Sensor) -> Iterator[Miss]:
     """Yield the errors of the full tier's presses in the validation's report."""
-    rows = dict(
-        re.findall(rf"^\| {sensor}_full_(\S+) \| ([^|]+ \|[^|]*\|[^|]*\|[^|]*)\|", REPORT.read_text(), re.MULTILINE)
-    )
-    for name, line in rows.items():
-        depth = re.fullmatch(r"([\d.]+)mm(\S*)_shape_rms", name)
+    rows = {row["name"]: row for row in read_table(REPORT)}
+    for name, row in rows.items():
+        depth = re.fullmatch(rf"{sensor}_full_([\d.]+)mm(\S*)_shape_rms", name)
         if depth:
-            value, _, _, baseline = (cell.strip() for cell in line.split("|"))
-            force = float(rows[f"{depth[1]}mm{depth[2]}_force_error"].split("|")[0]) / 100
+            force = float(rows[name.replace("_shape_rms", "_force_error")]["value"]) / 100
             share = 1e-3 * float(depth[1]) / tiers.thickness_of(sensor)
-            yield Miss(-100, share, 1e-6 * float(value), abs(force), 1e-6 * float(baseline))
+            yield Miss(-100, share, 1e-6 * float(row["value"]), abs(force), 1e-6 * float(row["baseline"]))
 
 
 def share_of(full: dict) -> dict:

@@ -1,14 +1,18 @@
-"""Print the rows of a measuring script as they come, write them as JSON, and name those that miss their target."""
+"""Print the rows of a measuring script as they come, write them as JSON or CSV, and name those that miss a target."""
 
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 from tactile_core.accuracy import HEADER, Row, failed, line
 from tactile_core.files import atomic
+
+COLUMNS = ("name", "value", "unit", "target", "baseline", "set", "ok")
 
 
 def parser_of(about: str | None) -> argparse.ArgumentParser:
@@ -26,6 +30,22 @@ def printed(rows: Iterable[Row]) -> list[Row]:
         found.append(each)
         print(line(each), flush=True)
     return found
+
+
+def write_table(path: Path, parts: dict[str, list[Row]]) -> None:
+    """Write the rows of a page as CSV; parts : heading -> its rows."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["part", *COLUMNS])
+    for part, rows in parts.items():
+        table.writerows([part, *(each[name] for name in COLUMNS)] for each in rows)
+    atomic.write_bytes(path, text.getvalue().encode())
+
+
+def read_table(path: Path) -> list[dict[str, str]]:
+    """Read the rows that ``write_table`` wrote, their cells as text."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def finished(rows: list[Row], json: Path | None) -> int:

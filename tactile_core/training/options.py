@@ -34,7 +34,7 @@ class Options:
         unit_offset, counts, of its rest (10 to 60 counts between two halves of a unit's recordings; docs/convert.md)
     misfit : of samples read as a real unit is known and of rectified ones, share of the whole signal's size that each
         channel is off by besides. The simulated contacts nearest to real slides leave .3 of it, .07 a channel
-        (``benchmarks.translation.simulated_patterns``); 0.1 was chosen against 0.05 (docs/train.md)
+        (commit d537259); 0.1 was chosen against 0.05 (docs/train.md)
     rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
         rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
         from the simulated ones by), rectified_offset, counts, of the tare before the fold, rectified_missing, share of

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.competitors.taxim_like import TableBench, fit_table, try_table
+from benchmarks.table.taxim_like import TableBench, fit_table, try_table
 
 from tactile_core.accuracy import HEADER, line, row
 from tactile_core.pictures.calibrate import ball_pictures

@@ -27,7 +27,6 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "scripts"), str(ROOT / "tests" / "helpers")]
 
-from benchmarks.isaac import tet_file  # noqa: E402
 from small_pairs import write_pairs  # noqa: E402
 
 from tactile_core import recordings  # noqa: E402
@@ -137,7 +136,6 @@ def hdf5(arrays: dict[str, np.ndarray], packing: str | None = "gzip") -> bytes:
 
 def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
     """Scenes, meshes, weights, sensor files, jobs, simulations of others."""
-    tetrahedra = b"v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nt 0 1 2 3\n"
     faces = b"v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
     header = {"a": {"dtype": "F32", "shape": [2, 2], "data_offsets": [0, 16]},
               "b": {"dtype": "F16", "shape": [4], "data_offsets": [16, 24]}}  # fmt: skip
@@ -169,7 +167,6 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         "sensor": ((folder / "sensor.toml").read_bytes(), electrode_gains.read),
         "gel": ((descriptor.FOLDER / "gelsight_mini" / descriptor.FILE).read_bytes(), read_gel),
         "dome": ((descriptor.FOLDER / "gelsight_mini" / "profile.csv").read_bytes(), read_dome),
-        "tet": (tetrahedra, tet_file.read_tet),
         "obj": (faces, read_mesh(".obj")),
         "stl": (bytes(80) + struct.pack("<I", 4) + triangles(), read_mesh(".stl")),
         "ply": (PLY, read_mesh(".ply")),

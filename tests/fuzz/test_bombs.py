@@ -10,7 +10,6 @@ import zlib
 
 import numpy as np
 import pytest
-from benchmarks.isaac import tet_file
 
 from tactile_core import recordings
 from tactile_core.files.outside import MOST_TEXT
@@ -162,12 +161,6 @@ def test_meshes(name, tmp_path):
     path = tmp_path / name
     path.write_bytes(MESHES[name]())
     refused(lambda path: mesh_file.solid(mesh_file.read_bytes(path), path, 1e-3, "z"), path, str(path))
-
-
-def test_tetrahedra(tmp_path):
-    path = tmp_path / "a.tet"
-    path.write_bytes(b"v 0 0 0\n" * 2_000_000)
-    refused(tet_file.read_tet, path, str(path))
 
 
 @pytest.mark.parametrize("way", ["/etc/passwd", "../out.stl", "link.stl", "C:\\out.stl"])

@@ -128,7 +128,7 @@ def test_the_signal_grows_with_the_press_and_is_like_the_cheap_law(solved):
     for row in solved[0]:
         cheap = signal_of_gaps(row["gap"].astype(float))
         like = row["signal"] @ cheap / (np.linalg.norm(row["signal"]) * np.linalg.norm(cheap))
-        assert like > 0.8  # over 240 contacts the laws correlate by .94 (docs/mechanics.md)
+        assert like > 0.8  # over 240 contacts the laws correlate by .94 (docs/mechanics.md of commit d537259)
     sizes = [np.abs(row["signal"]).max() for row in solved[0][:3]]
     assert 0 < sizes[0] < sizes[1] < sizes[2]
 

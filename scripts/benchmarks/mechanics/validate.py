@@ -9,7 +9,6 @@ Prints a table as it goes; exits 1 when an error row misses its target. Needs th
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 import traceback
@@ -18,8 +17,6 @@ from pathlib import Path
 
 from benchmarks.measured_rows import finished, parser_of
 from benchmarks.mechanics import (
-    comsol,
-    electrode_law,
     fluid,
     golden,
     hertz,
@@ -28,20 +25,17 @@ from benchmarks.mechanics import (
     many,
     oracle,
     patch,
-    public_mesh,
     symmetry,
     thin_layers,
     tiers,
     work,
 )
 from benchmarks.mechanics.mechanics_page import write
-from benchmarks.translation import rest_impedance, simulated_patterns, skin_stiffness
 from tactile_core.accuracy import HEADER, Row, line
 from tactile_core.accuracy import row as make_row
 
 ROOT = Path(__file__).resolve().parents[3]
 REPORT = ROOT / "docs" / "mechanics.md"
-DATA = Path(os.environ.get("TACTILE_TEST_DATA") or ROOT.parent / "shared" / "data")  # outside data, where it is present
 
 # name -> function(quick) that yields rows, and what it shows, for the report
 CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
@@ -58,27 +52,6 @@ CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
     "symmetry": (symmetry.rows, "Turned and mirrored sensors give the turned and mirrored answer"),
     "fluid": (fluid.rows, "The fluid keeps its volume"),
     "incompressible": (incompressible.rows, "Poisson's ratio up to .4999"),
-    "electrodes": (
-        lambda quick: electrode_law.electrode_rows(*((40,) if quick else ()), each=not quick),
-        "The electrodes' gap law against the thin-sheet solve",
-    ),
-    "rest_impedance": (
-        lambda quick: rest_impedance.rows(quick, DATA),
-        "Electrodes of two real fingers at rest, by models of the film (needs the outside data)",
-    ),
-    "simulated_patterns": (
-        lambda quick: simulated_patterns.rows(quick, DATA),
-        "Real grips and slides against the nearest simulated contact, by the electrodes' law (needs the outside data)",
-    ),
-    "skin_stiffness": (
-        lambda quick: skin_stiffness.rows(quick, DATA),
-        "Pressure in real fingers over that of the simulated contacts most like them (needs the outside data)",
-    ),
-    "public_mesh": (
-        lambda quick: public_mesh.rows(quick, DATA),
-        "Isaac-like settings on the public meshes against our own model (needs the outside data)",
-    ),
-    "comsol": (lambda quick: comsol.rows(quick, DATA), "COMSOL's presses of a BioTac SP (needs the outside data)"),
     "many": (many.rows, "Random contacts of nine indenters: how many settle in the fast tier, and how long one takes"),
     "tiers": (tiers.rows, "The fast and the full tier against the reference tier: error beside time"),
 }

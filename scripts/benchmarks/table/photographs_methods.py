@@ -2,7 +2,7 @@
 
 Photographs are of a 6 mm ball pressed into a DIGIT; those that the calibration was not fitted on are the truth. The
 baseline is the background alone; a table after Taxim is fitted on the photographs the calibration was fitted on
-(scripts/benchmarks/competitors/taxim_like.py); each preset of `tactile render`. Where and how deep the ball was pressed
+(taxim_like.py); each preset of `tactile render`. Where and how deep the ball was pressed
 is three numbers a photograph, found once by the fast picture; the table finds its own.
 """
 
@@ -19,8 +19,8 @@ from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration
 
-from ..competitors.taxim_like import TableBench, fit_table, try_table
 from .method import Method, best_ms, peak_mb
+from .taxim_like import TableBench, fit_table, try_table
 
 BALL = 3e-3  # m, radius
 TABLE = "taxim_like"

@@ -5,13 +5,12 @@
     python scripts/benchmark.py --only chain --json FILE    some stages, or methods such as "translation numpy_1"
     python scripts/benchmark.py PRESSES              pictures beside photographs too: a folder of a 6 mm ball's presses
     python scripts/benchmark.py --promised           bounds against errors alone, in seconds: docs/promised.png
-    python scripts/benchmark.py --across PAIRS       first trains ACROSS's networks and ours on PAIRS, for 10 minutes
 
-Stages: contact mechanics by tier and sensor; translation, in numpy, in torch and by ACROSS's network shapes; pictures
-by preset; the whole chain from signals to pictures. Each method is measured in a process of its own: CPU time on one
-core, peak memory, and the error on a held-out set beside that of doing nothing. Then the errors that are promised are
-held against those that are found: exits with 1 where a bound of 95 % holds for under 90 or over 98 %. Methods that need
-a library that is missing are left out and named. Needs the extras [fem] and [render]; torch for its rows.
+Stages: contact mechanics by tier and sensor; translation; pictures by preset; the whole chain from signals to pictures.
+Each method is measured in a process of its own: CPU time on one core, peak memory, and the error on a held-out set
+beside that of doing nothing. Then the errors that are promised are held against those that are found: exits with 1
+where a bound of 95 % holds for under 90 or over 98 %. Methods that need a library that is missing are left out and
+named. Needs the extras [fem] and [render].
 """
 
 from __future__ import annotations
@@ -41,17 +40,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", nargs="+", default=(), metavar="STAGE", help="measure these alone; writes no report")
     parser.add_argument("--promised", action="store_true", help="the bounds alone, in docs/promised.png and its table")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
-    parser.add_argument("--across", type=Path, metavar="PAIRS", help="train both on these pairs first")
     options = parser.parse_args(arguments)
     unknown = [each for each in options.only if each.split(" ")[0] not in STAGES]
     if unknown:
         parser.error(f"--only: no stage {', '.join(unknown)}; there are {', '.join(STAGES)}")
     missing: dict[str, str] = {}
     try:
-        if options.across:
-            from benchmarks.table.same_pairs import train_both
-
-            train_both(options.across)
         methods = [] if options.promised else list(all_measured(options, missing))
         rows, text, picture = [each for method in methods for each in method.rows()], "", b""
         if options.promised:

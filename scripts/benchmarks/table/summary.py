@@ -22,8 +22,6 @@ LINES = (
     ("", "reference tier", "mechanics biotac_reference"),
     ("signals → DIGIT gel", "ours, one frame", "translation numpy_1"),
     ("", "ours, 500 at once", "translation numpy_500"),
-    ("the same, fewer pairs, equal training time", "ours", "translation numpy_same_pairs_1"),
-    ("", "networks of ACROSS's shapes", "translation across_1"),
     ("picture of a known gel", "fast", "pictures fast"),
     ("", "standard", "pictures standard"),
     ("", "quality", "pictures quality"),

@@ -1,8 +1,7 @@
-"""Translation from signals to both displacements: our networks in numpy and in torch, and ACROSS's shapes."""
+"""Translation from signals to both displacements: our networks in numpy."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -11,33 +10,28 @@ import numpy as np
 
 from benchmarks.translation.noise import as_read
 from benchmarks.translation.test_set import SEED
-from tactile_core import accuracy, sensors
+from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.error_summary import metric_rows
 from tactile_core.training.step_errors import joined, mesh_columns, parts, true_displacement
-from tactile_core.translation.networks import COUNT_SCALE
 from tactile_core.translation.translate import load_translator
 
-from .method import ROOT, TEST_SET, Method, best_ms, peak_mb
+from .method import TEST_SET, Method, best_ms, peak_mb
 
 BATCHES = 1, 500  # frames a call
 NAMES = (
-    *(f"{kind}_{batch}" for kind in ("numpy", "numpy_confidence", "torch", "across") for batch in BATCHES),
-    "numpy_same_pairs_1",
+    *(f"{kind}_{batch}" for kind in ("numpy", "numpy_confidence") for batch in BATCHES),
     "numpy_solved_100",
 )
-QUOTED = {"across": "across", "numpy_same_pairs": "ours"}  # whose errors come from SAME_PAIRS
-# Rows of ours and of ACROSS's networks, trained on the same pairs.
-SAME_PAIRS = ROOT / "scripts" / "benchmarks" / "competitors" / "across_rows.json"
 EVERY = 3  # of as many test presses one, in a quick run; prime to how box, ring and others take turns
 Change = np.ndarray  # (B, 19) counts
 Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure one way of calculating; raises ModuleNotFoundError where torch is missing."""
+    """Measure one way of calculating."""
     kind, batch = name.rsplit("_", 1)
     pairs = read_pairs(TEST_SET)
     if quick:
@@ -46,13 +40,8 @@ def measure(name: str, quick: bool) -> Method:
     work = KINDS[kind]()
     some = np.resize(change, (int(batch), change.shape[1]))
     ms, mb = best_ms(lambda: work(some), int(batch), most=200), peak_mb()
-    if kind in QUOTED:
-        record = json.loads(SAME_PAIRS.read_text())
-        found = {each["name"]: each for each in record[QUOTED[kind]]}
-        of = f"{record['contacts']} test contacts, trained on {record['pairs']:,} pairs (across_rows.json)"
-    else:
-        found = {each["name"]: each for each in _errors(work, pairs, change)}
-        of = f"{len(pairs.press)} test contacts, signal to DIGIT"
+    found = {each["name"]: each for each in _errors(work, pairs, change)}
+    of = f"{len(pairs.press)} test contacts, signal to DIGIT"
     chain, skin = found["chain_rms_um"], found["S2MPN_rms_um"]
     more = row(
         f"translation_{name}_biotac_error",
@@ -109,23 +98,7 @@ def plain_signals(change: Change) -> Any:
     )  # fmt: skip
 
 
-def _torch() -> Surfaces:
-    from ..competitors.torch_chain import TorchChain
-
-    return TorchChain(load_translator().nets)
-
-
-def _across() -> Surfaces:
-    from ..competitors.across_networks import untrained
-
-    surfaces = untrained(sensors.biotac_surface(), sensors.digit_surface())  # its time does not depend on its weights
-    return lambda change: surfaces(np.arcsinh(change / np.float32(COUNT_SCALE)))
-
-
-KINDS = {
-    "numpy": _numpy, "numpy_same_pairs": _numpy, "numpy_confidence": _numpy_confidence, "torch": _torch,
-    "across": _across, "numpy_solved": _numpy_solved,
-}  # fmt: skip
+KINDS = {"numpy": _numpy, "numpy_confidence": _numpy_confidence, "numpy_solved": _numpy_solved}
 
 
 def _errors(work: Surfaces, pairs: Pairs, change: Change) -> list[Row]:

@@ -12,7 +12,6 @@ translations are left in --out, in the form that judge_recordings.py, the tool b
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
@@ -61,8 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--weights", metavar="FOLDER", help="networks of your own training instead of the shipped ones")
     parser.add_argument("--sensor", metavar="FILE", help="gains and offsets of their sensor, from `tactile adapt`")
     parser.add_argument("--out", default="out/translated", metavar="FOLDER", help="translations (default: %(default)s)")
-    parser.add_argument("--card", metavar="FILE", help="write the model card (Markdown, and a picture beside it) here")
-    parser.add_argument("--sweep", metavar="FILE", help="rows of sweep_networks.py, for the card")
+    parser.add_argument("--card", metavar="FILE", help="write the model card (Markdown, CSV, a picture) here")
     parser.add_argument("--quick", action="store_true", help="a few recordings, or a few test presses")
     options = parser.parse_args(arguments)
     try:
@@ -104,6 +102,5 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
     for unaware in apart:
         found += test_set.unseen_rows(unaware, pairs, bodies)
     if options.card:
-        sweep = json.loads(Path(options.sweep).read_text()) if options.sweep else []
-        write_model_card(Path(options.card), found, network, pairs, apart, sweep)
+        write_model_card(Path(options.card), found, network, pairs, apart)
     return found

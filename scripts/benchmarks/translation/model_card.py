@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from tactile_core import sensors
-from tactile_core.accuracy import HEADER, Row, line
+from tactile_core.accuracy import Row
 from tactile_core.files import atomic
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import mesh_columns, true_displacement
 from tactile_core.translation.translator import Translator
 
+from ..measured_rows import write_table
 from ..table.summary import short
 from .noise import as_read
 from .test_set import SEED
@@ -24,7 +25,7 @@ PICTURE = "translation_cases.png"
 PURPOSE = """\
 The networks take the changes of a BioTac's 19 electrodes to the contact that most plausibly caused them, and to the
 deformation of the skin and of a DIGIT's gel. `tactile convert` and `tactile.translate` run them; nothing needs to be
-set. This page says how far to trust the result, first in short, then in every number that was measured.
+set. This page says how far to trust the result; `docs/translation.csv` holds every number that was measured.
 """
 # Words of an estimate, its row, and what the number is followed by.
 EXPECTED = (
@@ -48,14 +49,6 @@ NAMES = """\
 | peak, core | depth of the dent; nodes deeper than 30 % of it |
 | place, position | centre of the contact |
 | iou | intersection over union of the true and the estimated contact patch |
-"""
-SWEEP = """\
-## Sweep
-
-Other latent sizes and KL weights, each a training of its own on the same fewer pairs, against the test contacts
-(`scripts/benchmarks/make/sweep_networks.py`): to be compared with each other, not with the rows above. `published` has
-the latents and the KL weight of the method's authors. Rows of seeds: one direct network from signals to the DIGIT
-beside the chain, each from three seeds, on the trainings' own test presses.
 """
 LIMITS = """\
 ## Limits
@@ -91,11 +84,10 @@ def write_model_card(
     translator: Translator,
     pairs: Pairs,
     apart: Sequence[Translator] = (),
-    sweep: Sequence[Row] = (),
 ) -> None:
-    """Write the card as Markdown, and the picture of cases beside it.
+    """Write the card as Markdown, its rows as CSV and the picture of cases beside it.
 
-    apart : the networks of the unseen rows; sweep : rows of scripts/benchmarks/make/sweep_networks.py
+    apart : the networks of the unseen rows
     """
     card = translator.card
     unseen = [each for each in rows if (each["set"] or "").startswith("unseen")]
@@ -124,20 +116,14 @@ def write_model_card(
         "From signals to the DIGIT's gel: the contact with the least, the median and the largest error over the true"
         " deformation's size, among those the gel is moved 0.1 mm by and more.",
         "",
-        "## Names in the tables",
+        "## Names in the rows",
         "",
         NAMES,
-        "## Errors",
-        "",
-        HEADER,
-        *(line(each) for each in rows if each not in unseen),
-        "",
-        *(["## Kept apart", "", _apart([each.card["options"] for each in apart]), "", HEADER] if apart else []),
-        *(line(each) for each in unseen),
-        *([""] if apart else []),
-        *([SWEEP, HEADER, *map(line, sweep), ""] if sweep else []),
+        *([_apart([each.card["options"] for each in apart]), ""] if apart else []),
     ]
     atomic.write_bytes(path, "\n".join(text).encode())
+    parts = {"test contacts": [each for each in rows if each not in unseen], "kept apart": unseen}
+    write_table(path.with_suffix(".csv"), parts)
     atomic.write_bytes(path.with_name(PICTURE), _cases(translator, pairs))
 
 

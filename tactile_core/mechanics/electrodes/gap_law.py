@@ -1,7 +1,6 @@
 """The electrode forward model: raw counts from the thickness of the fluid film over each electrode.
 
-The cheap law, 1 / gap, beside that of the thin sheet (``law``); ``benchmarks.mechanics.electrode_law`` holds the one
-against the other.
+The cheap law, 1 / gap, beside that of the thin sheet (``law``).
 """
 
 from __future__ import annotations
@@ -13,7 +12,8 @@ from ..fast.sensing_points import electrode_feet
 
 # counts m: assumed. No gap law is published (docs/sources.md); this one puts the 95th percentile of the largest change
 # a press makes near 150 counts, as of the networks' prototype. One constant for all electrodes: against the thin
-# sheet it leaves 9 counts rms of 20 over 240 contacts, a constant for each electrode 7 (``electrode_law``).
+# sheet it leaves 9 counts rms of 20 over 240 contacts, a constant for each electrode 7
+# (`scripts/benchmarks/mechanics/electrode_law.py` of commit d537259).
 FILM_CONSTANT = 0.1
 
 

@@ -1,7 +1,7 @@
 """The BioTac's sheet on a few fields in place of its nodes: cheap enough for every contact of a simulation.
 
 Galerkin's method: potentials are sought among the combinations of fixed fields, those of the electrodes at rest and the
-principal ones of sheets with random dents. ``benchmarks.mechanics.electrode_law`` holds it against the whole sheet.
+principal ones of sheets with random dents.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from ..solids.sparse_cholesky import factor
 from .biotac_sheet import FED, BiotacSheet, biotac_sheet
 from .thin_sheet import resistances
 
-# 60 fields of 60 dents leave 0.28 % rms of rest where contacts change resistances by 9.3 % (docs/mechanics.md); in
-# trials by hand 20 fields left 0.7 %, and 150 dents were no better. Dents as wide and deep as contacts make them, and
-# sides that bulge (assumed ranges, m).
+# 60 fields of 60 dents leave 0.28 % rms of rest where contacts change resistances by 9.3 % (docs/mechanics.md of commit
+# d537259); in trials by hand 20 fields left 0.7 %, and 150 dents were no better. Dents as wide and deep as contacts
+# make them, and sides that bulge (assumed ranges, m).
 _DENTS, _FIELDS = 60, 60
 _WIDTH, _DEPTH, _BULGE = (1.5e-3, 5e-3), (0.24e-3, 1.2e-3), (0.0, 0.15e-3)
 _PAD = -2e-3  # m, y below which dents lie

@@ -3,10 +3,11 @@
 import json
 
 import pytest
+from benchmarks.measured_rows import read_table
 from benchmarks.mechanics import mechanics_page, validate
 from benchmarks.mechanics.golden import GOLDEN_FORCE
 
-from tactile_core.accuracy import failed, order, row
+from tactile_core.accuracy import failed, line, order, row
 
 
 @pytest.fixture
@@ -42,9 +43,11 @@ def test_report_holds_every_row_and_small_plots(tmp_path):
     speed = [row("digit_fast_0.2mm_shape_rms", 3.0, "um", 2.0), row("digit_fast_0.2mm_time", 2.0, "ms")]
     mechanics_page.write(tmp_path / "mechanics.md", {"Golden": forces, "Refined": refined, "Speed": speed})
     text = (tmp_path / "mechanics.md").read_text(encoding="utf-8")
-    for found in forces + refined + speed:
-        assert mechanics_page.line(found) in text
-    assert text.count("MISSED") == 1
+    table = read_table(tmp_path / "mechanics.csv")
+    assert [each["name"] for each in table] == [each["name"] for each in forces + refined + speed]
+    assert {each["part"] for each in table} == {"Golden", "Refined", "Speed"}
+    assert [each["name"] for each in table if each["ok"] == "False"] == ["digit_fast_0.2mm_shape_rms"]
+    assert "| Speed | 2 | 1 | `digit_fast_0.2mm_shape_rms` 3 um |" in text
     plots = sorted(tmp_path.glob("*.png"))
     assert [plot.name for plot in plots] == ["mechanics_force.png", "mechanics_spacing.png", "mechanics_speed.png"]
     assert all(f"({plot.name})" in text and plot.stat().st_size < 100_000 for plot in plots)
@@ -57,7 +60,7 @@ def test_script_writes_its_rows_and_says_what_missed(script, monkeypatch, tmp_pa
     assert json.loads((tmp_path / "rows.json").read_text()) == [good, slow]
     assert script.main(["--quick"]) == 1
     said = capsys.readouterr()
-    assert "MISSED: b = 2.0 1, target 1.0" in said.err and mechanics_page.line(bad) in said.out
+    assert "MISSED: b = 2.0 1, target 1.0" in said.err and line(bad) in said.out
 
 
 def test_a_check_that_breaks_off_is_a_miss_and_the_others_go_on(script, monkeypatch, tmp_path, capsys):

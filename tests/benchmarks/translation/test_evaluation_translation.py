@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from benchmarks.measured_rows import read_table
 from benchmarks.translation import evaluation, test_set
 from benchmarks.translation.noise import GAIN, NOISE, as_read
 from small_pairs import bodies, write_pairs
@@ -168,7 +169,8 @@ def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(reques
     for step, share in {"MVB": 0.2, "MVD": 0.3, "M2MPN": 0.6, "S2MPN": 0.5, "D2B": 0.5}.items():
         assert found[f"{step}_rms_um"]["value"] < share * found[f"{step}_rms_um"]["baseline"]
     card = (tmp_path / "card.md").read_text(encoding="utf-8")
-    assert "| M2MPN_rms_um |" in card and (tmp_path / "translation_cases.png").exists()
+    names = {each["name"] for each in read_table(tmp_path / "card.csv")}
+    assert "M2MPN_rms_um" in names and "## Limits" in card and (tmp_path / "translation_cases.png").exists()
 
 
 def test_a_file_that_is_no_test_set_is_refused(tmp_path, capsys):

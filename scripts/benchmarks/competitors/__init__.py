@@ -1,1 +1,0 @@
-"""Counterparts of published methods, and of our chain in torch, trained and measured on the same data as ours."""

@@ -1,1 +1,0 @@
-"""Contacts as Isaac Gym computes them, with corotated linear tetrahedra, for comparison with our own mechanics."""
