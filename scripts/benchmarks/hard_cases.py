@@ -2,16 +2,13 @@
 
     python scripts/benchmarks/hard_cases.py                       all of them (minutes); writes docs/hard_cases.md
     python scripts/benchmarks/hard_cases.py --quick --json FILE   the quick ones, those of the tests; writes FILE alone
-    python scripts/benchmarks/hard_cases.py --markdown FILE       the table goes there
 
-A case is within its target and breaks no law of its stage, or says in words that it cannot; exits 1 when one is not,
-but for those whose limit is known and stands beside them (they are MISSED in the table, too).
+A case is within its target and breaks no law of its stage, or says in words that it cannot; exits 1 when one is not.
 Needs the extras [fem] and [render]. The cases are in tests/hard_cases.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 import traceback
 from pathlib import Path
@@ -19,10 +16,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / each) for each in (".", "scripts", "tests", "tests/helpers")]
 
+from hard_cases import CASES, HARD  # noqa: E402
 from hard_cases.case import Case  # noqa: E402
-from hard_cases.table import CASES, HARD  # noqa: E402
 
-from tactile_core.accuracy import HEADER, Row, failed, line  # noqa: E402
+from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
+from tactile_core.accuracy import Row  # noqa: E402
 from tactile_core.accuracy import row as make_row  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
 
@@ -40,28 +38,14 @@ nodes for heights; Mitsuba's standard preset for the fast picture.
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the checks, print and write their rows; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    """Run the cases, print and write their rows; returns the exit status."""
+    parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="without the slow cases")
-    parser.add_argument("--json", metavar="FILE", type=Path, help="write the rows here")
-    parser.add_argument(
-        "--markdown", metavar="FILE", type=Path, help=f"write the table here (all cases: {REPORT.name})"
-    )
     options = parser.parse_args(arguments)
-    rows = []
-    print(HEADER)
-    for case in CASES:
-        if not (options.quick and case.slow):
-            rows.append(_row(case))
-            print(line(rows[-1]), flush=True)
-    report = options.markdown or (None if options.quick else REPORT)
-    if options.json:
-        atomic.write_json(options.json, rows)
-    if report:
-        atomic.write_bytes(report, markdown(rows).encode())
-    for row in failed(rows):
-        print(f"MISSED: {row['name']} = {row['value']} {row['unit']}: {row['words']} {row['limit']}", file=sys.stderr)
-    return int(any(not row["limit"] for row in failed(rows)))
+    rows = printed(_row(case) for case in CASES if not (options.quick and case.slow))
+    if not options.quick:
+        atomic.write_bytes(REPORT, markdown(rows).encode())
+    return finished(rows, options.json)
 
 
 def _row(case: Case) -> Row:
@@ -71,7 +55,7 @@ def _row(case: Case) -> Row:
     except Exception as error:  # whatever it was, the other cases are still worth their rows
         traceback.print_exc()
         made = make_row(case.name, 0, "answers", 1, of=case.stage, at_least=True)
-        return made | {"case": case.hard, "expected": case.expected, "words": f"broke off: {error}", "limit": ""}
+        return made | {"case": case.hard, "expected": case.expected, "words": f"broke off: {error}"}
 
 
 def markdown(rows: list[Row]) -> str:
@@ -89,7 +73,6 @@ def markdown(rows: list[Row]) -> str:
 def _line(row: Row) -> str:
     number = f"{row['value']:.3g} {row['unit']}"
     found = row["words"] if row["unit"] == "said" else number + (f": {row['words']}" if row["words"] else "")
-    found += f". Limit: {row['limit']}" if row["limit"] else ""
     cells = [row["set"], row["name"], row["expected"], found, "ok" if row["ok"] else "**MISSED**"]
     return "| " + " | ".join(cell.replace("|", "/").replace("\n", " ") for cell in cells) + " |"
 

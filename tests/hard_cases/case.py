@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Iterable
 
 from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
@@ -11,6 +12,18 @@ from tactile_core.errors import TactileError
 MECHANICS_FAST, MECHANICS_FULL = "mechanics, fast tier", "mechanics, full tier"
 TRANSLATION, HEIGHT_MAP = "translation", "height map"
 FAST_PICTURE, MITSUBA = "fast picture", "Mitsuba's picture"
+TIERS = {"fast": MECHANICS_FAST, "full": MECHANICS_FULL}
+PRESETS = {"fast": FAST_PICTURE, "standard": MITSUBA}
+# The difficulties that were set out from, each of which must be in the table.
+HARD = (
+    "near-incompressible gel", "indentation beyond 60 % of the thickness", "sharp edges and corners",
+    "ring and concave contact", "sliding and rolling", "contact at the pad's rim and leaving it",
+    "indenter much smaller than an element", "tiny force (1e-6 N)", "tiny depth (0.1 um)", "zero contact",
+    "two patches at once", "load step ten times too large", "coarse and fine meshes", "inverted start",
+    "saturated electrodes", "dead electrodes", "12-bit quantisation", "drift over an hour", "out-of-range latents",
+    "single precision against double", "extreme px/mm", "grazing light", "depth discontinuities",
+    "one-frame recordings",
+)  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,9 +45,8 @@ class Found:
 class Case:
     """One hard case of one stage.
 
-    hard : the difficulty, by a name of ``table.HARD``
-    expected : the behaviour, and where the target comes from; slow : not in a quick run
-    limit : why it is known to miss; "" where it must not
+    hard : the difficulty, one of HARD; expected : the behaviour, and where the target comes from
+    slow : not in a quick run
     """
 
     name: str
@@ -43,7 +55,6 @@ class Case:
     expected: str
     find: Callable[[], Found]
     slow: bool = False
-    limit: str = ""
 
     def row(self) -> Row:
         """What was found, as a row of a report, with its words."""
@@ -51,19 +62,33 @@ class Case:
         made = row(self.name, found.value, found.unit, found.target, of=self.stage, at_least=found.at_least)
         made["ok"] = bool(made["ok"]) and not found.broken
         words = "; ".join([found.words, *found.broken] if found.words else found.broken)
-        return made | {"case": self.hard, "expected": self.expected, "words": words, "limit": self.limit}
+        return made | {"case": self.hard, "expected": self.expected, "words": words}
 
 
 CASES: list[Case] = []
 
 
 def case(
-    name: str, hard: str, stage: str, expected: str, *, slow: bool = False, limit: str = ""
-) -> Callable[[Callable[[], Found]], Callable[[], Found]]:
-    """Add a function that finds something to the table."""
+    name: str,
+    hard: str | dict[str, str],
+    stage: str | dict[str, str],
+    expected: str,
+    *each: tuple,
+    slow: Iterable[str] = (),
+) -> Callable[[Callable[..., Found]], Callable[..., Found]]:
+    """Add a function that finds something to the table.
 
-    def add(find: Callable[[], Found]) -> Callable[[], Found]:
-        CASES.append(Case(name, hard, stage, expected, find, slow, limit))
+    each : its arguments, a case each, which the name is formatted with; hard, stage : or by the first argument that
+    they have; slow : names, or arguments, of slow cases
+    """
+
+    def by(which: str | dict[str, str], args: tuple) -> str:
+        return which if isinstance(which, str) else next(which[arg] for arg in args if arg in which)
+
+    def add(find: Callable[..., Found]) -> Callable[..., Found]:
+        for args in each or [()]:
+            made = name.format(*args), by(hard, args), by(stage, args), expected, functools.partial(find, *args)
+            CASES.append(Case(*made, slow=bool({made[0], *args} & {*slow})))
         return find
 
     return add

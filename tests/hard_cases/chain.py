@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 
 import numpy as np
 
@@ -15,13 +14,18 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.sensors import REST_COUNTS
 
 from .case import TRANSLATION, Found, case
-from .shapes import CONTACTS, SUNK
+from .shapes import CONTACTS, HARD_OF, SHOWN
 from .signals import prepared, translator
 
 WORDS = Flag.OUT_OF_RANGE | Flag.BEYOND_DIGIT
 
 
-def _translated(name: str, share: float) -> Found:
+@case("faint_touch_translated", "tiny depth (0.1 um)", TRANSLATION,
+      "a twentieth of a light press: the bound holds, or the frame is flagged", ("deep", 0.01))  # fmt: skip
+@case("{}_translated", HARD_OF, TRANSLATION,
+      "the largest node error lies below the bound that holds for 95 of 100 frames, or the frame is flagged",
+      *((name,) for name in SHOWN))  # fmt: skip
+def _translated(name: str, share: float = 1.0) -> Found:
     """A contact of the BioTac at a share of its depth and the DIGIT's at the same force, against the translation."""
     _, indenter, place, depth, friction = CONTACTS[name]
     biotac = solve("biotac", indenter, place, depth=share * depth, friction=friction)
@@ -54,14 +58,6 @@ def _translated(name: str, share: float) -> Found:
     return Found(worst, "of stated", 1.0, words=", ".join(words), broken=finite)
 
 
-for _name, (_hard, *_rest) in CONTACTS.items():
-    if not {("digit", _name), ("biotac", _name)} & set(SUNK):
-        case(f"{_name}_translated", _hard, TRANSLATION,
-             "the largest node error lies below the bound that holds for 95 of 100 frames, or the frame is flagged")(
-            functools.partial(_translated, _name, 1.0)
-        )  # fmt: skip
-
-
 @case("nothing_touches_translated", "zero contact", TRANSLATION, "no force, no place, and the gel at rest to 20 um")
 def still() -> Found:
     """Counts that do not change at all."""
@@ -72,9 +68,3 @@ def still() -> Found:
     found = translator()(signals)
     broken = () if not found.force.any() and np.isnan(found.contact_center).all() else ("a force or a place",)
     return Found(float(np.abs(found.displacement_digit).max()) * 1e6, "um", 20.0, broken=broken)
-
-
-case("faint_touch_translated", "tiny depth (0.1 um)", TRANSLATION,
-     "a twentieth of a light press: the bound holds, or the frame is flagged")(
-    functools.partial(_translated, "deep", 0.01)
-)  # fmt: skip

@@ -13,6 +13,7 @@ from slab import slab_compliance
 from tactile_core import sensors
 from tactile_core.geometry.indenters import Sphere, pose_on
 from tactile_core.mechanics.fast.contact import ContactProblem
+from tactile_core.mechanics.fast.press import FastContact
 from tactile_core.mechanics.finite_strain.body import graded_body
 from tactile_core.mechanics.placement import pose_at
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, State
@@ -25,7 +26,7 @@ from tactile_core.sensors import Material, digit
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y
 from tactile_core.translation import networks
 
-from .case import HEIGHT_MAP, MECHANICS_FAST, MECHANICS_FULL, TRANSLATION, Found, case, refusal
+from .case import HEIGHT_MAP, MECHANICS_FAST, MECHANICS_FULL, TIERS, TRANSLATION, Found, case, refusal
 from .contacts import MIDDLE, broken_fast, broken_full, full, over_stated, press
 from .signals import prepared
 
@@ -33,6 +34,8 @@ BALL = Sphere(3.5e-3)
 YOUNGS = 0.4e6  # Pa, about the gel's
 
 
+@case("nu_{:g}_fast", "near-incompressible gel", MECHANICS_FAST, "within 3 % of the exact force on a bonded layer",
+      (0.49,), (0.499,), slow=[0.49])  # fmt: skip
 def _layer_fast(poisson: float) -> Found:
     """A ball on a bonded layer: the fast tier's own condensation and contact, against the exact small-strain answer."""
     radius, thickness, depth = 7e-3, 2e-3, 0.06e-3
@@ -47,6 +50,8 @@ def _layer_fast(poisson: float) -> Found:
     return Found(100 * (found.axial_force / exact - 1), "percent", 3.0, words=words, broken=broken)
 
 
+@case("nu_{:g}_full", "near-incompressible gel", MECHANICS_FULL,
+      "in 10 Newton iterations at most, as prototypes took 3 to 7", (0.49,), (0.499,))  # fmt: skip
 def _gel_full(poisson: float) -> Found:
     """The gel itself, made of another material, 0.6 mm deep in one step from rest."""
     pose = pose_at("digit", BALL, MIDDLE)
@@ -68,33 +73,23 @@ def _disc(poisson: float, spacing: float) -> float:
     return float(np.linalg.norm(touch.force))
 
 
-def _mesh_full(poisson: float, spacing: float, most: float = 1.0) -> Found:
+@case("nu_{:g}_full_force", "near-incompressible gel", MECHANICS_FULL,
+      "within 1 % on nodes twice as far apart: no locking", (0.49,), (0.499,))  # fmt: skip
+def _mesh_full(poisson: float, spacing: float = 0.2e-3, most: float = 1.0) -> Found:
     coarse, fine = _disc(poisson, spacing), _fine_disc(poisson)
-    return Found(
-        100 * (coarse / fine - 1), "percent", most, words=f"{coarse:.4g} N, on nodes 0.1 mm apart {fine:.4g} N"
-    )
+    words = f"{coarse:.4g} N, on nodes 0.1 mm apart {fine:.4g} N"
+    return Found(100 * (coarse / fine - 1), "percent", most, words=words)
+
+
+@case("nodes_{:g}mm_apart", "coarse and fine meshes", MECHANICS_FULL,
+      "within 2 % of a mesh of 0.1 mm: the contact, 2.9 mm wide, ends between nodes", (0.4,), (0.8,))  # fmt: skip
+def _coarse(millimetres: float) -> Found:
+    return _mesh_full(0.49, 1e-3 * millimetres, 2.0)
 
 
 @functools.cache
 def _fine_disc(poisson: float) -> float:
     return _disc(poisson, 0.1e-3)
-
-
-NEARLY = "near-incompressible gel"
-for _nu in (0.49, 0.499):
-    case(f"nu_{_nu:g}_fast", NEARLY, MECHANICS_FAST, "within 3 % of the exact force on a bonded layer",
-         slow=_nu < 0.499)(functools.partial(_layer_fast, _nu))  # fmt: skip
-    case(f"nu_{_nu:g}_full", NEARLY, MECHANICS_FULL, "in 10 Newton iterations at most, as prototypes took 3 to 7")(
-        functools.partial(_gel_full, _nu)
-    )
-    case(f"nu_{_nu:g}_full_force", NEARLY, MECHANICS_FULL, "within 1 % on nodes twice as far apart: no locking")(
-        functools.partial(_mesh_full, _nu, 0.2e-3)
-    )
-for _spacing in (0.4e-3, 0.8e-3):
-    case(f"nodes_{_spacing * 1e3:g}mm_apart", "coarse and fine meshes", MECHANICS_FULL,
-         "within 2 % of a mesh of 0.1 mm: the contact, 2.9 mm wide, ends between nodes")(
-        functools.partial(_mesh_full, 0.49, _spacing, 2.0)
-    )  # fmt: skip
 
 
 @case("beyond_60_percent", "indentation beyond 60 % of the thickness", MECHANICS_FAST, "refused, in words")
@@ -131,47 +126,43 @@ def at_limit_full() -> Found:
                  broken=broken_full(found, "digit", ball, pose.moved(deep), 0.0))  # fmt: skip
 
 
-def _path_full(steps: int, friction: float) -> Found:
-    """The same depth at once and in steps."""
-    depth, whole = 0.8e-3, [0.8e-3]
-    parts = list(np.arange(1, steps + 1) / steps * depth)
+@case("ten_steps_at_once_full", "load step ten times too large", MECHANICS_FULL,
+      "the same answer to 1 um without friction: equilibrium knows no path")  # fmt: skip
+def steps_full() -> Found:
+    """0.8 mm at once and in ten steps."""
+    depth = 0.8e-3
     one, many = (
-        list(solve_path("digit", BALL, MIDDLE, [Step(depth=d) for d in way], "full", friction))[-1]
-        for way in (whole, parts)
+        list(solve_path("digit", BALL, MIDDLE, [Step(depth=depth * part) for part in way], "full", 0.0))[-1]
+        for way in ([1.0], np.arange(1, 11) / 10)
     )
     off = np.linalg.norm(one.displacement - many.displacement, axis=1).max()
-    broken = broken_full(one, "digit", BALL, pose_at("digit", BALL, MIDDLE).moved(depth), friction)
+    broken = broken_full(one, "digit", BALL, pose_at("digit", BALL, MIDDLE).moved(depth), 0.0)
     words = f"{one.load_steps} load steps; force {np.linalg.norm(one.force) / np.linalg.norm(many.force) - 1:.2%} off"
     return Found(off * 1e6, "um", 1.0, words=words, broken=broken)
 
 
-case("ten_steps_at_once_full", "load step ten times too large", MECHANICS_FULL,
-     "the same answer to 1 um without friction: equilibrium knows no path")(
-    functools.partial(_path_full, 10, 0.0)
-)  # fmt: skip
+def _ten_steps(friction: float) -> tuple[FastContact, FastContact, tuple[str, ...]]:
+    """0.8 mm at once and in ten steps, in the fast tier; and the laws that the first breaks."""
+    at_once, walk = press("digit", BALL, MIDDLE, friction).at_depth(0.8e-3), press("digit", BALL, MIDDLE, friction)
+    for depth in np.arange(1, 11) * 0.08e-3:
+        slow = walk.at_depth(float(depth))
+    return at_once, slow, broken_fast(at_once, BALL, friction)
 
 
 @case("ten_steps_at_once_fast", "load step ten times too large", MECHANICS_FAST, "the same answer to 1 um")
 def steps_fast() -> Found:
-    """0.8 mm at once and in ten steps."""
-    at_once = press("digit", BALL, MIDDLE, 0.0).at_depth(0.8e-3)
-    walk = press("digit", BALL, MIDDLE, 0.0)
-    for depth in np.arange(1, 11) * 0.08e-3:
-        slow = walk.at_depth(float(depth))
-    off = np.abs(at_once.corrected.displacement - slow.corrected.displacement).max()
-    return Found(off * 1e6, "um", 1.0, broken=broken_fast(at_once, BALL, 0.0))
+    """Without friction."""
+    one, many, broken = _ten_steps(0.0)
+    off = np.abs(one.corrected.displacement - many.corrected.displacement).max()
+    return Found(off * 1e6, "um", 1.0, broken=broken)
 
 
 @case("ten_steps_at_once_friction_fast", "load step ten times too large", MECHANICS_FAST,
       "with friction the path matters: within 2 % of force, a fortieth of what the tier states")  # fmt: skip
 def steps_friction_fast() -> Found:
-    """0.8 mm at once and in ten steps, with friction."""
-    at_once = press("digit", BALL, MIDDLE, 0.78).at_depth(0.8e-3)
-    walk = press("digit", BALL, MIDDLE, 0.78)
-    for depth in np.arange(1, 11) * 0.08e-3:
-        slow = walk.at_depth(float(depth))
-    off = np.linalg.norm(at_once.force) / np.linalg.norm(slow.force) - 1
-    return Found(100 * off, "percent", 2.0, broken=broken_fast(at_once, BALL, 0.78))
+    """With friction."""
+    one, many, broken = _ten_steps(0.78)
+    return Found(100 * (np.linalg.norm(one.force) / np.linalg.norm(many.force) - 1), "percent", 2.0, broken=broken)
 
 
 @case("inverted_start_full", "inverted start", MECHANICS_FULL, "refused, in words: no step leads out of a turned cell")
@@ -186,30 +177,31 @@ def inverted() -> Found:
     return refusal(lambda: problem.move(pose.moved(0.3e-3), start, 5e-3), "no equilibrium")
 
 
-def _near(name: str, hard: str, ask: dict, tier: str, *, most: float) -> None:
+# name -> the difficulty, what is asked, um that a node may move
+SMALL = {
+    "depth_0.1um": ("tiny depth (0.1 um)", {"depth": 1e-7}, 0.1),
+    "force_1uN": ("tiny force (1e-6 N)", {"force": 1e-6}, 2.0),
+    "depth_zero": ("zero contact", {"depth": 0.0}, 0.0),
+    "force_zero": ("zero contact", {"force": 0.0}, 0.0),
+}
+
+
+@case("{}_{}", {name: hard for name, (hard, *_) in SMALL.items()}, TIERS,
+      "converges; nothing moves more than the depth asked for, 2 um by 1 uN, not at all by none; its error is honest",
+      *((name, tier) for tier in TIERS for name in SMALL), slow=["force_1uN_full"])  # fmt: skip
+def _near(name: str, tier: str) -> Found:
     """A request too small for any lattice: nothing moves farther than was asked, and the error says so."""
-
-    def find() -> Found:
-        found = solve("digit", BALL, MIDDLE, tier=tier, friction=0.0, **ask)
-        moved = float(np.linalg.norm(found.displacement, axis=1).max())
-        broken = [] if found.converged and np.isfinite(found.displacement).all() else ["did not converge"]
-        nodes = int(found.contact_patch.sum())
-        if not found.force.any() and found.depth > 0 and found.force_error < 1:
-            broken.append(f"no force at a depth, and a stated error of {found.force_error:.0%}")
-        words = f"{np.linalg.norm(found.force):.3g} N at {found.depth * 1e6:.3g} um, {nodes} nodes, "
-        words += f"states {found.force_error:.0%} and {found.shape_error * 1e6:.2g} um"
-        return Found(moved * 1e6, "um", most, words=words, broken=tuple(broken))
-
-    stage = MECHANICS_FAST if tier == "fast" else MECHANICS_FULL
-    case(f"{name}_{tier}", hard, stage, f"converges; nothing moves more than {most:g} um; its stated error is honest",
-         slow=tier == "full" and "force" in ask and bool(ask["force"]))(find)  # fmt: skip
-
-
-for _tier in ("fast", "full"):
-    _near("depth_0.1um", "tiny depth (0.1 um)", {"depth": 1e-7}, _tier, most=0.1)
-    _near("force_1uN", "tiny force (1e-6 N)", {"force": 1e-6}, _tier, most=2.0)
-    _near("depth_zero", "zero contact", {"depth": 0.0}, _tier, most=0.0)
-    _near("force_zero", "zero contact", {"force": 0.0}, _tier, most=0.0)
+    _, ask, most = SMALL[name]
+    found = solve("digit", BALL, MIDDLE, tier=tier, friction=0.0, **ask)
+    moved = float(np.linalg.norm(found.displacement, axis=1).max())
+    broken = [] if found.converged and np.isfinite(found.displacement).all() else ["did not converge"]
+    if not found.force.any() and found.depth > 0 and found.force_error < 1:
+        broken.append(f"no force at a depth, and a stated error of {found.force_error:.0%}")
+    words = (
+        f"{np.linalg.norm(found.force):.3g} N at {found.depth * 1e6:.3g} um, {int(found.contact_patch.sum())} nodes, "
+    )
+    words += f"states {found.force_error:.0%} and {found.shape_error * 1e6:.2g} um"
+    return Found(moved * 1e6, "um", most, words=words, broken=tuple(broken))
 
 
 @case("force_1nN", "tiny force (1e-6 N)", MECHANICS_FAST, "a thousandth of that is refused, in words")
@@ -218,19 +210,13 @@ def smaller_force() -> Found:
     return refusal(lambda: solve("digit", BALL, MIDDLE, force=1e-9), "at least 1e-06 N")
 
 
-def _narrow(sensor: str, radius: float, tier: str) -> Found:
-    return refusal(lambda: solve(sensor, Sphere(radius), MIDDLE, depth=0.3e-3, tier=tier, friction=0.0), "sunk")
-
-
-for _sensor in ("digit", "biotac"):
-    for _radius in (0.05e-3, 0.2e-3):
-        case(f"ball_{2e3 * _radius:g}mm_{_sensor}_fast", "indenter much smaller than an element", MECHANICS_FAST,
-             "0.3 mm deep it sinks in between nodes 0.35 and 0.5 mm apart: said in words")(
-            functools.partial(_narrow, _sensor, _radius, "fast")
-        )  # fmt: skip
-case("ball_0.1mm_digit_full", "indenter much smaller than an element", MECHANICS_FULL, "as in the fast tier")(
-    functools.partial(_narrow, "digit", 0.05e-3, "full")
-)
+@case("ball_{:g}mm_{}_{}", "indenter much smaller than an element", TIERS,
+      "0.3 mm deep it sinks in between nodes 0.35 and 0.5 mm apart: said in words",
+      *((width, sensor, "fast") for sensor in ("digit", "biotac") for width in (0.1, 0.4)),
+      (0.1, "digit", "full"))  # fmt: skip
+def _narrow(millimetres: float, sensor: str, tier: str) -> Found:
+    ball = Sphere(millimetres * 1e-3 / 2)
+    return refusal(lambda: solve(sensor, ball, MIDDLE, depth=0.3e-3, tier=tier, friction=0.0), "sunk")
 
 
 @case("ball_1mm_digit_fast", "indenter much smaller than an element", MECHANICS_FAST,

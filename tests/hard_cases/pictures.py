@@ -23,13 +23,14 @@ from tactile_core.pictures.renderer import Renderer
 from tactile_core.pictures.shading import Shader
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y, Led
 
-from .case import FAST_PICTURE, HEIGHT_MAP, MITSUBA, Found, case, refusal
+from .case import FAST_PICTURE, HEIGHT_MAP, MITSUBA, PRESETS, Found, case, refusal
 from .contacts import press
-from .shapes import CONTACTS, SUNK
+from .shapes import CONTACTS, HARD_OF, SHOWN
 
 UNIT = plain_unit()
 HALF = plain_unit().at_size(120, 160)  # a quarter of the pixels: the time of Mitsuba's scalar variant
 GREY = np.full((*UNIT.camera.shape, 3), 128)
+BOTH = [(preset,) for preset in PRESETS]
 FAR = 3e-3  # m from a dent of 20 um, where its picture must be that of the resting gel to half a level
 
 
@@ -40,6 +41,9 @@ def moved(name: str) -> np.ndarray:
     return press("digit", indenter, place, friction).at_depth(depth).corrected.displacement
 
 
+@case("{}_heights", HARD_OF, HEIGHT_MAP,
+      "99 of 100 nodes are where the map says, to 5 um (a pixel is 53 um wide)", *((name,) for name in SHOWN)
+      )  # fmt: skip
 def _heights(name: str) -> Found:
     """At each displaced node, looked up among the pixels, against the node's own height."""
     mapper, displacement = gel_mapper(), moved(name)
@@ -55,6 +59,9 @@ def _heights(name: str) -> Found:
     return Found(float(np.quantile(off, 0.99)) * 1e6, "um", 5.0, words=words, broken=broken)
 
 
+@case("{}_pictures", HARD_OF, MITSUBA,
+      "fast and Mitsuba's picture differ by 1.5 levels rms at most (docs/optics.md: 1.2 and 1.4 off the reference)",
+      *((name,) for name in SHOWN), slow=["rim", "deep", "two_patches"])  # fmt: skip
 def _pictures(name: str) -> Found:
     """The change that the contact makes, fast against Mitsuba."""
     heights = HeightMapper(sensors.digit_surface(), HALF.camera)(moved(name))
@@ -71,6 +78,8 @@ def _compared(unit, heights: np.ndarray, rest: np.ndarray, most: float) -> Found
     return Found(off, "levels", most, words=f"of a change of {size:.1f} levels rms", broken=broken)
 
 
+@case("{}_far_off", HARD_OF, FAST_PICTURE, "3 mm away nothing changes by more than half a level",
+      ("edge",), ("two_patches",), ("sharp_corner",))  # fmt: skip
 def _far_off(name: str) -> Found:
     """How much the picture changes away from the contact."""
     heights = gel_mapper()(moved(name))
@@ -83,21 +92,6 @@ def _far_off(name: str) -> Found:
     return Found(float(change[far].mean()) if far.any() else 0.0, "levels", 0.5, words=f"near it {near:.1f} levels")
 
 
-for _name, (_hard, *_rest) in CONTACTS.items():
-    if ("digit", _name) in SUNK:
-        continue
-    case(
-        f"{_name}_heights", _hard, HEIGHT_MAP, "99 of 100 nodes are where the map says, to 5 um (a pixel is 53 um wide)"
-    )(functools.partial(_heights, _name))
-    case(f"{_name}_pictures", _hard, MITSUBA,
-         "fast and Mitsuba's picture differ by 1.5 levels rms at most (docs/optics.md: 1.2 and 1.4 off the reference)",
-         slow=_name in ("rim", "deep", "two_patches"))(functools.partial(_pictures, _name))  # fmt: skip
-    if _name in ("edge", "two_patches", "sharp_corner"):
-        case(f"{_name}_far_off", _hard, FAST_PICTURE, "3 mm away nothing changes by more than half a level")(
-            functools.partial(_far_off, _name)
-        )
-
-
 @case("nothing_touches_heights", "zero contact", HEIGHT_MAP, "exactly the resting gel")
 def still_heights() -> Found:
     """No displacement."""
@@ -105,18 +99,16 @@ def still_heights() -> Found:
     return Found(float(np.abs(still - rest_height_map()).max()) * 1e6, "um", 0.0)
 
 
+@case("nothing_touches_{}", "zero contact", PRESETS,
+      "bit-equal to the background", *BOTH)  # fmt: skip
 def _still(preset: str) -> Found:
     background = np.random.default_rng(0).integers(0, 256, (*HALF.camera.shape, 3), dtype=np.uint8)
     drawn = Renderer(HALF, preset, background=background)(rest_height_map(HALF.camera))
     return Found(float(np.abs(drawn.astype(int) - background).max()), "levels", 0.0)
 
 
-for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
-    case(f"nothing_touches_{_preset}", "zero contact", _stage, "bit-equal to the background")(
-        functools.partial(_still, _preset)
-    )
-
-
+@case("depth_0.1um_{}_picture", "tiny depth (0.1 um)", PRESETS,
+      "less than half a level anywhere", *BOTH)  # fmt: skip
 def _faint(preset: str) -> Found:
     """A press of 0.1 um: it must not show, and its noise neither."""
     rest = rest_height_map(HALF.camera)
@@ -125,12 +117,6 @@ def _faint(preset: str) -> Found:
     drawn = Renderer(HALF, preset)
     change = levels(HALF, drawn.radiance(rest + dent) - drawn.rest_radiance)
     return Found(float(np.abs(change).max()), "levels", 0.5)
-
-
-for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
-    case(f"depth_0.1um_{_preset}_picture", "tiny depth (0.1 um)", _stage, "less than half a level anywhere")(
-        functools.partial(_faint, _preset)
-    )
 
 
 @case("2_px_per_mm", "extreme px/mm", HEIGHT_MAP, "a picture wider than the gel's window is refused, in words")
@@ -157,6 +143,7 @@ def narrow() -> Found:
     return Found(float(np.abs(mapper(displacement) - truth).max()) * 1e6, "um", 0.05)
 
 
+@case("{:g}_px_per_mm_pictures", "extreme px/mm", MITSUBA, "fast and Mitsuba's agree to 1.5 levels", (18.8,), (400.0,))
 def _scaled(px_per_mm: float) -> Found:
     """The same bump, seen by a camera so near that it fills the picture, with lights as near."""
     factor = 18.8 / px_per_mm
@@ -167,12 +154,8 @@ def _scaled(px_per_mm: float) -> Found:
     return _compared(unit, bump, np.zeros_like(bump), 1.5)
 
 
-for _scale in (18.8, 400.0):
-    case(f"{_scale:g}_px_per_mm_pictures", "extreme px/mm", MITSUBA, "fast and Mitsuba's agree to 1.5 levels")(
-        functools.partial(_scaled, _scale)
-    )
-
-
+@case("grazing_plane_{}", "grazing light", PRESETS,
+      "Lambert's law on a plane to 0.2 % (a pixel's middle is 3 um off in Mitsuba)", *BOTH)  # fmt: skip
 def _lambert(preset: str) -> Found:
     """A small light 0.1 mm over the plane, 13 mm away: it comes in at half a degree."""
     led = Led("green", (-13e-3, -3e-3, 0.1e-3), 1e-5, 1.0)
@@ -185,13 +168,6 @@ def _lambert(preset: str) -> Found:
     return Found(100 * float(np.abs(found / truth / unit.facing[1] - 1).max()), "percent", 0.2)
 
 
-for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
-    case(f"grazing_plane_{_preset}", "grazing light", _stage,
-         "Lambert's law on a plane to 0.2 % (a pixel's middle is 3 um off in Mitsuba)")(
-        functools.partial(_lambert, _preset)
-    )  # fmt: skip
-
-
 @case("grazing_bump", "grazing light", MITSUBA, "fast and Mitsuba's agree to 1.5 levels where lights are 1 mm high")
 def grazing_bump() -> Found:
     """A bump of 0.3 mm on a plane, lights at 4 degrees: its shadows are 4 mm long."""
@@ -202,6 +178,8 @@ def grazing_bump() -> Found:
     return _compared(unit, bump, np.zeros_like(bump), 1.5)
 
 
+@case("gel_over_the_lights_{}", "grazing light", PRESETS,
+      "a gel higher than its lights is refused, in words", *BOTH)  # fmt: skip
 def _below(preset: str) -> Found:
     """Lights 1 mm high beside a dome of 1.6 mm."""
     low = with_leds(HALF, radius=0.1e-3)
@@ -213,12 +191,8 @@ def _below(preset: str) -> Found:
     return refusal(draw, "below LEDs")
 
 
-for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
-    case(
-        f"gel_over_the_lights_{_preset}", "grazing light", _stage, "a gel higher than its lights is refused, in words"
-    )(functools.partial(_below, _preset))
-
-
+@case("cliff_{}", "depth discontinuities", PRESETS,
+      "the shadow of a step is as long as it should be, to 1.5 pixels", *BOTH)  # fmt: skip
 def _cliff(preset: str) -> Found:
     """A step of 0.6 mm within one pixel, a far light at 30 degrees: the shadow is 0.6 mm / tan 30 degrees long."""
     height, angle = 0.6e-3, np.radians(30)
@@ -237,15 +211,6 @@ def _cliff(preset: str) -> Found:
     return Found((length - height / np.tan(angle)) / camera.pixel_size[0], "pixels", 1.5, words=words, broken=broken)
 
 
-for _stage, _preset in ((FAST_PICTURE, "fast"), (MITSUBA, "standard")):
-    case(
-        f"cliff_{_preset}",
-        "depth discontinuities",
-        _stage,
-        "the shadow of a step is as long as it should be, to 1.5 pixels",
-    )(functools.partial(_cliff, _preset))
-
-
 @case("cliffs_heights", "depth discontinuities", HEIGHT_MAP,
       "one node pushed in by 0.5 mm: finite, overshot by a fifth at most, as cubic splines do")  # fmt: skip
 def spike() -> Found:
@@ -259,9 +224,8 @@ def spike() -> Found:
     return Found(100 * float(-rise.min() / 0.5e-3), "percent", 20.0, broken=broken)
 
 
-@case(
-    "inverted_gel_heights", "inverted start", HEIGHT_MAP, "a gel folded over itself gives finite heights, and says so"
-)
+@case("inverted_gel_heights", "inverted start", HEIGHT_MAP,
+      "a gel folded over itself gives finite heights, and says so")  # fmt: skip
 def folded() -> Found:
     """Sideways displacements of five times a press, toward its middle."""
     gel, heard = sensors.digit_surface(), []

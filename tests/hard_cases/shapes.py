@@ -6,8 +6,6 @@ apart lay below). The full tier itself must fulfil the laws of contact; its own 
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 
 from tactile_core.geometry.indenters import Box, BumpyCube, Edge, Indenter, Pose, Ring, Several, Sphere
@@ -17,7 +15,6 @@ from tactile_core.mechanics.solve import solve
 from .case import MECHANICS_FAST, MECHANICS_FULL, Found, case, refusal
 from .contacts import MIDDLE, broken_fast, broken_full, full, over_stated, press
 
-SENSORS = ("digit", "biotac")
 PAIR = Several(tuple((Sphere(2e-3), Pose(np.array([x, 0.0, 0.0]), np.eye(3))) for x in (-2.5e-3, 2.5e-3)))
 CORNER = Placement(-8.2e-3, 1.13e-3, np.radians(35), np.radians(45))
 RIM = Placement(-8e-3, 8.6e-3)  # 0.6 mm from the gel's outline
@@ -33,12 +30,18 @@ CONTACTS: dict[str, tuple[str, Indenter, Placement, float, float]] = {
     "deep": ("indentation beyond 60 % of the thickness", Sphere(7e-3), MIDDLE, 1.5e-3, 0.0),
 }
 # Blades between the nodes of lattices 0.35 and 0.5 mm apart, and of meshes 0.5 and 0.8 mm.
-SUNK = (("digit", "sharp_edge"), ("biotac", "sharp_edge"))
+SUNK = "sharp_edge"
+SHOWN = [name for name in CONTACTS if name != SUNK]
+HARD_OF = {name: hard for name, (hard, *_) in CONTACTS.items()}
+EACH = [(name, sensor) for name in CONTACTS for sensor in ("digit", "biotac")]
 
 
-def _fast(sensor: str, name: str) -> Found:
+@case("{}_{}_fast", HARD_OF, MECHANICS_FAST,
+      "converges and is off the full tier by no more than it states, or says that it cannot", *EACH, slow=["biotac"]
+      )  # fmt: skip
+def _fast(name: str, sensor: str) -> Found:
     _, indenter, place, depth, friction = CONTACTS[name]
-    if (sensor, name) in SUNK:
+    if name == SUNK:
         return refusal(lambda: press(sensor, indenter, place, friction).at_depth(depth), "sunk")
     found = press(sensor, indenter, place, friction).at_depth(depth)
     answer = solve(sensor, indenter, place, depth=depth, friction=friction)
@@ -46,9 +49,12 @@ def _fast(sensor: str, name: str) -> Found:
     return Found(value, "of stated", 1.0, words=words, broken=broken_fast(found, indenter, friction))
 
 
-def _full(sensor: str, name: str) -> Found:
+@case("{}_{}_full", HARD_OF, MECHANICS_FULL,
+      "no node in the indenter or pulled, forces balanced, no cell inside out; or says that it cannot", *EACH,
+      slow=["biotac"])  # fmt: skip
+def _full(name: str, sensor: str) -> Found:
     _, indenter, place, depth, friction = CONTACTS[name]
-    if (sensor, name) in SUNK:
+    if name == SUNK:
         return refusal(lambda: full(sensor, indenter, place, depth, friction), "sunk")
     found = full(sensor, indenter, place, depth, friction)
     pose = pose_at(sensor, indenter, place).moved(depth)
@@ -57,32 +63,12 @@ def _full(sensor: str, name: str) -> Found:
     return Found(found.penetration * 1e6, "um", 1.0, words=words, broken=broken)
 
 
-def _against_reference(sensor: str, name: str) -> Found:
+@case("{}_{}_full_against_reference", HARD_OF, MECHANICS_FULL,
+      "differs from the reference tier by no more than it states of itself",
+      ("edge", "digit"), ("ring", "digit"), ("two_patches", "digit"), slow=["digit"])  # fmt: skip
+def _against_reference(name: str, sensor: str) -> Found:
     _, indenter, place, depth, friction = CONTACTS[name]
     found = full(sensor, indenter, place, depth, friction)
     truth = solve(sensor, indenter, place, depth=depth, tier="reference", friction=friction)
     value, words = over_stated(found, truth)
     return Found(value, "of stated", 1.0, words=words)
-
-
-def _add() -> None:
-    for name, (hard, *_) in CONTACTS.items():
-        for sensor in SENSORS:
-            case(
-                f"{name}_{sensor}_fast", hard, MECHANICS_FAST,
-                "converges and is off the full tier by no more than it states, or says that it cannot",
-                slow=sensor == "biotac",
-            )(functools.partial(_fast, sensor, name))  # fmt: skip
-            case(
-                f"{name}_{sensor}_full", hard, MECHANICS_FULL,
-                "no node in the indenter or pulled, forces balanced, no cell inside out; or says that it cannot",
-                slow=sensor == "biotac",
-            )(functools.partial(_full, sensor, name))  # fmt: skip
-        if name in ("edge", "ring", "two_patches"):
-            case(
-                f"{name}_digit_full_against_reference", hard, MECHANICS_FULL,
-                "differs from the reference tier by no more than it states of itself", slow=True,
-            )(functools.partial(_against_reference, "digit", name))  # fmt: skip
-
-
-_add()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 
 from tactile_core.geometry.indenters import Sphere
@@ -16,8 +14,10 @@ from .contacts import MIDDLE, broken_fast, broken_full, press
 
 BALL = Sphere(3.5e-3)
 FRICTION = 0.5
+ENDS_AT_MU = "the force along the slide ends at 0.5 of the normal one, to the dome's slope of 0.05; Coulomb's law holds"
 
 
+@case("slide_{}_fast", "sliding and rolling", MECHANICS_FAST, ENDS_AT_MU, ("digit",), ("biotac",), slow=["biotac"])
 def _slide_fast(sensor: str) -> Found:
     """0.3 mm deep, then 1.2 mm along the finger: friction grows to the coefficient, and stays."""
     one = press(sensor, BALL, MIDDLE, FRICTION)
@@ -29,22 +29,15 @@ def _slide_fast(sensor: str) -> Found:
     return Found(along / normal - FRICTION, "of force", 0.06, words=words, broken=broken_fast(found, BALL, FRICTION))
 
 
-def _slide_full() -> Found:
+@case("slide_{}_full", "sliding and rolling", MECHANICS_FULL, ENDS_AT_MU, ("digit",), slow=["digit"])
+def _slide_full(sensor: str) -> Found:
     """The same in the full tier, 0.6 mm far."""
     steps = [Step(depth=0.3e-3), *(Step(depth=0.3e-3, slide=(way, 0.0)) for way in (0.2e-3, 0.4e-3, 0.6e-3))]
-    found = list(solve_path("digit", BALL, MIDDLE, steps, "full", FRICTION))[-1]
-    pose = pose_at("digit", BALL, MIDDLE)
+    found = list(solve_path(sensor, BALL, MIDDLE, steps, "full", FRICTION))[-1]
+    pose = pose_at(sensor, BALL, MIDDLE)
     ratio = (found.force @ pose.axes[:, 0]) / (found.force @ pose.direction)
-    broken = broken_full(found, "digit", BALL, pose.slid(0.6e-3, 0).moved(0.3e-3), FRICTION)
+    broken = broken_full(found, sensor, BALL, pose.slid(0.6e-3, 0).moved(0.3e-3), FRICTION)
     return Found(ratio - FRICTION, "of force", 0.06, words=f"{found.slipping:.0%} slip", broken=broken)
-
-
-ENDS_AT_MU = "the force along the slide ends at 0.5 of the normal one, to the dome's slope of 0.05; Coulomb's law holds"
-for _sensor in ("digit", "biotac"):
-    case(f"slide_{_sensor}_fast", "sliding and rolling", MECHANICS_FAST, ENDS_AT_MU, slow=_sensor == "biotac")(
-        functools.partial(_slide_fast, _sensor)
-    )
-case("slide_digit_full", "sliding and rolling", MECHANICS_FULL, ENDS_AT_MU, slow=True)(_slide_full)
 
 
 @case("roll_digit_fast", "sliding and rolling", MECHANICS_FAST,
@@ -61,6 +54,9 @@ def rolled() -> Found:
     return Found(off * 1e6, "um", 0.4, broken=broken_fast(found, BALL, 0.0))
 
 
+@case("off_the_rim_{:g}_fast", "contact at the pad's rim and leaving it", MECHANICS_FAST,
+      "forces stay balanced and in Coulomb's cone; beyond the gel there is none, and nothing stays deformed",
+      (0.0,), (0.5,))  # fmt: skip
 def _off_the_rim(friction: float) -> Found:
     """From 2 mm inside the gel's side outward, past its outline, until nothing touches."""
     place = Placement(-8e-3, digit.HALF_WIDTH - 2e-3)
@@ -78,13 +74,6 @@ def _off_the_rim(friction: float) -> Found:
     return Found(forces[-1], "N", 0.0, words=words, broken=tuple(broken))
 
 
-for _friction in (0.0, 0.5):
-    case(f"off_the_rim_{_friction:g}_fast", "contact at the pad's rim and leaving it", MECHANICS_FAST,
-         "forces stay balanced and in Coulomb's cone; beyond the gel there is none, and nothing stays deformed")(
-        functools.partial(_off_the_rim, _friction)
-    )  # fmt: skip
-
-
 @case("lifted_full", "contact at the pad's rim and leaving it", MECHANICS_FULL,
       "a path that ends above the gel ends without force, the gel at rest to 0.01 um")  # fmt: skip
 def lifted() -> Found:
@@ -95,12 +84,8 @@ def lifted() -> Found:
     return Found(float(np.abs(found.displacement).max()) * 1e6, "um", 0.01, broken=broken)
 
 
-@case(
-    "off_the_gel",
-    "contact at the pad's rim and leaving it",
-    MECHANICS_FAST,
-    "a press beside the gel is refused, in words",
-)
+@case("off_the_gel", "contact at the pad's rim and leaving it", MECHANICS_FAST,
+      "a press beside the gel is refused, in words")  # fmt: skip
 def beside() -> Found:
     """1 mm outside the outline."""
     place = Placement(-8e-3, digit.HALF_WIDTH + 1e-3)
