@@ -1,4 +1,4 @@
-"""Measure the cost of each part of a simulation, a conversion and a rendering, for `tactile plan`.
+"""Measure the cost of each part of a simulation, a conversion and a rendering, for `--plan`.
 
     python scripts/benchmarks/measure_costs.py                       writes data/costs.json, about five minutes
     python scripts/benchmarks/measure_costs.py --quick --json FILE   one sensor, and writes rows alone

@@ -98,7 +98,7 @@ CASES = (
         "render_standard", "render {}/converted/touch/frames.h5 --out {}/standard --frames :2",
         "numpy h5py PIL mitsuba drjit",
     ),
-    Case("plan", "plan {}/scene.toml", "numpy msgspec scipy"),
+    Case("simulate --plan", "simulate {}/scene.toml --out {}/planned.h5 --plan", "numpy msgspec scipy"),
     Case("simulate", "simulate {}/scene.toml --out {}/simulated.h5", f"{SOLVING} cholespy"),
     Case("simulate_gel", "simulate {}/scene.toml --keep displacement_digit --out {}/gel.h5", SOLVING),
     Case("pairs", f"pairs {ROOT / 'scenes' / 'press_sphere'} --count 2 --out {{}}/pairs.h5", f"{SOLVING} cholespy"),

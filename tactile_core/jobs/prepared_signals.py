@@ -7,7 +7,6 @@ counts. ``about``: JSON of what is reported of the recording. Chunks carry check
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,15 +19,13 @@ from ..errors import TactileError
 from ..files import atomic, checksummed
 from ..files.hdf5_checked import check_plain, declared, open_plain
 from ..files.hdf5_writer import Disk
-from ..recordings import PrepareOptions, Recording, Signals, electrode_gains, prepare
+from ..recordings import Recording, Signals
 from ..recordings.chunks import read_parts
 from ..recordings.fingers import split
-from ..recordings.flags import Flag
 from ..recordings.labels import Runs, extend
-from ..recordings.polarity import AUTO
-from ..recordings.signals import Rest
+from ..recordings.preparer import Preparer
 from ..sensors import SOURCE
-from ..sensors.fluid_sensor import FALLS, MOST_ELECTRODES
+from ..sensors.fluid_sensor import MOST_ELECTRODES
 from .convert import check_order
 from .engine import job as jobs
 from .engine.inputs import content_hash
@@ -43,8 +40,6 @@ COLUMNS = {
     "time": np.float64, "change": np.float64, "electrodes": np.float32, "quiet": bool, "flags": np.uint16,
     "pdc": np.float64,
 }  # fmt: skip
-CARRIED = "no quiet part: the rest of the part before is taken"
-DOUBTS = np.uint16(Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED)
 MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
@@ -107,74 +102,17 @@ def _write(file: Path, job: Job, path: str, digest: str) -> int:
 
 def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
     """Prepare each part of a recording; also yields the number of its frames that the part before had."""
-    options, rest, rest_pdc = job.recipe.prepare.options(), None, np.nan
-    sensor, source = job.recipe.sensor, job.recipe.source
+    options, source = job.recipe.prepare.options(), job.recipe.source
+    sensor = job.recipe.sensor
     unit = None if sensor is None else sensor.gains_for(path, split(path)[1], "--sensor", source)
-    if unit is not None:
-        options = dataclasses.replace(options, rest=unit.rest())
-    evidence, doubts = "", np.uint16(0)
+
+    def parts() -> Iterator[Recording]:
+        return (part.recording for part in read_parts(path, options.columns, source))
+
+    prepare = Preparer(options, unit, parts)
     for part in read_parts(path, options.columns, source):
-        recording = part.recording
-        check_order(recording, job.recipe.answer)
-        if rest is not None and options.tare not in (None, "none"):  # frames that the user named lie in the first part
-            options = dataclasses.replace(options, tare=slice(0, len(recording)))
-        signals = prepare(recording, options)
-        if rest is None:
-            if options.polarity == AUTO and signals.flags[0] & DOUBTS:
-                options, evidence = _one_polarity(path, options, source)
-                signals = prepare(recording, options)
-            factor, polarity = (signals.report[name] for name in ("counts_per_unit", "polarity"))
-            doubts = np.uint16(0) if evidence else signals.flags[0] & DOUBTS
-            options = dataclasses.replace(options, kind=signals.kind, counts_per_unit=factor, polarity=polarity)
-        elif options.tare is not None or (not signals.quiet.any() and signals.kind != "raw"):
-            signals = _carried(recording, signals, rest, rest_pdc, given=options.tare is not None)
-        signals = _decided_once(signals, doubts, evidence, first=rest is None)
-        rest, rest_pdc = signals.rest + signals.drift * recording.duration, _rest_pdc(recording, signals)
-        # What is calm in the next part is rest where it lies near this one's: a long grip is calm, too.
-        known = Rest(tuple(rest), (0.0,) * len(rest), rest_pdc if np.isfinite(rest_pdc) else None)
-        options = dataclasses.replace(options, rest=known)
-        if unit is not None:
-            signals = electrode_gains.apply(signals, unit)
-        yield recording, signals, part.repeated
-
-
-def _one_polarity(path: str, options: PrepareOptions, sensor: str) -> tuple[PrepareOptions, str]:
-    """Options that name the polarity of the first part that shows it, and the evidence; as they are where none does."""
-    for part in read_parts(path, options.columns, sensor):
-        signals = prepare(part.recording, options)
-        if not signals.flags[0] & DOUBTS:
-            name, evidence = (signals.report[each] for each in ("polarity", "polarity_evidence"))
-            return dataclasses.replace(options, polarity=name), evidence
-    return options, ""
-
-
-def _decided_once(signals: Signals, doubts: np.uint16, evidence: str, *, first: bool) -> Signals:
-    """Return a part's signals under the polarity decided for the whole recording, which is reported once."""
-    flags = (signals.flags & ~DOUBTS) | doubts
-    report = signals.report | ({"polarity_evidence": evidence} if evidence else {})
-    keep = first and not evidence
-    warnings = tuple(text for text in signals.warnings if keep or not text.startswith("polarity "))
-    if not first:
-        own = "rest is the unit's own"
-        warnings = tuple(CARRIED if text.startswith(own) else text for text in warnings)
-    return dataclasses.replace(signals, flags=flags, report=report, warnings=warnings)
-
-
-def _rest_pdc(recording: Recording, signals: Signals) -> float:
-    """PDC, counts, that a part's pressure was measured from; NaN where there is none."""
-    return float(recording.pdc[0] - signals.pdc[0]) if recording.pdc is not None else np.nan
-
-
-def _carried(recording: Recording, signals: Signals, rest: np.ndarray, rest_pdc: float, given: bool) -> Signals:
-    """Prepare a part without a rest of its own, from the rest (19,) and PDC at the end of the part before."""
-    drift = np.zeros_like(signals.drift)
-    warnings = tuple(text for text in signals.warnings if not text.startswith(("no quiet part", "rest is the unit's")))
-    if not given:
-        warnings += (CARRIED,)
-    sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
-    change = signals.change + sign * (signals.rest - rest)
-    pdc = signals.pdc + _rest_pdc(recording, signals) - rest_pdc
-    return dataclasses.replace(signals, change=change, rest=rest, pdc=pdc, drift=drift, warnings=warnings)
+        check_order(part.recording, job.recipe.answer)
+        yield part.recording, prepare(part.recording), part.repeated
 
 
 class _Writer:

@@ -15,6 +15,7 @@ import numpy as np
 from ..sensors import SOURCE, contact_pressures_of, contacts_of
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import Fluid
+from .doubt import Doubt, Reason
 from .flags import Flag
 from .gain_matching import match
 from .polarity import contact_signals, patterns, spread_out, touching, unit
@@ -24,7 +25,6 @@ MOST = 2000  # frames looked at, evenly spread
 MOST_MATCHED = 200  # of them by which gains are fitted, which takes longer
 NEIGHBOURS = 8  # simulated contacts that a change is put together from
 RIDGE = 0.1  # of their unit vectors' products: neighbours are alike, and their differences must not grow without bound
-BEGINNING = "signals unlike simulated contacts"  # of the warning
 FEWEST = 13  # different contacts: one press and its noise are like up to a dozen, and fewer hardly show a wrong gain
 # Share of a change left over, LEFT + MORE / sqrt(different contacts), that 199 of 200 recordings of units with the
 # right law stay below: simulated contacts of even presses, gains 10 % apart, noise of 1.5 counts, by
@@ -148,65 +148,53 @@ def limit(contacts: int) -> float:
     return LEFT + MORE / float(np.sqrt(contacts))
 
 
-def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = SOURCE) -> str:
-    """Say why changes in contact (n, 19) counts, of a typical unit, are doubted; empty where they are not.
+def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = SOURCE) -> Doubt | None:
+    """Return the doubt of changes in contact (n, 19) counts, of a typical unit; None where there is none.
 
     pressure : (n,) Pa, of the fluid over its level at rest, NaN where it was not measured; None without
     """
     left, contacts = unexplained_share(change, sensor)
     enough, most = contacts >= FEWEST, limit(max(contacts, 1))
-    words = _doubt_electrodes(change, left - most, sensor) if contacts and apart(change, sensor) >= FEWEST_APART else ""
-    if words:
-        return words
+    if contacts and apart(change, sensor) >= FEWEST_APART:
+        found = _doubt_electrodes(change, left - most, sensor)
+        if found is not None:
+            return found
     if enough and left > most:
-        return (
-            f"{BEGINNING}: {left:.0%} of them is left over by their neighbours among these, as a mean"
-            f" of {contacts} contacts, at most {most:.0%} of a unit as simulated. Polarity, gains, order of"
-            " the electrodes or rest may be wrong: see tactile info, --polarity, --tare, and tactile adapt for gains"
-        )
+        return Doubt(Reason.LAW_LEFT_OVER, left=left, contacts=contacts, most=most)
     ratio, pressed = pressure_ratio(change, pressure, sensor) if enough and pressure is not None else (np.nan, 0)
     if pressed >= FEWEST_PRESSED and not LEAST_PRESSURE <= ratio <= MOST_PRESSURE:
-        return (
-            f"{BEGINNING}: the fluid's pressure is {ratio:.2f} times theirs, as the median of {pressed} contacts,"
-            f" {LEAST_PRESSURE:g} to {MOST_PRESSURE:g} of a unit as simulated. The skin may be softer or stiffer, or"
-            " filled to another pressure: forces are wrong by about as much"
-        )
-    return ""
+        limits = {"least": LEAST_PRESSURE, "most": MOST_PRESSURE}
+        return Doubt(Reason.LAW_PRESSURE, ratio=ratio, contacts=pressed, **limits)
+    return None
 
 
 def flagged(
     typical: Framewise, kind: str, quiet: np.ndarray, flags: np.ndarray, pdc: np.ndarray, sensor: str
-) -> tuple[np.ndarray, str]:
-    """Return the flags (T,) of changes of a typical unit, and why their law is doubted; empty where it is not."""
+) -> tuple[np.ndarray, Doubt | None]:
+    """Return the flags (T,) of changes of a typical unit, and the doubt of their law, if there is one."""
     if kind not in ("raw", "tared") or contacts_of(sensor) is None:
-        return flags, ""
+        return flags, None
     contact = touching(typical) & ~quiet
     frames = np.flatnonzero(contact)
     seen = frames[spread_out(len(frames), MOST)]
     guessed = bool(flags[0] & np.uint16(Flag.NO_QUIET_PART))  # then so is what pressure rose from
     pressure = None if guessed else of_kind(sensor, Fluid).readout.pressure * pdc[seen]
-    words = doubt(typical[seen], pressure, sensor)
+    found = doubt(typical[seen], pressure, sensor)
     flags = flags & ~np.uint16(Flag.LAW_DOUBTED)
-    if words:
+    if found is not None:
         flags[contact] |= np.uint16(Flag.LAW_DOUBTED)
-    return flags, words
+    return flags, found
 
 
-def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> str:
-    """Say that two electrodes look exchanged, or gains wrong; empty where neither explains what is left over.
+def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt | None:
+    """Return the doubt that two electrodes are exchanged, or gains wrong; None where neither explains what is left.
 
     beyond : how much more is left over than of a unit as simulated, which either must explain
     """
     less, (first, second) = exchanged_share(change, sensor)
     if less > max(EXCHANGED, beyond):
-        return (
-            f"{BEGINNING}: {less:.1%} of them is explained if E{first + 1} and E{second + 1} are exchanged, at most"
-            f" {EXCHANGED:.1%} of a unit as simulated: look at their plugs, or at the order of the file's columns"
-        )
+        return Doubt(Reason.LAW_EXCHANGED, share=less, first=first + 1, second=second + 1, most=EXCHANGED)
     less, spread = gained_share(change, sensor)
     if less > max(GAINED, beyond) and spread > SPREAD:
-        return (
-            f"{BEGINNING}: {less:.1%} of them is explained by gains of the electrodes {spread:.0%} apart, at most"
-            f" {GAINED:.0%} or {SPREAD:.0%} of a unit as simulated: see tactile adapt"
-        )
-    return ""
+        return Doubt(Reason.LAW_GAINS, share=less, spread=spread, most=GAINED, usual=SPREAD)
+    return None

@@ -19,8 +19,7 @@ from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typica
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
 from .fingers import FINGERS, short_of, split
-from .recording import Recording
-from .signals import EVERY, PrepareOptions, Rest, Signals, doubt_law, prepare
+from .signals import Rest, Signals, doubt_law
 
 FORMAT = "tactile-sensor-2"
 OLD_FORMAT = "tactile-sensor-1"  # its offsets were of counts that rise where a film thins
@@ -104,22 +103,6 @@ def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> Sensor
 
 def _in_words(finger: int | None) -> str:
     return "one unit" if finger is None else f"finger {finger}"
-
-
-def prepare_unit(
-    recording: Recording,
-    options: PrepareOptions | None,
-    unit: ElectrodeGains | None,
-    frames: slice | np.ndarray = EVERY,
-) -> Signals:
-    """Prepare a recording by its unit's rest, and correct its gains and offsets; None: same as `prepare`.
-
-    frames : those whose signals are returned. Raises TactileError like `prepare`.
-    """
-    if unit is None:
-        return prepare(recording, options, frames)
-    every = prepare(recording, dataclasses.replace(options or PrepareOptions(), rest=unit.rest()))
-    return apply(every, unit).at(frames)
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:

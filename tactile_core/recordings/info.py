@@ -12,6 +12,7 @@ from ..sensors import electrode_count, title, typical_rest
 from .biotac_sp import describe_sp
 from .fingers import split
 from .flags import Flag, names
+from .preparer import Preparer
 from .readers import pac_columns, read, sensor_of
 from .recording import Recording
 from .signals import PrepareOptions, Signals, prepare
@@ -41,9 +42,7 @@ def describe(
         return describe_sp(os.fspath(path), recording, gains, _channels(recording, pac), _not_taken(recording))
     signals = prepare(recording, options)
     if gains is not None:
-        from .electrode_gains import prepare_unit
-
-        signals = prepare_unit(recording, options, gains)
+        signals = Preparer(options, gains)(recording)
     lines = [os.fspath(path)]
     lines += [f"  {label:<11}{text}" for label, text in _rows(recording, signals, pac)]
     lines.append("")

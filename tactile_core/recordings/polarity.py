@@ -7,6 +7,7 @@ that of simulated contacts under one sign and not under the other.
 
 from __future__ import annotations
 
+import enum
 import functools
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ from ..errors import TactileError
 from ..sensors import SOURCE, contacts_of, title
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, POLARITIES, RISES, Fluid
+from .doubt import Doubt, Reason
 from .flags import Flag
 from .rest_level import BLOCK, Framewise
 
@@ -36,13 +38,31 @@ LIKE = 0.6  # likeness that is one: 95 of 100 random changes reach .62, changes 
 SCALE = 15.0  # counts, of the arcsinh that the networks see changes through
 
 
+class Basis(enum.Enum):
+    """How far a polarity is borne out: shown by the recording or known, assumed, or stated against what is shown."""
+
+    SURE = enum.auto()
+    ASSUMED = enum.auto()
+    CONTRADICTED = enum.auto()
+
+
 @dataclass(frozen=True)
 class Polarity:
-    """Polarity of a recording: name "falls" or "rises"; evidence in words; sure : shown by the recording, or known."""
+    """Polarity of a recording: name "falls" or "rises"; found : what says so, in words; basis : how far it does."""
 
     name: str
-    evidence: str
-    sure: bool
+    found: str
+    basis: Basis = Basis.SURE
+
+    @property
+    def sure(self) -> bool:
+        """Return true if the recording shows it, or it is known."""
+        return self.basis is Basis.SURE
+
+    @property
+    def evidence(self) -> str:
+        """Return what says so, for reports."""
+        return f"assumed: {self.found}" if self.basis is Basis.ASSUMED else self.found
 
     @property
     def sign(self) -> float:
@@ -52,23 +72,15 @@ class Polarity:
     @property
     def doubt(self) -> Flag | int:
         """Return the flag of every frame where the polarity is in doubt, else 0."""
-        if self.sure:
-            return 0
-        return Flag.POLARITY_ASSUMED if self._assumed else Flag.POLARITY_DOUBTED
+        flags = {Basis.ASSUMED: Flag.POLARITY_ASSUMED, Basis.CONTRADICTED: Flag.POLARITY_DOUBTED}
+        return flags.get(self.basis, 0)
 
     @property
-    def warnings(self) -> list[str]:
-        """Return a sentence for the user where the polarity is in doubt, else none."""
-        if self.sure:
-            return []
-        if not self._assumed:
-            return [f"polarity {self.name!r} contradicts the recording ({self.evidence})"]
-        advice = "say --polarity rises if they hold rest minus reading"
-        return [f"polarity {self.evidence}. Counts are taken to fall where the film thins, as raw ones do; {advice}"]
-
-    @property
-    def _assumed(self) -> bool:
-        return self.evidence.startswith("assumed")
+    def warnings(self) -> list[Doubt]:
+        """Return the doubt for the user, if there is one."""
+        if self.basis is Basis.CONTRADICTED:
+            return [Doubt(Reason.POLARITY_CONTRADICTED, name=self.name, found=self.found)]
+        return [] if self.sure else [Doubt(Reason.POLARITY_ASSUMED, found=self.found)]
 
 
 def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
@@ -78,8 +90,9 @@ def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
     """
     for stated, who in ((given, "as given"), (of_file, "as the file says")):
         if stated in POLARITIES:
-            doubt = shown.sure and shown.name != stated
-            return Polarity(stated, f"{who}; {shown.evidence}" if shown.sure else who, not doubt)
+            against = shown.sure and shown.name != stated
+            basis = Basis.CONTRADICTED if against else Basis.SURE
+            return Polarity(stated, f"{who}; {shown.found}" if shown.sure else who, basis)
     return shown
 
 
@@ -87,7 +100,7 @@ def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
     """Return the polarity of a sensor's raw readings, as its descriptor has it; of other kinds assumed."""
     reading = of_kind(sensor, Fluid).readout.polarity
     raw = f"raw counts of a {title(sensor)}"
-    return Polarity(reading, raw, True) if kind == "raw" else Polarity(reading, f"assumed: as {raw}", False)
+    return Polarity(reading, raw) if kind == "raw" else Polarity(reading, f"as {raw}", Basis.ASSUMED)
 
 
 def polarity_of(
@@ -108,14 +121,14 @@ def polarity_of(
     if pdc is not None and swing < SWING and not rest_known:
         # Nothing was pressed, or the grip was steady: then what looks like rest may be a contact.
         found = f"the fluid's pressure changes by {swing:.0f} counts, less than {SWING:.0f}"
-        return Polarity(FALLS, f"assumed: {found}", False)
+        return Polarity(FALLS, found, Basis.ASSUMED)
     shown = [_by_pressure(electrodes, pdc, swing, sensor)] if pdc is not None and swing >= SWING else []
     shown += [contacts] if contacts is not None and (rest_known or quiet.any()) else []
     sure = [found for found in shown if found.sure]
     if sure and len({found.name for found in sure}) == 1:
         return sure[0]
-    evidence = "; but ".join(found.evidence for found in shown) or "nothing in the recording shows it"
-    return Polarity(FALLS, f"assumed: {evidence}", False)
+    evidence = "; but ".join(found.found for found in shown) or "nothing in the recording shows it"
+    return Polarity(FALLS, evidence, Basis.ASSUMED)
 
 
 def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float, sensor: str) -> Polarity:
@@ -150,7 +163,8 @@ def _decided(changes: np.ndarray, what: str, sensor: str) -> Polarity:
     falls, rises = likeness(changes, sensor), likeness(-changes, sensor)
     name = FALLS if falls >= rises else RISES
     evidence = f"{what} is like simulated contacts by {falls:.2f} if counts fall, by {rises:.2f} if they rise"
-    return Polarity(name, evidence, max(falls, rises) >= LIKE and _apart(min(falls, rises), max(falls, rises)))
+    sure = max(falls, rises) >= LIKE and _apart(min(falls, rises), max(falls, rises))
+    return Polarity(name, evidence, Basis.SURE if sure else Basis.ASSUMED)
 
 
 def _apart(less: float, more: float) -> bool:

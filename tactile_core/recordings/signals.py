@@ -13,6 +13,7 @@ from ..sensors import SOURCE, contacts_of, divider, typical_rest
 from ..sensors.fluid_sensor import FALLS, POLARITIES
 from . import contact_law
 from .assemble import check_electrodes
+from .doubt import LAW, Doubt, Reason, without
 from .electrode_faults import dead, saturated
 from .flags import Flag
 from .polarity import AUTO, Polarity, choose, polarity_of, polarity_of_sensor
@@ -116,7 +117,7 @@ class Signals:
     quiet : (T,) bool, frames without contact that rest was taken from
     flags : (T,) uint16, the recording's and those found here
     pdc : (T,) float, counts, the fluid's pressure over its level at rest; NaN where the recording has none
-    warnings : the recording's and those found here
+    warnings : the recording's and those found here; doubts among them carry their reason, see `doubt`
     report : what was found and done, fit for JSON
     sensor : whose they are; 19 is of a BioTac
     """
@@ -219,7 +220,7 @@ def doubt_law(signals: Signals) -> Signals:
     """
     typical = Changes(len(signals.change), signals.typical_of)
     flags, doubt = contact_law.flagged(typical, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
-    others = tuple(text for text in signals.warnings if not text.startswith(contact_law.BEGINNING))
+    others = without(signals.warnings, LAW)
     return replace(signals, flags=flags, warnings=(*others, *filter(None, [doubt])))
 
 
@@ -260,7 +261,7 @@ def _unit_rest(
             return None
         off = np.abs(still - np.array(options.rest.counts))
         reason = f"what is calm lies up to {off.max():.0f} counts from it (E{off.argmax() + 1})"
-    warnings.append(f"rest is the unit's own: {reason}")
+    warnings.append(Doubt(Reason.REST_OF_UNIT, found=reason))
     return options.rest
 
 
@@ -284,7 +285,7 @@ def _polarity(
     *, rest_known: bool,
 ) -> Polarity:  # fmt: skip
     if kind == "rectified":
-        return Polarity(FALLS, "the sign is lost", True)
+        return Polarity(FALLS, "the sign is lost")
     if contacts_of(recording.sensor) is None:
         return choose(polarity_of_sensor(recording.sensor, kind), options.polarity, recording.about.get("polarity", ""))
     shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known, sensor=recording.sensor)
@@ -384,12 +385,10 @@ def _rest(
         return Baseline.constant(np.zeros(readings.shape[1]))
     if kind == "raw":
         guess = calmest(readings, recording.pdc, recording.rate)
-        warnings.append(
-            f"no quiet part ({quiet.evidence}): rest is guessed from the calmest {guess.stop - guess.start} frames, "
-            f"{guess.start}:{guess.stop}"
-        )
+        frames = {"frames": guess.stop - guess.start, "first": guess.start, "last": guess.stop}
+        warnings.append(Doubt(Reason.REST_GUESSED, found=quiet.evidence, **frames))
         return Baseline.constant(level(readings[guess]))
-    warnings.append(f"no quiet part ({quiet.evidence}): the file's own zero is taken for rest")
+    warnings.append(Doubt(Reason.REST_OF_FILE, found=quiet.evidence))
     return Baseline.constant(np.zeros(readings.shape[1]))
 
 

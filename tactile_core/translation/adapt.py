@@ -13,9 +13,10 @@ import numpy as np
 from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_faults import named_electrodes
-from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, prepare_unit, section_of, units_file
+from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, section_of, units_file
 from ..recordings.fingers import FINGERS, short_of, split
 from ..recordings.gain_matching import PRIOR, Match, match
+from ..recordings.preparer import Preparer
 from ..recordings.readers import each_finger, sensor_of
 from ..recordings.tables.truncated_cell import listed
 from ..sensors import title, typical_rest
@@ -64,7 +65,7 @@ def adapt(
     rest = _rest(recordings)
     bare = _bare(rest)
     for path, recording in zip(paths, recordings, strict=True):
-        signals = prepare_unit(recording, options, bare)
+        signals = Preparer(options, bare)(recording)
         if signals.kind == "scaled":
             advice = "Give its counts a unit, or use another recording"
             raise TactileError(path, "a scaled recording, whose unit is not known", "counts", advice)

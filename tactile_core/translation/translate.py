@@ -15,6 +15,7 @@ from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, electrode_gains
 from ..recordings.electrode_gains import ElectrodeGains
 from ..recordings.fingers import split
+from ..recordings.preparer import Preparer
 from ..sensors import SOURCE, TARGET
 from . import error_bounds, networks, reference_signals
 from .answer import Answer
@@ -83,14 +84,14 @@ class PreparedRows:
         self, recording: Recording, frames: np.ndarray, answer: Answer, options: PrepareOptions | None = None,
         unit: ElectrodeGains | None = None,
     ) -> None:  # fmt: skip
-        """Prepare a recording for rising frames (T,); raises TactileError like `electrode_gains.prepare_unit`."""
+        """Prepare a recording for rising frames (T,); raises TactileError like `Preparer`."""
         rows, self.count = needed(frames, len(recording)) if answer.follows else frames, len(recording)
         if 2 * len(rows) > self.count:  # a copy would take more than it lets go
             self._rows, self.recording = np.arange(self.count), recording
-            self.signals = electrode_gains.prepare_unit(recording, options, unit)
+            self.signals = Preparer(options, unit)(recording)
         else:
             self._rows, self.recording = rows, recording.at(rows)
-            self.signals = electrode_gains.prepare_unit(recording, options, unit, rows)
+            self.signals = Preparer(options, unit)(recording, rows)
 
     def at(self, frames: np.ndarray) -> np.ndarray:
         """Return the indices (n,) of needed frames (n,) among the rows."""

@@ -18,9 +18,11 @@ def test_control_characters_are_escaped(capsys):
     assert err == "tactile: a\\x1b]0;owned\\x07 b\\x9b31m\n"
 
 
-@pytest.mark.parametrize("verb", ["info", "plan"])
+@pytest.mark.parametrize("verb", ["info", "adapt"])
 def test_a_file_s_name_reaches_the_terminal_escaped(verb, capsys, tmp_path):
-    assert main([verb, str(tmp_path / "a\x1b[31m.csv")]) == 2
+    assert (
+        main([verb, str(tmp_path / "a\x1b[31m.csv"), *(["--out", str(tmp_path / "x")] if verb == "adapt" else [])]) == 2
+    )
     assert "\x1b" not in capsys.readouterr().err
 
 

@@ -1,4 +1,4 @@
-"""`tactile plan`: what is built for which outputs, and that its numbers follow the tables."""
+"""`--plan`: what is built for which outputs, and that its numbers follow the tables."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 
 from tactile_core.cli.main import main
-from tactile_core.errors import TactileError
 from tactile_core.jobs import plan
-from tactile_core.jobs.error_budget import Budget
 from tactile_core.mechanics.fast import compliance
 from tactile_core.pictures import presets
 from tactile_core.simulation import tier_choice
@@ -39,8 +37,8 @@ def tables(monkeypatch):
     monkeypatch.setattr(tier_choice, "choose_for_scene", choose)
 
 
-def plan_for(path=PRESS, keep=None, budget=None, preset=None):
-    return plan.plan(path, keep, budget or Budget(), preset)
+def plan_for(path=PRESS, keep="", um=None):
+    return plan.of_scene(path, keep.split(","), um)
 
 
 def built(found):
@@ -50,18 +48,14 @@ def built(found):
 @pytest.mark.parametrize(
     ("keep", "has", "lacks"),
     [
-        ("electrodes", {"BioTac contacts", "electrodes"}, {"DIGIT contacts", "DIGIT matrices", "networks", "pictures"}),
-        ("displacement_digit", {"DIGIT contacts"}, {"BioTac contacts", "BioTac matrices", "electrodes", "pictures"}),
-        ("image", {"DIGIT contacts", "pictures"}, {"BioTac contacts", "electrodes", "networks"}),
-        ("translation", {"BioTac contacts", "electrodes", "networks"}, {"DIGIT contacts", "pictures"}),
-        (None, {"BioTac contacts", "DIGIT contacts", "electrodes", "networks", "pictures"}, set()),
+        ("electrodes", {"BioTac contacts", "electrodes"}, {"DIGIT contacts", "DIGIT matrices"}),
+        ("displacement_digit", {"DIGIT contacts"}, {"BioTac contacts", "BioTac matrices", "electrodes"}),
+        ("electrodes,displacement_digit", {"BioTac contacts", "DIGIT contacts", "electrodes"}, set()),
     ],
 )
 def test_only_what_outputs_need_is_built(keep, has, lacks):
-    found = plan_for(keep=keep)
-    assert has <= set(built(found)) and not lacks & set(built(found))
-    for name in ("BioTac", "DIGIT"):
-        assert any(text.startswith(name) for text in found.left_out) == (f"{name} contacts" not in built(found))
+    found = built(plan_for(keep=keep))
+    assert has <= set(found) and not lacks & set(found)
 
 
 def test_outputs_add_up(monkeypatch, tmp_path):
@@ -79,7 +73,7 @@ def test_outputs_add_up(monkeypatch, tmp_path):
 
 
 def test_an_exact_bound_costs_the_full_tier():
-    found, exact = (plan_for(keep="displacement_digit", budget=Budget(um=um)) for um in (30, 5))
+    found, exact = (plan_for(keep="displacement_digit", um=um) for um in (30, 5))
     assert exact.seconds > found.seconds + 30 and "full tier" in "\n".join(exact.lines())
 
 
@@ -98,45 +92,45 @@ def test_matrices_that_are_cached_are_told_with_their_size(monkeypatch, tmp_path
     folder.mkdir()
     for name in compliance.ARRAYS:
         (folder / f"{name}.npy").write_bytes(bytes(1_000_000))
-    matrices = next(part for part in plan_for(keep="image").parts if part.what == "DIGIT matrices")
+    matrices = next(part for part in plan_for(keep="displacement_digit").parts if part.what == "DIGIT matrices")
     assert matrices.seconds == 0 and "7 MB, cached" in matrices.extent and "2867 surface nodes" in matrices.extent
 
 
-def test_pictures_cost_what_their_preset_was_measured_to(monkeypatch):
-    fast, reference = (plan_for(keep="image", preset=name).seconds for name in ("fast", "reference"))
-    ms = {name: plan._preset_ms(name) for name in ("fast", "reference")}
+def test_pictures_cost_what_their_preset_was_measured_to():
+    fast, reference = (plan.of_frames(201, ("image",), name).seconds for name in ("fast", "reference"))
+    ms = {name: max(presets.measured()["presets"][name]["ms"].values()) for name in ("fast", "reference")}
     assert reference - fast == pytest.approx(201 * (ms["reference"] - ms["fast"]) / 1e3)
-    monkeypatch.setattr(plan, "_variant", lambda preset: "scalar_rgb")
-    assert plan._preset_ms("standard") == presets.measured()["presets"]["standard"]["ms"]["scalar_rgb"]
-    exact = presets.measured()["presets"]["fast"]["error"]
-    assert any("preset fast" in part.extent for part in plan_for(keep="image", budget=Budget(levels=exact)).parts)
 
 
-def test_a_recording_is_planned_as_it_is_converted(slide_csv):
-    latent, everything = plan_for(slide_csv(), "latent"), plan_for(slide_csv(), "latent,displacement,height,image")
-    assert built(latent) == ["networks"] and "contact mechanics" in latent.left_out
-    assert built(everything) == ["networks", "height maps", "pictures"]
-    assert built(plan_for(slide_csv())) == ["networks", "pictures"]  # as `convert` keeps them
-    assert latent.seconds == pytest.approx(1.0 + 0.01 * 150) and "150 frames" in latent.parts[0].extent
+def test_a_recording_is_planned_as_it_is_converted(slide_csv, tmp_path, capsys):
+    assert built(plan.of_frames(150, ("latent",))) == ["networks"]
+    assert built(plan.of_frames(150, ("latent", "height", "image"))) == ["networks", "height maps", "pictures"]
+    assert {"force field", "DIGIT matrices"} <= set(built(plan.of_frames(10, ("traction",))))
+    line = [
+        "convert",
+        str(slide_csv()),
+        "--out",
+        str(tmp_path / "out"),
+        "--keep",
+        "latent",
+        "--frames",
+        ":100",
+        "--plan",
+    ]
+    assert main(line) == 0 and not (tmp_path / "out").exists()
+    said = capsys.readouterr().out
+    assert "100 frames" in said and f"in all about {1.0 + 0.01 * 100:g} s" in said
 
 
-@pytest.mark.parametrize(
-    ("keep", "preset", "words"),
-    [("electrodes,gel", None, "gel"), (",", None, "nothing"), ("image", "draft", "draft"), ("latent", None, "latent")],
-)
-def test_unknown_words_are_refused(keep, preset, words):
-    with pytest.raises(TactileError, match=words):
-        plan_for(keep=keep, preset=preset)
+def test_pairs_are_contacts_on_both_sensors():
+    assert [part.what for part in plan.of_pairs(20).parts if part.seconds == 0.2] == ["DIGIT contacts"]
 
 
-def test_the_command_prints_a_table_or_json(capsys):
-    assert main(["plan", str(PRESS), "--keep", "electrodes"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "scene press: electrodes" and lines[-1].startswith("not built: DIGIT")
-    assert main(["plan", str(PRESS), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["seconds"] == pytest.approx(sum(part["seconds"] for part in found["parts"]), abs=1e-3)
-    assert main(["plan", str(ROOT / "scenes" / "press_sphere")]) == 2  # pairs alone, no recording
+def test_a_simulation_is_planned_and_not_run(tmp_path, capsys):
+    words = ["--out", str(tmp_path / "press.h5"), "--plan"]
+    assert main(["simulate", str(PRESS), "--keep", "electrodes", *words]) == 0
+    assert "BioTac contacts" in capsys.readouterr().out and not (tmp_path / "press.h5").exists()
+    assert main(["simulate", str(ROOT / "scenes" / "press_sphere"), *words]) == 2  # pairs alone, no recording
     assert "[recording]" in capsys.readouterr().err
 
 
@@ -144,7 +138,7 @@ def test_friction_costs_the_full_tier_what_was_measured_with_it(tmp_path):
     text = (PRESS / "scene.toml").read_text(encoding="utf-8")
     assert "friction = 0.0" in text
     (tmp_path / "scene.toml").write_text(text.replace("friction = 0.0", "friction = 0.5"), encoding="utf-8")
-    smooth, rough = (plan_for(path, "displacement_digit", Budget(um=5.0)) for path in (PRESS, tmp_path))
+    smooth, rough = (plan_for(path, "displacement_digit", 5.0) for path in (PRESS, tmp_path))
     assert rough.seconds > 3 * smooth.seconds
 
 
@@ -154,9 +148,3 @@ def test_the_shipped_table_holds_every_part():
         part = found["parts"][name]
         assert all(part[key] >= 0 for key in PART) and part["mb"] > 0
     assert all(each["rough"] > each["smooth"] > 0 for each in found["full_ms"].values())
-
-
-def test_a_translated_force_field_asks_for_the_gel(request):
-    recording = request.config.rootpath / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
-    assert {"force field", "DIGIT matrices"} <= set(built(plan_for(recording, "traction")))
-    assert "contact mechanics" in plan_for(recording, "latent").left_out

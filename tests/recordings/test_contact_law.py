@@ -10,6 +10,7 @@ from benchmarks.translation import wrong_laws
 
 from tactile_core import recordings
 from tactile_core.recordings import contact_law, electrode_gains
+from tactile_core.recordings.doubt import LAW, Reason, reason_of
 from tactile_core.recordings.electrode_gains import ElectrodeGains
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.signals import doubt_law
@@ -47,7 +48,7 @@ def test_one_contact_unlike_simulated_ones_says_nothing_of_gains_and_exchanges()
     noise = wrong_laws.NOISE * np.random.default_rng(0).standard_normal((200, 19))
     grip = wrong_laws.touches(odd=True)[0][100] * np.where(np.arange(19) % 3, 1.0, 2.5) + noise
     assert contact_law.apart(grip) < contact_law.FEWEST_APART and contact_law.exchanged_share(grip)[0] > 0
-    assert "gains" not in contact_law.doubt(grip) and "exchanged" not in contact_law.doubt(grip)
+    assert reason_of(contact_law.doubt(grip)) not in (Reason.LAW_GAINS, Reason.LAW_EXCHANGED)
 
 
 def test_contacts_as_simulated_are_not_doubted():
@@ -58,16 +59,16 @@ def test_a_skin_of_half_the_stiffness_is_seen_by_the_fluid_s_pressure_alone():
     change, pressure, _ = wrong_laws.touches(odd=True)
     contact = contact_law.touching(change)
     change, pressure = change[contact], pressure[contact]
-    assert contact_law.doubt(change) == contact_law.doubt(change, pressure) == ""
-    assert contact_law.doubt(change, np.full(len(change), np.nan)) == ""
+    assert contact_law.doubt(change) is contact_law.doubt(change, pressure) is None
+    assert contact_law.doubt(change, np.full(len(change), np.nan)) is None
     assert "the fluid's pressure is 0.5" in contact_law.doubt(change, pressure / 2)
     assert "the fluid's pressure is 2." in contact_law.doubt(change, 2.2 * pressure)
 
 
 def test_one_contact_however_strange_is_too_little():
     strange = 100 * np.random.default_rng(0).standard_normal(19)
-    assert contact_law.doubt(np.tile(strange, (50, 1)), np.full(50, 1e5)) == ""
-    assert contact_law.doubt(np.empty((0, 19)), np.empty(0)) == ""
+    assert contact_law.doubt(np.tile(strange, (50, 1)), np.full(50, 1e5)) is None
+    assert contact_law.doubt(np.empty((0, 19)), np.empty(0)) is None
 
 
 def signals_of(change, pdc=None):
@@ -89,7 +90,7 @@ def test_the_doubt_flags_contacts_alone_and_a_unit_s_gains_take_it_back():
     contact = contact_law.touching(change * gain)
     assert not (doubted.flags[:40] & Flag.LAW_DOUBTED).any()
     assert np.array_equal(doubted.flags[40:] & Flag.LAW_DOUBTED > 0, contact)
-    assert doubted.warnings[0].startswith(contact_law.BEGINNING)
+    assert reason_of(doubted.warnings[0]) in LAW
     mended = electrode_gains.apply(doubted, ElectrodeGains("a unit", gain.tolist(), [0.0] * 19))
     assert not (mended.flags & Flag.LAW_DOUBTED).any() and not mended.warnings
     rectified = doubt_law(dataclasses.replace(doubted, kind="rectified", flags=0 * doubted.flags, warnings=()))

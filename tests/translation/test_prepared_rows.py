@@ -12,9 +12,10 @@ import pytest
 from tactile_core import recordings
 from tactile_core.jobs import convert
 from tactile_core.pictures import shading
-from tactile_core.recordings import PrepareOptions, electrode_gains
+from tactile_core.recordings import PrepareOptions
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.electrode_gains import ElectrodeGains
+from tactile_core.recordings.preparer import Preparer
 from tactile_core.translation.answer import Answer
 from tactile_core.translation.contact_track import BLOCK, MARGIN
 from tactile_core.translation.translate import PreparedRows
@@ -48,8 +49,8 @@ def test_signals_of_some_frames_are_those_of_the_whole(kind, shipped):
         recording = recording.at(np.arange(100, 140))
     if kind == "unit":
         unit = ElectrodeGains("a unit", np.linspace(0.8, 1.2, 19).tolist(), [1.0] * 19)
-    whole, rows = electrode_gains.prepare_unit(recording, options, unit), np.arange(3, len(recording), 7)
-    some = electrode_gains.prepare_unit(recording, options, unit, rows)
+    whole, rows = Preparer(options, unit)(recording), np.arange(3, len(recording), 7)
+    some = Preparer(options, unit)(recording, rows)
     for name in ARRAYS:
         expected = getattr(whole, name)
         np.testing.assert_array_equal(getattr(some, name), expected if expected.ndim == 1 and len(expected) == 19 else

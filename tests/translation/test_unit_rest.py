@@ -10,8 +10,9 @@ import pytest
 from tactile_core import recordings
 from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, electrode_gains, polarity
-from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile, prepare_unit, units_file
+from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile, units_file
 from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.preparer import Preparer
 from tactile_core.translation.unit_rest import find_rest
 
 REST = np.linspace(3100.0, 3500.0, 19)
@@ -52,14 +53,14 @@ def test_too_few_and_rectified_recordings_are_refused():
 def test_a_grip_without_rest_is_measured_from_the_unit_s_own():
     unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
     grip = held(0.6, 3)
-    bare, found = recordings.prepare(grip), prepare_unit(grip, None, unit)
+    bare, found = recordings.prepare(grip), Preparer(None, unit)(grip)
     assert np.abs(bare.change).max() < 10  # the grip is calm, and taken for rest
     np.testing.assert_allclose(found.change.mean(axis=0), grip.electrodes.mean(axis=0) - REST, atol=1e-6)
     assert not (found.flags & Flag.NO_QUIET_PART).any() and found.report["polarity"] == "falls"
     assert found.pdc.mean() == pytest.approx(120, abs=2)
-    light = prepare_unit(held(0.01, 4), None, unit)  # calm and near the unit's rest: its own is better
+    light = Preparer(None, unit)(held(0.01, 4))  # calm and near the unit's rest: its own is better
     assert light.quiet.any() and np.abs(light.change).max() < 10
-    said = prepare_unit(grip, PrepareOptions(tare="0:50"), unit)
+    said = Preparer(PrepareOptions(tare="0:50"), unit)(grip)
     assert np.abs(said.change).max() < 10  # the user's own frames stand
 
 
@@ -100,7 +101,7 @@ def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
     for path in hard:
         for finger in (0, 1):
             recording = recordings.read(f"{path}#{finger}")
-            signals = prepare_unit(recording, None, sensor.gains_for(path, finger, "made"))
+            signals = Preparer(None, sensor.gains_for(path, finger, "made"))(recording)
             some = signals.at(slice(None, None, 100))
             for name, order in (("as read", slice(None)), ("shuffled", shuffled)):
                 turned = {"change": some.change[:, order], "rest": signals.rest[order]}
@@ -120,16 +121,16 @@ def test_a_quiet_part_under_the_pressure_of_rest_is_kept_however_far_it_drifted(
     unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
     drifted = held(0.0, 5, drift=0.0)
     drifted = dataclasses.replace(drifted, electrodes=drifted.electrodes + 90)
-    found = prepare_unit(drifted, None, unit)
+    found = Preparer(None, unit)(drifted)
     assert found.quiet.any() and np.abs(found.change).max() < 10
-    grip = prepare_unit(held(0.6, 3), None, unit)
+    grip = Preparer(None, unit)(held(0.6, 3))
     assert any("rest is the unit's own: what is calm lies up to" in warning for warning in grip.warnings)
 
 
 def test_pressure_of_another_zero_is_not_measured_from_the_unit_s(tmp_path):
     unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
     grip = held(0.6, 3)
-    found = prepare_unit(dataclasses.replace(grip, pdc=grip.pdc - 1000), None, unit)
+    found = Preparer(None, unit)(dataclasses.replace(grip, pdc=grip.pdc - 1000))
     assert np.abs(found.pdc).max() < 200
     tared = [dataclasses.replace(one, pdc=one.pdc - 1000) for one in (held(s, k) for k, s in enumerate((0.01, 0.1, 1)))]
     assert find_rest(tared).pdc is None

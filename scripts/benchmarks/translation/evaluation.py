@@ -33,7 +33,8 @@ from benchmarks.translation.model_card import write_model_card
 from tactile_core.accuracy import Row
 from tactile_core.errors import TactileError
 from tactile_core.recordings import electrode_gains, read
-from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
+from tactile_core.recordings.electrode_gains import ElectrodeGains
+from tactile_core.recordings.preparer import Preparer
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training.step_errors import our_bodies
 from tactile_core.translation import translate
@@ -86,7 +87,7 @@ def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]
 
 def _slide_prints(folder: Path, network: Translator, most: int | None, sensor: ElectrodeGains | None) -> list[Row]:
     paths = slide_set.reporting(folder)[:most]
-    return prints.rows("recordings", (prepare_unit(read(path), None, sensor) for path in paths), network)
+    return prints.rows("recordings", (Preparer(None, sensor)(read(path)) for path in paths), network)
 
 
 def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:

@@ -13,7 +13,8 @@ import numpy as np
 
 from tactile_core.accuracy import Row, row
 from tactile_core.recordings import Signals, read
-from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
+from tactile_core.recordings.electrode_gains import ElectrodeGains
+from tactile_core.recordings.preparer import Preparer
 from tactile_core.sensors import PRESSURE_PER_COUNT
 from tactile_core.translation.translate import pass_over
 from tactile_core.translation.translator import Translator
@@ -76,7 +77,7 @@ def _frames(path: Path, network: Translator, sensor: ElectrodeGains | None) -> n
     Contacts are followed, as `convert` does: a light frame alone may look like none, and then has no pressure.
     """
     recording = read(path)
-    signals = prepare_unit(recording, None, sensor)
+    signals = Preparer(None, sensor)(recording)
     measured = PRESSURE_PER_COUNT * signals.pdc
     estimated = pass_over(network, signals, recording.time)(np.arange(len(recording))).translation.pressure
     columns = np.column_stack([measured, estimated, np.abs(signals.change).sum(axis=1)])

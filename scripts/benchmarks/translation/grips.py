@@ -15,8 +15,9 @@ from tactile_core import recordings
 from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
 from tactile_core.recordings import Recording
-from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile, prepare_unit
+from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile
 from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.readers import each_finger
 from tactile_core.recordings.signals import Signals
 from tactile_core.sensors import digit, digit_surface, electrodes
@@ -73,8 +74,8 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
         raise TactileError(folder, f"{len(soft)} soft and {len(hard)} hard grips", "some of each, by their trials")
     sensor, _ = adapt.adapt_hand(soft, reference_signals.read(networks.WEIGHTS_FOLDER))
     held = [(one, finger) for path in hard for finger, one in enumerate(each_finger(path))]
-    prepared = [prepare_unit(recordings.read(one), None, sensor.gains_for(one, finger, SOFT)) for one, finger in held]
-    every = [prepare_unit(recordings.read(one), None, sensor.gains_for(one, finger, SOFT)) for path in files
+    prepared = [Preparer(None, sensor.gains_for(one, finger, SOFT))(recordings.read(one)) for one, finger in held]
+    every = [Preparer(None, sensor.gains_for(one, finger, SOFT))(recordings.read(one)) for path in files
              if _trial(path) in REPORTING for finger, one in enumerate(each_finger(path))]  # fmt: skip
     found = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
     found += prints.rows("grip", prepared, network)
@@ -83,7 +84,7 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
 
 def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
     """Measure a grip's unexplained changes with rest taken in the grip; baseline: with the unit's own rest, none."""
-    loaded = [prepare_unit(recordings.read(one), None, None) for one, _ in held]
+    loaded = [Preparer()(recordings.read(one)) for one, _ in held]
     of = f"{len(held)} grips of hard flat objects, rest taken during the grip; baseline: with the unit's rest"
     return row("grip_unexplained", unexplained(loaded), "1", 0.9, baseline=unexplained(known), of=of, at_least=True)
 
@@ -131,7 +132,7 @@ def _judged(
     recording: Recording, unit: ElectrodeGains, network: Translator, order: np.ndarray | slice = slice(None)
 ) -> tuple[float, float, float]:
     """Return whether the median place lies in the box; shares of frames with a place, and of those out of range."""
-    signals = prepare_unit(recording, None, unit)
+    signals = Preparer(None, unit)(recording)
     signals = dataclasses.replace(signals, change=signals.change[:, order], rest=signals.rest[order])
     found = pass_over(network, signals, recording.time)(np.arange(0, len(recording), EVERY)).translation
     known = np.isfinite(found.contact_center[:, 0])

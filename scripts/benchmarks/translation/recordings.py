@@ -17,8 +17,9 @@ from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic
 from tactile_core.recordings import PrepareOptions, Signals, read
-from tactile_core.recordings.electrode_gains import ElectrodeGains, prepare_unit
+from tactile_core.recordings.electrode_gains import ElectrodeGains
 from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.repair import fill
 from tactile_core.sensors import unrolling
 from tactile_core.translation.translate import pass_over
@@ -61,7 +62,7 @@ def translate(
 ) -> Translated:
     """Translate one recording as `tactile convert` does. Raises TactileError for a file that cannot be read."""
     recording = read(path)
-    signals = prepare_unit(recording, options, sensor)
+    signals = Preparer(options, sensor)(recording)
     every = np.arange(len(recording))
     if isinstance(network, Translator):
         whole = pass_over(network, signals, recording.time)

@@ -156,6 +156,13 @@ def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
     verb.add_argument("--error", metavar="BOUND", help=f"the largest error that the toolkit itself may add: {what}")
 
 
+def plan_argument(verb: argparse.ArgumentParser) -> None:
+    """Add ``--plan`` to a verb that has no job to write."""
+    verb.add_argument(
+        "--plan", action="store_true", help="print what would be built, and its time, memory and disk, and stop"
+    )
+
+
 def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:
     """Add ``--seed``; ``same`` : the output that a seed determines, in words."""
     verb.add_argument(

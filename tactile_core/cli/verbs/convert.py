@@ -11,6 +11,7 @@ from .common import (
     NOTHING,
     answer_arguments,
     error_argument,
+    plan_argument,
     prepare_arguments,
     prepare_words,
     progress_argument,
@@ -42,6 +43,7 @@ examples:
   tactile convert touch.csv --out results
   tactile convert day1/*.csv --out results --keep latent --overwrite
   tactile convert touch.csv --out results --frames 200:300:5 --tare 0:50
+  tactile convert touch.csv --out results --plan       what it would build and cost; nothing is run
 
 Words of --keep, beside what frames.h5 always holds:
   latent         the networks' codes of the signals and of both surfaces
@@ -81,6 +83,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     unit_arguments(verb)
     answer_arguments(verb)
     error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
+    plan_argument(verb)
     progress_argument(verb)
 
 
@@ -92,6 +95,7 @@ def run(options: argparse.Namespace) -> int:
     from ...pictures import presets
     from ...pictures.mitsuba import variant
     from ...recordings import PrepareOptions, electrode_gains, readers
+    from ...sensors import SOURCE
     from ...translation.answer import parse_answer
 
     prepare = PrepareOptions(**prepare_words(options))
@@ -103,6 +107,14 @@ def run(options: argparse.Namespace) -> int:
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     levels = None if budget is None else budget.levels
     preset = presets.FAST if levels is None else variant.fitting(levels)
+    source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
+    if options.plan:
+        from ...jobs import plan
+
+        counts = [len(readers.read(path, prepare.columns, source or SOURCE, lean=True)) for path in paths]
+        chosen = sum(len(frame_range.select(frames, count)) for count in counts)
+        tell("\n".join(plan.of_frames(chosen, keep, preset).lines()))
+        return 0
     folders = results.result_folders(paths, options.out, options.overwrite)
     converted = []
     tools = convert.load_tools(
@@ -112,7 +124,7 @@ def run(options: argparse.Namespace) -> int:
         answer=answer,
         gel=options.gel,
         target=options.target,
-        source=None if options.weights else readers.sensor_of_first(paths, prepare.columns),
+        source=source,
     )
     if levels is not None:
         why = presets.describe_choice(preset, levels)

@@ -38,8 +38,9 @@ def parts_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--plan",
         action="store_true",
-        help="write the job into OUT.parts and stop, for `tactile batch --out OUT.parts` with --array I/N, --status or"
-        " --verify; the same command without --plan then finishes it and makes OUT",
+        help="print the cost where it is known and stop; a job is first written into OUT.parts, for `tactile batch"
+        " --out OUT.parts` with --array I/N, --status or --verify, and the same command without --plan then finishes it"
+        " and makes OUT",
     )
 
 

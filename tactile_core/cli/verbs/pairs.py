@@ -6,7 +6,7 @@ import argparse
 from shlex import quote
 
 from ...files.threads import one_thread
-from ..terminal import bar, next_step, tell
+from ..terminal import bar, next_step, say, tell
 from . import engine
 from .common import RESUMES, check_seed, electrodes_argument, progress_argument, seed_argument
 
@@ -60,14 +60,18 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     engine.check_counts(options, "workers", "restart")
     check_seed(options.seed)
-    from ...jobs import pairs, results
+    from ...jobs import pairs, plan, results
     from ...jobs.engine import result_parts
+    from ...sensors import PAIR
     from ...simulation.pairs_file import KEEPABLE
 
     pair = options.source, options.target
     keep = () if options.keep is None else results.parse_words(options.keep, tuple(KEEPABLE))
     if options.plan:
         job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes, pair, keep)
+        if pair == PAIR:  # of others no cost was measured
+            for line in plan.of_pairs(options.count).lines():
+                say(line)
         engine.tell_planned_parts(result_parts.write(options.out, job))
         return 0
     place = engine.place_or_none(options)

@@ -54,5 +54,5 @@ def _following(copied: list[Path]) -> str:
             return f"tactile convert {quote(str(recording))} --out results"
     for folder in copied:
         if (folder / "scene.toml").is_file():
-            return f"tactile plan {quote(str(folder))} says what this scene builds and costs"
+            return f"tactile simulate {quote(str(folder))} --out scene.h5 --plan"
     return ""

@@ -27,6 +27,7 @@ examples:
   tactile simulate scenes/press_roll_slide/scene.toml --seed 1 --out press_roll_slide.h5
   tactile simulate scenes/press --keep electrodes --out press.h5          the BioTac alone
   tactile simulate scenes/press --error 50um --out press.h5
+  tactile simulate scenes/press --out press.h5 --plan                     what it would build and cost; nothing is run
   tactile simulate scenes/press_roll_slide --grid force_n=0.2:1:5 --grid recording.tilt_deg=0,10 --out many"""
 LEAVES = NOTHING
 
@@ -66,10 +67,15 @@ def run(options: argparse.Namespace) -> int:
     check_seed(options.seed)
     if options.grid:
         return _run_grid(options)
-    for name in ("workers", "cluster", "restart", "plan"):
+    for name in ("workers", "cluster", "restart"):
         if getattr(options, name):
             raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
     bound = None if options.error is None else _bound(options.error)
+    if options.plan:
+        from ...jobs.plan import of_scene
+
+        tell("\n".join(of_scene(Path(options.scene), _keep(options.keep), bound).lines()))
+        return 0
     with bar("simulate", "frame", options.progress) as shown:
         from ...simulation.scene_recording import simulate_recording
 
@@ -113,7 +119,6 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> 
 
     Raises TactileError for a long simulation without consent.
     """
-    from ...jobs.error_budget import Budget
     from ...jobs.plan import of_scene
     from ...simulation.scene_recording import sensors_of
     from ...simulation.tier_choice import choose_for_scene
@@ -122,7 +127,7 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> 
     for sensor, choice in found.items():
         say(choice.describe(sensor))
     if any(choice.tier != "fast" for choice in found.values()):
-        cost = of_scene(Path(options.scene), keep, Budget(um=bound), None)
+        cost = of_scene(Path(options.scene), keep, bound)
         agree(f"about {duration(cost.seconds)} and {cost.memory:.0f} MB of memory", cost.seconds, options.yes)
     return {sensor: choice.tier for sensor, choice in found.items()}
 

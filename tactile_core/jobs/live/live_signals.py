@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...recordings.flags import Flag
-from ...recordings.polarity import AUTO, TOUCHING, Polarity, polarity_of, polarity_of_sensor
+from ...recordings.polarity import AUTO, TOUCHING, Basis, Polarity, polarity_of, polarity_of_sensor
 from ...recordings.rest_level import find_quiet, level, tare_frames, window_frames
 from ...recordings.signal_kind import detect
 from ...recordings.signals import Rest, Signals
@@ -100,7 +100,7 @@ class LiveSignals:
     def _decide(self) -> None:
         """Decide the polarity from the frames so far, repeated from time to time; once it is sure it stays."""
         if self.kind == "rectified":
-            self.polarity = Polarity(FALLS, "the sign is lost", True)
+            self.polarity = Polarity(FALLS, "the sign is lost")
         if not self.polarity.sure and contacts_of(self._sensor) is None:
             self.polarity = polarity_of_sensor(self._sensor, self.kind)
         elif not self.polarity.sure and len(self._seen) >= self._looked_at + AGAIN:
@@ -134,5 +134,5 @@ class LiveSignals:
 def _stated_polarity(polarity: str, who: str) -> Polarity:
     """Return the polarity stated by ``who``; an assumed one where nobody states it."""
     if polarity in POLARITIES:
-        return Polarity(polarity, who, True)
-    return Polarity(FALLS, "assumed: no contact has shown it yet", False)
+        return Polarity(polarity, who)
+    return Polarity(FALLS, "no contact has shown it yet", Basis.ASSUMED)

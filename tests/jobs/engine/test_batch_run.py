@@ -74,7 +74,7 @@ def test_what_is_told_of_a_recording_is_checked(finished, about):
         del data["about"]
         data["about"] = np.frombuffer(about, np.uint8)
     with pytest.raises(TactileError, match="a prepared recording"):
-        prepared_signals.Prepared(file).rows(0, 1)
+        prepared_signals.Prepared(file).read(np.arange(1))
     assert manifest.status(folder, job).prepared == len(job.inputs) - 1
 
 

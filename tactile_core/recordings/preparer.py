@@ -1,0 +1,108 @@
+"""Prepare a recording's signals, whole or fed a part after another, with its unit's rest and gains."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from ..sensors.fluid_sensor import FALLS
+from . import electrode_gains
+from .doubt import POLARITY, REST, Doubt, Reason, reason_of, without
+from .electrode_gains import ElectrodeGains
+from .flags import Flag
+from .polarity import AUTO
+from .recording import Recording
+from .signals import EVERY, PrepareOptions, Rest, Signals, prepare
+
+DOUBTS = np.uint16(Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED)
+
+
+class Preparer:
+    """Prepares the parts of one recording in order; what earlier ones showed of kind, rest and polarity holds for all.
+
+    A recording that is a single part is as `prepare` has it, its gains and offsets corrected.
+    """
+
+    def __init__(
+        self,
+        options: PrepareOptions | None = None,
+        unit: ElectrodeGains | None = None,
+        parts: Callable[[], Iterable[Recording]] = tuple,
+    ) -> None:
+        """Take the options, the unit (None: a typical one), and what gives all parts, looked through for polarity."""
+        options = options or PrepareOptions()
+        self._options = options if unit is None else dataclasses.replace(options, rest=unit.rest())
+        self._unit, self._parts = unit, parts
+        self._rest: np.ndarray | None = None  # at the end of the part before, with its PDC, counts
+        self._rest_pdc = np.nan
+        self._polarity_found = ""  # in another part than the first
+        self._doubts = np.uint16(0)  # of the first part's polarity, which hold for all
+
+    def __call__(self, part: Recording, frames: slice | np.ndarray = EVERY) -> Signals:
+        """Prepare the next part; frames : those whose signals are returned. Raises TactileError like `prepare`."""
+        first, options = self._rest is None, self._options
+        if not first and options.tare not in (None, "none"):  # frames that the user named lie in the first part
+            options = dataclasses.replace(options, tare=slice(0, len(part)))
+        rows = EVERY if self._unit is not None else frames
+        signals = prepare(part, options, rows)
+        if first:
+            if options.polarity == AUTO and signals.flags[0] & DOUBTS and self._look_for_polarity():
+                signals = prepare(part, self._options, rows)
+            self._doubts = np.uint16(0) if self._polarity_found else signals.flags[0] & DOUBTS
+            factor, polarity = (signals.report[name] for name in ("counts_per_unit", "polarity"))
+            self._options = dataclasses.replace(
+                self._options, kind=signals.kind, counts_per_unit=factor, polarity=polarity
+            )
+        elif options.tare is not None or (not signals.quiet.any() and signals.kind != "raw"):
+            signals = self._carried(part, signals, rows, given=options.tare is not None)
+        signals = self._decided_once(signals, first=first)
+        self._keep_rest(part, signals, rows)
+        return signals if self._unit is None else electrode_gains.apply(signals, self._unit).at(frames)
+
+    def _look_for_polarity(self) -> bool:
+        """Take the polarity of the first part that shows it; returns whether one does."""
+        for part in self._parts():
+            signals = prepare(part, self._options)
+            if not signals.flags[0] & DOUBTS:
+                name, self._polarity_found = (signals.report[each] for each in ("polarity", "polarity_evidence"))
+                self._options = dataclasses.replace(self._options, polarity=name)
+                return True
+        return False
+
+    def _decided_once(self, signals: Signals, *, first: bool) -> Signals:
+        """Return a part's signals under the polarity decided for the whole recording, which is reported once."""
+        report, warnings = signals.report, signals.warnings
+        if self._polarity_found:
+            report = report | {"polarity_evidence": self._polarity_found}
+        if self._polarity_found or not first:
+            warnings = without(warnings, POLARITY)
+        if not first:  # what the first part takes from its unit, a later one takes from the part before
+            carried = Doubt(Reason.REST_CARRIED)
+            warnings = tuple(carried if reason_of(one) is Reason.REST_OF_UNIT else one for one in warnings)
+        flags = (signals.flags & ~DOUBTS) | self._doubts
+        return dataclasses.replace(signals, flags=flags, report=report, warnings=warnings)
+
+    def _carried(self, part: Recording, signals: Signals, rows: slice | np.ndarray, *, given: bool) -> Signals:
+        """Return the signals of a part without a rest of its own, from the rest (19,) and PDC of the part before."""
+        warnings = without(signals.warnings, REST)
+        if not given:
+            warnings += (Doubt(Reason.REST_CARRIED),)
+        sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
+        change = signals.change + sign * (signals.rest - self._rest)
+        pdc = signals.pdc + _rest_pdc(part, signals, rows) - self._rest_pdc
+        drift = np.zeros_like(signals.drift)
+        return dataclasses.replace(signals, change=change, rest=self._rest, pdc=pdc, drift=drift, warnings=warnings)
+
+    def _keep_rest(self, part: Recording, signals: Signals, rows: slice | np.ndarray) -> None:
+        """Keep the rest at the part's end: what is calm in the next is rest where it lies near it, as a grip may be."""
+        rest = self._rest = signals.rest + signals.drift * part.duration
+        self._rest_pdc = _rest_pdc(part, signals, rows)
+        pdc = self._rest_pdc if np.isfinite(self._rest_pdc) else None
+        self._options = dataclasses.replace(self._options, rest=Rest(tuple(rest), (0.0,) * len(rest), pdc))
+
+
+def _rest_pdc(part: Recording, signals: Signals, rows: slice | np.ndarray) -> float:
+    """PDC, counts, that a part's pressure was measured from; NaN where there is none."""
+    return np.nan if part.pdc is None else float(part.pdc[rows][0] - signals.pdc[0])
