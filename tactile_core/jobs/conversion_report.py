@@ -108,7 +108,8 @@ class ConversionReport:
             return ""
         from .solved_gel import describe_miss
 
-        return describe_miss(*np.concatenate(self._forces, axis=1), solved=self._tools.drawer.solve is not None)
+        total, force = np.concatenate(self._forces, axis=1)
+        return describe_miss(total, force, solved=self._tools.drawer.solve is not None)
 
     def draw_sheet(self, path: Path) -> None:
         """Draw the contact sheet of the frames kept for it, once all were taken."""

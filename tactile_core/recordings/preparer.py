@@ -42,12 +42,13 @@ class Preparer:
 
     def __call__(self, part: Recording, frames: slice | np.ndarray = EVERY) -> Signals:
         """Prepare the next part; frames : those whose signals are returned. Raises TactileError like `prepare`."""
-        first, options = self._rest is None, self._options
+        options, rest = self._options, self._rest
+        first = rest is None
         if not first and options.tare not in (None, "none"):  # frames that the user named lie in the first part
             options = dataclasses.replace(options, tare=slice(0, len(part)))
         rows = EVERY if self._unit is not None else frames
         signals = prepare(part, options, rows)
-        if first:
+        if rest is None:
             if options.polarity == AUTO and signals.flags[0] & DOUBTS and self._look_for_polarity():
                 signals = prepare(part, self._options, rows)
             self._doubts = np.uint16(0) if self._polarity_found else signals.flags[0] & DOUBTS
@@ -56,7 +57,7 @@ class Preparer:
                 self._options, kind=signals.kind, counts_per_unit=factor, polarity=polarity
             )
         elif options.tare is not None or (not signals.quiet.any() and signals.kind != "raw"):
-            signals = self._carried(part, signals, rows, given=options.tare is not None)
+            signals = self._carried(part, signals, rest, rows, given=options.tare is not None)
         signals = self._decided_once(signals, first=first)
         self._keep_rest(part, signals, rows)
         return signals if self._unit is None else electrode_gains.apply(signals, self._unit).at(frames)
@@ -84,16 +85,18 @@ class Preparer:
         flags = (signals.flags & ~DOUBTS) | self._doubts
         return dataclasses.replace(signals, flags=flags, report=report, warnings=warnings)
 
-    def _carried(self, part: Recording, signals: Signals, rows: slice | np.ndarray, *, given: bool) -> Signals:
+    def _carried(
+        self, part: Recording, signals: Signals, rest: np.ndarray, rows: slice | np.ndarray, *, given: bool
+    ) -> Signals:
         """Return the signals of a part without a rest of its own, from the rest (19,) and PDC of the part before."""
         warnings = without(signals.warnings, REST)
         if not given:
             warnings += (Doubt(Reason.REST_CARRIED),)
         sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
-        change = signals.change + sign * (signals.rest - self._rest)
+        change = signals.change + sign * (signals.rest - rest)
         pdc = signals.pdc + _rest_pdc(part, signals, rows) - self._rest_pdc
         drift = np.zeros_like(signals.drift)
-        return dataclasses.replace(signals, change=change, rest=self._rest, pdc=pdc, drift=drift, warnings=warnings)
+        return dataclasses.replace(signals, change=change, rest=rest, pdc=pdc, drift=drift, warnings=warnings)
 
     def _keep_rest(self, part: Recording, signals: Signals, rows: slice | np.ndarray) -> None:
         """Keep the rest at the part's end: what is calm in the next is rest where it lies near it, as a grip may be."""

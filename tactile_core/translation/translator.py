@@ -215,6 +215,23 @@ class Translator:
             confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
         )  # fmt: skip
 
+    def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
+        """Translate displacements (T, M, 3) m of the target's gel back to the source, each frame alone (D2BPN, B2SPN).
+
+        displacement : (T, N, 3) m of the source's skin; force : (T, 3) N; electrodes : (T, e) counts, changes against
+        rest. All are zero where no node of the gel moves as far as noise alone makes the networks move one.
+        """
+        nets = self.nets
+        skin = nets.m2m_back(nets.encode_digit(displacement))
+        found = {
+            "displacement": nets.decode_biotac(skin), "force": nets.force(skin),
+            "electrodes": nets.decode_signal(nets.m2s(skin)),
+        }  # fmt: skip
+        still = accuracy.lengths(displacement).max(axis=1) < self.silent("digit_m")
+        for values in found.values():
+            values[still] = 0
+        return found
+
     def silent(self, quantity: str) -> float:
         """Return the `silent_level` of a quantity in this card."""
         return silent_level(self.card["silence"], quantity)

@@ -43,6 +43,7 @@ examples:
   tactile convert touch.csv --out results
   tactile convert day1/*.csv --out results --keep latent --overwrite
   tactile convert touch.csv --out results --frames 200:300:5 --tare 0:50
+  tactile convert results/touch/frames.h5 --reverse --out skin.h5
   tactile convert touch.csv --out results --plan       what it would build and cost; nothing is run
 
 Words of --keep, beside what frames.h5 always holds:
@@ -78,6 +79,12 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         help="additional outputs, out of latent,displacement,height,image,traction,marker_motion"
         " (default: %(default)s)",
     )
+    verb.add_argument(
+        "--reverse",
+        action="store_true",
+        help="the other way: from the DIGIT's gel in frames.h5, or in a simulated recording or scene, to the BioTac's"
+        " skin, force and electrodes, into the HDF5 file --out; takes --frames, --weights and --overwrite",
+    )
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
     prepare_arguments(verb)
     unit_arguments(verb)
@@ -90,6 +97,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Convert each recording, going on after a bad one; returns the exit status."""
     one_thread()  # before numpy is imported
+    if options.reverse:
+        return _reverse(options)
     from ...jobs import convert, frame_range, results
     from ...jobs.error_budget import parse_budget
     from ...pictures import presets
@@ -149,3 +158,18 @@ def run(options: argparse.Namespace) -> int:
     if failed and len(folders) > 1:
         complain(f"{failed} of {len(folders)} recordings were not converted")
     return 2 if failed else 0
+
+
+def _reverse(options: argparse.Namespace) -> int:
+    """Translate one gel's frames back; returns the exit status."""
+    from ...jobs import frame_range, reverse
+    from ...translation.translate import load_translator
+
+    if len(options.recordings) > 1:
+        raise TactileError("--reverse", f"{len(options.recordings)} inputs", "one", "Give each a file of its own")
+    frames = frame_range.parse_frames(options.frames)
+    translator = load_translator(options.weights, None, options.target if options.weights is None else None, None)
+    with bar("reverse", "frame", options.progress) as shown:
+        reverse.reverse(options.recordings[0], options.out, translator, frames, shown, overwrite=options.overwrite)
+    tell(options.out)
+    return 0

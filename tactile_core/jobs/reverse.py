@@ -1,0 +1,69 @@
+"""The other direction: a gel's deformation to the skin of a BioTac, its force, and what its electrodes would read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import TactileError
+from ..files import atomic
+from ..files.hdf5_writer import Disk
+from ..sensors import title
+from ..translation.translate import CHUNK
+from ..translation.translator import Translator
+from .frame_range import select
+from .gel_frames import read_frames
+
+FORMAT = "tactile-reverse-1"
+# dataset -> (unit, meaning); T is the number of frames
+ARRAYS = {
+    "frame": ("1", "index of the frame in the input"),
+    "displacement": ("m", "(T, N, 3) of the skin's nodes, attribute sensor: whose"),
+    "force": ("N", "(T, 3) of the object on the sensor; 0 where the gel is at rest"),
+    "electrodes": ("count", "(T, e) changes against rest, as raw readings have them"),
+}
+
+
+def reverse(
+    path: str | os.PathLike,
+    out: str | os.PathLike,
+    translator: Translator,
+    frames: slice = slice(None),
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Translate the gel of frames.h5, or of a simulated recording or scene, back into a new HDF5 file of ``ARRAYS``.
+
+    translator : whose networks lead from the skin to that gel; progress : called with (frames done, frames in all)
+    Raises TactileError for an input without that gel's displacement, and an output that is there or cannot be written.
+    """
+    import h5py
+
+    if os.path.lexists(out) and not overwrite:
+        raise TactileError(out, "exists", "a new file", "Add --overwrite, or another --out")
+    held = read_frames(path, gel=translator.target)
+    if held.displacement is None:
+        raise TactileError(path, f"a {held.kind}", f"the displacement of a {title(translator.target)}'s gel")
+    rows = select(frames, len(held.numbers))
+    advice = "Name another --out"
+    with atomic.writing(out, "a file in a writable folder", advice), atomic.new_file(out) as unfinished:
+        disk = Disk(unfinished)
+        with h5py.File(disk, "w") as file:
+            file.attrs.update({"format": FORMAT, "sensor": translator.source, "weights": translator.sha256})
+            for start in range(0, len(rows), CHUNK):
+                some = rows[start : start + CHUNK]
+                gel = np.stack(list(held.iterate_rows(some))).astype(np.float32)
+                arrays = {"frame": held.numbers[some].astype(np.int32), **translator.reverse(gel)}
+                for name, values in arrays.items():
+                    if start == 0:
+                        data = file.create_dataset(
+                            name, (len(rows), *values.shape[1:]), values.dtype, track_times=False
+                        )
+                        data.attrs.update(dict(zip(("unit", "description"), ARRAYS[name], strict=True)))
+                    file[name][start : start + len(some)] = values
+                progress(start + len(some), len(rows))
+        disk.close()
+        disk.check()

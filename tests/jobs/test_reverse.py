@@ -1,0 +1,42 @@
+"""From a gel back to the skin: nearer the truth than an untouched finger, and refused where there is no gel."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+
+from tactile_core import recordings
+from tactile_core.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def shipped(request):
+    return request.config.rootpath / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+
+
+def test_a_gel_gives_back_the_skin_the_force_and_the_counts(shipped, tmp_path):
+    """The simulated truth is what pairs are made of; an untouched finger is the baseline."""
+    out = tmp_path / "skin.h5"
+    words = ["convert", str(shipped), "--reverse", "--frames", "60:300:10", "--out", str(out)]
+    assert main(words) == 0
+    recording, rows = recordings.read(shipped), np.arange(60, 300, 10)
+    signals, truth = recordings.prepare(recording), recording.truth
+    with h5py.File(out) as file:
+        assert file.attrs["sensor"] == "biotac" and np.array_equal(file["frame"][:], rows)
+        skin, force, counts = (file[name][:] for name in ("displacement", "force", "electrodes"))
+    pairs = (skin, truth.displacement_biotac[rows]), (force, truth.force[rows]), (counts, signals.typical[rows])
+    for found, expected in pairs:
+        assert np.square(found - expected).sum() < 0.15 * np.square(expected).sum()
+    still = ~truth.force[rows].any(axis=1)
+    assert still.any() and not skin[still].any() and not counts[still].any()
+    before = out.read_bytes()
+    assert main(words) == 2 and out.read_bytes() == before
+    assert main([*words, "--overwrite"]) == 0 and out.read_bytes() == before
+
+
+def test_what_is_no_gel_is_refused(slide_csv, tmp_path, capsys):
+    np.savez(tmp_path / "heights.npz", height_map=np.zeros((2, 3, 3), np.float32))
+    for path, words in ((slide_csv(), "no HDF5 file"), (tmp_path / "heights.npz", "displacement of a DIGIT's gel")):
+        assert main(["convert", str(path), "--reverse", "--out", str(tmp_path / "skin.h5")]) == 2
+        assert words in capsys.readouterr().err and not (tmp_path / "skin.h5").exists()
